@@ -26,8 +26,8 @@ from gmwm import (
 )
 from gmwm.calibration import random_walk
 from gmwm.filter_numbers import Chain, tuning
-from gmwm.filter_numbers.axes import Axes
-from gmwm.filter_numbers.spectra import Estimated, Problem, Target, standard_errors
+from gmwm.filter_numbers.axes import SensorAxes
+from gmwm.filter_numbers.spectra import Estimated, Problem, RequiredSpectrum, standard_errors
 from gmwm.ins import (
     Recorded,
     SensorModels,
@@ -72,7 +72,7 @@ SENSORS = ("1 GM", "demo gyro", "3 GM", "3 GM, other")
 def _least_error(truth: Model, hours: int) -> float:
     """Relative standard error of K that any estimate from a record has (Cramer-Rao bound)."""
     found = gmwm.cramer_rao(truth, hours * 36_000, 0.1)
-    problem = Problem((Target.of(truth, 0.1, 60.0),), 60.0)
+    problem = Problem((RequiredSpectrum.of(truth, 0.1, 60.0),), 60.0)
     safe = gmwm.bound(truth, dt=0.1)
     known = Estimated(truth, found.keys, found.covariance)
     return standard_errors(problem, safe.model, [known])["K"] / safe.K
@@ -147,7 +147,7 @@ def balance() -> None:
         nees, losses = [], []
         for name in ("gyro_x", "accel_x", "gyro_z"):
             for truth in TRUTHS.values():
-                axis = Axes.of({name: truth}, DT, 0.0).axes[0]
+                axis = SensorAxes.of({name: truth}, DT, 0.0).axes[0]
                 found = gmwm.reduce({name: truth})[name]
                 models = ((found.model, found.initial_sd), (truth, 0.0))
                 each, full = (axis.chain.errors(truth, model, DT, OUTAGES, believed_sd=sd)

@@ -25,7 +25,7 @@ from scipy.stats import binomtest
 from gmwm.ins import SensorModels, car_drive, compare, gnss, tuning
 from gmwm.ins.covariance.analysis import Course
 from gmwm.ins.filter import Outage
-from gmwm.ins.montecarlo import Scenario
+from gmwm.ins.simulation import Scenario
 from gmwm.study import emulated_log, sensors
 
 NAMES = ("larger", "calibrated")

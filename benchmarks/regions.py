@@ -18,7 +18,7 @@ from gmwm import GaussMarkov, Model, RandomWalk, WhiteNoise
 from gmwm.filter_numbers import Chain
 from gmwm.filter_numbers.spectra import ParameterRegion
 from gmwm.ins import SensorModels, covariance_analysis, loiter_with_outages, monte_carlo
-from gmwm.ins.montecarlo import Simulated
+from gmwm.ins.simulation import Simulated
 from gmwm.study.sensor_tables import TABLE_6
 
 LEVEL, DRAWS, SEED = 0.95, 200, 99

@@ -21,7 +21,7 @@ from scipy.spatial.transform import Rotation
 
 import gmwm
 from gmwm import GaussMarkov, Model, RandomWalk, WhiteNoise
-from gmwm.filter_numbers.axes import Axes
+from gmwm.filter_numbers.axes import SensorAxes
 from gmwm.filter_numbers.tuning import KEYFRAME_SD, KEYFRAMES
 from gmwm.ins import SensorModels
 from gmwm.ins.imu.sensors import AXES
@@ -140,7 +140,7 @@ def certified(truth: dict[str, Model], rule: dict[str, tuple[float, float, float
 def expected(truth: dict[str, Model], rule: dict[str, tuple[float, float, float]]) -> list[float]:
     """The same after as many keyframes as here."""
     models, result = _models(rule), []
-    for axis in Axes.of(truth, DT, TURN_ON).axes:
+    for axis in SensorAxes.of(truth, DT, TURN_ON).axes:
         chain = replace(axis.between(1.0), settled=SECONDS - 1.0)
         errors = chain.errors(axis.model, models[axis.name], DT, (1.0,), true_sd=axis.bias_sd,
                               believed_sd=rule[axis.name][2])  # fmt: skip

@@ -23,8 +23,7 @@ __getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
 
 def _load_pages() -> None:
     """Import what writes pages of results, which stand below the room of pages."""
-    from gmwm.report import calibration, navigated, validation  # noqa: F401
-    from gmwm.report.several import compared, fleet  # noqa: F401
+    from gmwm.report import calibration, compared, fleet, navigation  # noqa: F401
 
 
 _provide(_load_pages)

@@ -1,9 +1,4 @@
 from . import ins as ins
-from .budget import (
-    ErrorBudget as ErrorBudget,
-    ErrorRow as ErrorRow,
-    error_budget as error_budget,
-)
 from .calibration import (
     Calibration as Calibration,
     calibrate as calibrate,
@@ -41,12 +36,15 @@ from .estimate import (
 from .export import export as export
 from .filter_numbers import (
     Certificate as Certificate,
+    ErrorBudget as ErrorBudget,
+    ErrorRow as ErrorRow,
     FilterNumbers as FilterNumbers,
     Imperfections as Imperfections,
     Motion as Motion,
     SensorNumbers as SensorNumbers,
     bound as bound,
     certify as certify,
+    error_budget as error_budget,
     reduce as reduce,
 )
 from .population import (

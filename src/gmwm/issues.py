@@ -312,55 +312,162 @@ _READERS = (
 )  # fmt: skip
 
 _VARIANCE = (
-    Issue("curve-shortened", "{text}", severity="warning", topic="samples"),
+    Issue("curve-shortened", "missing samples shorten the curve: it ends at tau = {tau:.3g} s, a "
+          "complete record at {complete:.3g} s", severity="warning", topic="samples"),
 )  # fmt: skip
 
 _DIAGNOSIS = (
-    Issue("abrupt-end", "{text}", severity="warning", topic="samples", lacks="within_range",
+    Issue("abrupt-end",
+          "samples end abruptly at {ends}, where noise would thin out: rectified, wrapped round or "
+          "sorted out",
+          "look for what wraps, cuts or takes absolute values between the sensor and the file",
+          severity="warning", topic="samples", lacks="within_range",
           reason="samples that end abruptly", spoils=("channel",), user_only=True),
-    Issue("clean", "{text}", severity="good", topic="recording"),
-    Issue("clock", "{text}", severity="warning", topic="recording"),
-    Issue("crosstalk", "{text}", severity="warning", topic="samples"),
-    Issue("dead", "{text}", severity="bad", topic="samples", lacks="samples_change",
-          spoils=("channel",)),
-    Issue("drift", "{text}", topic="samples"),
-    Issue("event", "{text}", severity="warning", topic="samples", masks=True),
-    Issue("events-left-out", "{text}", topic="samples"),
-    Issue("filled", "{text}", severity="warning", topic="samples", lacks="samples_measured",
-          reason="samples put between others", spoils=("channel",), user_only=True),
-    Issue("gap", "{text}", severity="bad", topic="samples"),
-    Issue("heavy-tails", "{text}", topic="samples"),
-    Issue("held", "{text}", severity="warning", topic="samples", lacks="samples_measured",
-          reason="samples that repeat the one before", spoils=("channel",), masks=True,
+    Issue("clean", "nothing found that spoils the estimates", severity="good"),
+    Issue("clock", "the steps of the time stamps vary by {jitter:.2g%} rms",
+          "harmless if only the stamps are late; else let the sensor's own clock trigger it",
+          severity="warning"),
+    Issue("crosstalk", "fast noise of {both} is correlated by {correlation:.2g}",
+          "each channel is modelled by itself; a filter may need their covariance",
+          severity="warning", topic="samples"),
+    Issue("dead", "every sample is {shown}: the channel is dead",
+          "check sensor and columns; the calibration skips it",
+          severity="bad", topic="samples", lacks="samples_change", spoils=("channel",)),
+    Issue("drift",
+          {"": "means of {length:.3g} s wander by {shown} rms, {times} times what the fast noise "
+               "leaves",
+           "ramp": "drifts by {shown[0]} over the record and wanders about that by {shown[1]} rms"},
+          "estimated as a random walk or a slow Gauss-Markov process", topic="samples"),
+    Issue("event",
+          {"": "a spike or shock {shown} at {time:.6g} s, {duration:.2g} s long",
+           "many": "{count:,.0f} spikes or shocks, the largest {shown} at {time:.6g} s, "
+                   "{duration:.2g} s long{others}",
+           "most": "{part:.2g%} of the samples differ from what is before them as spikes do: "
+                   "values that are held, switched or made otherwise, not noise of a sensor"},
+          "gmwm calibrate leaves it out; in Python: Health.masked, or robust=True",
+          severity="warning", topic="samples", masks=True),
+    Issue("events-left-out",
+          "{samples:,} samples of {copies}spikes, shocks or lost packets left out",
+          topic="samples"),
+    Issue("filled",
+          "{share:.2g%} of the samples lie on straight lines between others: put there for samples "
+          "that were lost or sorted out",
+          "make such samples missing (NaN)", severity="warning", topic="samples",
+          lacks="samples_measured", reason="samples put between others", spoils=("channel",),
           user_only=True),
-    Issue("infinite", "{text}", severity="bad", topic="samples"),
-    Issue("interpolated", "{text}", severity="bad", topic="samples"),
-    Issue("length", "{text}", severity="good", topic="recording"),
-    Issue("light-tails", "{text}", topic="samples"),
-    Issue("line", "{text}", topic="samples"),
-    Issue("not-static", "{text}", severity="warning", topic="recording", lacks="recording_static",
-          reason="the sensor moved", spoils=("gyro", "accel")),
-    Issue("outliers", "{text}", severity="warning", topic="samples", masks=True),
-    Issue("repeated-samples", "{text}", topic="samples"),
-    Issue("resets", "{text}", severity="warning", topic="samples", user_only=True),
-    Issue("resonance", "{text}", topic="samples"),
-    Issue("rounding", "{text}", severity="bad", topic="samples", lacks="resolution_fine",
+    Issue("gap",
+          {"": "{missing:,.0f} of {n:,} samples missing ({share:.2g%}) in {gaps:,.0f} "
+               "gap{gaps:s?}, the longest {longest:.3g} s",
+           "all": "all samples missing"},
+          severity="bad", topic="samples"),
+    Issue("heavy-tails",
+          {"student": "the noise has heavy tails, like Student's t with {shape:.2g} degrees of "
+                      "freedom: large samples belong to it",
+           "power": "the noise has heavy tails, like exp(-|x|^{shape:.2g}): large samples belong "
+                    "to it"},
+          "nothing is left out; the standard error of the white noise allows for it",
+          topic="samples"),
+    Issue("held",
+          "{share:.2g%} of the samples repeat the one before, where chance explains "
+          "{chance:.2g%}: lost packets, for which the last sample was written again",
+          "make such samples missing (NaN)", severity="warning", topic="samples",
+          lacks="samples_measured", reason="samples that repeat the one before",
+          spoils=("channel",), masks=True, user_only=True),
+    Issue("infinite", "{count:,} infinite samples", "repair them, or set them to NaN for missing",
+          severity="bad", topic="samples"),
+    Issue("interpolated",
+          "{share:.2g%} of the samples lie on straight lines between others: interpolated from "
+          "about {rate:.3g} Hz, so the noise is not the sensor's",
+          "record what the sensor gives, in a topic of its own or without the driver's "
+          "interpolation (RealSense: unite_imu_method 0); the calibration skips the channel",
+          severity="bad", topic="samples"),
+    Issue("length",
+          {"": "{n:,} samples at {rate:g} Hz, {duration:.6g} s",
+           "short": "{n:,} samples at {rate:g} Hz, {duration:.6g} s, too short for slow errors of "
+                    "minutes and more",
+           "few": "fewer than {fewest} samples in a row, too few for any other check"},
+          "an hour or more shows them", severity="good"),
+    Issue("line",
+          {"": "a periodic line at {frequency:.4g} Hz, amplitude {shown}, {times} times its "
+               "surroundings{also}",
+           "weak": "{count:.0f} weaker periodic line{count:s?}, the strongest at "
+                   "{frequency:.4g} Hz, amplitude {shown}"},
+          "gmwm calibrate adds a Sinusoid to the model; or find what turns or hums",
+          topic="samples"),
+    Issue("not-static", "not static: {verb} {times}", severity="warning",
+          lacks="recording_static", reason="the sensor moved", spoils=("gyro", "accel")),
+    Issue("outliers",
+          "{share:.2g%} of the samples are outliers spread over the record, beyond four standard "
+          "deviations, where noise has {usual:.2g%}",
+          "gmwm calibrate leaves them out; in Python: Health.masked, or robust=True",
+          severity="warning", topic="samples", masks=True),
+    Issue("repeated-samples",
+          "each sample is written {times:.0f} times: the channel's own rate is {rate:.6g} Hz",
+          "one of each is used, at that rate", topic="samples"),
+    Issue("resonance",
+          "a resonance at {frequency:.3g} Hz, damping {damping:.2g}, {times} times its "
+          "surroundings, {shown} rms",
+          "gmwm calibrate adds a Resonance to the model where it is needed", topic="samples"),
+    Issue("rounding",
+          {"": "samples come in steps of {step}, {times} times the white noise of {shown}",
+           "coarse": "samples come in steps of {step}, more than three times the noise below them"},
+          severity="bad", topic="samples", lacks="resolution_fine",
           reason="steps coarser than the noise", spoils=("channel",)),
-    Issue("rows-copied", "{text}", severity="warning", topic="samples", masks=True),
-    Issue("saturation", "{text}", severity="warning", topic="samples", lacks="within_range",
+    Issue("rows-copied",
+          {"": "{samples:,.0f} rows repeat earlier ones in every channel, all from {start:.6g} s "
+               "on, as from {first:.6g} s on: noise does not repeat",
+           "several": "{samples:,.0f} rows repeat earlier ones in every channel, in {count:,.0f} "
+                      "stretches, the longest {longest:.6g} s from {start:.6g} s on, as from "
+                      "{first:.6g} s on: noise does not repeat"},
+          "look for files joined with an overlap and for buffers that are sent again",
+          severity="warning", topic="samples", masks=True),
+    Issue("saturation",
+          "cut off at {ends}: {samples:,.0f} samples ({share:.2g%}) at the end of the scale",
+          "use a wider range; make such samples missing (NaN) if they are few",
+          severity="warning", topic="samples", lacks="within_range",
           reason="samples cut off at range", spoils=("channel",), user_only=True),
-    Issue("size", "{text}", severity="bad", topic="recording"),
-    Issue("still-stretches", "{text}", severity="warning", topic="recording"),
-    Issue("stuck", "{text}", severity="warning", topic="samples", lacks="samples_change",
-          reason="values that stick", spoils=("channel",), user_only=True),
-    Issue("temperature", "{text}", severity="warning", topic="recording", user_only=True),
-    Issue("tilt", "{text}", severity="warning", topic="recording", lacks="attitude_kept",
-          reason="the sensor tilted", spoils=("accel",)),
-    Issue("value-repeated", "{text}", severity="warning", topic="samples",
-          lacks="samples_measured", reason="one value stands for many", spoils=("channel",)),
-    Issue("variance", "{text}", severity="bad", topic="samples", lacks="noise_steady",
+    Issue("size", "varies by {spread:.1g} {unit}, which no sensor gives", "check the unit",
+          severity="bad"),
+    Issue("still-stretches",
+          "in motion or vibrating for a part of its {duration:.4g} s; at rest from {listed} "
+          "|{timeline}|: these {total:.4g} s are used, and no averaging time is longer than the "
+          "longest of them, {longest:.4g} s",
+          "slower errors are not seen", severity="warning"),
+    Issue("stuck",
+          {"": "stuck at {shown} for {longest:,.0f} samples from {time:.6g} s on, where rounding "
+               "explains {chance:,}",
+           "often": "stuck {count:,.0f} times, the longest at {shown} for {longest:,.0f} samples "
+                    "from {time:.6g} s on, where rounding explains {chance:,}"},
+          "make such samples missing (NaN) before the fit", severity="warning", topic="samples",
+          lacks="samples_change", reason="values that stick", spoils=("channel",),
+          user_only=True),
+    Issue("temperature", "follows {name} by {per} (correlation {correlation:.2g})",
+          "compensate for it first, or slow terms of the model will stand for it",
+          severity="warning", user_only=True),
+    Issue("tilt",
+          "tilted by {degrees:.2g} deg at {time:.4g} s{others}: gravity moves between the axes",
+          severity="warning", lacks="attitude_kept", reason="the sensor tilted",
+          spoils=("accel",)),
+    Issue("value-repeated",
+          "{samples:,.0f} samples ({share:.2g%}) are {shown}, which comes {times} times as often "
+          "as the values next to it",
+          "if it stands for no answer or a dead band, make such samples missing (NaN)",
+          severity="warning", topic="samples", lacks="samples_measured",
+          reason="one value stands for many", spoils=("channel",)),
+    Issue("variance",
+          {"": "{before}the noise is not steady: {low} in the quiet and {high} in the loud tenth "
+               "of parts of {part:.3g} s, so that its mean is {excess:.2g%} above that of the "
+               "quiet quarter",
+           "half": "the noise is {growth:.2g%} {word} in the second half than in the first",
+           "tenth": "the noise is {growth:.2g%} larger than usual in the tenth of the record that "
+                    "begins at {start:.4g} s"},
+          "use a recording, or a part, without what vibrates",
+          severity="bad", topic="samples", lacks="noise_steady",
           reason="the noise comes and goes", spoils=("channel",), user_only=True),
-    Issue("vibration", "{text}", severity="warning", topic="recording"),
+    Issue("vibration",
+          "it vibrates for {total:.4g} s: samples scatter up to {times} times more than at rest "
+          "from {listed}",
+          "use what is at rest: gmwm.find_still has the stretches", severity="warning"),
 )  # fmt: skip
 
 _CALIBRATION = (
@@ -387,61 +494,123 @@ _CALIBRATION = (
 )  # fmt: skip
 
 _ESTIMATE = (
-    Issue("amplitude-bound", "{text}", severity="bad", topic="fit", lacks="amplitudes_above_zero",
+    Issue("amplitude-bound", "not significantly above zero: only an upper limit is known",
+          severity="bad", topic="fit", lacks="amplitudes_above_zero",
           reason="a term was not found"),
-    Issue("confounded", "{text}", severity="bad", topic="fit", lacks="parameters_separable",
-          reason="terms cannot be separated"),
-    Issue("drift-in-state", "{text}", severity="bad", topic="fit", lacks="drift_is_ramp",
-          reason="the drift is no ramp"),
-    Issue("indistinct-terms", "{text}", severity="bad", topic="fit", lacks="terms_distinct",
-          reason="two terms look alike"),
-    Issue("level-missed", "{text}", severity="bad", topic="fit", lacks="describes_every_level",
-          reason="the model misses one level"),
-    Issue("misfit", "{text}", severity="bad", topic="fit", lacks="describes_data",
-          reason="the model misses the data"),
-    Issue("no-curvature", "{text}", severity="bad", topic="fit", lacks="converged",
-          reason="the search did not converge"),
-    Issue("no-region", "{text}", severity="bad", topic="fit", lacks="regions_found",
-          reason="no straight region found"),
-    Issue("no-test", "{text}", topic="fit"),
-    Issue("not-converged", "{text}", severity="bad", topic="fit", lacks="converged",
-          reason="the search did not converge"),
-    Issue("recordings-differ", "{text}", severity="bad", topic="fit", lacks="recordings_agree",
-          reason="the recordings disagree"),
-    Issue("redundant-term", "{text}", severity="bad", topic="fit", lacks="terms_needed",
+    Issue("confounded", "cannot be distinguished from {other} (their estimates have a correlation "
+          "of {correlation:.5f})", "fix one of them", severity="bad", topic="fit",
+          lacks="parameters_separable", reason="terms cannot be separated"),
+    Issue("drift-in-state", "a drift that enters the {term} state is not a ramp of the signal",
+          severity="bad", topic="fit", lacks="drift_is_ramp", reason="the drift is no ramp"),
+    Issue("indistinct-terms", "two {kind} terms do not differ significantly ({first} = {one:.3g} "
+          "s, {second} = {other:.3g} s)", "use one fewer", severity="bad", topic="fit",
+          lacks="terms_distinct", reason="two terms look alike"),
+    Issue("level-missed", "at tau = {tau:.3g} s the data lie {errors} standard errors {side} the "
+          "model: it lacks a term there, or the recording has a fault", severity="bad",
+          topic="fit", lacks="describes_every_level", reason="the model misses one level"),
+    Issue("misfit", {
+        "": "predictions over {tau:.3g} s are too {scale}: there the data lie {share} {side} the "
+            "model's Allan deviation, by {errors} standard errors",
+        "chance": "at tau = {tau:.3g} s the data lie {share} {side} the model's Allan deviation, "
+                  "which may be chance: {chance:.0f} % of right models are missed as clearly",
+        "slight": "describes the Allan deviation to {share} (least well at tau = {tau:.3g} s)",
+        "allowed": "describes the Allan deviation to {share} (least well at tau = {tau:.3g} s), "
+                   "which the intervals allow for",
+        "lines": "the sum of the lines misses the Allan deviation by {share} at tau = {tau:.3g} s",
+    }, severity="bad", topic="fit", lacks="describes_data", reason="the model misses the data"),
+    Issue("no-curvature", "the likelihood has no curvature in some direction: too many parameters",
+          severity="bad", topic="fit", lacks="converged", reason="the search did not converge"),
+    Issue("no-region", "the Allan plot has no region of slope {named}, so it is not estimated",
+          severity="bad", topic="fit", lacks="regions_found", reason="no straight region found"),
+    Issue("no-test", "the fit is not tested: the gaps leave no wavelet variance, straight lines "
+          "bridge them", topic="fit"),
+    Issue("not-converged", {
+        "": "the maximum of the likelihood was not reached",
+        "em": "EM did not converge in {iterations} iterations",
+        "no-maximum": "EM did not reach a maximum of the likelihood",
+    }, severity="bad", topic="fit", lacks="converged", reason="the search did not converge"),
+    Issue("recordings-differ", {
+        "": "the recordings do not have the same parameters (p = {equality_p:.2g}): the joint "
+            "values are their mean, see the spread",
+        "curves": "the wavelet variances differ from the joint model (p = {curves_p:.2g}): the "
+                  "recordings differ, or the model is wrong",
+    }, severity="bad", topic="fit", lacks="recordings_agree", reason="the recordings disagree"),
+    Issue("redundant-term", "the {term} does not improve the fit significantly: it is not "
+          "identifiable", "leave it out", severity="bad", topic="fit", lacks="terms_needed",
           reason="a term is not needed"),
-    Issue("search-limit", "{text}", severity="bad", topic="fit", lacks="shapes_within_search",
-          reason="a correlation time beyond reach"),
-    Issue("sensor-bandwidth", "{text}", topic="fit"),
-    Issue("too-few-levels", "{text}", severity="bad", topic="fit", lacks="enough_levels",
-          reason="record too short"),
-    Issue("undetermined", "{text}", severity="bad", topic="fit", lacks="shapes_determined",
+    Issue("search-limit", "the {term} is at the limit of what this record can show: it is not "
+          "identifiable", "leave it out", severity="bad", topic="fit",
+          lacks="shapes_within_search", reason="a correlation time beyond reach"),
+    Issue("sensor-bandwidth", "the sensor's {bandwidth:.3g} Hz low-pass shapes this noise "
+          "({term}, N = {size:.3g} {unit}); a filter needs no state for it", topic="fit"),
+    Issue("too-few-levels", "{levels} levels cannot determine {parameters} parameters",
+          "record longer or take a smaller model", severity="bad", topic="fit",
+          lacks="enough_levels", reason="record too short"),
+    Issue("undetermined", "not determined by this record (standard error {stderr:.2g})",
+          severity="bad", topic="fit", lacks="shapes_determined",
           reason="record too short for model"),
-    Issue("wrong-slope", "{text}", severity="bad", topic="fit", lacks="slopes_agree",
-          reason="slopes contradict the model"),
+    Issue("wrong-slope", "from {first:.4g} to {last:.4g} s the Allan plot has the slope "
+          "{slope:+.2f}, not {named}", "give another region", severity="bad", topic="fit",
+          lacks="slopes_agree", reason="slopes contradict the model"),
 )  # fmt: skip
 
 _SELECTION = (
-    Issue("ramp-or-walk", "{text}", topic="selection"),
+    Issue("ramp-or-walk", "a rate ramp of {ramp} or slow noise ({slow}): this record cannot tell "
+          "them apart, so the model has no ramp", topic="selection"),
     Issue("tie", "{text}", topic="selection"),
 )  # fmt: skip
 
 _FILTER_NUMBERS = (
-    Issue("bounded-error", "{text}", topic="filter"),
-    Issue("estimate-it", "{text}", severity="warning", topic="filter"),
-    Issue("fast-peak-left-out", "{text}", topic="filter"),
-    Issue("less-white-noise", "{text}", topic="filter"),
-    Issue("line-left-out", "{text}", severity="warning", topic="filter"),
-    Issue("loose-form", "{text}", topic="filter"),
-    Issue("more-than-random-walk", "{text}", topic="filter"),
-    Issue("more-than-white-noise", "{text}", topic="filter"),
-    Issue("no-navigation-filter", "{text}", topic="filter"),
-    Issue("not-predicted", "{text}", topic="filter"),
-    Issue("optimistic", "{text}", topic="filter"),
-    Issue("other-units", "{text}", severity="warning", topic="filter"),
-    Issue("ramp-as-constant", "{text}", severity="warning", topic="filter"),
-    Issue("turn-on-left-out", "{text}", topic="filter"),
-    Issue("uncertainty-not-covered", "{text}", topic="filter"),
+    Issue("bounded-error",
+          "a {cause} moves the first integral by a bounded amount: its N, which is enough at any "
+          "time, is {factor:.2g} times too large after {horizon:g} s", topic="filter"),
+    Issue("estimate-it",
+          "larger numbers are a poor substitute for {cause}: N times {N_factor:.3g}, K times "
+          "{K_factor:.3g}", "estimate it as a state, or calibrate it", "warning", "filter"),
+    Issue("fast-peak-left-out",
+          "only the low-frequency density{also} of the {label} counts: it lies above {fast:.3g} Hz "
+          "and averages out", topic="filter"),
+    Issue("less-white-noise",
+          "N is {share:.3g} times that of the error model: use N and K as a pair, for outages of "
+          "the given lengths", topic="filter"),
+    Issue("line-left-out",
+          {"": "the {label} at {frequency:.4g} Hz, amplitude {size}, is left out",
+           "slow": "the {label} at {frequency:.4g} Hz, amplitude {size}, is left out: it is slow "
+                   "for this horizon, and errors are larger than the numbers say"}, topic="filter"),
+    Issue("loose-form",
+          "after an outage of {time:g} s predicted errors are {tightness:.3g} times the true ones; "
+          "with {tightest}, {with_state:.3g} times", topic="filter"),
+    Issue("more-than-random-walk",
+          {"": "the model has no random walk: K covers {parts}",
+           "more": "K is {times:.3g} times that of the model's random walk: it also covers "
+                   "{parts}"},
+          topic="filter"),
+    Issue("more-than-white-noise",
+          {"": "the model has no white noise: N covers {parts}",
+           "more": "N is {times:.3g} times that of the model's white noise: it also covers "
+                   "{parts}"},
+          topic="filter"),
+    Issue("no-navigation-filter", "the INS/GNSS filter is left out: {reason}", topic="filter"),
+    Issue("not-predicted", "the consistency is not predicted: {reason}", topic="filter"),
+    Issue("optimistic",
+          {"bound": "overconfident: NEES {nees:.3g} {when}; the numbers leave out too much here",
+           "reduce": "overconfident: NEES {nees:.3g} after an outage of {time:g} s; no such "
+                     "numbers are consistent at all times and on all axes that share them",
+           "beyond": "overconfident: NEES {nees:.3g} after an outage of {time:g} s, longer than "
+                     "the numbers are for"}, "estimate it as a state, or remove it from the data",
+          "warning", "filter"),
+    Issue("other-units",
+          "N in use is {factor:.3g} times that of the error model: it may be in other units",
+          "give it in {unit}/sqrt(Hz)", "warning", "filter"),
+    Issue("ramp-as-constant",
+          "the {label} counts as a constant of standard deviation {size}: |R| times the horizon",
+          "a filter that lasts longer needs a state for it", "warning", "filter"),
+    Issue("turn-on-left-out",
+          "the start bias leaves out the turn-on bias, which a recording at rest cannot show",
+          "add its variance", topic="filter"),
+    Issue("uncertainty-not-covered",
+          {"": "the uncertainty of the fitted parameters is not covered", "why": "{reason}"},
+          topic="filter"),
 )  # fmt: skip
 
 _INS = (
@@ -452,17 +621,26 @@ _INS = (
     Issue("biases-assumed", "{text}", topic="navigation"),
     Issue("columns-unused", "{text}", topic="navigation"),
     Issue("consistent", "{text}", severity="good", topic="navigation"),
-    Issue("diverged", "{text}", severity="bad", topic="navigation"),
-    Issue("fewer-runs", "{text}", severity="warning", topic="navigation"),
+    Issue("diverged", {
+        "": "{text}",
+        "runs": "diverged in {diverged} of {runs} runs; figures are those of the other runs",
+    }, severity="bad", topic="navigation"),
+    Issue("fewer-runs", "{runs} runs in place of {asked}: the recording has no more stretches of "
+          "this length that do not overlap", severity="warning", topic="navigation"),
     Issue("fixes-left-out", "{text}", topic="navigation"),
     Issue("fixes-rejected", "{text}", severity="warning", topic="navigation"),
     Issue("heading", "{text}", topic="navigation"),
-    Issue("judged-on-loiter", "{text}", topic="navigation"),
+    Issue("judged-on-loiter", "judged on the loiter of a fixed-wing aircraft",
+          "give the motion that it is for, trajectory= or scenario=", topic="navigation"),
     Issue("levelled", "{text}", topic="navigation"),
     Issue("lost", "{text}", severity="bad", topic="navigation"),
     Issue("no-time-stamps", "{text}", topic="navigation"),
     Issue("not-white", "{text}", severity="bad", topic="navigation"),
-    Issue("outside-linearity", "{text}", severity="warning", topic="navigation"),
+    Issue("outside-linearity",
+          "at {time:g} s the attitude is off by {tilt_deg:.2g} deg in tilt and {heading_deg:.2g} "
+          "deg in heading (1 sigma): products of errors count, and NEES and errors predicted there "
+          "are too small",
+          "check them by runs, as gmwm navigate does", "warning", "navigation"),
     Issue("positions-at-zero", "{text}", severity="warning", topic="navigation"),
     Issue("resolution", "{text}", topic="navigation"),
     Issue("samples-filled", "{text}", severity="warning", topic="navigation"),

@@ -121,7 +121,7 @@ def test_help_of_each_command_has_units_and_an_example(command, option):
 
 def test_help_of_calibrate_names_units():
     shown = CliRunner().invoke(cli.cli, ["calibrate", "--help"]).output
-    for words in ("--rate FLOAT", "in Hz", "rad/s, deg/s, deg/h", "m/s^2, g, mg", "NAME=COLUMN"):
+    for words in ("--rate NUMBER", "in Hz", "rad/s, deg/s, deg/h", "m/s^2, g, mg", "NAME=COLUMN"):
         assert words in shown
 
 

@@ -15,7 +15,7 @@ import pytest
 from gmwm import GaussMarkov, RandomWalk, WhiteNoise
 from gmwm.ins.filter.aiding import Outage, gnss
 from gmwm.ins.filter.filter import InitialSd, navigate
-from gmwm.ins.geometry.earth import ned_difference
+from gmwm.ins.geometry import ned_difference
 from gmwm.ins.imu.emulation import emulate
 from gmwm.ins.imu.sensors import SensorModels
 from gmwm.ins.trajectory.missions import helicopter_mapping

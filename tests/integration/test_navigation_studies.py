@@ -13,11 +13,11 @@ from gmwm import GaussMarkov, WhiteNoise
 from gmwm.ins.covariance.analysis import covariance_analysis
 from gmwm.ins.filter.aiding import Outage, gnss
 from gmwm.ins.imu.sensors import SensorModels
-from gmwm.ins.montecarlo.consistency import at_epoch, innovation_test, over_time
-from gmwm.ins.montecarlo.filter_errors import GROUPS
-from gmwm.ins.montecarlo.outage_errors import difference, sizes, spread
-from gmwm.ins.montecarlo.scenario import Scenario, Simulated
-from gmwm.ins.montecarlo.trials import monte_carlo
+from gmwm.ins.simulation.consistency import at_epoch, innovation_test, over_time
+from gmwm.ins.simulation.filter_errors import GROUPS
+from gmwm.ins.simulation.outage_errors import difference, sizes, spread
+from gmwm.ins.simulation.scenario import Scenario, Simulated
+from gmwm.ins.simulation.trials import monte_carlo
 from gmwm.ins.trajectory.missions import helicopter_mapping
 
 TRUE = SensorModels.of(

@@ -7,8 +7,10 @@ import os
 import shutil
 import tempfile
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
@@ -61,18 +63,19 @@ def _check_room(size: int) -> None:
         )
 
 
-def alike(array: FloatArray, n: int) -> FloatArray:
+def alike(array: FloatArray, n: int, dtype: Any = float) -> npt.NDArray[Any]:
     """An array for ``n`` numbers, on disk if another one is.
 
     Raises InputError if the disk is full.
     """
     if not is_spooled(array):
-        return np.empty(n)
-    _check_room(8 * n)
+        return np.empty(n, dtype)
+    size = n * np.dtype(dtype).itemsize
+    _check_room(size)
     with tempfile.TemporaryFile() as file:  # a map holds the file itself
         if hasattr(os, "posix_fallocate"):  # a full disk would end the process where it is mapped
-            os.posix_fallocate(file.fileno(), 0, 8 * n)
-        return np.asarray(np.memmap(file, float, "r+" if n else "w+", shape=(n,)))
+            os.posix_fallocate(file.fileno(), 0, size)
+        return np.asarray(np.memmap(file, dtype, "r+", shape=(n,)))
 
 
 def scaled(array: FloatArray, factor: float, offset: float = 0.0) -> FloatArray:
@@ -87,24 +90,35 @@ def scaled(array: FloatArray, factor: float, offset: float = 0.0) -> FloatArray:
     return result
 
 
+def moved(array: npt.NDArray[Any], like: FloatArray) -> npt.NDArray[Any]:
+    """The array itself, or a copy on disk if ``like`` is there."""
+    if not is_spooled(like):
+        return array
+    result = alike(like, array.size, array.dtype)
+    for part in windows(array.size):
+        result[part] = array[part]
+        release(result)
+    return result
+
+
 def windows(n: int) -> Iterator[slice]:
     """Consecutive rows of ``n``, some at a time."""
     for begin in range(0, n, ROWS):
         yield slice(begin, min(begin + ROWS, n))
 
 
-def release(array: FloatArray) -> None:
-    """Give back the memory of what was read of an array on disk; nothing to do for any other."""
+def release(array: npt.NDArray[Any]) -> None:
+    """Give back the memory of an array on disk that was read; others stay as they are."""
     if (held := _mapped(array)) is not None and hasattr(mmap, "MADV_DONTNEED"):
         held.madvise(mmap.MADV_DONTNEED)
 
 
-def is_spooled(array: FloatArray) -> bool:
+def is_spooled(array: npt.NDArray[Any]) -> bool:
     """Whether an array lies on disk."""
     return _mapped(array) is not None
 
 
-def _mapped(array: FloatArray) -> mmap.mmap | None:
+def _mapped(array: npt.NDArray[Any]) -> mmap.mmap | None:
     held: object = array
     while held is not None and not isinstance(held, mmap.mmap):
         held = getattr(held, "base", None)

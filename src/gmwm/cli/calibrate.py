@@ -17,9 +17,11 @@ from gmwm._core.text import wrapped
 from gmwm.cli.console import new_console, new_table, print_whole, progress_bar
 from gmwm.cli.hints import in_options, with_option
 from gmwm.cli.options import (
+    PATH,
     estimating_options,
     memory_option,
     models_of_channels,
+    option,
     output_folder,
     part_options,
     printing_options,
@@ -32,9 +34,9 @@ from gmwm.errors import InputError
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from gmwm._core.notices import Notice
     from gmwm.calibration import Calibration, Stopwatch
     from gmwm.estimate.result import Estimate
+    from gmwm.issues import Notice
     from gmwm.readers import Recording
 
 NONE_VALID = 1
@@ -49,13 +51,6 @@ _ON_DISK = 2 << 30
 _SHOWN_OTHERWISE = ("gap", "dead", "infinite")
 """Codes of issues that notices of the reader or reasons to skip say already."""
 
-_OF_RECORDING = (
-    "not-static", "tilt", "rate-changes", "rounding", "saturation", "abrupt-end", "stuck",
-    "held", "filled", "value-repeated", "variance", "counts", "gravity", "swapped",
-)  # fmt: skip
-"""Codes of notices of a fit that are those of the recording."""
-
-
 _FILES = ("calibration.json", "report.html", "imu.yaml")
 
 
@@ -64,27 +59,34 @@ def output_option(default: str) -> Callable[[Any], Any]:
 
 
 @click.command()
-@click.argument("files", metavar="FILE...", nargs=-1, required=True,
-                type=click.Path(path_type=Path))  # fmt: skip
+@click.argument("files", metavar="FILE...", nargs=-1, required=True, type=PATH)
 @output_option("gmwm-out")
 @reading_options
 @part_options
 @estimating_options
-@click.option("--remove-departures", is_flag=True,
-              help="Subtract steps, transients at the start and slow periods that are found, and "
-                   "calibrate what is left.")  # fmt: skip
-@click.option(
-    "--export",
-    "target",
-    metavar="NAME",
-    help="Also write the file of this program into the folder; see gmwm export --list.",
+@option(
+    "--remove-departures",
+    "Subtract steps, transients at the start and slow periods that are found, and "
+    "calibrate what is left.",
 )
-@click.option("--datasheet", type=click.Path(path_type=Path), metavar="YAML",
-              help="N, B and K by sensor or channel, each with its unit, to be drawn over the "
-                   "curves of the report: 'gyro: {N: 0.15 deg/sqrt(h), B: 7 deg/h}'.")  # fmt: skip
-@click.option("--jobs", type=click.IntRange(min=1), default=2, show_default=True,
-              help="Processes at most; short recordings take one.")  # fmt: skip
-@click.option("--timings", is_flag=True, help="Print where the time went, stage by stage.")
+@option(
+    "--export NAME",
+    "Also write the file of this program into the folder; see gmwm export --list.",
+    name="target",
+)
+@option(
+    "--datasheet YAML",
+    "N, B and K by sensor or channel, each with its unit, to be drawn over the curves "
+    "of the report: 'gyro: {N: 0.15 deg/sqrt(h), B: 7 deg/h}'.",
+    type=PATH,
+)
+@option(
+    "--jobs N",
+    "Processes at most; short recordings take one.",
+    type=click.IntRange(min=1),
+    default=2,
+)
+@option("--timings", "Print where the time went, stage by stage.")
 @memory_option
 @printing_options
 def calibrate(
@@ -191,10 +193,10 @@ def _show_timings(watch: Stopwatch, jobs: int) -> None:
 
 
 def show(result: Calibration) -> None:
-    from gmwm._core.notices import worst_first
     from gmwm.calibration import LONGEST_PART
     from gmwm.diagnosis import gathered
     from gmwm.estimate.result import JointFit
+    from gmwm.issues import worst_first
     from gmwm.report import duration_text
 
     size = f"{duration_text(result.duration)} at {result.rate:g} Hz, {result.n:,} samples a channel"
@@ -218,7 +220,7 @@ def show(result: Calibration) -> None:
     for name, fit in result.fits.items():
         if isinstance(fit, JointFit):
             remarks.append(f"{name}: {fit.agreement}")
-        of_fit = [each for each in fit.notices if each.code not in _OF_RECORDING]
+        of_fit = [each for each in fit.notices if not each.issue.spoils]
         remarks += [f"{name}: {with_option(n)}" for n in of_fit if n.severity != "bad"]
     invalid = [f"{name} is not valid: {with_option(notice)}" for name, notice in reasons]
     for remark in (*invalid, *remarks):
@@ -227,9 +229,7 @@ def show(result: Calibration) -> None:
 
 def _is_shown(notice: Notice) -> bool:
     """How the file was read, and what may spoil the estimates; the report has the rest."""
-    from gmwm.readers import READING
-
-    if notice.code in (*READING, "events-left-out"):
+    if notice.issue.topic in ("reading", "clock") or notice.code == "events-left-out":
         return True
     if notice.code == "length":
         return notice.severity != "good"

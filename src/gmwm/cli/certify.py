@@ -9,58 +9,75 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from gmwm.cli.numbers import show, units_option
-from gmwm.cli.options import output_file, seconds
+from gmwm.cli.options import PATH, option, output_file, seconds
 from gmwm.errors import InputError
 
 if TYPE_CHECKING:
     from gmwm.calibration import Calibration
 
 _GRAVITY = 9.80665
+_SI = {
+    "scale_error": 0.01,
+    "misalignment": math.radians(1.0),
+    "g_sensitivity": math.radians(1.0) / _GRAVITY,
+    "time_offset": 1e-3,
+    "vibration_rectification": 1e-3 / _GRAVITY,
+    "vibration": _GRAVITY,
+}
+"""SI units of one unit of each option of errors."""
 
 
 @click.command()
-@click.argument("file", type=click.Path(path_type=Path))
-@click.option("--imu", type=click.Path(path_type=Path), metavar="FILE",
-              help="Numbers in use: a file of Kalibr, OpenVINS, VINS, ORB-SLAM3, FAST-LIO, LIO-SAM "
-                   "or their like, or of gmwm bound and gmwm reduce (.json).")  # fmt: skip
-@click.option("-N", "white", metavar="GYRO,ACCEL",
-              help="White noise in use, in place of --imu, rad/s/sqrt(Hz) and "
-                   "m/s^2/sqrt(Hz).")  # fmt: skip
-@click.option("-K", "walk", metavar="GYRO,ACCEL",
-              help="Random walk in use, with -N, rad/s^2/sqrt(Hz) and m/s^3/sqrt(Hz).")  # fmt: skip
-@click.option("--outages", default="10,60", show_default=True, metavar="T,T,...",
-              help="Times without aiding in seconds.")  # fmt: skip
-@click.option("--keyframe", type=float, default=1.0, show_default=True, metavar="S",
-              help="Interval of keyframes or scans in seconds.")  # fmt: skip
-@click.option(
-    "--motion",
-    metavar="NAME",
-    help="Motion in which the errors below act: handheld, drone, car, fixed-wing, or a recording "
-    "of your own.",
+@click.argument("file", type=PATH)
+@option(
+    "--imu FILE",
+    "Numbers in use: a file of Kalibr, OpenVINS, VINS, ORB-SLAM3, FAST-LIO, LIO-SAM or "
+    "their like, or of gmwm bound and gmwm reduce (.json).",
+    type=PATH,
 )
-@click.option("--scale-error", type=float, default=0.0, metavar="PERCENT",
-              help="Scale error of both sensors.")  # fmt: skip
-@click.option(
-    "--misalignment", type=float, default=0.0, metavar="DEG", help="Misalignment of the axes."
+@option(
+    "-N GYRO,ACCEL",
+    "White noise in use, in place of --imu, rad/s/sqrt(Hz) and m/s^2/sqrt(Hz).",
+    name="white",
 )
-@click.option("--g-sensitivity", type=float, default=0.0, metavar="DEG/S/G",
-              help="g-sensitivity of the gyros.")  # fmt: skip
-@click.option("--time-offset", type=float, default=0.0, metavar="MS",
-              help="Delay against what the IMU is fused with.")  # fmt: skip
-@click.option("--vibration-rectification", type=float, default=0.0, metavar="MG/G^2",
-              help="Vibration rectification of the accelerometers, with --vibration.")  # fmt: skip
-@click.option(
-    "--vibration", type=float, default=0.0, metavar="G", help="Vibration, root mean square."
+@option(
+    "-K GYRO,ACCEL",
+    "Random walk in use, with -N, rad/s^2/sqrt(Hz) and m/s^3/sqrt(Hz).",
+    name="walk",
 )
+@option("--outages T,T,...", "Times without aiding in seconds.", default="10,60")
+@option("--keyframe S", "Interval of keyframes or scans in seconds.", default=1.0)
+@option(
+    "--motion NAME",
+    "Motion in which the errors below act: handheld, drone, car, fixed-wing, or a "
+    "recording of your own.",
+)
+@option("--scale-error PERCENT", "Scale error of both sensors.", default=0.0)
+@option("--misalignment DEG", "Misalignment of the axes.", default=0.0)
+@option("--g-sensitivity DEG/S/G", "g-sensitivity of the gyros.", default=0.0)
+@option("--time-offset MS", "Delay against what the IMU is fused with.", default=0.0)
+@option(
+    "--vibration-rectification MG/G^2",
+    "Vibration rectification of the accelerometers, with --vibration.",
+    default=0.0,
+)
+@option("--vibration G", "Vibration, root mean square.", default=0.0)
 @output_file("File to save the certificate in.", "JSON")
 @units_option
-@click.option("--json", "as_json", is_flag=True, help="Print JSON.")
+@option("--json", "Print JSON.", name="as_json")
 def certify(
-    file: Path, imu: Path | None, white: str | None, walk: str | None, outages: str,
-    keyframe: float, motion: str | None, scale_error: float, misalignment: float,
-    g_sensitivity: float, time_offset: float, vibration_rectification: float, vibration: float,
-    output: Path | None, units: str, as_json: bool,
-) -> None:  # fmt: skip
+    file: Path,
+    imu: Path | None,
+    white: str | None,
+    walk: str | None,
+    outages: str,
+    keyframe: float,
+    motion: str | None,
+    output: Path | None,
+    units: str,
+    as_json: bool,
+    **errors: float,
+) -> None:
     """Predict how consistent a filter is with the numbers in use.
 
     FILE is a calibration.json, taken for the truth. True errors beside those that the filter
@@ -77,22 +94,18 @@ def certify(
     from gmwm.filter_numbers import Imperfections, certify as run
 
     calibration = Calibration.load(file)
-    known = Imperfections(
-        scale_error=scale_error / 100.0,
-        misalignment=math.radians(misalignment),
-        g_sensitivity=math.radians(g_sensitivity) / _GRAVITY,
-        time_offset=time_offset / 1000.0,
-        vibration_rectification=vibration_rectification * 1e-3 / _GRAVITY,
-        vibration=vibration * _GRAVITY,
-    )
+    known = Imperfections(**{name: errors[name] * _SI[name] for name in errors})
     if known.needs_motion and motion is None:
         raise InputError("errors that come with motion do nothing at rest: add --motion drone")
     found = run(
-        calibration, _numbers(imu, white, walk, calibration),
-        outages=seconds("--outages", outages), keyframe=keyframe, imperfections=known,
+        calibration,
+        _numbers(imu, white, walk, calibration),
+        outages=seconds("--outages", outages),
+        keyframe=keyframe,
+        imperfections=known,
         motion=_motion(motion),
-    )  # fmt: skip
-    show(found, output, as_json, units)
+    )
+    show(found, output=output, as_json=as_json, units=units)
 
 
 def _numbers(

@@ -13,6 +13,8 @@ import click
 
 from gmwm.cli.console import progress_bar
 from gmwm.cli.options import (
+    PATH,
+    option,
     output_file,
     part_options,
     printing_options,
@@ -25,14 +27,17 @@ if TYPE_CHECKING:
 
 
 @click.command()
-@click.argument("files", metavar="FILE FILE...", nargs=-1, required=True,
-                type=click.Path(path_type=Path))  # fmt: skip
+@click.argument("files", metavar="FILE FILE...", nargs=-1, required=True, type=PATH)
 @output_file("Page to write, of two printed ones.", "HTML")
-@click.option("--horizon", type=float, default=60.0, show_default=True, metavar="S",
-              help="Time without aiding that the filter numbers are for, in seconds.")  # fmt: skip
-@click.option("--datasheet", type=click.Path(path_type=Path), metavar="YAML",
-              help="N, B and K by sensor or channel, each with its unit, to be drawn over the "
-                   "curves of the page: 'gyro: {N: 0.15 deg/sqrt(h), B: 7 deg/h}'.")  # fmt: skip
+@option(
+    "--horizon S", "Time without aiding that the filter numbers are for, in seconds.", default=60.0
+)
+@option(
+    "--datasheet YAML",
+    "N, B and K by sensor or channel, each with its unit, to be drawn over the curves "
+    "of the page: 'gyro: {N: 0.15 deg/sqrt(h), B: 7 deg/h}'.",
+    type=PATH,
+)
 @reading_options
 @part_options
 @printing_options

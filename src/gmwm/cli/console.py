@@ -60,9 +60,14 @@ def progress_bar(title: str, unit: str) -> Iterator[Progress]:
     if not console.is_terminal:
         yield lambda done, total, what: None
         return
-    columns = (TextColumn(title), BarColumn(), MofNCompleteColumn(),
-               TextColumn(unit + " {task.description}", markup=False), TimeRemainingColumn(),
-               TextColumn("left"))  # fmt: skip
+    columns = (
+        TextColumn(title),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TextColumn(unit + " {task.description}", markup=False),
+        TimeRemainingColumn(),
+        TextColumn("left"),
+    )
     with Bar(*columns, console=console, transient=True) as bar:
         task = bar.add_task("", total=None)
 

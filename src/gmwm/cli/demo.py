@@ -9,6 +9,7 @@ import click
 
 from gmwm.cli.calibrate import output_option, write_files
 from gmwm.cli.console import new_console, new_table, print_whole, progress_bar
+from gmwm.cli.options import option
 
 if TYPE_CHECKING:
     from gmwm.calibration import Calibration
@@ -17,12 +18,18 @@ if TYPE_CHECKING:
 
 @click.command()
 @output_option("gmwm-demo")
-@click.option("--hours", type=click.FloatRange(0.01, 100.0), default=1.0, show_default=True,
-              help="Length of the simulated recording in hours.")  # fmt: skip
-@click.option("--seed", type=int, default=1, show_default=True)
-@click.option("--files", is_flag=True,
-              help="Only write files to try the other commands with: static.csv of a sensor at "
-                   "rest, imu.csv and fixes.csv of a drive with it.")  # fmt: skip
+@option(
+    "--hours X",
+    "Length of the simulated recording in hours.",
+    type=click.FloatRange(0.01, 100.0),
+    default=1.0,
+)
+@option("--seed NUMBER", "", type=int, default=1)
+@option(
+    "--files",
+    "Only write files to try the other commands with: static.csv of a sensor at rest, "
+    "imu.csv and fixes.csv of a drive with it.",
+)
 def demo(output: Path, hours: float, seed: int, files: bool) -> None:
     """Simulate an IMU, calibrate it and compare with the truth.
 
@@ -98,8 +105,14 @@ def show_truth(fitted: Calibration, truth: dict[str, Model]) -> None:
             if not row.covered:
                 cells[1] += " *"
             first = name if i == 0 else ""
-            table.add_row(first, row.what, f"{row.truth:.4g}", *cells, row.unit,
-                          end_section=i == len(rows) - 1)  # fmt: skip
+            table.add_row(
+                first,
+                row.what,
+                f"{row.truth:.4g}",
+                *cells,
+                row.unit,
+                end_section=i == len(rows) - 1,
+            )
     console = new_console()
     print_whole(console, table)
     console.print(

@@ -6,20 +6,22 @@ from pathlib import Path
 
 import click
 
-from gmwm.cli.options import output_file
+from gmwm.cli.options import PATH, option, output_file
 from gmwm.errors import InputError
 
 
 @click.command()
-@click.argument("files", metavar="FILE...", nargs=-1, type=click.Path(path_type=Path))
-@click.option("--to", "target", metavar="NAME", help="The program; see --list.")
-@click.option("--horizon", type=float, metavar="T",
-              help="Time without aiding that the numbers are for, in seconds; by default 1 "
-                   "(keyframes, scans) or 60, see --list.")  # fmt: skip
-@click.option("--form", metavar="FORM",
-              help="N+K, N+GM, ...: most programs hold one; state-space holds any.")  # fmt: skip
+@click.argument("files", metavar="FILE...", nargs=-1, type=PATH)
+@option("--to NAME", "The program; see --list.", name="target")
+@option(
+    "--horizon T",
+    "Time without aiding that the numbers are for, in seconds; by default 1 (keyframes,"
+    " scans) or 60, see --list.",
+    type=float,
+)
+@option("--form FORM", "N+K, N+GM, ...: most programs hold one; state-space holds any.")
 @output_file("File to write instead of printing; .npz for state-space.")
-@click.option("--list", "listed", is_flag=True, help="List the programs.")
+@option("--list", "List the programs.", name="listed")
 def export(
     files: tuple[Path, ...],
     target: str | None,

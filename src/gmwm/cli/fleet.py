@@ -16,6 +16,7 @@ from gmwm.cli.hints import with_hint
 from gmwm.cli.options import (
     arguments_of_read,
     estimating_options,
+    option,
     output_folder,
     part_options,
     printing_options,
@@ -27,14 +28,15 @@ from gmwm.cli.options import (
 @click.command()
 @click.argument("patterns", metavar="PATTERN...", nargs=-1, required=True)
 @output_folder("gmwm-fleet", "Folder for calibrations, fleet.parquet, fleet.html, fleet.json.")
-@click.option("--jobs", type=click.IntRange(min=1), help="Processes; one a core by default.")
-@click.option("--cluster", metavar="ADDRESS",
-              help="Dask scheduler that does the work, e.g. tcp://10.0.0.1:8786; its workers read "
-                   "the files.")  # fmt: skip
-@click.option("--resume", is_flag=True,
-              help="Go on with what the folder holds; what changed is done again.")  # fmt: skip
-@click.option("--horizon", type=float, default=60.0, show_default=True, metavar="S",
-              help="Time without aiding in seconds that N and K of a filter are for.")  # fmt: skip
+@option("--jobs N", "Processes; one a core by default.", type=click.IntRange(min=1))
+@option(
+    "--cluster ADDRESS",
+    "Dask scheduler that does the work, e.g. tcp://10.0.0.1:8786; its workers read the files.",
+)
+@option("--resume", "Go on with what the folder holds; what changed is done again.")
+@option(
+    "--horizon S", "Time without aiding in seconds that N and K of a filter are for.", default=60.0
+)
 @reading_options
 @part_options
 @estimating_options
@@ -80,12 +82,20 @@ def fleet(
     try:
         with nullcontext() if quiet else progress_bar("fleet", "units") as bar:
             found = run(
-                patterns, written_models(models) or None,
+                patterns,
+                written_models(models) or None,
                 screening=() if "all" in left else [n for n in SCREENING if n not in left],
-                still=not everything, horizon=horizon, start=0.0 if start is None else start,
-                stop=stop, folder=output, resume=resume, jobs=jobs or os.cpu_count() or 1,
-                cluster=cluster, progress=bar, **arguments_of_read(**reading),
-            )  # fmt: skip
+                still=not everything,
+                horizon=horizon,
+                start=0.0 if start is None else start,
+                stop=stop,
+                folder=output,
+                resume=resume,
+                jobs=jobs or os.cpu_count() or 1,
+                cluster=cluster,
+                progress=bar,
+                **arguments_of_read(**reading),
+            )
     except KeyboardInterrupt:
         if (output / "calibrations").is_dir():
             click.echo(f"finished units are kept in {output}: add --resume to go on", err=True)

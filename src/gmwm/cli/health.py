@@ -9,6 +9,7 @@ from typing import Any
 import click
 
 from gmwm.cli.options import (
+    PATH,
     memory_option,
     output_file,
     part_options,
@@ -19,7 +20,7 @@ from gmwm.cli.options import (
 
 
 @click.command()
-@click.argument("file", type=click.Path(path_type=Path))
+@click.argument("file", type=PATH)
 @output_file("Write all findings with their numbers, in SI units, to this file.")
 @reading_options
 @part_options

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 from gmwm.errors import InputError
 
 if TYPE_CHECKING:
-    from gmwm._core.notices import Notice
     from gmwm.calibration import Calibration
+    from gmwm.issues import Notice
 
 HINTS = {
     "accel-unit-missing": "--accel-unit {unit}",

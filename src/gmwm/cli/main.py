@@ -41,9 +41,19 @@ def cli(context: click.Context) -> None:
 
 
 for _command in (
-    calibrate, fleet, compare, demo, budget, health, bound, reduce, certify, export, navigate,
+    calibrate,
+    fleet,
+    compare,
+    demo,
+    budget,
+    health,
+    bound,
+    reduce,
+    certify,
+    export,
+    navigate,
     reproduce,
-):  # fmt: skip
+):
     cli.add_command(_command)
 
 

@@ -15,7 +15,7 @@ import click
 
 from gmwm.cli.console import progress_bar
 from gmwm.cli.hints import with_option
-from gmwm.cli.options import arguments_of_read, output_folder, reading_options
+from gmwm.cli.options import PATH, arguments_of_read, option, output_folder, reading_options
 from gmwm.errors import InputError
 
 _NEEDED = (
@@ -24,15 +24,35 @@ _NEEDED = (
     "navigate --help)"
 )
 
-_READING = {"units": "--gyro-unit or --accel-unit", "channels": "--channel", "time": "--time",
-            "start": "--imu-start", "format": "--format", "layout": "--layout",
-            "damaged": "--damaged"}  # fmt: skip
+_READING = {
+    "units": "--gyro-unit or --accel-unit",
+    "channels": "--channel",
+    "time": "--time",
+    "start": "--imu-start",
+    "format": "--format",
+    "layout": "--layout",
+    "damaged": "--damaged",
+}
 _OF_DATA = frozenset({"imu", "gnss_fixes", "sensors", "compare"})
 _OF_FILE = (
-    "trajectory", "duration", "truth", "filters", "outages", "runs", "seed", "imu", "gnss_fixes",
-    "lever_arm", "heading", "attitude", "barometer", "zero_velocity", "gate", "position_sd",
+    "trajectory",
+    "duration",
+    "truth",
+    "filters",
+    "outages",
+    "runs",
+    "seed",
+    "imu",
+    "gnss_fixes",
+    "lever_arm",
+    "heading",
+    "attitude",
+    "barometer",
+    "zero_velocity",
+    "gate",
+    "position_sd",
     "velocity_sd",
-)  # fmt: skip
+)
 """Options that are keys of the file of a study; paths are relative to where one is."""
 
 _OF_STUDY, _OF_LOG = ("validation.txt", "validation.html"), ("solution.csv", "report.html")
@@ -112,71 +132,117 @@ def _named(option: str, texts: tuple[str, ...]) -> dict[str, str]:
 
 
 @click.command()
-@click.argument("file", required=False, type=click.Path(path_type=Path), metavar="[STUDY.yaml]")
-@click.option("--trajectory", metavar="NAME",
-              help="helicopter, car, loiter, or a CSV of time, latitude, longitude, height, roll, "
-                   "pitch, yaw.")  # fmt: skip
-@click.option("--duration", type=float, help="Of the trajectory, in seconds.")
-@click.option("--truth", metavar="FILE", callback=_as(_absolute),
-              help="calibration.json that sensor errors are drawn from.")  # fmt: skip
-@click.option("--filter", "filters", multiple=True, metavar="NAME=FILE",
-              callback=_as(partial(_named, "--filter")),
-              help="A filter and the calibration.json that it believes; 'truth' for the true "
-                   "models; repeat. The others are compared with the first.")  # fmt: skip
-@click.option("--outage", "outages", multiple=True, metavar="START:LENGTH",
-              callback=_as(lambda texts: [_span(text) for text in texts]),
-              help="Seconds without GNSS; repeat.")  # fmt: skip
-@click.option("--runs", type=click.IntRange(min=1), help="Number of runs.  [default: 100]")
-@click.option("--seed", type=click.IntRange(min=0), help="[default: 0]")
-@click.option("--jobs", type=click.IntRange(min=1), help="Processes; one a core by default.")
-@output_folder("gmwm-navigate", "Folder for the report, the table and the runs.",
-               [*_OF_STUDY, *_OF_LOG, _OF_SENSORS])  # fmt: skip
-@click.option("--resume", is_flag=True, help="Go on with the runs that the folder holds.")
-@click.option("--cluster", metavar="ADDRESS",
-              help="Dask scheduler that does the runs, e.g. tcp://10.0.0.1:8786.")  # fmt: skip
-@click.option("--imu", metavar="FILE", callback=_as(_absolute),
-              help="Your own data: IMU samples, with a header as for gmwm calibrate; axes forward, "
-                   "right, down.")  # fmt: skip
-@click.option("--gnss", "gnss_fixes", metavar="FILE", callback=_as(_absolute),
-              help="Fixes: time, latitude, longitude, height, on the IMU's clock.")  # fmt: skip
-@click.option("--sensors", multiple=True, metavar="[NAME=]FILE",
-              help="calibration.json of the IMU; several with names are compared.")  # fmt: skip
-@click.option("--outages", "outage_length", metavar="auto|SECONDS",
-              help="Length of the outages that are cut into the log to compare sensors; auto is "
-                   "30 s.  [default: auto]")  # fmt: skip
-@click.option("--lever-arm", metavar="X,Y,Z", callback=_as(partial(_three, "--lever-arm")),
-              help="From the IMU to the antenna, metres: forward, right, down.")  # fmt: skip
-@click.option("--heading", type=float, callback=_as(_degrees),
-              help="Degrees, at the first fix; by default from GNSS once it moves.")  # fmt: skip
-@click.option("--attitude", metavar="ROLL,PITCH,YAW", callback=_as(_attitude),
-              help="Degrees, at the first fix, of a record that begins in motion; by default "
-                   "from the data.")  # fmt: skip
-@click.option("--imu-start", type=float, metavar="S",
-              help="Time of the first IMU sample, without time stamps, on the clock of the "
-                   "fixes.")  # fmt: skip
-@click.option("--barometer", metavar="FILE", callback=_as(_absolute),
-              help="Barometric heights: time, height.")  # fmt: skip
-@click.option("--zero-velocity", metavar="VALUE",
-              help="Use standstills that the IMU shows, to this accuracy, e.g. '0.02 m/s'."
-              )  # fmt: skip
-@click.option("--gate", type=float, metavar="P",
-              help="Reject fixes whose innovation is less probable, e.g. 1e-5.")  # fmt: skip
-@click.option("--position-sd", metavar="N[,E,D]", callback=_as(partial(_sd, "--position-sd")),
-              help="Standard deviations of fixes that have none, metres: north, east, down.  "
-                   "[default: 1,1,1.5]")  # fmt: skip
-@click.option("--velocity-sd", metavar="N[,E,D]", callback=_as(partial(_sd, "--velocity-sd")),
-              help="The same of velocities, m/s.  [default: 0.1,0.1,0.15]")  # fmt: skip
-@click.option("--gyro-bias", metavar="VALUE",
-              help="Bias of a gyro at switch-on, 1 sigma.  [default: 0.1 deg/s]")  # fmt: skip
-@click.option("--accel-bias", metavar="VALUE",
-              help="The same of an accelerometer.  [default: 0.1 m/s^2]")  # fmt: skip
-@click.option("--json", "as_json", is_flag=True, help="Print JSON, of your own data.")
+@click.argument("file", required=False, type=PATH, metavar="[STUDY.yaml]")
+@option(
+    "--trajectory NAME",
+    "helicopter, car, loiter, or a CSV of time, latitude, longitude, height, roll, pitch, yaw.",
+)
+@option("--duration NUMBER", "Of the trajectory, in seconds.", type=float)
+@option(
+    "--truth FILE", "calibration.json that sensor errors are drawn from.", callback=_as(_absolute)
+)
+@option(
+    "--filter NAME=FILE",
+    "A filter and the calibration.json that it believes; 'truth' for the true models; "
+    "repeat. The others are compared with the first.",
+    name="filters",
+    multiple=True,
+    callback=_as(partial(_named, "--filter")),
+)
+@option(
+    "--outage START:LENGTH",
+    "Seconds without GNSS; repeat.",
+    name="outages",
+    multiple=True,
+    callback=_as(lambda texts: [_span(text) for text in texts]),
+)
+@option("--runs N", "Number of runs.  [default: 100]", type=click.IntRange(min=1))
+@option("--seed N", "[default: 0]", type=click.IntRange(min=0))
+@option("--jobs N", "Processes; one a core by default.", type=click.IntRange(min=1))
+@output_folder(
+    "gmwm-navigate",
+    "Folder for the report, the table and the runs.",
+    [*_OF_STUDY, *_OF_LOG, _OF_SENSORS],
+)
+@option("--resume", "Go on with the runs that the folder holds.")
+@option("--cluster ADDRESS", "Dask scheduler that does the runs, e.g. tcp://10.0.0.1:8786.")
+@option(
+    "--imu FILE",
+    "Your own data: IMU samples, with a header as for gmwm calibrate; axes forward, right, down.",
+    callback=_as(_absolute),
+)
+@option(
+    "--gnss FILE",
+    "Fixes: time, latitude, longitude, height, on the IMU's clock.",
+    name="gnss_fixes",
+    callback=_as(_absolute),
+)
+@option(
+    "--sensors [NAME=]FILE",
+    "calibration.json of the IMU; several with names are compared.",
+    multiple=True,
+)
+@option(
+    "--outages auto|SECONDS",
+    "Length of the outages that are cut into the log to compare sensors; auto is 30 s."
+    "  [default: auto]",
+    name="outage_length",
+)
+@option(
+    "--lever-arm X,Y,Z",
+    "From the IMU to the antenna, metres: forward, right, down.",
+    callback=_as(partial(_three, "--lever-arm")),
+)
+@option(
+    "--heading NUMBER",
+    "Degrees, at the first fix; by default from GNSS once it moves.",
+    type=float,
+    callback=_as(_degrees),
+)
+@option(
+    "--attitude ROLL,PITCH,YAW",
+    "Degrees, at the first fix, of a record that begins in motion; by default from the data.",
+    callback=_as(_attitude),
+)
+@option(
+    "--imu-start S",
+    "Time of the first IMU sample, without time stamps, on the clock of the fixes.",
+    type=float,
+)
+@option("--barometer FILE", "Barometric heights: time, height.", callback=_as(_absolute))
+@option(
+    "--zero-velocity VALUE",
+    "Use standstills that the IMU shows, to this accuracy, e.g. '0.02 m/s'.",
+)
+@option("--gate P", "Reject fixes whose innovation is less probable, e.g. 1e-5.", type=float)
+@option(
+    "--position-sd N[,E,D]",
+    "Standard deviations of fixes that have none, metres: north, east, down.  [default: 1,1,1.5]",
+    callback=_as(partial(_sd, "--position-sd")),
+)
+@option(
+    "--velocity-sd N[,E,D]",
+    "The same of velocities, m/s.  [default: 0.1,0.1,0.15]",
+    callback=_as(partial(_sd, "--velocity-sd")),
+)
+@option("--gyro-bias VALUE", "Bias of a gyro at switch-on, 1 sigma.  [default: 0.1 deg/s]")
+@option("--accel-bias VALUE", "The same of an accelerometer.  [default: 0.1 m/s^2]")
+@option("--json", "Print JSON, of your own data.", name="as_json")
 @reading_options
 def navigate(
-    file: Path | None, jobs: int | None, output: Path, resume: bool, cluster: str | None,
-    sensors: tuple[str, ...], outage_length: str | None, imu_start: float | None,
-    gyro_bias: str | None, accel_bias: str | None, as_json: bool, **options: Any,
-) -> None:  # fmt: skip
+    file: Path | None,
+    jobs: int | None,
+    output: Path,
+    resume: bool,
+    cluster: str | None,
+    sensors: tuple[str, ...],
+    outage_length: str | None,
+    imu_start: float | None,
+    gyro_bias: str | None,
+    accel_bias: str | None,
+    as_json: bool,
+    **options: Any,
+) -> None:
     """Prove sensor models by navigating, or filter your own data.
 
     INS/GNSS filters, outages, Monte Carlo: errors of the sensors, drawn from the true models or
@@ -266,7 +332,7 @@ def _validate(
 ) -> None:
     """Do the runs of a study."""
     from gmwm._core.files import folder_to_fill, written
-    from gmwm.ins.montecarlo import Validation
+    from gmwm.ins.simulation import Validation
     from gmwm.ins.spec import experiment_from
 
     with _named_in_messages(place):
@@ -276,9 +342,13 @@ def _validate(
         table, page = (folder / name for name in _OF_STUDY)
         with progress_bar("navigating", "runs") as bar:
             validation = Validation.of(
-                experiment, jobs=jobs, cluster=cluster, folder=store,
-                earlier="resume" if resume else "replace", progress=bar,
-            )  # fmt: skip
+                experiment,
+                jobs=jobs,
+                cluster=cluster,
+                folder=store,
+                earlier="resume" if resume else "replace",
+                progress=bar,
+            )
         text = str(validation)
         with written(table) as stream:
             stream.write(text + "\n")

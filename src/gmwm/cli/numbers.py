@@ -3,39 +3,46 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from gmwm._core.text import bullets
 from gmwm.cli.console import progress_bar
-from gmwm.cli.options import output_file, seconds, together
+from gmwm.cli.options import PATH, option, output_file, seconds, together
 
 if TYPE_CHECKING:
     from gmwm.filter_numbers import Certificate, SensorNumbers
 
-units_option = click.option(
-    "--units", type=click.Choice(["field", "si"]), default="field", show_default=True,
-    help="Units of what is printed; files and JSON are in SI.",
-)  # fmt: skip
+units_option = option(
+    "--units",
+    "Units of what is printed; files and JSON are in SI.",
+    type=click.Choice(["field", "si"]),
+    default="field",
+)
 
 _number_options = together(
-    click.argument("file", type=click.Path(path_type=Path)),
-    click.option("--form", default="N+K", show_default=True,
-                 help="N+K, N+GM or N+K+GM; for gmwm reduce N+2GM too."),
-    click.option("--shared", is_flag=True, help="The same numbers for all axes of a sensor."),
-    click.option("--tau", metavar="S", callback=lambda _, __, text: _tau(text),
-                 help="Correlation time of the Gauss-Markov process in seconds; \"shared\": the "
-                      "one for all axes that costs least. Each axis has its own by default."),
-    click.option("--gyro-bias", type=float, default=0.0, metavar="RAD/S",
-                 help="Standard deviation of the turn-on bias of a gyro."),
-    click.option("--accel-bias", type=float, default=0.0, metavar="M/S^2",
-                 help="Standard deviation of the turn-on bias of an accelerometer."),
+    click.argument("file", type=PATH),
+    option("--form TEXT", "N+K, N+GM or N+K+GM; for gmwm reduce N+2GM too.", default="N+K"),
+    option("--shared", "The same numbers for all axes of a sensor."),
+    option(
+        "--tau S",
+        'Correlation time of the Gauss-Markov process in seconds; "shared": the one for all'
+        " axes that costs least. Each axis has its own by default.",
+        callback=lambda _, __, text: _tau(text),
+    ),
+    option("--gyro-bias RAD/S", "Standard deviation of the turn-on bias of a gyro.", default=0.0),
+    option(
+        "--accel-bias M/S^2",
+        "Standard deviation of the turn-on bias of an accelerometer.",
+        default=0.0,
+    ),
     output_file("File to save the numbers in.", "JSON"),
     units_option,
-    click.option("--json", "as_json", is_flag=True, help="Print JSON."),
-)  # fmt: skip
+    option("--json", "Print JSON.", name="as_json"),
+)
 
 
 def _tau(text: str | None) -> float | str | None:
@@ -44,18 +51,18 @@ def _tau(text: str | None) -> float | str | None:
 
 @click.command()
 @_number_options
-@click.option("--horizon", type=float, default=60.0, show_default=True, metavar="S",
-              help="Time without aiding in seconds; of relative poses, the interval of "
-                   "keyframes.")  # fmt: skip
-@click.option("--level", type=float, metavar="P",
-              help="Cover the confidence region of this level, e.g. 0.95, and not the estimate "
-                   "alone.")  # fmt: skip
-def bound(
-    file: Path, form: str, shared: bool, tau: float | str | None, gyro_bias: float,
-    accel_bias: float, output: Path | None, units: str, as_json: bool, horizon: float,
-    level: float | None,
-) -> None:  # fmt: skip
-    """Find the smallest numbers that are never too optimistic.
+@option(
+    "--horizon S",
+    "Time without aiding in seconds; of relative poses, the interval of keyframes.",
+    default=60.0,
+)
+@option(
+    "--level P",
+    "Cover the confidence region of this level, e.g. 0.95, and not the estimate alone.",
+    type=float,
+)
+def bound(file: Path, horizon: float, level: float | None, **options: Any) -> None:
+    """Find the smallest numbers that are never overconfident.
 
     FILE is a calibration.json.
 
@@ -66,25 +73,23 @@ def bound(
     from gmwm.calibration import Calibration
     from gmwm.filter_numbers import bound as run
 
-    found = run(
-        Calibration.load(file), form, horizon, level=level, shared=shared, tau=tau,
-        bias_sd={"gyro": gyro_bias, "accel": accel_bias},
-    )  # fmt: skip
-    show(found, output, as_json, units, _left_out(found, gyro_bias, accel_bias))
+    found = run(Calibration.load(file), horizon=horizon, level=level, **_arguments(options))
+    show(found, **_printing(options), remark=_turn_on_hint(found, options))
 
 
 @click.command()
 @_number_options
-@click.option("--outages", default="10,30,60", show_default=True, metavar="T,T,...",
-              help="Times without aiding that the numbers are for, in seconds.")  # fmt: skip
-@click.option("--keyframe", type=float, metavar="S",
-              help="Interval of keyframes or scans, in place of outages, for relative "
-                   "poses.")  # fmt: skip
-def reduce(
-    file: Path, form: str, shared: bool, tau: float | str | None, gyro_bias: float,
-    accel_bias: float, output: Path | None, units: str, as_json: bool, outages: str,
-    keyframe: float | None,
-) -> None:  # fmt: skip
+@option(
+    "--outages T,T,...",
+    "Times without aiding that the numbers are for, in seconds.",
+    default="10,30,60",
+)
+@option(
+    "--keyframe S",
+    "Interval of keyframes or scans, in place of outages, for relative poses.",
+    type=float,
+)
+def reduce(file: Path, outages: str, keyframe: float | None, **options: Any) -> None:
     """Find the numbers with which a small filter is consistent.
 
     FILE is a calibration.json.
@@ -99,19 +104,19 @@ def reduce(
     calibration, times = Calibration.load(file), seconds("--outages", outages)
     with progress_bar("reducing", "channels") as bar:
         found = run(
-            calibration, form, times, keyframe=keyframe, shared=shared, tau=tau, progress=bar,
-            bias_sd={"gyro": gyro_bias, "accel": accel_bias},
-        )  # fmt: skip
-    show(found, output, as_json, units, _left_out(found, gyro_bias, accel_bias))
+            calibration, outages=times, keyframe=keyframe, progress=bar, **_arguments(options)
+        )
+    show(found, **_printing(options), remark=_turn_on_hint(found, options))
 
 
 @click.command()
-@click.argument("file", type=click.Path(path_type=Path))
-@click.option("--times", default="1,10,60,600", show_default=True, metavar="T,T,...",
-              help="Coasting times in seconds.")  # fmt: skip
-@click.option("--unknown-start", is_flag=True,
-              help="Nothing is known of the errors at the start; by default the initial values of "
-                   "the slow ones are, as after aiding.")  # fmt: skip
+@click.argument("file", type=PATH)
+@option("--times T,T,...", "Coasting times in seconds.", default="1,10,60,600")
+@option(
+    "--unknown-start",
+    "Nothing is known of the errors at the start; by default the initial values of the "
+    "slow ones are, as after aiding.",
+)
 def budget(file: Path, times: str, unknown_start: bool) -> None:
     """Predict the error growth of unaided navigation.
 
@@ -124,27 +129,39 @@ def budget(file: Path, times: str, unknown_start: bool) -> None:
     Example:
       gmwm budget out/calibration.json --times 1,10,60
     """
-    from gmwm.budget import error_budget
     from gmwm.calibration import Calibration
+    from gmwm.filter_numbers import error_budget
 
     calibration = Calibration.load(file)
     click.echo(error_budget(calibration, seconds("--times", times), calibrated=not unknown_start))
 
 
-def _left_out(numbers: SensorNumbers, gyro_bias: float, accel_bias: float) -> str:
-    """A line on the bias at switch-on, of the sensors for which none was given."""
-    given = {"gyro": gyro_bias, "accel": accel_bias}
-    flags = [f"--{kind}-bias" for kind, sd in given.items() if sd == 0.0 and numbers.of(kind)]
-    if not flags:
-        return ""
-    text = f"give the bias at switch-on (1 sigma) by {' and '.join(flags)}"
-    return "\n".join(bullets([text]))
+def _arguments(options: Mapping[str, Any]) -> dict[str, Any]:
+    """Arguments of the function that finds the numbers."""
+    bias_sd = {"gyro": options["gyro_bias"], "accel": options["accel_bias"]}
+    return {"bias_sd": bias_sd} | {name: options[name] for name in ("form", "shared", "tau")}
+
+
+def _printing(options: Mapping[str, Any]) -> dict[str, Any]:
+    return {name: options[name] for name in ("output", "as_json", "units")}
+
+
+def _turn_on_hint(numbers: SensorNumbers, options: Mapping[str, Any]) -> str:
+    """A line for the sensors whose turn-on bias was not given."""
+    kinds = [kind for kind in ("gyro", "accel") if numbers.of(kind)]
+    flags = [f"--{kind}-bias" for kind in kinds if options[f"{kind}_bias"] == 0.0]
+    text = f"add your turn-on bias (1 sigma) by {' and '.join(flags)}"
+    return "\n".join(bullets([text])) if flags else ""
 
 
 def show(
-    result: SensorNumbers | Certificate, output: Path | None, as_json: bool, units: str,
+    result: SensorNumbers | Certificate,
+    *,
+    output: Path | None,
+    as_json: bool,
+    units: str,
     remark: str = "",
-) -> None:  # fmt: skip
+) -> None:
     """Save and print a result."""
     if output is not None:
         result.save(output)

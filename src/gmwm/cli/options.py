@@ -21,6 +21,28 @@ _TERM = re.compile(r"\s*(?:([1-9])\s*\*?\s*)?([A-Za-z]+)\s*")
 TERMS = "Q, N, B, K, R, GM, Resonance, LowPassNoise, AveragedNoise, Sinusoid, AR, MA, ARMA, ARIMA"
 """What `gmwm.process.CATALOGUE` has, which would take long to import for a line of help."""
 
+PATH = click.Path(path_type=Path)
+
+
+def option(usage: str, text: str, *, name: str = "", **settings: Any) -> Callable[[Any], Any]:
+    """An option of a command.
+
+    usage: Its flags, and what is to be given after them: ``"-o --output FILE"``; with nothing to
+        give it is a switch.
+    text: The help; a default is added to it, unless it is zero or settings hide it.
+    name: Of the argument, if not that of the flag.
+    settings: Of `click.option`.
+    """
+    words = usage.split()
+    flags = [word for word in words if word.startswith("-")]
+    metavar = " ".join(words[len(flags) :])
+    if not metavar and "type" not in settings:
+        settings["is_flag"] = True
+    settings.setdefault("show_default", bool(settings.get("default")))
+    names = [*flags, name] if name else flags
+    return click.option(*names, metavar=metavar or None, help=text or None, **settings)
+
+
 def together(*options: Callable[[Any], Any]) -> Callable[[Any], Any]:
     """One decorator that gives a command several options, listed in this order."""
 
@@ -40,8 +62,7 @@ def output_file(text: str, metavar: str = "FILE") -> Callable[[Any], Any]:
 
         return path and writable_file(path)
 
-    return click.option("-o", "--output", type=click.Path(path_type=Path), metavar=metavar,
-                        help=text, callback=checked)  # fmt: skip
+    return click.option("-o", "--output", type=PATH, metavar=metavar, help=text, callback=checked)
 
 
 def output_folder(default: str, text: str, names: Sequence[str] = ()) -> Callable[[Any], Any]:
@@ -52,75 +73,105 @@ def output_folder(default: str, text: str, names: Sequence[str] = ()) -> Callabl
 
         return writable_folder(path, names)
 
-    return click.option("-o", "--output", type=click.Path(path_type=Path), default=Path(default),
-                        show_default=True, help=text, callback=checked)  # fmt: skip
+    return option("-o --output", text, type=PATH, default=Path(default), callback=checked)
 
 
 reading_options = together(
-    click.option("--rate", type=float, help="Sampling rate in Hz; needed without a time column."),
-    click.option("--gyro-unit", help="Unit of the gyro columns: rad/s, deg/s, deg/h, ..."),
-    click.option("--accel-unit", help="Unit of the accelerometer columns: m/s^2, g, mg, ..."),
-    click.option("--channel", "channels", multiple=True, metavar="NAME=COLUMN",
-                 help="Role of a column by its name or 0-based number, e.g. gyro_x=wx or "
-                      "accel_z=5; repeat. By default roles are guessed from the column names."),
-    click.option("--time", "time_column", metavar="COLUMN",
-                 help="Time column by name or number; 'none' to ignore it."),
-    click.option("--format", "form", type=click.Choice(FORMATS), metavar="NAME",
-                 help="What the file is, where its content and its name do not show it: "
-                      f"{', '.join(FORMATS)}."),
-    click.option("--layout", metavar="LAYOUT",
-                 help="Of a binary file without a header: IMAR, LN200, LN200IG, IXSEA, "
-                      "NAVCHIP_INT, NAVCHIP_FLT, KF-GINS, or TYPE,GYRO_SCALE,ACCEL_SCALE"
-                      "[,rates][,little|big]."),
-    click.option("--damaged", is_flag=True,
-                 help="Use what is left of a text or a flight log that is cut off or damaged in "
-                      "places; it is refused otherwise."),
-)  # fmt: skip
+    option("--rate NUMBER", "Sampling rate in Hz; needed without a time column.", type=float),
+    option("--gyro-unit TEXT", "Unit of the gyro columns: rad/s, deg/s, deg/h, ..."),
+    option("--accel-unit TEXT", "Unit of the accelerometer columns: m/s^2, g, mg, ..."),
+    option(
+        "--channel NAME=COLUMN",
+        "Role of a column by its name or 0-based number, e.g. gyro_x=wx or accel_z=5; "
+        "repeat. By default roles are guessed from the column names.",
+        name="channels",
+        multiple=True,
+    ),
+    option(
+        "--time COLUMN", "Time column by name or number; 'none' to ignore it.", name="time_column"
+    ),
+    option(
+        "--format NAME",
+        f"What the file is, where its content and its name do not show it: {', '.join(FORMATS)}.",
+        name="form",
+        type=click.Choice(FORMATS),
+    ),
+    option(
+        "--layout LAYOUT",
+        "Of a binary file without a header: IMAR, LN200, LN200IG, IXSEA, NAVCHIP_INT, "
+        "NAVCHIP_FLT, KF-GINS, or TYPE,GYRO_SCALE,ACCEL_SCALE[,rates][,little|big].",
+    ),
+    option(
+        "--damaged",
+        "Use what is left of a text or a flight log that is cut off or damaged in places;"
+        " it is refused otherwise.",
+    ),
+)
 """What the file is, for `read_recording`."""
 
 part_options = together(
-    click.option("--topic", "topics", multiple=True, metavar="NAME",
-                 help="Topic of a bag or a flight log; needed where several have an IMU. Repeat "
-                      "for gyros and accelerometers in topics of their own."),
-    click.option("--clock", type=click.Choice(CLOCKS), default=CLOCKS[0], show_default=True,
-                 help="Stamps of messages: of their headers, or when they were recorded."),
-    click.option("--channels", "only", metavar="NAME,...",
-                 help="Only these channels: gyro_x,accel_z, or gyro for all of them."),
-    click.option("--start", type=float, metavar="S",
-                 help="Leave out what is before this time, in seconds."),
-    click.option("--stop", type=float, metavar="S",
-                 help="Leave out what is after this time, in seconds."),
-)  # fmt: skip
+    option(
+        "--topic NAME",
+        "Topic of a bag or a flight log; needed where several have an IMU. Repeat for gyros"
+        " and accelerometers in topics of their own.",
+        name="topics",
+        multiple=True,
+    ),
+    option(
+        "--clock",
+        "Stamps of messages: of their headers, or when they were recorded.",
+        type=click.Choice(CLOCKS),
+        default=CLOCKS[0],
+    ),
+    option(
+        "--channels NAME,...",
+        "Only these channels: gyro_x,accel_z, or gyro for all of them.",
+        name="only",
+    ),
+    option("--start S", "Leave out what is before this time, in seconds.", type=float),
+    option("--stop S", "Leave out what is after this time, in seconds.", type=float),
+)
 """Topics, channels and a stretch, for `read_recording`."""
 
 estimating_options = together(
-    click.option("--model", "models", multiple=True, metavar="[NAME=]MODEL",
-                 help=f"Fit this in place of selecting: terms {TERMS}, e.g. 'N + K + 2 GM'; or "
-                      "'gyro=N + 2 GM' for a sensor or channel; repeat."),
-    click.option("--leave", "left", multiple=True,
-                 type=click.Choice(["events", "lines", "resonances", "outliers", "all"]),
-                 metavar="WHAT",
-                 help="Leave events, lines, resonances, outliers or all as they are: samples of "
-                      "shocks are masked otherwise, lines and resonances are terms that a model "
-                      "may have, outliers all over it make the variances robust; repeat."),
-    click.option("--all", "everything", is_flag=True,
-                 help="Take everything as static; by default only the stretches at rest of a log "
-                      "that moves are used."),
-)  # fmt: skip
+    option(
+        "--model [NAME=]MODEL",
+        f"Fit this in place of selecting: terms {TERMS}, e.g. 'N + K + 2 GM'; or "
+        "'gyro=N + 2 GM' for a sensor or channel; repeat.",
+        name="models",
+        multiple=True,
+    ),
+    option(
+        "--leave WHAT",
+        "Leave events, lines, resonances, outliers or all as they are: samples of shocks "
+        "are masked otherwise, lines and resonances are terms that a model may have, "
+        "outliers all over it make the variances robust; repeat.",
+        name="left",
+        multiple=True,
+        type=click.Choice(["events", "lines", "resonances", "outliers", "all"]),
+    ),
+    option(
+        "--all",
+        "Take everything as static; by default only the stretches at rest of a log that "
+        "moves are used.",
+        name="everything",
+    ),
+)
 """What is fitted, and to which samples."""
 
 printing_options = together(
-    click.option("--json", "as_json", is_flag=True, help="Print the result as JSON, in SI units."),
-    click.option("-q", "--quiet", is_flag=True, help="Print nothing but errors."),
+    option("--json", "Print the result as JSON, in SI units.", name="as_json"),
+    option("-q --quiet", "Print nothing but errors."),
 )
 """How results are printed."""
 
 
-memory_option = click.option(
-    "--memory", type=float, metavar="GB",
-    help="For the samples: those of a longer file are kept on disk, in TMPDIR, and about three "
-         "times one channel is in memory. By default 1 GB.",
-)  # fmt: skip
+memory_option = option(
+    "--memory GB",
+    "For the samples: those of a longer file are kept on disk, in TMPDIR, and about "
+    "three times one channel is in memory. By default 1 GB.",
+    type=float,
+)
 
 
 def read_recording(

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from gmwm.cli.console import progress_bar
-from gmwm.cli.options import output_folder, read_recording, reading_options
+from gmwm.cli.options import PATH, option, output_folder, read_recording, reading_options
 from gmwm.errors import InputError
 
 if TYPE_CHECKING:
@@ -20,10 +20,24 @@ if TYPE_CHECKING:
     from gmwm.study import Study
 
 EXPERIMENTS = (
-    "table2", "table3", "table4", "five-gm", "fig2", "fig3", "fig4", "appendix-a",
-    "fig5", "fig6", "fig7", "fig8", "fig9", "selection",
-    "weights2", "weights3", "weights4",
-)  # fmt: skip
+    "table2",
+    "table3",
+    "table4",
+    "five-gm",
+    "fig2",
+    "fig3",
+    "fig4",
+    "appendix-a",
+    "fig5",
+    "fig6",
+    "fig7",
+    "fig8",
+    "fig9",
+    "selection",
+    "weights2",
+    "weights3",
+    "weights4",
+)
 
 
 NAVIGATION = ("fig5", "fig6", "fig7", "fig8", "fig9")
@@ -33,21 +47,30 @@ ROTATED = ("fig8", "fig9")
 @click.command()
 @click.argument("experiment", type=click.Choice(EXPERIMENTS), metavar="EXPERIMENT")
 @output_folder("gmwm-study", "Folder for tables, figures and raw estimates.")
-@click.option("--runs", type=click.IntRange(min=2), help="Number of simulated series.")
-@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
-@click.option("--jobs", type=click.IntRange(min=1), help="Processes; one a core by default.")
-@click.option("--method", "methods", multiple=True, metavar="NAME",
-              help="Only this method, e.g. GMWM; repeat. By default all of the table.")  # fmt: skip
-@click.option("--resume", is_flag=True, help="Go on with the runs that the folder holds.")
-@click.option("--cluster", metavar="ADDRESS",
-              help="Dask scheduler that does the runs, e.g. tcp://10.0.0.1:8786.")  # fmt: skip
-@click.option("--recording", "recordings", multiple=True, type=click.Path(path_type=Path),
-              metavar="FILE",
-              help="fig5 to fig9: a real static recording in place of a simulated one; the first "
-                   "is calibrated, the others are navigated with; repeat.")  # fmt: skip
-@click.option("--rotate", is_flag=True,
-              help="fig8, fig9: calibrate every recording in turn and navigate with the others; "
-                   "further filters, intervals over recordings.")  # fmt: skip
+@option("--runs N", "Number of simulated series.", type=click.IntRange(min=2))
+@option("--seed N", "", type=click.IntRange(min=0), default=0)
+@option("--jobs N", "Processes; one a core by default.", type=click.IntRange(min=1))
+@option(
+    "--method NAME",
+    "Only this method, e.g. GMWM; repeat. By default all of the table.",
+    name="methods",
+    multiple=True,
+)
+@option("--resume", "Go on with the runs that the folder holds.")
+@option("--cluster ADDRESS", "Dask scheduler that does the runs, e.g. tcp://10.0.0.1:8786.")
+@option(
+    "--recording FILE",
+    "fig5 to fig9: a real static recording in place of a simulated one; the first is "
+    "calibrated, the others are navigated with; repeat.",
+    name="recordings",
+    multiple=True,
+    type=PATH,
+)
+@option(
+    "--rotate",
+    "fig8, fig9: calibrate every recording in turn and navigate with the others; "
+    "further filters, intervals over recordings.",
+)
 @reading_options
 def reproduce(
     experiment: str,
@@ -86,9 +109,15 @@ def reproduce(
 
     processes = jobs or os.cpu_count() or 1
     if experiment in NAVIGATION:
-        _check_alone(experiment, {"--method": methods, "--cluster": cluster,
-                                  "--resume": resume and not rotate,
-                                  "--rotate": rotate and experiment not in ROTATED})  # fmt: skip
+        _check_alone(
+            experiment,
+            {
+                "--method": methods,
+                "--cluster": cluster,
+                "--resume": resume and not rotate,
+                "--rotate": rotate and experiment not in ROTATED,
+            },
+        )
         given = [read_recording(file, **reading) for file in recordings]
         with folder_to_fill(output) as folder:
             options = {"runs": runs, "seed": seed, "jobs": processes}
@@ -108,10 +137,16 @@ def reproduce(
         try:
             with progress_bar(study.name, "runs") as bar:
                 table = run_study(
-                    study, folder, runs=runs or study.runs, seed=seed,
-                    methods=methods or None, jobs=processes, resume=resume, cluster=cluster,
+                    study,
+                    folder,
+                    runs=runs or study.runs,
+                    seed=seed,
+                    methods=methods or None,
+                    jobs=processes,
+                    resume=resume,
+                    cluster=cluster,
                     progress=bar,
-                )  # fmt: skip
+                )
         except KeyboardInterrupt:
             click.echo(f"finished runs are kept in {folder}: add --resume to go on", err=True)
             raise

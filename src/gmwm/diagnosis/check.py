@@ -1,68 +1,81 @@
-"""Examine a recording."""
+"""Examine a recording.
+
+Every check is one function: of a channel in `CHECKS`, of the whole recording in `OF_RECORDING`. To
+add one, write it in the file of what it looks for, name it in one of these, and describe its
+notices in `gmwm.issues`.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
 import numpy.typing as npt
 
 from gmwm._core.jobs import one_blas_thread, shared
-from gmwm._core.notices import Notice, Severity, worst_first
-from gmwm._core.text import per_cent
-from gmwm._core.typing import BoolArray, FloatArray, Progress, known_of
+from gmwm._core.spool import release
+from gmwm._core.typing import Progress, known_of
 from gmwm.diagnosis import tuning
-from gmwm.diagnosis.contamination import (
-    Tails,
-    contamination,
-    contamination_notice,
-    heavy_tails,
-    tails_notice,
-)
-from gmwm.diagnosis.drift import drift_notice, variance_notice
-from gmwm.diagnosis.events import event_notice, find_events, with_single_outliers
-from gmwm.diagnosis.innovations import Innovations, Signal, innovations
-from gmwm.diagnosis.motion import Motion, find_motion, motion_notices
+from gmwm.diagnosis.channel import Examined
+from gmwm.diagnosis.copies import Copy, copied_rows, find_copies
+from gmwm.diagnosis.drift import drift, variance
+from gmwm.diagnosis.events import event, find_events, with_single_outliers
+from gmwm.diagnosis.health import ChannelHealth, Health
+from gmwm.diagnosis.innovations import innovations
+from gmwm.diagnosis.motion import Motion, find_motion, moves
 from gmwm.diagnosis.pairs import crosstalk_notices, temperature_notices
-from gmwm.diagnosis.resolution import rounding_notice, step_size, widest_step
-from gmwm.diagnosis.result import ChannelHealth, Health
-from gmwm.diagnosis.samples import (
-    abrupt_end_notice,
-    dead_notice,
-    gap_notices,
-    length_notice,
-    repeated_value_notice,
-    saturation_notice,
-    stuck_notice,
-)
-from gmwm.diagnosis.spectral import line_notices, peaks, resonance_notice
-from gmwm.diagnosis.still import vibration_notice
-from gmwm.diagnosis.unmeasured import (
-    Copy,
-    copies_notice,
-    find_copies,
-    held_notice,
-    held_share,
+from gmwm.diagnosis.repeats import (
+    held_or_stuck,
+    held_samples,
     interpolation_notice,
-    leaves_runs,
     repetition,
     repetition_notice,
     thinned,
 )
+from gmwm.diagnosis.resolution import rounding, step_size, widest_step
+from gmwm.diagnosis.resonances import peaks, spectral_notices
+from gmwm.diagnosis.samples import (
+    cut_off_or_abrupt_end,
+    dead_notice,
+    gap_notices,
+    length,
+    repeated_value,
+)
+from gmwm.diagnosis.still import vibration
+from gmwm.diagnosis.tails import contamination, heavy_tails, outliers_or_tails
+from gmwm.issues import Notice, Severity, notice, worst_first
 from gmwm.readers import Channel, Recording, require_recording
 
-_SEVERE = ("warning", "bad")
+
+def clock(recording: Recording) -> Iterator[Notice]:
+    """Say that time stamps come unevenly; for small jitter the notice of the reader is enough."""
+    jitter = recording.jitter
+    if jitter is not None and jitter >= tuning.JITTER:
+        severity: Severity = "warning" if jitter > tuning.LARGE_JITTER else "note"
+        yield notice("clock", "", {"jitter": jitter}, severity=severity)
+
+
+OF_RECORDING: tuple[Callable[[Recording], Iterator[Notice]], ...] = (
+    length, moves, clock, copied_rows, vibration,
+)  # fmt: skip
+"""Checks of a whole recording of one rate."""
+
+CHECKS: tuple[Callable[[Examined], Iterator[Notice]], ...] = (
+    held_or_stuck, cut_off_or_abrupt_end, repeated_value, event, outliers_or_tails, rounding,
+    variance, drift,
+)  # fmt: skip
+"""Checks of a channel; those of its spectrum come last (`spectral_notices`)."""
 
 
 @dataclass(frozen=True, eq=False)
-class _Examined:
-    """A channel: its notices, its numbers, and its prediction errors in standard deviations."""
+class _Found:
+    """What was found of a channel, and its prediction errors in standard deviations."""
 
     notices: list[Notice]
-    facts: ChannelHealth
-    errors: npt.NDArray[np.float32] | None
+    facts: ChannelHealth = field(default_factory=ChannelHealth)
+    errors: npt.NDArray[np.float32] | None = None
 
 
 @one_blas_thread()
@@ -99,120 +112,87 @@ def health(recording: Recording, *, progress: Progress | None = None) -> Health:
     require_recording(recording)
     parts = recording.by_rate()
     if len(parts) > 1:
-        return _together(recording, [health(part, progress=progress) for part in parts])
+        return _joined(recording, [health(part, progress=progress) for part in parts])
     # What is missing is counted anew, channel by channel.
-    read = [notice for notice in recording.notices if notice.code != "missing-samples"]
-    motion = find_motion(recording)
-    whole = [
-        length_notice(recording.n, recording.rate),
-        *motion_notices(motion),
-        *read,
-        *_clock(recording),
-    ]
-    copies = find_copies(recording)
-    if (again := copies_notice(copies, recording.dt)) is not None:
-        whole.append(again)
-    if not motion.moves and (vibration := vibration_notice(recording)) is not None:
-        whole.append(vibration)
-    examined: dict[str, _Examined] = {}
+    notices = [one for one in recording.notices if one.code != "missing-samples"]
+    notices += [one for check in OF_RECORDING for one in check(recording)]
+    found = _channels_found(recording, progress)
+    between = gap_notices(recording.inertial, recording.dt)
+    between += crosstalk_notices(
+        {name: one.errors for name, one in found.items() if one.errors is not None}
+    )
+    between += temperature_notices(recording)
+    notices = worst_first(notices + [one for one in between if not one.where])
+    is_static = not find_motion(recording).moves
+    for name, one in found.items():
+        own = one.notices + [each for each in between if each.where == name]
+        if is_static and not any(each.severity in ("warning", "bad") for each in own):
+            own.append(notice("clean", name))
+        notices += worst_first(own)
+    facts = {name: one.facts for name, one in found.items()}
+    return Health(tuple(notices), facts, recording.source, recording.rate, recording.n)
+
+
+def _joined(recording: Recording, found: Sequence[Health]) -> Health:
+    """Join what was found of sensors with rates of their own."""
+    notices: list[Notice] = []
+    for one in found:
+        notices += [each for each in one.notices if each not in notices]
+    whole = worst_first([each for each in notices if not each.where])
+    own = [each for each in notices if each.where]
+    facts = {name: channel for one in found for name, channel in one.channels.items()}
+    in_order = {channel.name: facts[channel.name] for channel in recording.inertial}
+    return Health((*whole, *own), in_order, recording.source, recording.rate, recording.n)
+
+
+def _channels_found(recording: Recording, progress: Progress | None) -> dict[str, _Found]:
+    """Examine the channels side by side."""
     channels = recording.inertial
+    found: dict[str, _Found] = {}
 
     def begun() -> Iterator[Channel]:
         for channel in channels:
             if progress is not None:
-                progress(len(examined), len(channels), channel.name)
+                progress(len(found), len(channels), channel.name)
             yield channel
 
-    for channel, one in shared(partial(_once, copies=copies, motion=motion), begun()):
-        examined[channel.name] = one
-    examined = {channel.name: examined[channel.name] for channel in channels}
+    work = partial(_without_copies, copies=find_copies(recording), motion=find_motion(recording))
+    for channel, one in shared(work, begun()):
+        found[channel.name] = one
+        release(channel.values)
     if progress is not None:
         progress(len(channels), len(channels), "")
-    between = gap_notices(channels, recording.dt)
-    between += crosstalk_notices(
-        {name: one.errors for name, one in examined.items() if one.errors is not None}
-    )
-    between += temperature_notices(recording)
-    notices = worst_first(whole + [found for found in between if not found.where])
-    for name, one in examined.items():
-        own = one.notices + [found for found in between if found.where == name]
-        if not motion.moves and not any(found.severity in _SEVERE for found in own):
-            own.append(_clean(name))
-        notices += worst_first(own)
-    return Health(
-        notices=tuple(notices),
-        channels={name: one.facts for name, one in examined.items()},
-        source=recording.source,
-        rate=recording.rate,
-        n=recording.n,
-    )
+    return {channel.name: found[channel.name] for channel in channels}
 
 
-def _together(recording: Recording, found: Sequence[Health]) -> Health:
-    """Of sensors with rates of their own, each examined for itself."""
-    notices: list[Notice] = []
-    for one in found:
-        notices += [notice for notice in one.notices if notice not in notices]
-    whole = worst_first([notice for notice in notices if not notice.where])
-    facts = {name: channel for one in found for name, channel in one.channels.items()}
-    return Health(
-        notices=(*whole, *(notice for notice in notices if notice.where)),
-        channels={channel.name: facts[channel.name] for channel in recording.inertial},
-        source=recording.source,
-        rate=recording.rate,
-        n=recording.n,
-    )
-
-
-def _clock(recording: Recording) -> list[Notice]:
-    """Time stamps that come unevenly; for small jitter the notice of the reader is enough."""
-    jitter = recording.jitter
-    if jitter is None or jitter < tuning.JITTER:
-        return []
-    severity: Severity = "warning" if jitter > tuning.LARGE_JITTER else "note"
-    text = f"the steps of the time stamps vary by {per_cent(jitter)} rms"
-    hint = "harmless if only the stamps are late; else let the sensor's own clock trigger it"
-    return [Notice("clock", severity, "", text, {"jitter": jitter}, hint)]
-
-
-def _clean(name: str) -> Notice:
-    text = "nothing found that spoils the estimates"
-    return Notice("clean", "good", name, text)
-
-
-def _once(channel: Channel, copies: Sequence[Copy], motion: Motion) -> _Examined:
-    """A channel without rows that are copies, which are to be left out."""
+def _without_copies(channel: Channel, copies: Sequence[Copy], motion: Motion) -> _Found:
+    """Examine a channel without rows that are copies, which are left out like events."""
     if not copies:
-        return _unrepeated(channel, motion)
+        return _at_own_rate(channel, motion)
     values = np.array(channel.values, dtype=float)
     for each in copies:
         values[each.start : each.stop] = np.nan
-    one = _unrepeated(replace(channel, values=values), motion)
-    spans = [*one.facts.events, *((each.start, each.stop) for each in copies)]
-    return replace(one, facts=replace(one.facts, events=_united(spans)))
-
-
-def _united(spans: Sequence[tuple[int, int]]) -> tuple[tuple[int, int], ...]:
-    found: list[tuple[int, int]] = []
-    for start, stop in sorted(spans):
-        if found and start <= found[-1][1]:
-            start, before = found.pop()
+    one = _at_own_rate(replace(channel, values=values), motion)
+    united: list[tuple[int, int]] = []
+    for start, stop in sorted([*one.facts.events, *((each.start, each.stop) for each in copies)]):
+        if united and start <= united[-1][1]:
+            start, before = united.pop()
             stop = max(stop, before)
-        found.append((start, stop))
-    return tuple(found)
+        united.append((start, stop))
+    return replace(one, facts=replace(one.facts, events=tuple(united)))
 
 
-def _unrepeated(channel: Channel, motion: Motion) -> _Examined:
-    """A channel at its own rate, if each sample of it is written several times."""
+def _at_own_rate(channel: Channel, motion: Motion) -> _Found:
+    """Examine a channel at its own rate, where each sample is written several times."""
     found = repetition(channel)
-    straight = interpolation_notice(channel) if found is None and channel.is_of_a_sensor else None
-    if straight is not None:
-        if straight.code == "interpolated":
-            return _Examined([straight], ChannelHealth(), None)
-        some = _examined(channel, motion)
-        return replace(some, notices=[straight, *some.notices])
     if found is None:
-        return _examined(channel, motion)
+        straight = interpolation_notice(channel) if channel.is_of_a_sensor else None
+        if straight is None:
+            return _examined(channel, motion)
+        if straight.code == "interpolated":
+            return _Found([straight])
+        one = _examined(channel, motion)
+        return replace(one, notices=[straight, *one.notices])
     one = _examined(thinned(channel, found), motion)
     events = tuple(
         (found.first + start * found.times, min(found.first + stop * found.times, channel.n))
@@ -220,111 +200,104 @@ def _unrepeated(channel: Channel, motion: Motion) -> _Examined:
     )
     facts = replace(one.facts, events=events, repetition=found, held=0.0)
     # Its prediction errors have no partners of the same time in other channels.
-    return _Examined([repetition_notice(channel, found), *one.notices], facts, None)
+    return _Found([repetition_notice(channel, found), *one.notices], facts)
 
 
-def _examined(channel: Channel, motion: Motion) -> _Examined:
-    name, unit, dt = channel.name, channel.unit, channel.dt
+def _examined(channel: Channel, motion: Motion) -> _Found:
+    """Run all checks of a channel."""
     values = np.asarray(channel.values, dtype=float)
-    dead = dead_notice(channel)
-    if dead is not None or channel.missing == channel.n:
-        return _Examined([dead] if dead else [], ChannelHealth(), None)
+    if channel.missing == channel.n:
+        return _Found([])
     unusable = _unusable(channel)
     if unusable is not None:
-        return _Examined([unusable], ChannelHealth(), None)
+        return _Found([unusable])
     present = known_of(values)
     smallest = step_size(present)
     step = widest_step(present, smallest)
-    errors = innovations(values, step)
-    if errors is None:
-        text = f"fewer than {tuning.FEWEST_KNOWN} samples in a row, too few for any other check"
-        short = Notice("length", "warning", name, text, hint="record longer")
-        return _Examined([short], ChannelHealth(lsb=step), None)
-    events, outliers, tails = _events(errors, values, step)
-    events = motion.joined(events, dt)
-    usable = errors.known.copy()
-    quiet = values.copy() if events else values
-    for start, stop in events:
-        usable[start:stop] = False
-        quiet[start:stop] = np.nan
-    # Where steps are wide in a part of the values, neighbours are equal by chance in that part.
-    held, chance = (
-        held_share(values, step, errors.level)
-        if step == smallest or 2.0 * step < errors.level
-        else (0.0, 0.0)
-    )
-    signal = Signal(name, unit, dt, step, errors.level)
-    stuck = stuck_notice(signal, values, errors)
-    if stuck is not None and 2.0 * stuck.values["samples"] > held * present.size:
-        held = 0.0  # most of what is held is held in a few places
-    is_even = held > 0.0 and not leaves_runs(values)
-    noise = known_of(quiet)
-    found = [
-        held_notice(name, held, chance, is_even=is_even) if held > 0.0 else stuck,
-        saturation_notice(signal, present, noise) or abrupt_end_notice(signal, noise),
-        repeated_value_notice(signal, present),
-        event_notice(signal, values, motion.outside(events, dt)),
-        contamination_notice(name, outliers),
-        tails_notice(name, errors, tails),
-        rounding_notice(signal, noise, smallest),
-        variance_notice(signal, errors, usable, is_heavy=tails is not None),
-        drift_notice(signal, quiet),
-    ]
-    notices = [one for one in found if one is not None]
-    standardized = _standardized(errors, usable)
-    level = errors.level
-    del present, noise, errors  # the spectrum needs as much memory
-    lines, bumps = peaks(quiet, dt)
+    del present
+    examined = _with_errors(channel, values, step, smallest, motion)
+    if examined is None:
+        few = notice("length", channel.name, severity="warning", variant="few",
+                     hint="record longer", fewest=tuning.FEWEST_KNOWN)  # fmt: skip
+        return _Found([few], ChannelHealth(lsb=step))
+    notices = [one for check in CHECKS for one in check(examined)]
+    held, events, level = examined.held, examined.events, examined.scatter
+    outliers, quiet = examined.outliers, examined.quiet
+    standardized = _standardized(examined)
+    del examined  # the spectrum needs as much memory
+    lines, bumps = peaks(quiet, channel.dt)
     if any(one.code == "rounding" and one.severity == "bad" for one in notices):
         bumps = ()  # steps that come and go as the level passes them make bumps of their own
-    notices += line_notices(name, unit, lines)
-    notices += [resonance_notice(name, unit, bump) for bump in bumps]
+    notices += spectral_notices(channel.name, channel.unit, lines, bumps)
     facts = ChannelHealth(
         lines=tuple((line.frequency, line.amplitude) for line in lines),
         resonances=tuple((bump.frequency, bump.damping) for bump in bumps),
         events=events,
         lsb=step,
         outliers=outliers,
-        held=held if chance <= tuning.CHANCE_OF_HELD and not is_even else 0.0,
+        held=held.share if held.chance <= tuning.CHANCE_OF_HELD and not held.is_even else 0.0,
         noise=level,
     )
-    return _Examined(notices, facts, standardized)
+    return _Found(notices, facts, standardized)
 
 
 def _unusable(channel: Channel) -> Notice | None:
-    """Why there is nothing to examine in a channel, if so."""
-    name, unit = channel.name, channel.unit
+    """Say why there is nothing to examine in a channel, if so."""
+    dead = dead_notice(channel)
+    if dead is not None:
+        return dead
     infinite = int(np.count_nonzero(np.isinf(channel.values)))
     if infinite:
-        text = f"{infinite:,} infinite samples"
-        return Notice(
-            "infinite", "bad", name, text, hint="repair them, or set them to NaN for missing"
-        )
+        return notice("infinite", channel.name, count=infinite)
     if not channel.is_of_a_sensor:
-        text = f"varies by {channel.spread:.1g} {unit}, as no sensor does"
-        return Notice("size", "bad", name, text, {"spread": channel.spread}, "check the unit")
+        return notice("size", channel.name, {"spread": channel.spread}, unit=channel.unit)
     return None
 
 
-def _events(
-    errors: Innovations, values: FloatArray, step: float
-) -> tuple[tuple[tuple[int, int], ...], float, Tails | None]:
-    """Shocks and spikes, the share of outliers all over the record, and tails if heavy."""
+def _with_errors(
+    channel: Channel, values: npt.NDArray[np.float64], step: float, smallest: float, motion: Motion
+) -> Examined | None:
+    """A channel with its prediction errors, events and outliers; None if it is too short."""
+    errors = innovations(values, step)
+    if errors is None:
+        return None
     events = find_events(errors)
     outliers = contamination(errors, events)
     tails = heavy_tails(errors) if outliers > 0.0 else None
     if tails is not None:
-        return find_events(errors, tails), 0.0, tails
-    if outliers > 0.0:
+        events, outliers = find_events(errors, tails), 0.0
+    elif outliers > 0.0:
         events = with_single_outliers(events, errors, values, step)
-    return events, outliers, None
+    events = motion.joined(events, channel.dt)
+    usable, quiet = errors.known.copy(), values.copy() if events else values
+    for start, stop in events:
+        usable[start:stop] = False
+        quiet[start:stop] = np.nan
+    found = Examined(
+        name=channel.name,
+        unit=channel.unit,
+        dt=channel.dt,
+        values=values,
+        step=step,
+        smallest=smallest,
+        errors=errors,
+        events=events,
+        shocks=motion.outside(events, channel.dt),
+        outliers=outliers,
+        tails=tails,
+        usable=usable,
+        quiet=quiet,
+    )
+    return replace(found, held=held_samples(found))
 
 
-def _standardized(errors: Innovations, usable: BoolArray) -> npt.NDArray[np.float32] | None:
+def _standardized(channel: Examined) -> npt.NDArray[np.float32] | None:
+    """Prediction errors in standard deviations, clipped, 0 where there is none."""
+    errors = channel.errors
     if not errors.level > 0.0:
         return None
     result = np.where(errors.scale > 0.0, errors.scale, errors.level)
     np.divide(errors.values, result, out=result)
     np.clip(result, -tuning.CLIP, tuning.CLIP, out=result)
-    result[~usable] = 0.0
+    result[~channel.usable] = 0.0
     return result.astype(np.float32)  # those of all channels are kept

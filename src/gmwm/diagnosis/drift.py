@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from itertools import pairwise
 
 import numpy as np
 
 from gmwm._core.distributions import chi2, fisher, norm
-from gmwm._core.notices import Notice, Severity
-from gmwm._core.text import brief, per_cent, readable
-from gmwm._core.typing import BoolArray, FloatArray, inner
+from gmwm._core.text import brief, readable
+from gmwm._core.typing import FloatArray, inner
 from gmwm.diagnosis import tuning
-from gmwm.diagnosis.innovations import Innovations, Signal
+from gmwm.diagnosis.channel import Examined
+from gmwm.issues import Notice, Severity, notice
 
 
 def part_means(values: FloatArray, parts: int = tuning.PARTS, least: float = 0.5) -> FloatArray:
@@ -24,20 +25,18 @@ def part_means(values: FloatArray, parts: int = tuning.PARTS, least: float = 0.5
     return np.where(count > least * size, total / np.maximum(count, 1), np.nan)
 
 
-def drift_notice(signal: Signal, values: FloatArray) -> Notice | None:
+def drift(channel: Examined) -> Iterator[Notice]:
     """Say how far the level wanders, and whether it does so in one direction.
 
     The variance of the means of 64 parts is compared with what the differences between means of
     64 samples would give if all noise were white (F test). A straight line through the means is a
     drift only where a random walk would hardly have it: 99.9 % of random walks change by less than
     20 times the root mean square of what the line leaves (200,000 simulated).
-
-    values: (n,), samples, NaN where missing.
     """
-    name, unit, dt = signal.name, signal.unit, signal.dt
+    name, unit, values = channel.name, channel.unit, channel.quiet
     size = values.size // tuning.PARTS
     if size < 2 * tuning.SHORT_MEAN:
-        return None
+        return
     means = part_means(values)
     place = np.arange(tuning.PARTS) - 0.5 * (tuning.PARTS - 1)
     known = ~np.isnan(means)
@@ -45,7 +44,7 @@ def drift_notice(signal: Signal, values: FloatArray) -> Notice | None:
     steps = np.diff(short)
     steps = steps[~np.isnan(steps)]
     if np.count_nonzero(known) < tuning.PARTS / 2 or steps.size < tuning.PARTS:
-        return None
+        return
     means, place = means[known], place[known]
     place = place - np.mean(place)
     slope = float(place @ means / (place @ place))
@@ -55,75 +54,65 @@ def drift_notice(signal: Signal, values: FloatArray) -> Notice | None:
     # Differences of means that are not independent have two thirds of the degrees of freedom.
     white = float(np.sqrt(0.5 * np.mean(steps**2) * tuning.SHORT_MEAN / size))
     if not white > 0.0:
-        return None
+        return
     change = slope * tuning.PARTS
     ratio = wander / white
     ramp = abs(change) > tuning.RAMP * wander
     wanders = ratio**2 > fisher.isf(tuning.FALSE_ALARM, freedom, 2.0 / 3.0 * steps.size)
     if not (wanders or ramp):
-        return None
+        return
     numbers = {"wander": wander, "white": white, "change": change}
     if ramp:
-        return Notice(
-            "drift",
-            "warning",
-            name,
-            f"drifts by {readable(change, unit, sign=True)} over the record, and wanders about "
-            f"that by {readable(wander, unit)} rms",
-            numbers,
-            "add a RateRamp to the model, or leave out the warm-up",
+        shown = (readable(change, unit, sign=True), readable(wander, unit))
+        hint = "add a RateRamp to the model, or leave out the warm-up"
+        yield notice(
+            "drift", name, numbers, severity="warning", variant="ramp", hint=hint, shown=shown
         )
-    text = (
-        f"means of {size * dt:.3g} s wander by {readable(wander, unit)} rms, {brief(ratio)} times "
-        "what the fast noise leaves"
+        return
+    yield notice(
+        "drift",
+        name,
+        numbers,
+        length=size * channel.dt,
+        shown=readable(wander, unit),
+        times=brief(ratio),
     )
-    hint = "estimated as random walk or slow Gauss-Markov process"
-    return Notice("drift", "note", name, text, numbers, hint)
 
 
-def variance_notice(
-    signal: Signal, errors: Innovations, usable: BoolArray, *, is_heavy: bool = False
-) -> Notice | None:
+def variance(channel: Examined) -> Iterator[Notice]:
     """Say whether the noise is as large at the end as at the beginning, and all the time between.
 
     Squares of prediction errors are uncorrelated whatever the spectrum of the noise; their own
     variance gives the error of their means, so tails heavier than Gaussian do no harm.
-
-    usable: (n,) of bool, prediction errors outside events.
-    is_heavy: Whether the noise has heavy tails: the predictions after a large sample are worse
-        then.
     """
-    name, unit, dt = signal.name, signal.unit, signal.dt
-    if signal.step > 2.0 * errors.level:
-        return None  # noise below the step is seen only when the level is between two steps
-    found = _change_notice(name, dt, errors, usable)
-    values = _unsteadiness(dt, errors, usable, is_heavy)
+    if channel.step > 2.0 * channel.scatter:
+        return  # noise below the step is seen only when the level is between two steps
+    found = _change(channel)
+    values = _unsteadiness(channel)
     if values is None:
-        return found
-    low, high = (readable(values[each], unit) for each in ("quiet", "loud"))
-    text = (
-        f"the noise is not steady: {low} in the quiet and {high} in the loud tenth of parts of "
-        f"{values['part']:.3g} s, so that its mean is {per_cent(values['excess'])} above "
-        "that of the quiet quarter"
-    )
-    hint = "use a recording, or a part, without what vibrates"
-    if found is not None:
-        text, values = f"{found.text}; {text}", {**found.values, **values}
-    return Notice("variance", "bad", name, text, values, hint)
+        if found is not None:
+            yield found
+        return
+    low, high = (readable(values[each], channel.unit) for each in ("quiet", "loud"))
+    before = f"{found.text}; " if found is not None else ""
+    values = {**(found.values if found is not None else {}), **values}
+    yield notice("variance", channel.name, values, before=before, low=low, high=high)
 
 
-def _change_notice(name: str, dt: float, errors: Innovations, usable: BoolArray) -> Notice | None:
-    """Of the second half against the first, or of one tenth."""
+def _change(channel: Examined) -> Notice | None:
+    """Compare the second half with the first, and each tenth with the usual one."""
+    errors, usable = channel.errors, channel.usable
     if np.count_nonzero(usable) < 1000:
         return None
-    squares = [part[keep] ** 2 for part, keep in _tenths(errors.values, usable)]
+    edges = np.linspace(0, errors.values.size, tuning.TENTHS + 1).astype(int)
+    squares = [errors.values[a:b][usable[a:b]] ** 2 for a, b in pairwise(edges)]
     if min(part.size for part in squares) < 50:
         return None
     means = np.array([np.mean(part) for part in squares])
     spread = np.array([np.var(part) / part.size for part in squares])
     usual = float(np.median(means))
-    halves = np.split(np.arange(tuning.TENTHS), 2)
-    if min(np.count_nonzero(means[half]) for half in halves) < 2:
+    is_second = np.arange(tuning.TENTHS) >= tuning.TENTHS // 2
+    if min(np.count_nonzero(means[half]) for half in (is_second, ~is_second)) < 2:
         return None  # half of the record is predicted without any error
     loudest = int(np.argmax(means))
     jump = np.sqrt(means[loudest] / usual) - 1.0
@@ -131,12 +120,11 @@ def _change_notice(name: str, dt: float, errors: Innovations, usable: BoolArray)
     is_loud = jump > tuning.LARGE_CHANGE and means[loudest] / usual - 1.0 > tail
     # One loud tenth makes its half louder, which is not a trend.
     counted = np.arange(tuning.TENTHS) != loudest if is_loud else np.ones(tuning.TENTHS, dtype=bool)
-    first, first_error = _mean_of(
-        means, spread, counted & (np.arange(tuning.TENTHS) < tuning.TENTHS // 2)
-    )
-    second, second_error = _mean_of(
-        means, spread, counted & (np.arange(tuning.TENTHS) >= tuning.TENTHS // 2)
-    )
+    halves = (counted & ~is_second, counted & is_second)
+    first, second = (float(np.mean(means[half])) for half in halves)
+    errors_of_halves = [
+        float(np.sqrt(np.sum(spread[half])) / np.count_nonzero(half)) for half in halves
+    ]
     numbers = {
         "first_half": float(np.sqrt(first)),
         "second_half": float(np.sqrt(second)),
@@ -145,31 +133,39 @@ def _change_notice(name: str, dt: float, errors: Innovations, usable: BoolArray)
     }
     # On the logarithmic scale the ratio of two variances is nearly normal.
     error = norm.isf(0.5 * tuning.FALSE_ALARM) * np.hypot(
-        first_error / first, second_error / second
+        errors_of_halves[0] / first, errors_of_halves[1] / second
     )
     growth = np.sqrt(second / first) - 1.0
     if abs(np.log(second / first)) > error and abs(growth) > tuning.CHANGE:
         severity: Severity = "warning" if abs(growth) > tuning.LARGE_CHANGE else "note"
-        text = (
-            f"the noise is {per_cent(abs(growth))} "
-            f"{'larger' if growth > 0.0 else 'smaller'} in the second half than in the first"
-        )
         hint = "the model is an average: use the part that is like the use"
-        return Notice("variance", severity, name, text, numbers, hint)
-    if is_loud:
-        start = loudest * errors.values.size // tuning.TENTHS * dt
-        text = (
-            f"the noise is {per_cent(jump)} larger than usual in the tenth of the record "
-            f"that begins at {start:.4g} s"
+        return notice(
+            "variance",
+            channel.name,
+            numbers,
+            severity=severity,
+            variant="half",
+            hint=hint,
+            growth=abs(growth),
+            word="larger" if growth > 0.0 else "smaller",
         )
-        hint = "look for people or machines then, and leave it out if it is none of the sensor"
-        return Notice("variance", "warning", name, text, numbers, hint)
+    if is_loud:
+        start = loudest * errors.values.size // tuning.TENTHS * channel.dt
+        hint = "look for people or machines then, and leave it out if it is not the sensor"
+        return notice(
+            "variance",
+            channel.name,
+            numbers,
+            severity="warning",
+            variant="tenth",
+            hint=hint,
+            growth=jump,
+            start=start,
+        )
     return None
 
 
-def _unsteadiness(
-    dt: float, errors: Innovations, usable: BoolArray, is_heavy: bool
-) -> dict[str, float] | None:
+def _unsteadiness(channel: Examined) -> dict[str, float] | None:
     """By how much noise that comes and goes, or swells and dies, is above that of its quiet parts.
 
     Sizes of prediction errors, bounded so that tails do no harm, are averaged over parts of 64,
@@ -178,9 +174,10 @@ def _unsteadiness(
     16 samples, so that no memory of the sizes of a few samples counts. What the mean squares of
     the parts vary beyond the same of their own is the variance of the noise that changes.
     """
+    errors, usable = channel.errors, channel.usable
     size = errors.values[usable]
     np.abs(size, out=size)
-    memory = tuning.STEADY_MEAN * (tuning.STEADY_OF_TAILS if is_heavy else 1)
+    memory = tuning.STEADY_MEAN * (tuning.STEADY_OF_TAILS if channel.tails is not None else 1)
     lengths = 4 * memory * 4 ** np.arange(16)
     lengths = lengths[lengths * tuning.FEWEST_STEADY <= size.size]
     if not lengths.size or not errors.level > 0.0:
@@ -215,7 +212,7 @@ def _unsteadiness(
         if excess > found["excess"]:
             usual = float(np.sqrt(np.mean(size**2)))
             low, high = (usual * float(np.sqrt(each)) for each in (quiet, loud))
-            found = {"excess": excess, "quiet": low, "loud": high, "part": dt * length}
+            found = {"excess": excess, "quiet": low, "loud": high, "part": channel.dt * length}
     return found if "part" in found else None
 
 
@@ -227,14 +224,3 @@ def _long_run_variance(values: FloatArray, memory: int) -> float:
 def _means(values: FloatArray, length: int) -> FloatArray:
     """Of parts of a length."""
     return np.asarray(values[: values.size // length * length].reshape(-1, length).mean(axis=1))
-
-
-def _mean_of(means: FloatArray, spread: FloatArray, which: BoolArray) -> tuple[float, float]:
-    """Mean of some tenths and its standard error."""
-    count = np.count_nonzero(which)
-    return float(np.mean(means[which])), float(np.sqrt(np.sum(spread[which])) / count)
-
-
-def _tenths(values: FloatArray, usable: BoolArray) -> list[tuple[FloatArray, BoolArray]]:
-    edges = np.linspace(0, values.size, tuning.TENTHS + 1).astype(int)
-    return [(values[a:b], usable[a:b]) for a, b in pairwise(edges)]

@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from gmwm._core.distributions import norm
-from gmwm._core.notices import Notice, Severity
 from gmwm._core.text import readable
 from gmwm._core.typing import FloatArray
 from gmwm.diagnosis import tuning
-from gmwm.diagnosis.contamination import Tails
-from gmwm.diagnosis.innovations import Innovations, Signal, innovations, running_scale
+from gmwm.diagnosis.channel import Examined, Spans
+from gmwm.diagnosis.innovations import Innovations, innovations, running_scale
+from gmwm.diagnosis.tails import Tails
+from gmwm.issues import Notice, notice
 
 _LISTED = 3
 
 
-def find_events(errors: Innovations, tails: Tails | None = None) -> tuple[tuple[int, int], ...]:
+def find_events(errors: Innovations, tails: Tails | None = None) -> Spans:
     """Sample intervals in which prediction errors are too large for noise.
 
     An error is too large beyond the quantile of the law of the noise that it passes with
@@ -61,8 +64,8 @@ def _longest_chain(tails: Tails, known: int) -> float:
 
 
 def with_single_outliers(
-    events: tuple[tuple[int, int], ...], errors: Innovations, values: FloatArray, step: float
-) -> tuple[tuple[int, int], ...]:
+    events: Spans, errors: Innovations, values: FloatArray, step: float
+) -> Spans:
     """Events and, without any guard, outliers all over the record; of many, these alone.
 
     Predictions from an outlier are in error too. So the first that are left out are those farther
@@ -110,59 +113,61 @@ def _level(values: FloatArray) -> tuple[FloatArray, FloatArray]:
     return found[longest]
 
 
-def event_notice(
-    signal: Signal, values: FloatArray, events: tuple[tuple[int, int], ...]
-) -> Notice | None:
-    """Say when the events are, how large and how long.
-
-    values: (n,), samples, NaN where missing.
-    """
-    name, unit, dt, scatter = signal.name, signal.unit, signal.dt, signal.scatter
+def event(channel: Examined) -> Iterator[Notice]:
+    """Say when the events are, how large and how long."""
+    values, events = channel.values, channel.shocks
+    dt, scatter = channel.dt, channel.scatter
     if not events:
-        return None
+        return
     clean = np.array(values)
     for start, stop in events:
         clean[start:stop] = np.nan
     found = [_height(values, clean, *event) for event in events]
     heights = np.array([height for height, _ in found])
-    energy = sum(energy for _, energy in found)
     largest = int(np.argmax(np.abs(heights)))
     start, stop = events[largest]
     known = int(np.count_nonzero(~np.isnan(values)))
     # Squares of the noise are among those of the events.
-    samples = sum(stop - start for start, stop in events)
+    samples = sum(b - a for a, b in events)
+    energy = sum(each for _, each in found)
     share = max(energy / scatter**2 - samples, 0.0) / known if scatter > 0.0 else np.inf
-    # The variance of n samples is known to its (2/n)^(1/2)-th part.
-    harmful = share > np.sqrt(2.0 / known)
-    length = (stop - start) * dt
-    many = len(events) > 1
-    which = f"{len(events):,} spikes or shocks, the largest" if many else "a spike or shock"
-    height = readable(heights[largest], unit, sign=True)
-    text = f"{which} {height} at {start * dt:.6g} s, {length:.2g} s long"
-    if 1 < len(events) <= _LISTED + 1:
-        others = [f"{a * dt:.6g}" for i, (a, _) in enumerate(events) if i != largest]
-        text += f" (others at {', '.join(others)} s)"
-    hint = (
-        "gmwm calibrate leaves it out; in Python: Health.masked, or robust=True"
-        if harmful
-        else "too small to change the variance; Health.masked leaves it out"
-    )
-    severity: Severity = "warning" if harmful else "note"
-    if 2 * samples > known:
-        severity, hint = "bad", "look at what is done to them between the sensor and the file"
-        text = (
-            f"{samples / known:.2g} of the samples differ from what is before them as spikes do: "
-            "no noise of a sensor, but values that are held, switched or made otherwise"
-        )
     numbers = {
         "count": float(len(events)),
         "time": start * dt,
         "height": float(heights[largest]),
-        "duration": length,
+        "duration": (stop - start) * dt,
         "samples": float(samples),
         "variance_share": float(share),
     }
-    return Notice("event", severity, name, text, numbers, hint)
+    if 2 * samples > known:
+        hint = "look at what is done to them between the sensor and the file"
+        yield notice(
+            "event",
+            channel.name,
+            numbers,
+            severity="bad",
+            variant="most",
+            hint=hint,
+            part=samples / known,
+        )
+        return
+    others = ""
+    if 1 < len(events) <= _LISTED + 1:
+        times = ", ".join(f"{a * dt:.6g}" for i, (a, _) in enumerate(events) if i != largest)
+        others = f" (others at {times} s)"
+    # The variance of n samples is known to its (2/n)^(1/2)-th part.
+    is_harmful = share > np.sqrt(2.0 / known)
+    hint = "too small to change the variance; Health.masked leaves it out"
+    yield notice(
+        "event",
+        channel.name,
+        numbers,
+        severity="warning" if is_harmful else "note",
+        variant="many" if len(events) > 1 else "",
+        hint=None if is_harmful else hint,
+        shown=readable(heights[largest], channel.unit, sign=True),
+        others=others,
+    )
 
 
 def _height(values: FloatArray, clean: FloatArray, start: int, stop: int) -> tuple[float, float]:

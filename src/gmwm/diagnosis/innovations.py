@@ -22,23 +22,6 @@ _NORMAL_MAD = 1.482602  # standard deviation over median absolute value
 _ROUNDS = 20
 
 
-@dataclass(frozen=True)
-class Signal:
-    """What the checks of a channel know beside its samples.
-
-    name, unit: Of the channel.
-    dt: s.
-    step: To which samples are rounded, u; 0 if they are not.
-    scatter: Usual standard deviation of what cannot be predicted of a sample, u.
-    """
-
-    name: str
-    unit: str
-    dt: float = 1.0
-    step: float = 0.0
-    scatter: float = 0.0
-
-
 @dataclass(frozen=True, eq=False)
 class Innovations:
     """Prediction errors of a series.

@@ -8,11 +8,11 @@ import numpy as np
 import numpy.typing as npt
 
 from gmwm._core.distributions import norm, student
-from gmwm._core.notices import Notice, Severity
 from gmwm._core.text import readable
 from gmwm._core.typing import FloatArray, inner
 from gmwm.diagnosis import tuning
 from gmwm.diagnosis.drift import part_means
+from gmwm.issues import Notice, Severity, notice
 from gmwm.readers import Recording
 
 
@@ -37,16 +37,9 @@ def crosstalk_notices(errors: dict[str, npt.NDArray[np.float32]]) -> list[Notice
             continue
         if abs(r) > tuning.CORRELATED:
             severity: Severity = "warning" if abs(r) > tuning.STRONGLY_CORRELATED else "note"
-            notices.append(
-                Notice(
-                    "crosstalk",
-                    severity,
-                    "",
-                    f"fast noise of {one} and {other} is correlated by {r:.2g}",
-                    {"correlation": r, "samples": float(n), "channels": f"{one}, {other}"},
-                    "each channel is modelled for itself; a filter may want their covariance",
-                )
-            )
+            values = {"correlation": r, "samples": float(n), "channels": f"{one}, {other}"}
+            both = f"{one} and {other}"
+            notices.append(notice("crosstalk", "", values, severity=severity, both=both))
     return notices
 
 
@@ -72,13 +65,11 @@ def temperature_notices(recording: Recording) -> list[Notice]:
         ]
         if found:
             _, r, slope, thermometer = max(found, key=lambda one: one[0])
-            text = (
-                f"follows {thermometer.name} by {readable(slope, channel.unit)} per "
-                f"{thermometer.unit or 'unit'} (correlation {r:.2g})"
-            )
             values = {"correlation": r, "slope": slope}
-            hint = "compensate for it first, or slow terms of the model will stand for it"
-            notices.append(Notice("temperature", "warning", channel.name, text, values, hint))
+            per = f"{readable(slope, channel.unit)} per {thermometer.unit or 'unit'}"
+            notices.append(
+                notice("temperature", channel.name, values, name=thermometer.name, per=per)
+            )
     return notices
 
 

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from gmwm._core.distributions import norm
-from gmwm._core.notices import Notice, Severity
-from gmwm._core.text import brief, per_cent, readable
+from gmwm._core.text import brief, readable
 from gmwm._core.typing import FloatArray, inner
 from gmwm.diagnosis import tuning
-from gmwm.diagnosis.innovations import Signal
+from gmwm.diagnosis.channel import Examined
+from gmwm.issues import Notice, Severity, notice
 
 _SMALLEST = 1e-9  # of the range: what is smaller is the rounding of floating point
 
@@ -115,47 +117,38 @@ def is_coarse(values: FloatArray, step: float) -> bool:
     return bool(beyond < 2.0 * norm.sf(tuning.COARSE) * places.size)
 
 
-def rounding_notice(
-    signal: Signal, samples: FloatArray | None = None, smallest: float = 0.0
-) -> Notice | None:
+def rounding(channel: Examined) -> Iterator[Notice]:
     """Say how coarse the step is against the white noise.
 
     The error of rounding is uniform, white and independent of the signal as long as the noise
     before rounding is not much below half a step (Widrow & Kollar, *Quantization Noise*, 2008,
     sec. 5): of variance step^2/12, plain additive noise.
-
-    samples: (n,), for `is_coarse`.
-    smallest: Step of the smallest values, u, if they have one of their own.
     """
-    name, unit, step = signal.name, signal.unit, signal.step
+    unit, step, smallest = channel.unit, channel.step, channel.smallest
     if step == 0.0:
-        return None
-    noise = float(np.sqrt(max(signal.scatter**2 - step**2 / 12.0, 0.0)))
-    values = {"lsb": step, "noise": noise}
-    text = f"samples come in steps of {readable(step, unit)}"
+        return
+    noise = float(np.sqrt(max(channel.scatter**2 - step**2 / 12.0, 0.0)))
+    shown = readable(step, unit)
     if 0.0 < smallest < step:
-        text += f" ({readable(smallest, unit)} where they are smaller)"
-    if noise < step / tuning.COARSE or (samples is not None and is_coarse(samples, step)):
-        return Notice(
-            "rounding",
-            "bad",
-            name,
-            f"{text}, more than three times the noise below them",
-            values,
-            "the noise below the step cannot be estimated; use a finer range",
-        )
-    ratio = step / noise
-    text = f"{text}, {brief(ratio)} times the white noise of {readable(noise, unit)}"
-    if ratio > 1.0:
-        return Notice(
-            "rounding",
-            "warning",
-            name,
-            text,
-            values,
-            "counted as additive noise, which is nearly true up to a step of twice the noise",
-        )
-    severity: Severity = "note" if ratio > 0.5 else "good"
-    share = step**2 / 12.0 / (noise**2 + step**2 / 12.0)
-    hint = f"counted as white noise: {per_cent(share)} of it"
-    return Notice("rounding", severity, name, text, values, hint)
+        shown += f" ({readable(smallest, unit)} where they are smaller)"
+    coarse = noise < step / tuning.COARSE or is_coarse(channel.noise, step)
+    ratio = step / noise if noise > 0.0 else np.inf
+    severity: Severity = (
+        "bad" if coarse else "warning" if ratio > 1.0 else "note" if ratio > 0.5 else "good"
+    )
+    hint = {
+        "bad": "the noise below the step cannot be estimated; use a finer range",
+        "warning": "rounding is treated as white noise: true for steps up to twice the noise",
+    }.get(severity, "rounding is treated as white noise: {added:.2g%} of it")
+    yield notice(
+        "rounding",
+        channel.name,
+        {"lsb": step, "noise": noise},
+        severity=severity,
+        variant="coarse" if coarse else "",
+        hint=hint,
+        step=shown,
+        times=brief(ratio),
+        shown=readable(noise, unit),
+        added=step**2 / 12.0 / (noise**2 + step**2 / 12.0),
+    )

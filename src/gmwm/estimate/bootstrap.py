@@ -8,26 +8,23 @@ the record.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar, Self
+from typing import ClassVar
 
 import numpy as np
 
 from gmwm._core import checks
-from gmwm._core.documents import Document
+from gmwm._core.documents import Array, Document, Text
 from gmwm._core.frozen import freeze
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.estimate.entrance import estimate
 from gmwm.estimate.moments import GMWM, Design, Profile, Weights, search
 from gmwm.estimate.problem import Scales, drift_key, shape_of
-from gmwm.estimate.result import Fit, plain
+from gmwm.estimate.result import Fit
 from gmwm.process import Model, Process, as_model
 from gmwm.variance import PooledVariance
-
-if TYPE_CHECKING:
-    from gmwm._core.forms import Form
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,8 +41,8 @@ class Bootstrap(Document):
 
     SCHEMA: ClassVar[str] = "gmwm.bootstrap"
 
-    keys: tuple[str, ...]
-    draws: FloatArray
+    keys: tuple[Text, ...]
+    draws: Array
 
     def __post_init__(self) -> None:
         freeze(self, "draws")
@@ -53,21 +50,11 @@ class Bootstrap(Document):
     def __repr__(self) -> str:
         return f"<Bootstrap of {', '.join(self.keys)}, {len(self.draws)} draws>"
 
-    def content(self) -> dict[str, Any]:
-        """What it cannot be rebuilt without, in JSON types."""
-        draws = [[plain(value) for value in row] for row in self.draws.tolist()]
-        return {"keys": list(self.keys), "draws": draws}
-
-    @classmethod
-    def document_form(cls) -> type[Form]:
-        from gmwm.estimate.form import BootstrapForm
-
-        return BootstrapForm
-
-    @classmethod
-    def from_content(cls, content: Mapping[str, Any]) -> Self:
-        """Inverse of `content`."""
-        return cls(tuple(content["keys"]), np.array(content["draws"], dtype=float))
+    def check_content(self) -> None:
+        if not self.keys or self.draws.shape != (len(self.draws), len(self.keys)):
+            raise ValueError("draws are not one value a key")
+        if len(self.draws) < 2:
+            raise ValueError("there are fewer than two draws")
 
     @property
     def stderr(self) -> dict[str, float]:

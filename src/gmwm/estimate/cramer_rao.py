@@ -1,16 +1,24 @@
-"""Lower bounds on the covariance of estimates: of any, and of those by wavelet variances."""
+"""Lower bounds on the covariance of estimates: of any estimates, and from wavelet variances."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar, Self
+from typing import Annotated, ClassVar, NamedTuple
 
 import numpy as np
+from pydantic import Field
 
 from gmwm._core import checks
 from gmwm._core.compiled import compiled
-from gmwm._core.documents import Document
+from gmwm._core.documents import (
+    Array,
+    Document,
+    Interval,
+    Samples,
+    Text,
+    check_covariance,
+)
 from gmwm._core.frozen import freeze
 from gmwm._core.text import per_cent, wrapped
 from gmwm._core.typing import FloatArray
@@ -18,6 +26,7 @@ from gmwm.errors import InputError
 from gmwm.estimate.likelihood import (
     Columns,
     Regression,
+    arrays_of,
     filtered,
     regular_inverse,
     stacked,
@@ -37,13 +46,9 @@ from gmwm.process import (
     Process,
     StateSpace,
     as_model,
-    model_from_list,
 )
 from gmwm.variance import MIN_SAMPLES
 from gmwm.variance.covariance import dyadic_levels, haar_covariance, mean_covariance
-
-if TYPE_CHECKING:
-    from gmwm._core.forms import Form
 
 _MOST_WORK = 1e9  # multiplications of the exact recursion, some seconds
 _VAGUE = 1e6  # variance of the unknown constant, in variances of the series
@@ -77,11 +82,11 @@ class CramerRao(Document):
     SCHEMA: ClassVar[str] = "gmwm.cramer-rao"
 
     model: Model
-    n: int
-    dt: float
-    keys: tuple[str, ...]
-    covariance: FloatArray
-    wavelet_covariance: FloatArray
+    n: Samples
+    dt: Annotated[Interval, Field(validation_alias="dt_s", serialization_alias="dt_s")]
+    keys: tuple[Text, ...]
+    covariance: Array
+    wavelet_covariance: Array
     exact: bool
 
     def __post_init__(self) -> None:
@@ -90,40 +95,11 @@ class CramerRao(Document):
     def __repr__(self) -> str:
         return f"<CramerRao of {self.model!r}, n = {self.n:,}, dt = {self.dt:g} s>"
 
-    def content(self) -> dict[str, Any]:
-        """What it cannot be rebuilt without, in JSON types."""
-        return {
-            "model": [term.to_dict() for term in self.model.terms],
-            "n": self.n,
-            "dt_s": self.dt,
-            "keys": list(self.keys),
-            "covariance": self.covariance.tolist(),
-            "wavelet_covariance": self.wavelet_covariance.tolist(),
-            "exact": self.exact,
-        }
-
-    @classmethod
-    def document_form(cls) -> type[Form]:
-        from gmwm.estimate.form import CramerRaoForm
-
-        return CramerRaoForm
-
-    @classmethod
-    def from_content(cls, content: Mapping[str, Any]) -> Self:
-        """Inverse of `content`."""
-        keys, model = tuple(content["keys"]), model_from_list(content["model"])
-        if not {*keys} <= {*model.params}:
-            raise InputError(f"its keys are not those of its model {model!r}")
-        shape = (len(keys), len(keys))
-        return cls(
-            model=model,
-            n=content["n"],
-            dt=content["dt_s"],
-            keys=keys,
-            covariance=np.array(content["covariance"], dtype=float).reshape(shape),
-            wavelet_covariance=np.array(content["wavelet_covariance"], dtype=float).reshape(shape),
-            exact=content["exact"],
-        )
+    def check_content(self) -> None:
+        if not {*self.keys} <= {*self.model.params}:
+            raise ValueError(f"keys are not those of the model {self.model!r}")
+        check_covariance(self.covariance.tolist(), len(self.keys))
+        check_covariance(self.wavelet_covariance.tolist(), len(self.keys), "wavelet_covariance")
 
     @property
     def stderr(self) -> dict[str, float]:
@@ -208,10 +184,13 @@ def cramer_rao(model: Process | Model, n: int, dt: float) -> CramerRao:
         information = _exact_information(coordinates, processes, n, dt)
     else:
         information = spectral_information(coordinates, processes, n, dt)
-    try:
-        slope = _slope(model, processes, n, dt)
-    except MemoryError:
-        raise InputError(f"n = {n:,}: too long for the bound of a ramp, give less") from None
+    ramp = next((term for term in model.terms if term.is_drift), None)
+    slope = None
+    if ramp is not None:
+        try:
+            slope = Slope(ramp.drift_rate(), _slope_variance(processes, n, dt))
+        except MemoryError:
+            raise InputError(f"n = {n:,}: too long for the bound of a ramp, give less") from None
     moments = _held_to(information, _wavelet_information(coordinates, processes, n, dt, slope))
     transform = coordinates.jacobian(processes)
     keys = coordinates.fitted(processes)[1]
@@ -249,16 +228,8 @@ def _is_short(coordinates: Coordinates, processes: Sequence[Process], n: int, dt
     return n * (states * (1 + len(coordinates.owners))) ** 3 <= _MOST_WORK
 
 
-def _slope(model: Model, processes: Sequence[Process], n: int, dt: float) -> Slope | None:
-    """The ramp's slope with the variance of its generalized least-squares estimate."""
-    ramps = [term for term in model.terms if term.is_drift]
-    if not ramps:
-        return None
-    return Slope(ramps[0].drift_rate(), _slope_variance(processes, n, dt))
-
-
 def _slope_variance(processes: Sequence[Process], n: int, dt: float) -> float:
-    """Of the generalized least-squares slope, (u/s)^2."""
+    """Variance of the generalized least-squares slope, (u/s)^2."""
     columns = Columns(np.zeros(n), dt, None, True)
     innovations, _, _ = whitened(columns, processes)
     return columns.slope(Regression.of(innovations.T @ innovations))[1]
@@ -300,10 +271,10 @@ def _wavelet_information(
 
 
 def _held_to(most: FloatArray, information: FloatArray) -> FloatArray:
-    """The information less what of it exceeds ``most`` in any direction, (d, d).
+    """The information, limited in every direction to ``most``, (d, d).
 
-    A statistic knows no more than the series, which approximate covariances of coarse levels do
-    not heed.
+    A statistic knows no more than the series, but approximate covariances of coarse levels can
+    claim more.
     """
     root = np.linalg.cholesky(regular_inverse(most))
     values, vectors = np.linalg.eigh(root.T @ information @ root)
@@ -321,37 +292,22 @@ def _exact_information(
     """
     z = coordinates.pack(processes)
     level = float(np.mean(stacked(processes, dt).output_variance(min(n, 256))))
+    # The unknown constant is the last state.
+    constant = StateSpace.scalar("constant", 1.0, 0.0, level * _VAGUE)
 
-    def run(at: FloatArray) -> tuple[StateSpace, FloatArray, FloatArray]:
-        space = _with_constant(stacked(coordinates.processes(at, processes), dt), level * _VAGUE)
-        p = space.n_states
-        _, _, gain, _, variance = filtered(
-            space.transition, space.process_noise, space.output, space.measurement_noise,
-            space.initial_covariance, np.zeros((n, 1)), np.zeros((1, p)), np.zeros((1, p)),
-        )  # fmt: skip
-        return space, gain, variance
+    def run(at: FloatArray) -> _Recursion:
+        own = stacked(coordinates.processes(at, processes), dt)
+        space = StateSpace.stack([own, constant])
+        nothing = np.zeros((1, space.n_states))
+        found = filtered(arrays_of(space), np.zeros((n, 1)), nothing, nothing)
+        return _Recursion(space.transition, space.output, found.gains, found.variances)
 
-    space, gain, variance = run(z)
     slopes = []
     for k in range(z.size):
         up, down = (run(z + step) for step in _steps(z.size, k))
-        slopes.append(
-            [
-                (a - b) / (2.0 * _STEP)
-                for a, b in (
-                    (up[0].transition, down[0].transition),
-                    (up[0].output, down[0].output),
-                    (up[1], down[1]),
-                    (up[2], down[2]),
-                )
-            ]
-        )
-    d_transition, d_output, d_gain, d_variance = (
-        np.stack(part) for part in zip(*slopes, strict=True)
-    )
-    return _accumulate(
-        space.transition, space.output, gain, variance, d_transition, d_output, d_gain, d_variance
-    )
+        slopes.append([(a - b) / (2.0 * _STEP) for a, b in zip(up, down, strict=True)])
+    derivatives = _Recursion(*(np.stack(part) for part in zip(*slopes, strict=True)))
+    return np.asarray(_accumulate(run(z), derivatives))
 
 
 def _steps(size: int, k: int) -> tuple[FloatArray, FloatArray]:
@@ -360,27 +316,24 @@ def _steps(size: int, k: int) -> tuple[FloatArray, FloatArray]:
     return step, -step
 
 
-def _with_constant(space: StateSpace, variance: float) -> StateSpace:
-    """The state space with an unknown constant as its last state."""
-    return StateSpace.stack([space, StateSpace.scalar("constant", 1.0, 0.0, variance)])
+class _Recursion(NamedTuple):
+    """Transition (p, p), output (p,), gains (n, p) and variances (n,) of a Kalman filter."""
+
+    F: FloatArray
+    h: FloatArray
+    G: FloatArray
+    s: FloatArray
 
 
 @compiled()
-def _accumulate(
-    F: FloatArray,
-    h: FloatArray,
-    G: FloatArray,
-    s: FloatArray,
-    dF: FloatArray,
-    dh: FloatArray,
-    dG: FloatArray,
-    ds: FloatArray,
-) -> FloatArray:
-    """Information from gains G (n, p), variances s (n,) and their derivatives (d, ...).
+def _accumulate(at: _Recursion, by: _Recursion) -> FloatArray:
+    """Information from a filter and its derivatives, one row a parameter.
 
     The predicted state and its d derivatives follow one linear system driven by the innovations;
     its covariance is propagated.
     """
+    F, h, G, s = at
+    dF, dh, dG, ds = by
     n, p = G.shape
     d = dF.shape[0]
     size = p * (1 + d)

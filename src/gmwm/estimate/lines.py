@@ -16,13 +16,13 @@ from typing import ClassVar
 
 import numpy as np
 
-from gmwm._core.notices import Notice
 from gmwm._core.text import per_cent
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.estimate import tuning
 from gmwm.estimate.problem import ols_slope, weight_root
 from gmwm.estimate.result import Fit, Region, slope_name
+from gmwm.issues import Notice, notice
 from gmwm.process import (
     BiasInstability,
     Model,
@@ -34,20 +34,16 @@ from gmwm.process import (
 )
 from gmwm.variance import WaveletVariance
 
-# What is a region: a run of octaves (from one level to the next) that is straight as far as the
-# data show, and that the data distinguish from a corner.
+# A region is a run of octaves (from one level to the next) that is straight as far as the data
+# show, and that the data distinguish from a corner.
 #
-# - The slope of each octave differs from the nominal one by no more than the tolerance and what
-#   noise explains. The tolerance is that of reading a plot by eye. Noise is allowed no more than
-#   the tolerance itself: else the shorter the record, the more corners would pass for plateaus,
-#   since on either side of the minimum of white noise and random walk the slopes are -0.16, +0.16.
-# - From octave to octave the slope changes by no more than that either. On a line it does not
-#   change at all, at a corner between neighbouring slopes by up to 0.3, and by more between slopes
-#   further apart. This is what keeps a bend of the plot that passes through a nominal slope from
-#   being read: without it one record in three of white noise, random walk and ramp shows a region
-#   of slope +1/2 where there is none.
-# - Levels of fewer than 30 degrees of freedom, known to no better than 13 %, show no slope. Nor
-#   should they weigh as much as all others, as they do in a mean of logarithms.
+# - The slope of each octave differs from the nominal one by no more than the tolerance (that of
+#   reading a plot by eye) and the share of noise. Noise is allowed no more than the tolerance:
+#   otherwise more corners would pass for plateaus, the shorter the record.
+# - From octave to octave the slope changes by no more than that either. At a corner between
+#   neighbouring slopes it changes by up to 0.3. Without this rule one record in three of white
+#   noise, random walk and ramp shows a region of slope +1/2 where there is none.
+# - Levels of fewer than 30 degrees of freedom, known to no better than 13 %, show no slope.
 #
 # Measured on simulated records with all five parameters wanted: of one process alone (1000 and 6000
 # samples) none of 300 shows a second region; of white noise, random walk and ramp (6000 samples)
@@ -165,7 +161,6 @@ class AllanLines:
         runs = dict(given)
         searched = [line for key, line in lines.items() if key not in runs]
         runs |= _found_runs(wv, searched, lines, runs)
-        absent = [line for key, line in lines.items() if key not in runs]
         if not runs:
             slopes = ", ".join(slope_name(line.slope) for line in lines.values())
             raise InputError(
@@ -195,7 +190,11 @@ class AllanLines:
             method=self.name,
             weights="",
             notices=(
-                *_absence_notices(absent),
+                *(
+                    notice("no-region", key, {"slope": line.slope}, named=slope_name(line.slope))
+                    for key, line in lines.items()
+                    if key not in runs
+                ),
                 *_slope_notices(wv, [(lines[key], run) for key, run in given.items()]),
                 *_misfit_notices(fitted, wv),
                 *wv.notices,
@@ -365,20 +364,8 @@ def _fitted(model: Model, values: Mapping[str, float]) -> Model:
 # -- notices --------------------------------------------------------------------------------------
 
 
-def _absence_notices(absent: Sequence[_Line]) -> list[Notice]:
-    return [
-        Notice(
-            "no-region", "bad", line.key,
-            f"the Allan plot has no region of slope {slope_name(line.slope)}, so it is not "
-            "estimated",
-            {"slope": line.slope},
-        )
-        for line in absent
-    ]  # fmt: skip
-
-
 def _slope_notices(wv: WaveletVariance, given: Sequence[tuple[_Line, _Run]]) -> list[Notice]:
-    """Which of the regions that the user gave have another slope than their line."""
+    """Regions given by the user whose slope is not that of their line."""
     notices = []
     for line, run in given:
         levels = np.arange(run.first, run.last + 1)
@@ -392,19 +379,15 @@ def _slope_notices(wv: WaveletVariance, given: Sequence[tuple[_Line, _Run]]) -> 
         slope = float(combination @ np.log(wv.allan_deviation[levels]))
         error = float(np.sqrt(combination @ covariance @ combination))
         if abs(slope - line.slope) > max(tuning.WRONG_SLOPE, tuning.LINES_SIGMA * error):
-            notices.append(
-                Notice(
-                    "wrong-slope", "bad", line.key,
-                    f"from {wv.tau[run.first]:.4g} to {wv.tau[run.last]:.4g} s the Allan plot has "
-                    f"the slope {slope:+.2f}, not {slope_name(line.slope)}: give another region",
-                    {"slope": slope, "nominal": line.slope},
-                )
-            )  # fmt: skip
+            words = {"first": wv.tau[run.first], "last": wv.tau[run.last]}
+            values = {"slope": slope, "nominal": line.slope}
+            named = slope_name(line.slope)
+            notices.append(notice("wrong-slope", line.key, values, named=named, **words))
     return notices
 
 
 def _misfit_notices(model: Model, wv: WaveletVariance) -> list[Notice]:
-    """Whether the sum of the lines describes the data; what noise explains is not a misfit."""
+    """Misfit of the sum of the lines beyond chance."""
     variance = np.diag(wv.covariance)
     implied = model.wavelet_variance(wv.tau, wv.dt, wv.wavelet)
     # In logarithms, as the standard error of a variance is proportional to its estimate: one that
@@ -416,7 +399,5 @@ def _misfit_notices(model: Model, wv: WaveletVariance) -> list[Notice]:
     worst, tau = float(np.max(misfit)), float(wv.tau[int(np.argmax(misfit))])
     if worst <= tuning.POOR_DEVIATION:
         return []
-    text = (
-        f"the sum of the lines misses the Allan deviation by {per_cent(worst)} at tau = {tau:.3g} s"
-    )
-    return [Notice("misfit", "bad", "", text, {"misfit": worst, "tau": tau, "discrepancy": 0.0})]
+    values = {"misfit": worst, "tau": tau, "discrepancy": 0.0}
+    return [notice("misfit", "", values, variant="lines", share=per_cent(worst))]

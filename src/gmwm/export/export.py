@@ -14,7 +14,7 @@ from gmwm._core import checks
 from gmwm._core.files import writable_file
 from gmwm.calibration import Calibration
 from gmwm.errors import InputError
-from gmwm.export.keys import Entries, Keys, Pair
+from gmwm.export.keys import Keys, Pair, entries
 from gmwm.export.programs.gtsam import Gtsam, GtsamCpp
 from gmwm.export.programs.json_files import Basalt, Glim
 from gmwm.export.programs.keyed import KEYED
@@ -109,7 +109,7 @@ def read_numbers(
         text = Path(path).read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"{path}: cannot be read ({error}): check the path") from None
-    values = Entries.of(text)
+    values = entries(text)
     layouts: dict[Keys, None] = {each.keys: None for each in TARGETS.values() if each.keys}
     keys = next((each for each in layouts if any(name in values for name in each.names)), None)
     if keys is None:

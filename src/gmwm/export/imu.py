@@ -20,6 +20,8 @@ Outlook = Mapping[str, Mapping[float, tuple[float, float]]]
 
 LETTERS = "xyz"
 
+NO_RATE = "the numbers hold no sampling rate, which this file needs: export the calibration"
+
 
 @dataclass(frozen=True)
 class Axis:
@@ -127,26 +129,15 @@ class Triad:
 
 @dataclass(frozen=True)
 class ImuNumbers:
-    """Gyros and accelerometers, and what the numbers are for.
+    """Gyros and accelerometers, and the purpose of the numbers.
 
-    Attributes
-    ----------
-    gyro, accel : Triad
-    form : str
-    horizon : float
-        Time without aiding, s.
-    method : str
-        "bound", "reduce" or "given".
-    sources : tuple of str
-        One line about each recording.
-    outlook : dict
-        Quantity -> horizon in s -> N and K for it.
-    remarks : tuple of str
-        What the numbers leave out.
-    cautions : tuple of str
-        Why the numbers are not to be used as they are.
-    topic : str
-        On which the samples were sent, where a bag was calibrated; else empty.
+    horizon: Time without aiding, s.
+    method: {"bound", "reduce", "given"}.
+    sources: One line about each recording.
+    outlook: N and K at other horizons.
+    remarks: Terms that the numbers leave out.
+    cautions: Why the numbers are not to be used as they are.
+    topic: On which the samples were sent, where a bag was calibrated; else empty.
     """
 
     gyro: Triad
@@ -180,9 +171,7 @@ class ImuNumbers:
         """
         rate = max(self.gyro.rate, self.accel.rate)
         if not rate > 0.0:
-            raise InputError(
-                "the numbers hold no sampling rate, which this file needs: export the calibration"
-            )
+            raise InputError(NO_RATE)
         return rate
 
 

@@ -9,7 +9,6 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from math import sqrt
-from typing import ClassVar
 
 import numpy as np
 
@@ -99,42 +98,41 @@ class MemoryKeys(Keys):
         ]
 
 
-class Entries:
-    """Values of a file by their keys: one number, or three."""
+_COMMENT = re.compile(r"(#|//).*$", re.MULTILINE)
+_ENTRY = re.compile(
+    r"""^\s*(?:\d+\s+\d+\s+)?(?:\w+->|\w+\.(?=set))?["']?([A-Za-z_][\w.]*)["']?\s*[:=(\t](.*)$""",
+    re.MULTILINE,
+)
+_ALONE = re.compile(r"\s*([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*(?:,|\t\d+)?\s*")
+_NUMBER = re.compile(r"(?<![\w.])[-+]?\d+\.?\d*(?:[eE][-+]?\d+)?(?![\w.])")
 
-    COMMENT: ClassVar = re.compile(r"(#|//).*$", re.MULTILINE)
-    ENTRY: ClassVar = re.compile(
-        r"""^\s*(?:\d+\s+\d+\s+)?(?:\w+->|\w+\.(?=set))?["']?([A-Za-z_][\w.]*)["']?\s*[:=(\t](.*)$""",
-        re.MULTILINE,
-    )
-    ALONE: ClassVar = re.compile(r"\s*([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*(?:,|\t\d+)?\s*")
-    NUMBER: ClassVar = re.compile(r"(?<![\w.])[-+]?\d+\.?\d*(?:[eE][-+]?\d+)?(?![\w.])")
 
-    @classmethod
-    def of(cls, text: str) -> dict[str, FloatArray]:
-        """Of YAML, JSON, Python, C++ and parameter files, without knowing which it is."""
-        values: dict[str, FloatArray] = {}
-        # A list of JSON may have a line for each number.
-        with contextlib.suppress(ValueError, RecursionError):
-            text = "\n".join(cls._lines(json.loads(text)))
-        for name, rest in cls.ENTRY.findall(cls.COMMENT.sub("", text)):
-            alone = cls.ALONE.fullmatch(rest)
-            found = [alone[1]] if alone else cls.NUMBER.findall(rest)
-            if len(found) not in (1, 3) or (len(found) == 1 and not alone):
-                continue
+def entries(text: str) -> dict[str, FloatArray]:
+    """Values of a file by their keys: one number, or three.
+
+    Of YAML, JSON, Python, C++ and parameter files, without knowing which it is.
+    """
+    values: dict[str, FloatArray] = {}
+    # A list of JSON may have a line for each number.
+    with contextlib.suppress(ValueError, RecursionError):
+        text = "\n".join(_json_lines(json.loads(text)))
+    for name, rest in _ENTRY.findall(_COMMENT.sub("", text)):
+        alone = _ALONE.fullmatch(rest)
+        found = [alone[1]] if alone else _NUMBER.findall(rest)
+        if len(found) == 3 or alone:
             # A setter is named after what it sets.
             key = name[3].lower() + name[4:] if re.match(r"set[A-Z]", name) else name
             with contextlib.suppress(ValueError):
                 values[key] = np.array([float(each) for each in found])
-        return values
+    return values
 
-    @classmethod
-    def _lines(cls, content: object) -> Iterator[str]:
-        """A line for each key of JSON whose value is a number or three."""
-        if not isinstance(content, dict):
-            return
-        for key, value in content.items():
-            several = value if isinstance(value, list) else [value]
-            if len(several) in (1, 3) and all(map(checks.is_number, several)):
-                yield f"{key}: {several if len(several) == 3 else several[0]}"
-            yield from cls._lines(value)
+
+def _json_lines(content: object) -> Iterator[str]:
+    """A line for each key of JSON whose value is a number or three."""
+    if not isinstance(content, dict):
+        return
+    for key, value in content.items():
+        several = value if isinstance(value, list) else [value]
+        if len(several) in (1, 3) and all(map(checks.is_number, several)):
+            yield f"{key}: {several if len(several) == 3 else several[0]}"
+        yield from _json_lines(value)

@@ -1,10 +1,25 @@
 """What a filter of few states should believe: consistent numbers for it, and a check of given ones.
 
 A small filter has room for white noise with a random walk or a few Gauss-Markov processes on each
-axis; which numbers are right depends on how long it goes without aiding, the horizon.
+axis; which numbers are right depends on how long it goes without aiding, the horizon. `bound` is
+never overconfident, `reduce` is right for given outages, `certify` checks numbers in use, and
+`error_budget` predicts how fast a navigation without aiding goes wrong.
 """
 
 from gmwm.filter_numbers.bound import bound as bound, judged as judged
+from gmwm.filter_numbers.budget import (
+    FIELD_UNITS as FIELD_UNITS,
+    HORIZONTAL as HORIZONTAL,
+    QUANTITIES as QUANTITIES,
+    TIMES as TIMES,
+    ErrorBudget as ErrorBudget,
+    ErrorRow as ErrorRow,
+    axis as axis,
+    error_budget as error_budget,
+    is_steep as is_steep,
+    per_si as per_si,
+    root_sum as root_sum,
+)
 from gmwm.filter_numbers.certificate import (
     CONSUMERS as CONSUMERS,
     Cause as Cause,
@@ -12,9 +27,8 @@ from gmwm.filter_numbers.certificate import (
     Check as Check,
 )
 from gmwm.filter_numbers.certify import certify as certify
-from gmwm.filter_numbers.chain import Chain as Chain, ChainErrors as ChainErrors
-from gmwm.filter_numbers.given import read_numbers as read_numbers
 from gmwm.filter_numbers.imperfections import Imperfections as Imperfections, Motion as Motion
+from gmwm.filter_numbers.propagation import Chain as Chain, ChainErrors as ChainErrors
 from gmwm.filter_numbers.reduce import reduce as reduce
 from gmwm.filter_numbers.result import (
     FORMS as FORMS,
@@ -22,4 +36,3 @@ from gmwm.filter_numbers.result import (
     Predicted as Predicted,
     SensorNumbers as SensorNumbers,
 )
-from gmwm.filter_numbers.tuning import EKF2_INTERVAL as EKF2_INTERVAL

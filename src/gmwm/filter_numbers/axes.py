@@ -1,4 +1,4 @@
-"""The axes that filter numbers are made of, from a model, a fit or a calibration."""
+"""The axes that filter numbers are made for: one error model each, from any source."""
 
 from __future__ import annotations
 
@@ -11,8 +11,7 @@ from gmwm._core.units import SI_UNIT
 from gmwm.calibration import Calibration
 from gmwm.errors import InputError
 from gmwm.estimate import Fit
-from gmwm.filter_numbers import tuning
-from gmwm.filter_numbers.chain import Chain
+from gmwm.filter_numbers.propagation import Chain
 from gmwm.filter_numbers.result import FilterNumbers, SensorNumbers
 from gmwm.process import Model, Process, as_model
 
@@ -22,7 +21,10 @@ Sd = float | Mapping[str, float]
 """For every axis, or by the name of an axis or its kind (gyro, accel)."""
 
 SHARED = "shared"
-"""The correlation time that costs least, of one for all axes."""
+"""Value of ``tau``: the one correlation time for all axes that costs least."""
+
+DT = 0.01
+"""s, sampling interval of models that are not fitted; slow terms and horizons are far above it."""
 
 P = ParamSpec("P")
 
@@ -39,24 +41,20 @@ class PerAxis(Protocol[P]):
 def per_axis(
     function: Callable[Concatenate[One | Several, P], FilterNumbers | SensorNumbers],
 ) -> PerAxis[P]:
-    """The function itself, the type of whose result is by that of the source."""
+    """The function itself; the type of its result depends on that of the source."""
     return cast(PerAxis[P], function)
 
 
-DT = 0.01
-"""s, sampling interval of models that are not fitted; slow terms and horizons are far above it."""
-
-
 @dataclass(frozen=True, eq=False)
-class Axis:
-    """One axis of a sensor.
+class AxisModel:
+    """The error model of one axis of a sensor.
 
     name: Of the channel; empty if there is none.
     model: With given parameters.
     dt: Sampling interval, s.
     quantity: {"gyro", "accel", ""}.
     bias_sd: Of a constant bias, u.
-    fit: Where the model is from.
+    fit: Where the model is from, if from a fit.
     """
 
     name: str
@@ -67,19 +65,19 @@ class Axis:
     fit: Fit | None
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, Axis) and self._key == other._key
+        return isinstance(other, AxisModel) and self._key == other._key
 
     def __hash__(self) -> int:
         return hash(self._key)
 
     @property
     def _key(self) -> tuple[object, ...]:
-        """The same model and fit, not equal ones: a process of one's own may hold anything."""
+        """The same model and fit, not equal ones: a user's process may hold anything."""
         return self.name, self.dt, self.quantity, self.bias_sd, id(self.model), id(self.fit)
 
     @property
     def unit(self) -> str:
-        """SI; "u" if the quantity is not known."""
+        """SI; "u" if the quantity is unknown."""
         return SI_UNIT.get(self.quantity, "u")
 
     @property
@@ -89,48 +87,45 @@ class Axis:
         return Chain.usual("" if is_heading else self.quantity)
 
     def between(self, keyframe: float) -> Chain:
-        """That of relative poses, an interval (s) apart."""
-        return Chain(
-            tuning.KEYFRAME_ORDER[self.quantity], tuning.KEYFRAME_SD[self.quantity],
-            tuning.KEYFRAMES * keyframe, keyframe, is_relative=True,
-        )  # fmt: skip
+        """The filter of relative poses, an interval (s) apart."""
+        return Chain.of_poses(self.quantity, keyframe)
 
 
 @dataclass(frozen=True, eq=False)
-class Axes:
-    """Axes, and where they are from.
+class SensorAxes:
+    """The axes of a source.
 
-    rate, duration: Hz and s; NaN if they are not known.
+    rate, duration: Hz and s; NaN if unknown.
     single: Whether one axis was given, not a mapping.
     """
 
-    axes: tuple[Axis, ...]
+    axes: tuple[AxisModel, ...]
     source: str
     rate: float
     duration: float
     single: bool
 
     @classmethod
-    def of(cls, source: One | Several, dt: float | None, bias_sd: Sd) -> Axes:
+    def of(cls, source: One | Several, dt: float | None, bias_sd: Sd) -> SensorAxes:
         """Axes of a model, a fit, a calibration or a mapping.
 
-        Raises InputError if the source is something else, or a parameter is open.
+        Raises InputError if the source is something else, or a parameter is free.
         """
         if isinstance(source, Process | Model | Fit):
             name = (source.wv.name or "") if isinstance(source, Fit) else ""
             axis = _axis(name, source, dt, bias_sd)
             duration = source.wv.n_all * axis.dt if isinstance(source, Fit) else float("nan")
             return cls((axis,), "", 1.0 / axis.dt, duration, True)
-        if isinstance(source, Mapping) and len(source) > 0:
-            axes = tuple(_axis(name, item, dt, bias_sd) for name, item in source.items())
-            if isinstance(source, Calibration):
-                rate = source.rate if source.has_one_rate else float("nan")
-                return cls(axes, source.source, rate, source.duration, False)
-            return cls(axes, "", 1.0 / axes[0].dt, float("nan"), False)
-        raise InputError(
-            f"{checks.shown(source)} has no error model: give a model, a fit, a calibration, or "
-            "models by channel name"
-        )
+        if not isinstance(source, Mapping) or not source:
+            raise InputError(
+                f"{checks.shown(source)} has no error model: give a model, a fit, a calibration, "
+                "or models by channel name"
+            )
+        axes = tuple(_axis(name, item, dt, bias_sd) for name, item in source.items())
+        if isinstance(source, Calibration):
+            rate = source.rate if source.has_one_rate else float("nan")
+            return cls(axes, source.source, rate, source.duration, False)
+        return cls(axes, "", 1.0 / axes[0].dt, float("nan"), False)
 
     def check_interval(self, name: str, shortest: float) -> None:
         """Raise `InputError` if a time (s) is below two sampling intervals of an axis."""
@@ -141,40 +136,39 @@ class Axes:
             )
 
     @property
-    def groups(self) -> tuple[tuple[Axis, ...], ...]:
+    def groups(self) -> tuple[tuple[AxisModel, ...], ...]:
         """The axes of each quantity."""
         kinds = dict.fromkeys(axis.quantity for axis in self.axes)
         return tuple(tuple(a for a in self.axes if a.quantity == kind) for kind in kinds)
 
-    def sharing(self, shared: bool) -> tuple[tuple[Axis, ...], ...]:
-        """Those that have the same numbers."""
+    def sharing(self, shared: bool) -> tuple[tuple[AxisModel, ...], ...]:
+        """Groups of axes that have the same numbers."""
         return self.groups if shared else tuple((axis,) for axis in self.axes)
 
     def numbers(
-        self, found: Callable[[tuple[Axis, ...]], Sequence[FilterNumbers]], shared: bool
+        self, found: Callable[[tuple[AxisModel, ...]], Sequence[FilterNumbers]], shared: bool
     ) -> FilterNumbers | SensorNumbers:
-        """The result, from a function that gives axes that share their numbers their results."""
+        """The result of `bound` and `reduce`, given the numbers of axes that share them."""
         numbers = self.sensor(found, shared)
         return next(iter(numbers.values())) if self.single else numbers
 
     def sensor(
-        self, found: Callable[[tuple[Axis, ...]], Sequence[FilterNumbers]], shared: bool
+        self, found: Callable[[tuple[AxisModel, ...]], Sequence[FilterNumbers]], shared: bool
     ) -> SensorNumbers:
-        """The same as a mapping, of one axis too."""
-        pairs = [
-            (axis.name, each)
+        """The same as a mapping, also of one axis."""
+        by_name = {
+            axis.name: each
             for group in self.sharing(shared)
             for axis, each in zip(group, found(group), strict=True)
-        ]
-        by_name = dict(pairs)
+        }
         ordered = {axis.name: by_name[axis.name] for axis in self.axes}
         return SensorNumbers(ordered, self.source, self.rate, self.duration, shared)
 
 
 def given_tau(form: str, tau: float | str | None) -> float | str | None:
-    """A correlation time as users give it, of a form.
+    """A correlation time as users give it, checked; s or "shared".
 
-    Raises InputError if it is none, or the form has none or several.
+    Raises InputError if it is neither, or the form has no such process or several.
     """
     if tau is None:
         return None
@@ -187,7 +181,15 @@ def given_tau(form: str, tau: float | str | None) -> float | str | None:
     return SHARED if tau == SHARED else checks.positive("tau", tau, hint)
 
 
-def _axis(name: str, item: object, dt: float | None, bias_sd: Sd) -> Axis:
+def given_outages(outages: Sequence[float]) -> list[float]:
+    """Times without aiding as users give them, rising; raises InputError if there is none."""
+    times = sorted({checks.positive("outage", each) for each in outages})
+    if not times:
+        raise InputError("outages: give one length at least, s")
+    return times
+
+
+def _axis(name: str, item: object, dt: float | None, bias_sd: Sd) -> AxisModel:
     fit = item if isinstance(item, Fit) else None
     if not isinstance(item, Process | Model | Fit):
         raise InputError(f"{name}: {checks.shown(item)} is not an error model")
@@ -204,11 +206,9 @@ def _axis(name: str, item: object, dt: float | None, bias_sd: Sd) -> Axis:
         step = checks.sampling_interval(DT if dt is None else dt)
         quantity = name.partition("_")[0]
     quantity = quantity if quantity in SI_UNIT else ""
-    return Axis(name, model, step, quantity, _sd(name, quantity, bias_sd), fit)
-
-
-def _sd(name: str, quantity: str, given: Sd) -> float:
-    value = given.get(name, given.get(quantity, 0.0)) if isinstance(given, Mapping) else given
-    if not checks.is_number(value) or value < 0.0:
-        raise InputError(f"bias_sd = {checks.shown(value)}: give a number, zero or more")
-    return float(value)
+    sd = bias_sd
+    if isinstance(sd, Mapping):
+        sd = sd.get(name, sd.get(quantity, 0.0))
+    if not checks.is_number(sd) or sd < 0.0:
+        raise InputError(f"bias_sd = {checks.shown(sd)}: give a number, zero or more")
+    return AxisModel(name, model, step, quantity, float(sd), fit)

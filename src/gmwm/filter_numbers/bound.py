@@ -1,4 +1,4 @@
-"""Numbers with which a small filter is never too optimistic."""
+"""Numbers with which a small filter is never overconfident."""
 
 from __future__ import annotations
 
@@ -9,25 +9,24 @@ from functools import lru_cache
 import numpy as np
 
 from gmwm._core import checks
-from gmwm._core.notices import Notice
 from gmwm._core.text import per_cent
 from gmwm.errors import InputError
-from gmwm.estimate import Fit
 from gmwm.filter_numbers import tuning
-from gmwm.filter_numbers.axes import Axes, Axis, One, Sd, Several, given_tau, per_axis
-from gmwm.filter_numbers.chain import Chain
+from gmwm.filter_numbers.axes import AxisModel, One, Sd, SensorAxes, Several, given_tau, per_axis
+from gmwm.filter_numbers.propagation import Chain
 from gmwm.filter_numbers.result import FilterNumbers, Predicted, SensorNumbers
 from gmwm.filter_numbers.spectra import (
     KINDS,
     TIGHTEST,
     Estimated,
     Problem,
-    Target,
+    RequiredSpectrum,
     correlation_time,
     dominating,
-    region_targets,
+    region_spectra,
     standard_errors,
 )
+from gmwm.issues import Notice, notice
 from gmwm.process import Model, RandomWalk, WhiteNoise
 
 
@@ -43,7 +42,7 @@ def bound(
     tau: float | str | None = None,
     dt: float | None = None,
 ) -> FilterNumbers | SensorNumbers:
-    """The smallest numbers of a form with which a linear filter is never too optimistic.
+    """The smallest numbers of a form with which a linear filter is never overconfident.
 
     Parameters
     ----------
@@ -55,10 +54,10 @@ def bound(
         Time without aiding for which they are to be small, s. For relative poses, the interval of
         keyframes. They dominate at any time.
     level : float, optional
-        Of the confidence region of a fit, e.g. 0.95, all of which is dominated. By default the
-        estimate is, and the uncertainty of its parameters is not covered.
+        Of the confidence region of a fit, e.g. 0.95: all models in it are dominated. By default
+        only the estimate is, and the uncertainty of its parameters is not covered.
     bias_sd : float or mapping, optional
-        Standard deviation of a constant bias, such as that of turning on, in u; by axis or kind
+        Standard deviation of a constant bias, such as the turn-on bias, in u; by axis or kind
         ("gyro", "accel") if a mapping.
     shared : bool, optional
         Whether axes of a kind have the same numbers.
@@ -71,48 +70,44 @@ def bound(
     Returns
     -------
     FilterNumbers or SensorNumbers
-        Of one axis, or by channel; N and K of valid fits with the standard errors that these leave.
+        Of one axis, or by channel; N and K of valid fits with their standard errors.
 
     Raises
     ------
     InputError
-        If a parameter is open, a term is known by simulation only, the form cannot dominate the
+        If a parameter is free, a term is known by simulation only, the form cannot dominate the
         model, ``level`` is given without a fit, or ``tau`` without one Gauss-Markov process.
 
     Notes
     -----
     S_b(f) >= S(f) at every frequency f > 0, with the limits K_b >= K and N_b >= N; among those, the
     mean of AVAR_b(t)/AVAR(t) over t from a tenth of the horizon to the horizon is least. The
-    covariance of the believed error is then at least that of the true one, and so is that of what
-    any linear filter makes of it. That is a theorem for N+GM, stationary; with K it also takes the
-    start of the walk, whose variance is ``bias_sd^2`` and twice that of the slow terms, as measured
-    on many models (docs/filter-numbers.md). It covers neither nonlinearity nor errors that are not
-    in the model. Quantization noise and resonances above ten over the horizon count by their
-    density at low frequencies (resonances not far above by a part of their peak too), lines not at
-    all, and a ramp R is a constant of standard deviation ``|R| horizon``; notices report them.
+    covariance of the predicted error is then at least that of the true one, for any linear filter.
+    That is a theorem for N+GM, stationary; with K it also takes the start of the walk, whose
+    variance is ``bias_sd^2`` and twice that of the slow terms, as measured on many models
+    (docs/filter-numbers.md). It covers neither nonlinearity nor errors that are not in the model.
+    Quantization noise and resonances above ten over the horizon count by their density at low
+    frequencies (resonances not far above by a part of their peak too), lines not at all, and a ramp
+    R is a constant of standard deviation ``|R| horizon``; notices report them.
     """
     checks.choice("form", form, list(KINDS))
     tau = given_tau(form, tau)
     horizon = checks.positive("horizon", horizon, "give a time without aiding in seconds")
-    axes = Axes.of(source, dt, bias_sd)
+    axes = SensorAxes.of(source, dt, bias_sd)
     axes.check_interval("horizon", horizon)
     if level is not None:
         level = checks.share("level", level, 0.95)
-        for axis in axes.axes:
-            _fit(axis)
+        if any(axis.fit is None for axis in axes.axes):
+            raise InputError("level is that of a fit: a model has no confidence region")
     if isinstance(tau, str):
         problems = [_problem(group, horizon, level) for group in axes.sharing(shared)]
         tau = correlation_time(problems, form)
-
-    def found(group: tuple[Axis, ...]) -> Sequence[FilterNumbers]:
-        return bound_of(group, form, horizon, level, tau)
-
-    return axes.numbers(found, shared)
+    return axes.numbers(lambda group: bound_of(group, form, horizon, level, tau), shared)
 
 
 @lru_cache(maxsize=64)
 def bound_of(
-    group: tuple[Axis, ...],
+    group: tuple[AxisModel, ...],
     form: str,
     horizon: float,
     level: float | None,
@@ -120,112 +115,132 @@ def bound_of(
 ) -> tuple[FilterNumbers, ...]:
     """The bound of axes that share their numbers; see `bound`.
 
-    A report asks for some of them again, and the exports for those of the report.
+    Cached: reports and exports ask for some of them again.
     """
     problem = _problem(group, horizon, level)
     model = dominating(problem, form, tau)
-    # Errors of a fit that is not valid are not those of its parameters either.
+    # Covariances of fits that are not valid cannot be used.
     fits = [Estimated.of(axis.fit) for axis in group if axis.fit is not None and axis.fit.valid]
     known = form == "N+K" and level is None and len(fits) == len(group)
     stderr = standard_errors(problem, model, fits) if known else {}
     dominated = (*problem.targets, *problem.region)
-    sd = max(_start(group, each, model) for each in dominated)
+    biases = [max(axis.bias_sd for axis in group)] * len(dominated)
+    sd = start_sd(biases, dominated, model, tuning.INITIAL_SHARE)
     times = (horizon, 10.0 * horizon)
     errors = [predicted(axis, axis.chain, model, sd, times) for axis in group]
+    tight: list[Predicted | None] = [None] * len(group)
     if form != TIGHTEST and any(found[0].tightness > tuning.LOOSE for found in errors):
         other = dominating(problem, TIGHTEST)
-        start = max(_start(group, each, other) for each in dominated)
+        start = start_sd(biases, dominated, other, tuning.INITIAL_SHARE)
         tight = [predicted(axis, axis.chain, other, start, times[:1])[0] for axis in group]
-        looseness = [_loose(found[0], best) for found, best in zip(errors, tight, strict=True)]
-    else:
-        looseness = [()] * len(group)
-    return tuple(
-        FilterNumbers(
-            form=form,
-            model=model,
-            horizon=horizon,
-            initial_sd=sd,
-            method="bound",
-            predicted=found,
-            notices=(
-                *target.notices,
-                *(_optimistic(axis, model, sd, horizon) if target.notices else ()),
-                *loose,
-                *stands_for(axis, target, model, problem.targets),
-                *about(axis, level),
-            ),
-            quantity=axis.quantity,
-            stderr=stderr,
-        )
-        for axis, target, found, loose in zip(
-            group, problem.targets, errors, looseness, strict=True
-        )
-    )
+    numbers = []
+    for axis, target, found, best in zip(group, problem.targets, errors, tight, strict=True):
+        notices = list(target.notices)
+        notices += _overconfidence(axis, model, sd, horizon) if target.notices else []
+        notices += [] if best is None else _looseness(found[0], best)
+        notices += covered_terms_notices(axis, target, model, problem.targets)
+        notices += fit_notices(axis, level)
+        about = (form, model, horizon, sd, "bound", found, tuple(notices), axis.quantity, stderr)
+        numbers.append(FilterNumbers(*about))
+    return tuple(numbers)
 
 
-def _problem(group: Sequence[Axis], horizon: float, level: float | None) -> Problem:
-    """What the numbers that axes share have to dominate."""
-    targets = tuple(Target.of(axis.model, axis.dt, horizon, axis.unit) for axis in group)
-    region: list[Target] = []
-    if level is not None:
-        for axis, target in zip(group, targets, strict=True):
-            region += region_targets(target, _fit(axis), level)
+def _problem(group: Sequence[AxisModel], horizon: float, level: float | None) -> Problem:
+    """The spectra that the numbers of axes have to dominate."""
+    targets = tuple(RequiredSpectrum.of(axis.model, axis.dt, horizon, axis.unit) for axis in group)
+    region: list[RequiredSpectrum] = []
+    for axis, target in zip(group, targets, strict=True):
+        if level is not None and axis.fit is not None:
+            region += region_spectra(target, axis.fit, level)
     return Problem(targets, horizon, tuple(region))
 
 
-def _optimistic(axis: Axis, model: Model, sd: float, horizon: float) -> tuple[Notice, ...]:
-    """Where what the numbers leave out is too large for that, without aiding or before."""
-    late, early = ([share * horizon for share in each] for each in (tuning.SUSPECT, tuning.EARLY))
+def start_sd(
+    biases: Sequence[float], spectra: Sequence[RequiredSpectrum], model: Model, slow_share: float
+) -> float:
+    """Standard deviation of the bias at the start: of the walk, or of a constant without one.
 
-    def unaided(times: Sequence[float]) -> list[tuple[float, float, str]]:
-        found = predicted(axis, axis.chain, model, sd, times)
-        return [(e.nees, e.time, f"after {e.time:g} s without aiding") for e in found]
+    biases: Standard deviations of constant biases, one a spectrum.
+    slow_share: Of the variance of the slow terms that a walk starts with.
+    """
+    still = Model(tuple(term for term in model.terms if not term.is_walk))
+    share = slow_share if len(still.terms) < len(model.terms) else 0.0
+    variances = [
+        bias**2 + each.constant_sd**2 + (share * each.slow_variance(still) if share else 0.0)
+        for bias, each in zip(biases, spectra, strict=True)
+    ]
+    return float(np.sqrt(max(variances)))
 
-    worst = max(unaided(late))
+
+def predicted(
+    axis: AxisModel, chain: Chain, model: Model, sd: float, times: Sequence[float]
+) -> tuple[Predicted, ...]:
+    """How well a filter with these numbers knows its error after some times without aiding."""
+    try:
+        errors = chain.worse(axis.model, model, axis.dt, times, axis.bias_sd, sd)
+    except InputError:
+        nan = float("nan")
+        return tuple(Predicted(time, nan, nan) for time in times)
+    rows = zip(times, errors.nees(), errors.tightness(), strict=True)
+    return tuple(Predicted(time, float(nees), float(sd)) for time, nees, sd in rows)
+
+
+def judged(source: One | Several, numbers: FilterNumbers) -> FilterNumbers:
+    """The same numbers with the predictions where an error model is the truth.
+
+    source: The error model of the axis; as a mapping, with its name.
+    numbers: Of any origin; the times of its predictions are kept.
+    """
+    axis = SensorAxes.of(source, None, 0.0).axes[0]
+    times = [each.time for each in numbers.predicted]
+    found = predicted(axis, axis.chain, numbers.model, numbers.initial_sd, times)
+    return replace(numbers, predicted=found)
+
+
+def _overconfidence(axis: AxisModel, model: Model, sd: float, horizon: float) -> list[Notice]:
+    """Where the terms that the numbers leave out are too large for that, if anywhere."""
+
+    def unaided(shares: Sequence[float]) -> list[tuple[float, float, str]]:
+        found = predicted(axis, axis.chain, model, sd, [share * horizon for share in shares])
+        return [(e.nees, e.time, f"after an outage of {e.time:g} s") for e in found]
+
+    worst = max(unaided(tuning.SUSPECT))
     if worst[0] <= tuning.OPTIMISTIC:  # not NaN, where nothing is predicted
-        relative, usual = axis.between(horizon), axis.chain
+        usual = axis.chain
         (pose, *_), fixed = (
             chain.errors(
                 axis.model, model, axis.dt, [horizon],
                 true_sd=axis.bias_sd, believed_sd=sd, every_fix=chain is usual,
             ).nees()
-            for chain in (relative, usual)
+            for chain in (axis.between(horizon), usual)
         )  # fmt: skip
         worst = max(
             (float(pose), horizon, f"between keyframes every {horizon:g} s"),
             (float(np.max(fixed[:-1])), 0.0, f"with a fix every {usual.interval:g} s"),
-            *unaided(early),
+            *unaided(tuning.EARLY),
         )
     nees, time, when = worst
     if not nees > tuning.OPTIMISTIC:
-        return ()
-    text = (
-        f"too optimistic: a NEES of {nees:.3g} {when}; what the numbers leave out is not small here"
-    )
-    hint = "estimate it as a state, or take it off the data"
-    return (Notice("optimistic", "warning", "", text, {"nees": nees, "time": time}, hint),)
+        return []
+    return [notice("optimistic", "", {"nees": nees, "time": time}, variant="bound", when=when)]
 
 
-def _loose(found: Predicted, best: Predicted) -> tuple[Notice, ...]:
-    """What a form costs, and where another is worth its state."""
+def _looseness(found: Predicted, best: Predicted) -> list[Notice]:
+    """How conservative a form is, and whether another is worth its state."""
     if found.tightness <= tuning.LOOSE:
-        return ()
-    text = (
-        f"after {found.time:g} s without aiding errors are believed {found.tightness:.3g} times as "
-        f"large as they are; with {TIGHTEST}, {best.tightness:.3g} times"
-    )
+        return []
     values = {"tightness": found.tightness, "with_state": best.tightness}
     is_worth = best.tightness <= found.tightness / tuning.WORTH_A_STATE
     hint = f"use {TIGHTEST} where the filter has a state for it" if is_worth else ""
-    return (Notice("loose-form", "note", "", text, values, hint),)
+    return [notice("loose-form", "", values, hint=hint, time=found.time, tightest=TIGHTEST)]
 
 
-def stands_for(
-    axis: Axis, target: Target, model: Model, sharing: Sequence[Target]
-) -> tuple[Notice, ...]:
-    """What N and K are for beside white noise and a random walk: terms, where they are needed.
+def covered_terms_notices(
+    axis: AxisModel, target: RequiredSpectrum, model: Model, sharing: Sequence[RequiredSpectrum]
+) -> list[Notice]:
+    """The terms that N and K cover beside white noise and a random walk, where they are needed.
 
-    sharing: Targets of the axes that share the numbers; what another needs is not explained.
+    sharing: Spectra of the axes that share the numbers; needs of another axis are not explained.
     """
     f = target.frequencies(tuning.POINTS)
     need, believed = target.psd(f), model.psd(f, axis.dt)
@@ -237,10 +252,10 @@ def stands_for(
         for kind in ("is_white", "is_band_limited", "is_walk")
     )
     found = []
-    # White noise behind a low-pass is that of the sensor, too, and nothing to be explained.
-    for letter, name, one, own, explained, others in (
-        ("N", "white noise", WhiteNoise(1.0), white, filtered, white),
-        ("K", "random walk", RandomWalk(1.0), walks, [], [*walks, *white, *filtered]),
+    # White noise behind a low-pass is the sensor's own, too, and needs no explanation.
+    for letter, code, one, own, explained, others in (
+        ("N", "more-than-white-noise", WhiteNoise(1.0), white, filtered, white),
+        ("K", "more-than-random-walk", RandomWalk(1.0), walks, [], [*walks, *white, *filtered]),
     ):
         unit, square = one.psd(f, axis.dt), (model.params.get(letter) or 0.0) ** 2
         known, alone = (
@@ -252,89 +267,37 @@ def stands_for(
         # Where they are alike without it, too, it is not there for these.
         if tuning.ABOVE**2 * known >= square or needed[at] <= 1.0 - tuning.NEEDED:
             continue
+        densities = zip(target.densities(f[at : at + 1]), target.feet, strict=True)
         shares = {
             labels[id(term)]: float((density[0] + foot) / need[at])
-            for (term, density), foot in zip(
-                target.densities(f[at : at + 1]), target.feet, strict=True
-            )
+            for (term, density), foot in densities
             if not any(term is other for other in others)
         }
-        large = {
-            key: share
-            for share, key in sorted(((share, key) for key, share in shares.items()), reverse=True)
-            if share > tuning.MENTIONED
-        }
+        ordered = sorted(((share, key) for key, share in shares.items()), reverse=True)
+        large = {key: share for share, key in ordered if share > tuning.MENTIONED}
         parts = ", ".join(f"{key} ({per_cent(share)})" for key, share in large.items())
-        if alone > 0.0:
-            text = f"{letter} is {np.sqrt(square / alone):.3g} times that of the model's {name}: it"
-        else:
-            text = f"the model has no {name}: {letter}"
-        text += f" has to cover {parts}"
-        code = f"more-than-{name.replace(' ', '-')}"
-        found.append(Notice(code, "note", "", text, large))
-    return tuple(found)
+        times = float(np.sqrt(square / alone)) if alone > 0.0 else 0.0
+        variant = "more" if alone > 0.0 else ""
+        found.append(notice(code, "", large, variant=variant, times=times, parts=parts))
+    return found
 
 
-def _fit(axis: Axis) -> Fit:
-    if axis.fit is None:
-        raise InputError("level is that of a fit: a model has no confidence region")
-    return axis.fit
-
-
-def _start(group: Sequence[Axis], target: Target, model: Model) -> float:
-    """Standard deviation of the bias at the start: the walk, or a constant where there is none."""
-    variance = max(axis.bias_sd for axis in group) ** 2 + target.constant_sd**2
-    stationary = [term for term in model.terms if not term.is_walk]
-    if len(stationary) < len(model.terms):
-        variance += tuning.INITIAL_SHARE * target.slow_variance(Model(tuple(stationary)))
-    return float(np.sqrt(variance))
-
-
-def judged(source: One | Several, numbers: FilterNumbers) -> FilterNumbers:
-    """The same numbers with what is predicted where an error model is the truth.
-
-    source: The error model of the axis; as a mapping, with its name.
-    numbers: Of any origin; the times of its predictions are kept.
-    """
-    axis = Axes.of(source, None, 0.0).axes[0]
-    times = [each.time for each in numbers.predicted]
-    found = predicted(axis, axis.chain, numbers.model, numbers.initial_sd, times)
-    return replace(numbers, predicted=found)
-
-
-def predicted(
-    axis: Axis, chain: Chain, model: Model, sd: float, times: Sequence[float]
-) -> tuple[Predicted, ...]:
-    """What a filter with these numbers knows of its error after some times without aiding."""
-    try:
-        errors = chain.worse(axis.model, model, axis.dt, times, axis.bias_sd, sd)
-    except InputError:
-        nan = float("nan")
-        return tuple(Predicted(time, nan, nan) for time in times)
-    rows = zip(times, errors.nees(), errors.tightness(), strict=True)
-    return tuple(Predicted(time, float(nees), float(sd)) for time, nees, sd in rows)
-
-
-def about(axis: Axis, level: float | None) -> tuple[Notice, ...]:
-    """What there is to know of the fit and of the prediction."""
+def fit_notices(axis: AxisModel, level: float | None) -> list[Notice]:
+    """Limits of the fit and of the prediction."""
     found = []
     try:
         axis.model.state_space(axis.dt)
     except InputError as error:
-        text = f"the consistency is not predicted: {error}"
-        found.append(Notice("not-predicted", "note", "", text))
+        found.append(notice("not-predicted", reason=str(error)))
     if axis.fit is None:
-        return tuple(found)
+        return found
     if not axis.fit.valid:
-        text = "the fit is not valid, nor are numbers from it"
-        found.append(Notice("fit-not-valid", "warning", "", text, {}, "read its notices first"))
-    if axis.bias_sd == 0.0:
-        text = (
-            "the bias at the start leaves out that of switching on, which no recording at rest "
-            "shows: add its variance"
+        text = "the fit failed; do not use these numbers"
+        found.append(
+            notice("fit-not-valid", severity="warning", hint="read its notices first", text=text)
         )
-        found.append(Notice("turn-on-left-out", "note", "", text))
+    if axis.bias_sd == 0.0:
+        found.append(notice("turn-on-left-out"))
     if level is None:
-        text = "the uncertainty of the fitted parameters is not covered"
-        found.append(Notice("uncertainty-not-covered", "note", "", text))
-    return tuple(found)
+        found.append(notice("uncertainty-not-covered"))
+    return found

@@ -2,24 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from gmwm._core import checks
-from gmwm._core.notices import Notice
 from gmwm._core.units import SI_UNIT
 from gmwm.errors import InputError
 from gmwm.filter_numbers import tuning
-from gmwm.filter_numbers.axes import Axes, Axis, One, Sd, Several
+from gmwm.filter_numbers.axes import AxisModel, One, Sd, SensorAxes, Several, given_outages
 from gmwm.filter_numbers.bound import bound_of
 from gmwm.filter_numbers.certificate import Cause, Certificate, Check
-from gmwm.filter_numbers.given import Given, in_use
 from gmwm.filter_numbers.imperfections import Imperfections, Motion
 from gmwm.filter_numbers.result import FilterNumbers, SensorNumbers
-from gmwm.process import Model, Process, WhiteNoise
+from gmwm.ins import SensorModels, covariance_analysis, loiter_with_outages
+from gmwm.issues import Notice, notice
+from gmwm.process import Model, Process, RandomWalk, WhiteNoise, as_model
 from gmwm.readers import Recording
+
+Given = FilterNumbers | SensorNumbers | Mapping[str, Any]
+"""Numbers of all axes, or by axis or kind (gyro, accel): `FilterNumbers`, a model, or N and K."""
 
 _GRAVITY = 9.80665
 _INTEGRALS = {1: "angle", 2: "position", 3: "position by tilt"}
@@ -54,7 +58,7 @@ def certify(
     motion : {"handheld", "drone", "car", "fixed-wing"}, Motion or Recording, optional
         With which they come: a usual one, or that of a recording.
     bias_sd : float or mapping, optional
-        Standard deviation of a constant bias, such as that of turning on, in u; by axis or kind.
+        Standard deviation of a constant bias, such as the turn-on bias, in u; by axis or kind.
     dt : float, optional
         Sampling interval of models that are not fitted, s; 0.01 s by default.
 
@@ -71,16 +75,14 @@ def certify(
     Notes
     -----
     Exact covariance analysis of linear filters, for the truth given: of each axis alone (fixes of
-    its last integral every second, then none; of a heading, the angle gained since where that is
-    the worse), of each axis between keyframes (the pose starts anew at each, the bias goes on), and
-    of a whole INS/GNSS filter on a loiter, where all six axes are known. It covers neither
+    its last integral every second, then none; of a heading, the angle gained since if that is
+    worse), of each axis between keyframes (the pose starts anew at each, the bias goes on), and of
+    a whole INS/GNSS filter on a loiter, where all six axes are known. It covers neither
     nonlinearity nor errors that are not in the models.
     """
-    times = sorted({checks.positive("outage", each) for each in outages})
-    if not times:
-        raise InputError("outages: give one length at least, s")
+    times = given_outages(outages)
     keyframe = checks.positive("keyframe", keyframe, "give the interval of keyframes in seconds")
-    axes = Axes.of(source, dt, bias_sd)
+    axes = SensorAxes.of(source, dt, bias_sd)
     axes.check_interval("keyframe", keyframe)
     axes.check_interval("outages", times[0])
     known = Imperfections() if imperfections is None else imperfections
@@ -89,30 +91,54 @@ def certify(
         raise InputError("these imperfections do nothing at rest: give a motion too")
     horizon = times[-1]
     safe = axes.sensor(lambda group: bound_of(group, "N+K", horizon, None), shared=False)
-    own = replace(
-        safe,
-        source="",
-        axes={
-            axis.name: in_use(
-                numbers, axis.name, axis.quantity, horizon, safe[axis.name].initial_sd
-            )
-            for axis in axes.axes
-        },
-    )
+    in_use = {a.name: _in_use(numbers, a, horizon, safe[a.name].initial_sd) for a in axes.axes}
+    own = replace(safe, source="", axes=in_use)
     found = [check for axis in axes.axes for check in _of_axis(axis, own, times, keyframe)]
     in_flight, notices = _in_flight(axes, own, times)
-    causes, advice = _causes(axes, own, horizon, known, moved)
-    return Certificate(
-        numbers=own,
-        recommended=safe,
-        checks=(*found, *in_flight),
-        causes=tuple(causes),
-        notices=(*notices, *advice),
-    )
+    causes: list[Cause] = []
+    for group in axes.groups:
+        rows, advice = _causes(group, own, horizon, known, moved)
+        causes += rows
+        notices += advice
+    return Certificate(own, safe, (*found, *in_flight), tuple(causes), tuple(notices))
+
+
+def _in_use(given: Given, axis: AxisModel, horizon: float, start: float) -> FilterNumbers:
+    """The numbers of one axis in use.
+
+    horizon, start: s, and standard deviation of the bias at the start (u), of numbers without.
+    Raises InputError if there are none for this axis.
+    """
+    item: Any = given
+    kind = axis.quantity or axis.name
+    if isinstance(given, Mapping):
+        if axis.name not in given and kind not in given:
+            raise InputError(
+                f"there are no numbers for {axis.name or 'the axis'}: give them by axis, or for "
+                f"{kind or 'gyro and accel'}"
+            )
+        item = given[axis.name] if axis.name in given else given[kind]
+    if isinstance(item, FilterNumbers):
+        return item
+    if isinstance(item, Process | Model):
+        model = as_model(item)
+    elif isinstance(item, tuple | list) and len(item) == 2:
+        what = f"N and K of {axis.name or kind or 'the axis'}"
+        N, K = (checks.positive(what, value) for value in item)
+        model = WhiteNoise(N) + RandomWalk(K)
+    else:
+        raise InputError(
+            f"{checks.shown(item)} is not what a filter believes: give N and K, a model, or what "
+            "gmwm.bound returns"
+        )
+    kinds = [type(term).__name__ for term in model.terms]
+    slow = {0: "", 1: "+GM", 2: "+2GM"}.get(kinds.count("GaussMarkov"), "+?")
+    form = "N" + "+K" * ("RandomWalk" in kinds) + slow
+    return FilterNumbers(form, model, horizon, start, "given", quantity=axis.quantity)
 
 
 def _of_axis(
-    axis: Axis, numbers: SensorNumbers, times: Sequence[float], keyframe: float
+    axis: AxisModel, numbers: SensorNumbers, times: Sequence[float], keyframe: float
 ) -> list[Check]:
     """Errors of one axis without aiding, and between keyframes."""
     believed = numbers[axis.name]
@@ -135,17 +161,13 @@ def _of_axis(
 
 
 def _in_flight(
-    axes: Axes, numbers: SensorNumbers, times: Sequence[float]
+    axes: SensorAxes, numbers: SensorNumbers, times: Sequence[float]
 ) -> tuple[list[Check], list[Notice]]:
     """Errors of an INS/GNSS filter at the end of outages, where there are six axes."""
-    # Trajectories and filters, which no calibration needs.
-    from gmwm.ins import SensorModels, covariance_analysis, loiter_with_outages
-
-    by_name = {axis.name: axis for axis in axes.axes}
     try:
         truth = SensorModels.of(
-            {name: axis.model for name, axis in by_name.items()},
-            {name: axis.bias_sd for name, axis in by_name.items()},
+            {axis.name: axis.model for axis in axes.axes},
+            {axis.name: axis.bias_sd for axis in axes.axes},
         )
         believed = SensorModels.of(
             {name: each.model for name, each in numbers.items()},
@@ -154,98 +176,73 @@ def _in_flight(
         scenario = loiter_with_outages(times, axes.axes[0].dt)
         analysis = covariance_analysis(scenario, truth, believed)
     except InputError as error:
-        text = f"the INS/GNSS filter is left out: {error}"
-        return [], [Notice("no-navigation-filter", "note", "", text)]
+        return [], [notice("no-navigation-filter", reason=str(error))]
     nees, result = analysis.nees(), []
     for outage in scenario.outages:
-        at = analysis.index(outage.end)
+        at, time = analysis.index(outage.end), outage.duration
         true, own = (float(np.hypot(*sd[at, :2])) for sd in (analysis.sd, analysis.predicted_sd))
-        result.append(
-            Check(
-                "outage", "horizontal", "position", "m", outage.duration, true, own, float(nees[at])
-            )
-        )
+        where = ("outage", "horizontal", "position", "m")
+        result.append(Check(*where, time, true, own, float(nees[at])))
     return result, []
 
 
 def _causes(
-    axes: Axes, numbers: SensorNumbers, horizon: float, known: Imperfections, motion: Motion | None
+    group: tuple[AxisModel, ...],
+    numbers: SensorNumbers,
+    horizon: float,
+    known: Imperfections,
+    motion: Motion | None,
 ) -> tuple[list[Cause], list[Notice]]:
-    """What N and K of each kind of sensor have to cover."""
-    causes: list[Cause] = []
-    notices: list[Notice] = []
-    for group in axes.groups:
-        kind = group[0].quantity
-        in_hand = [numbers[axis.name] for axis in group]
-        N, K = (max(getattr(each, letter) for each in in_hand) for letter in "NK")
-        first = _bound(group, horizon)
+    """What N and K of a kind of sensor have to cover."""
+    kind = group[0].quantity
 
-        def row(name: str, found: FilterNumbers, over: tuple[float, float],
-                kind: str = kind) -> Cause:  # fmt: skip
-            pair = (found.N, found.K)
-            factors = (v / o if o > 0.0 else float("inf") for v, o in zip(pair, over, strict=True))
-            return Cause(kind, name, *pair, *factors)
+    def least(axes: tuple[AxisModel, ...], level: float | None = None) -> FilterNumbers:
+        return bound_of(axes, "N+K", horizon, level)[0]
 
-        if N > tuning.OTHER_UNITS * first.N:
-            notices.append(_units(kind, N / first.N))
-        causes.append(Cause(kind, "in use", N, K, 1.0, 1.0))
-        causes.append(row("error model with slow terms", first, (N, K)))
-        if all(axis.fit is not None for axis in group):
-            try:
-                wide = _bound(group, horizon, 0.95)
-                causes.append(row("uncertainty of the fit, 95 %", wide, (first.N, first.K)))
-            except InputError as error:
-                notices.append(Notice("uncertainty-not-covered", "note", group[0].name, str(error)))
-        terms = known.terms(kind or "gyro", motion)
-        for cause, term in terms.items():
-            larger = row(cause, _bound(_with(group, [term]), horizon), (first.N, first.K))
-            causes.append(larger)
-            if motion is not None and isinstance(term, WhiteNoise):
-                notices.append(_bounded(kind, cause, horizon, motion.memory))
-            if max(larger.N_factor, larger.K_factor) > tuning.LARGE:
-                text = (
-                    f"larger numbers are a poor substitute for {cause}: N times "
-                    f"{larger.N_factor:.3g}, K times {larger.K_factor:.3g}"
-                )
-                values = {"N_factor": larger.N_factor, "K_factor": larger.K_factor}
-                notices.append(
-                    Notice(
-                        "estimate-it",
-                        "warning",
-                        kind,
-                        text,
-                        values,
-                        "estimate it as a state, or calibrate it",
-                    )
-                )
-        if terms:
-            every = _bound(_with(group, list(terms.values())), horizon)
-            causes.append(row("all together", every, (N, K)))
+    def row(name: str, found: FilterNumbers, over: tuple[float, float]) -> Cause:
+        pair = (found.N, found.K)
+        factors = (v / o if o > 0.0 else float("inf") for v, o in zip(pair, over, strict=True))
+        return Cause(kind, name, *pair, *factors)
+
+    in_use = [numbers[axis.name] for axis in group]
+    N, K = max(each.N for each in in_use), max(each.K for each in in_use)
+    first = least(group)
+    alone = (first.N, first.K)
+    causes = [
+        Cause(kind, "in use", N, K, 1.0, 1.0),
+        row("error model with slow terms", first, (N, K)),
+    ]
+    notices = []
+    if N > tuning.OTHER_UNITS * first.N:
+        unit = SI_UNIT.get(kind, "u")
+        notices.append(notice("other-units", kind, {"factor": N / first.N}, unit=unit))
+    if all(axis.fit is not None for axis in group):
+        try:
+            causes.append(row("uncertainty of the fit, 95 %", least(group, 0.95), alone))
+        except InputError as error:
+            where, reason = group[0].name, str(error)
+            notices.append(notice("uncertainty-not-covered", where, variant="why", reason=reason))
+    terms = known.terms(kind or "gyro", motion)
+    for cause, term in terms.items():
+        larger = row(cause, least(_with(group, [term])), alone)
+        causes.append(larger)
+        if motion is not None and isinstance(term, WhiteNoise):
+            # The integral of a derivative is the difference of the motion at two times.
+            times = horizon / motion.memory
+            factor = float(np.sqrt(times / -np.expm1(-times)))
+            notices.append(
+                notice("bounded-error", kind, {"factor": factor}, cause=cause, horizon=horizon)
+            )
+        if max(larger.N_factor, larger.K_factor) > tuning.LARGE:
+            values = {"N_factor": larger.N_factor, "K_factor": larger.K_factor}
+            notices.append(notice("estimate-it", kind, values, cause=cause))
+    if terms:
+        every = least(_with(group, list(terms.values())))
+        causes.append(row("all together", every, (N, K)))
     return causes, notices
 
 
-def _bounded(kind: str, cause: str, horizon: float, memory: float) -> Notice:
-    """Of an error that is a derivative: its integral is that of the motion at two times."""
-    factor = float(np.sqrt(horizon / memory / -np.expm1(-horizon / memory)))
-    text = (
-        f"what a {cause} does to the first integral does not grow: N for it, which is enough at "
-        f"any time, is {factor:.2g} times too large after {horizon:g} s"
-    )
-    return Notice("bounded-error", "note", kind, text, {"factor": factor})
-
-
-def _units(kind: str, factor: float) -> Notice:
-    text = f"N in use is {factor:.3g} times that of the error model: it may be in other units"
-    hint = f"give it in {SI_UNIT.get(kind, 'u')}/sqrt(Hz)"
-    return Notice("other-units", "warning", kind, text, {"factor": factor}, hint)
-
-
-def _bound(group: tuple[Axis, ...], horizon: float, level: float | None = None) -> FilterNumbers:
-    """Shared by the axes of a kind."""
-    return bound_of(group, "N+K", horizon, level)[0]
-
-
-def _with(group: Sequence[Axis], terms: Sequence[Process]) -> tuple[Axis, ...]:
+def _with(group: Sequence[AxisModel], terms: Sequence[Process]) -> tuple[AxisModel, ...]:
     """Axes with more terms; white noise joins that of the model."""
     result = []
     for axis in group:

@@ -1,4 +1,4 @@
-"""What static data cannot show: errors that come with motion, as terms of an error model."""
+"""Errors that static data cannot show and motion brings, as terms of an error model."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from gmwm.readers import Recording
 
 @dataclass(frozen=True)
 class Motion:
-    """How a vehicle moves, about its mean.
+    """Size and memory of a vehicle's motion about its mean.
 
     Attributes
     ----------
@@ -33,7 +33,7 @@ class Motion:
 
     @classmethod
     def of(cls, motion: str | Motion | Recording) -> Motion:
-        """A usual one by name, or that of a recording.
+        """A usual motion by name, or the motion of a recording.
 
         Raises
         ------
@@ -69,7 +69,7 @@ class Motion:
 
 @dataclass(frozen=True)
 class Imperfections:
-    """Errors of a calibration and of a mounting; zero where none is known.
+    """Errors of a calibration and of a mounting; zero where unknown.
 
     Attributes
     ----------
@@ -104,7 +104,7 @@ class Imperfections:
 
     @property
     def needs_motion(self) -> bool:
-        """Whether one of them does nothing without motion."""
+        """Whether one of them has no effect without motion."""
         return any((self.scale_error, self.misalignment, self.g_sensitivity, self.time_offset))
 
     def terms(self, quantity: str, motion: Motion | None) -> Mapping[str, Process]:

@@ -6,18 +6,32 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import minimize, minimize_scalar
+from scipy.optimize import minimize_scalar
 
 from gmwm._core import checks
-from gmwm._core.notices import Notice
 from gmwm._core.typing import FloatArray, Progress
-from gmwm.errors import InputError
 from gmwm.filter_numbers import tuning
-from gmwm.filter_numbers.axes import Axes, Axis, One, Sd, Several, given_tau, per_axis
-from gmwm.filter_numbers.bound import about, predicted, stands_for
-from gmwm.filter_numbers.chain import Chain
+from gmwm.filter_numbers.axes import (
+    AxisModel,
+    One,
+    Sd,
+    SensorAxes,
+    Several,
+    given_outages,
+    given_tau,
+    per_axis,
+)
+from gmwm.filter_numbers.bound import (
+    covered_terms_notices,
+    fit_notices,
+    predicted,
+    start_sd,
+)
+from gmwm.filter_numbers.propagation import Chain, ChainErrors
 from gmwm.filter_numbers.result import FORMS, FilterNumbers, Predicted, SensorNumbers
-from gmwm.filter_numbers.spectra import Problem, Target, with_correlation_times
+from gmwm.filter_numbers.spectra import Problem, RequiredSpectrum, with_correlation_times
+from gmwm.ins.covariance import smallest_score
+from gmwm.issues import Notice, notice
 from gmwm.process import Model
 
 _TIMES = {"N+K": (), "N+GM": (1.0,), "N+K+GM": (1.0,), "N+2GM": (0.1, 3.0)}
@@ -39,7 +53,7 @@ def reduce(
 ) -> FilterNumbers | SensorNumbers:
     """The numbers of a form that make a small filter consistent, and as accurate as it can be.
 
-    Unlike those of `gmwm.bound` they may be too optimistic in some direction or at other times.
+    Unlike those of `gmwm.bound` they may be overconfident in some direction or at other times.
 
     Parameters
     ----------
@@ -53,7 +67,7 @@ def reduce(
         Interval of keyframes or scans between which poses are related, s, for which they shall be
         good in place of outages.
     bias_sd : float or mapping, optional
-        Standard deviation of a constant bias, such as that of turning on, in u; by axis or kind
+        Standard deviation of a constant bias, such as the turn-on bias, in u; by axis or kind
         ("gyro", "accel") if a mapping.
     shared : bool, optional
         Whether axes of a kind have the same numbers.
@@ -69,38 +83,36 @@ def reduce(
     -------
     FilterNumbers or SensorNumbers
         Of one axis, or by channel; the horizon is the longest outage or the interval of keyframes,
-        and what is predicted is at each of them and at ten times the longest.
+        and predictions are at each of them and at ten times the longest.
 
     Raises
     ------
     InputError
-        If a parameter is open, a term has no state-space form, there is no outage, or ``tau`` is
+        If a parameter is free, a term has no state-space form, there is no outage, or ``tau`` is
         given without one Gauss-Markov process.
 
     Notes
     -----
     They minimise the expected negative logarithm of the predicted density at the true error of the
     integrals at the end of the outages: a proper score, which punishes a covariance that is too
-    small as it does one that is too large. To it comes the squared logarithm of the NEES at each of
-    them: what one is too optimistic, another shall not make good. The expectation is exact for the
-    truth given, in the filter of `gmwm.filter_numbers.Chain`; of a heading it is that of the angle
-    gained since the last fix too, as `gmwm.certify` judges both. `gmwm.ins.reduce` does it in a
-    whole navigation filter on a trajectory.
+    small as it does one that is too large. The squared logarithm of the NEES at each of them is
+    added, so that one outage cannot make up for another. The expectation is exact for the truth
+    given, in the filter of `gmwm.filter_numbers.Chain`; of a heading it is that of the angle gained
+    since the last fix too, as `gmwm.certify` judges both. `gmwm.ins.reduce` does it in a whole
+    navigation filter on a trajectory, by the same search.
     """
     checks.choice("form", form, FORMS)
     tau = given_tau(form, tau)
     if keyframe is not None:
         outages = (checks.positive("keyframe", keyframe, "give the interval of keyframes in s"),)
-    times = sorted({checks.positive("outage", each) for each in outages})
-    if not times:
-        raise InputError("outages: give one length at least, s")
-    axes = Axes.of(source, dt, bias_sd)
+    times = given_outages(outages)
+    axes = SensorAxes.of(source, dt, bias_sd)
     axes.check_interval("outages" if keyframe is None else "keyframe", times[0])
     search = _Search(form, times, keyframe is not None)
     time = search.correlation_time(axes.sharing(shared)) if isinstance(tau, str) else tau
     done = 0
 
-    def found(group: tuple[Axis, ...]) -> list[FilterNumbers]:
+    def found(group: tuple[AxisModel, ...]) -> list[FilterNumbers]:
         nonlocal done
         if progress is not None:
             progress(done, len(axes.axes), group[0].name)
@@ -121,38 +133,33 @@ class _Search:
     times: Sequence[float]
     is_relative: bool
 
-    def chain(self, axis: Axis) -> Chain:
+    def chain(self, axis: AxisModel) -> Chain:
         return axis.between(self.times[-1]) if self.is_relative else axis.chain
 
-    def numbers(self, group: Sequence[Axis], tau: float | None) -> list[FilterNumbers]:
-        """Those that axes share."""
+    def required(self, group: Sequence[AxisModel]) -> tuple[RequiredSpectrum, ...]:
         longest = self.times[-1]
-        _, model, sd = self.least(group, tau)
-        times = (*self.times, 10.0 * longest)
-        errors = [predicted(axis, self.chain(axis), model, sd, times) for axis in group]
-        targets = [Target.of(axis.model, axis.dt, longest, axis.unit) for axis in group]
-        return [
-            FilterNumbers(
-                form=self.form,
-                model=model,
-                horizon=longest,
-                initial_sd=sd,
-                method="reduce",
-                predicted=found,
-                notices=(
-                    # All else that a bound leaves out is part of the truth of these.
-                    *(each for each in target.notices if each.code == "ramp-as-constant"),
-                    *_optimistic(found, longest),
-                    *_below(axis, model),
-                    *stands_for(axis, target, model, targets),
-                    *about(axis, None),
-                ),
-                quantity=axis.quantity,
-            )
-            for axis, found, target in zip(group, errors, targets, strict=True)
-        ]
+        return tuple(RequiredSpectrum.of(a.model, a.dt, longest, a.unit) for a in group)
 
-    def correlation_time(self, groups: Sequence[Sequence[Axis]]) -> float:
+    def numbers(self, group: Sequence[AxisModel], tau: float | None) -> list[FilterNumbers]:
+        """The numbers of axes that share them."""
+        _, model, sd = self.least(group, tau)
+        longest, numbers = self.times[-1], []
+        targets = self.required(group)
+        for axis, target in zip(group, targets, strict=True):
+            found = predicted(axis, self.chain(axis), model, sd, [*self.times, 10.0 * longest])
+            # All else that a bound leaves out is part of the truth here.
+            notices = [each for each in target.notices if each.code == "ramp-as-constant"]
+            notices += _overconfidence(found, longest)
+            own = float(np.sqrt(axis.model.white_density()))
+            share = float(np.sqrt(model.white_density())) / own if own > 0.0 else 1.0
+            notices += [notice("less-white-noise", "", {"share": share})] * (share <= tuning.BELOW)
+            notices += covered_terms_notices(axis, target, model, targets)
+            notices += fit_notices(axis, None)
+            about = (self.form, model, longest, sd, "reduce", found, tuple(notices), axis.quantity)
+            numbers.append(FilterNumbers(*about))
+        return numbers
+
+    def correlation_time(self, groups: Sequence[Sequence[AxisModel]]) -> float:
         """The one for all that costs least over them, s."""
 
         def cost(log_tau: float) -> float:
@@ -161,69 +168,52 @@ class _Search:
         grid = np.log(self.times[-1] * np.array(tuning.SHARED_TAUS))
         best = int(np.argmin([cost(each) for each in grid]))
         around = grid[max(best - 1, 0)], grid[min(best + 1, grid.size - 1)]
-        found = minimize_scalar(
-            cost, bounds=around, method="bounded", options={"xatol": tuning.SHARED_TAU_WITHIN}
-        )
+        options = {"xatol": tuning.SHARED_TAU_WITHIN}
+        found = minimize_scalar(cost, bounds=around, method="bounded", options=options)
         return float(np.exp(found.x))
 
-    def least(self, group: Sequence[Axis], tau: float | None) -> tuple[float, Model, float]:
-        """The least score, the numbers that have it, and the standard deviation at the start."""
-        start, sd = self._start(group, tau)
+    def least(self, group: Sequence[AxisModel], tau: float | None) -> tuple[float, Model, float]:
+        """The least score, its numbers, and the standard deviation of the bias at the start."""
+        targets = self.required(group)
+        start, sd = self._start(group, targets, tau)
         names = [name for name in start.params if tau is None or name != "tau"]
         values = np.array([float(start.params[name] or 0.0) for name in names])
 
         def scaled(logs: FloatArray) -> Model:
             return start.with_params(dict(zip(names, values * np.exp(logs), strict=True)))
 
-        def cost(logs: FloatArray) -> float:
-            # Finite beyond the farthest too, where a line search may try: it takes differences.
-            model = scaled(np.clip(logs, -tuning.FARTHEST, tuning.FARTHEST))
-            errors = [
-                [
-                    chain.errors(
-                        axis.model, model, axis.dt, self.times, true_sd=axis.bias_sd, believed_sd=sd
-                    )
-                    for chain in self.chain(axis).judged
-                ]
-                for axis in group
-            ]
-            total = tuning.INERTIA * float(logs @ logs)
-            for i in range(max(map(len, errors))):
-                found = [each[i] for each in errors if i < len(each)]
-                score = np.mean([each.score() for each in found], axis=0)
-                # Of all axes together: one that shares its numbers may be cautious, another bold.
+        def errors(axis: AxisModel, model: Model) -> list[ChainErrors]:
+            given = (axis.model, model, axis.dt, self.times)
+            chains = self.chain(axis).judged
+            return [c.errors(*given, true_sd=axis.bias_sd, believed_sd=sd) for c in chains]
+
+        def score(logs: FloatArray) -> float:
+            by_axis = [errors(axis, scaled(logs)) for axis in group]
+            total = 0.0
+            for i in range(max(map(len, by_axis))):
+                found = [each[i] for each in by_axis if i < len(each)]
+                # Of all axes together: one that shares its numbers may be conservative, another
+                # overconfident.
                 uneven = np.log(np.mean([each.nees() for each in found], axis=0)) ** 2
-                total += float(np.sum(score + tuning.EVENNESS * uneven))
+                mean = np.mean([each.score() for each in found], axis=0)
+                total += float(np.sum(mean + tuning.EVENNESS * uneven))
             return total
 
-        starts = [np.zeros(len(names)), *self._with_peaks(group, start, names)]
-        options = {"eps": tuning.DIFFERENCE, "gtol": tuning.SLOPE, "maxiter": tuning.STEPS}
-        found = [minimize(cost, logs, method="BFGS", options=options) for logs in starts]
-        best = min(found, key=lambda each: float(each.fun))
-        model = scaled(np.clip(best.x, -tuning.FARTHEST, tuning.FARTHEST))
-        return float(best.fun), model, sd
+        starts = [np.zeros(len(names))]
+        if any(each.code == "fast-peak-left-out" for target in targets for each in target.notices):
+            # A second start, with N read off at the longest time: of quantization of an angle it is
+            # a hundred times that of the bound, with a minimum between.
+            longest = self.times[-1]
+            at = np.array([longest])
+            read = max(2.0 * longest * axis.model.haar_variance(at, axis.dt)[0] for axis in group)
+            factor = float(np.sqrt(read / start.white_density()))
+            starts.append(np.where(np.array(names) == "N", np.log(factor), 0.0))
+        least, logs = smallest_score(score, starts)
+        return least, scaled(logs), sd
 
-    def _with_peaks(
-        self, group: Sequence[Axis], start: Model, names: Sequence[str]
-    ) -> list[FloatArray]:
-        """Another start, N read off at the longest time, where a bound leaves a peak out.
-
-        Of quantization of an angle it is a hundred times that of the bound, with a minimum between.
-        """
-        longest = self.times[-1]
-        notices = [
-            notice
-            for axis in group
-            for notice in Target.of(axis.model, axis.dt, longest, axis.unit).notices
-        ]
-        if not any(notice.code == "fast-peak-left-out" for notice in notices):
-            return []
-        time = np.array([longest])
-        read = max(2.0 * longest * axis.model.haar_variance(time, axis.dt)[0] for axis in group)
-        factor = float(np.sqrt(read / start.white_density()))
-        return [np.where(np.array(names) == "N", np.log(factor), 0.0)]
-
-    def _start(self, group: Sequence[Axis], tau: float | None) -> tuple[Model, float]:
+    def _start(
+        self, group: Sequence[AxisModel], targets: tuple[RequiredSpectrum, ...], tau: float | None
+    ) -> tuple[Model, float]:
         """A bound with given correlation times, without zeros; standard deviation at the start.
 
         Without a walk it lies above the models from the frequency of the longest time on: below, a
@@ -231,46 +221,23 @@ class _Search:
         search.
         """
         longest = self.times[-1]
-        targets = [Target.of(axis.model, axis.dt, longest, axis.unit) for axis in group]
         lowest = 0.0 if "K" in self.form else 0.5 / np.pi / longest
-        problem = Problem(tuple(targets), longest, lowest=lowest)
         taus = [factor * longest for factor in _TIMES[self.form]] if tau is None else [tau]
+        problem = Problem(targets, longest, lowest=lowest)
         model = with_correlation_times(problem, self.form, taus)
-        walking = any(term.is_walk for term in model.terms)
-        variance = 0.0
-        for axis, target in zip(group, targets, strict=True):
-            own = axis.bias_sd**2 + target.constant_sd**2
-            if walking:
-                still = Model(tuple(term for term in model.terms if not term.is_walk))
-                own += target.slow_variance(still)
-            variance = max(variance, own)
-        return model, float(np.sqrt(variance))
+        biases = [axis.bias_sd for axis in group]
+        return model, start_sd(biases, targets, model, slow_share=1.0)
 
 
-def _optimistic(found: Sequence[Predicted], longest: float) -> tuple[Notice, ...]:
-    """Where a filter with them believes too little, of the times asked for or else beyond."""
+def _overconfidence(found: Sequence[Predicted], longest: float) -> list[Notice]:
+    """Where a filter with these numbers is overconfident, at the times asked for or beyond."""
     high = [each for each in found if each.nees > tuning.INCONSISTENT]
     if not high:
-        return ()
+        return []
     worst = max(high, key=lambda each: (each.time <= longest, each.nees))
-    text = f"too optimistic: a NEES of {worst.nees:.3g} after {worst.time:g} s without aiding"
     values = {"nees": worst.nees, "time": worst.time}
     if worst.time > longest:
         hint = "give that time among the outages if there are such"
-        return (Notice("optimistic", "note", "", f"{text}, for which they are not", values, hint),)
-    text += "; no such numbers are consistent at all times and on all axes that share them"
+        return [notice("optimistic", "", values, severity="note", variant="beyond", hint=hint)]
     hint = "use gmwm.bound, a form with more terms, or own numbers of each axis"
-    return (Notice("optimistic", "warning", "", text, values, hint),)
-
-
-def _below(axis: Axis, model: Model) -> tuple[Notice, ...]:
-    """Where less white noise is believed than there is."""
-    own = float(np.sqrt(axis.model.white_density()))
-    share = float(np.sqrt(model.white_density())) / own if own > 0.0 else 1.0
-    if share > tuning.BELOW:
-        return ()
-    text = (
-        f"N is {share:.3g} times that of the error model: the other terms pay for it, at the times "
-        "without aiding that the numbers are for"
-    )
-    return (Notice("less-white-noise", "note", "", text, {"share": share}),)
+    return [notice("optimistic", "", values, variant="reduce", hint=hint)]

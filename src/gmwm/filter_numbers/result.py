@@ -2,55 +2,75 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import asdict, dataclass, field, replace
-from typing import TYPE_CHECKING, Any, ClassVar, Self
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+
+from annotated_types import MaxLen, MinLen
+from pydantic import Field
 
 from gmwm._core import checks
-from gmwm._core.documents import Document
-from gmwm._core.frames import frame
+from gmwm._core.documents import Document, NoneIs, NotNegative, Positive, Rate, Text, plain_schema
 from gmwm._core.frozen import freeze
-from gmwm._core.notices import Notice
-from gmwm._core.text import Printed, bullets, wrapped
-from gmwm._core.units import SI_UNIT
+from gmwm._core.tables import cell, frame, plain_table
+from gmwm._core.text import WIDTH, Printed, bullets, wrapped
+from gmwm._core.units import SI_UNIT, field_units, si_parameter_unit
 from gmwm.errors import MissingNameError
-from gmwm.estimate.result import plain
-from gmwm.filter_numbers.table import shown_unit, stacked
+from gmwm.issues import Notice
 from gmwm.process import Model, model_from_list
 
 if TYPE_CHECKING:
     import pandas
 
-    from gmwm._core.forms import Form
-
 FORMS = ("N+K", "N+GM", "N+K+GM", "N+2GM")
 """White noise with a random walk, with one or two Gauss-Markov processes, or with both."""
 
 METHODS = ("bound", "reduce", "given")
-"""Where numbers come from: `bound`, `reduce`, or somebody who gave them."""
+"""Where numbers come from: `bound`, `reduce`, or the user."""
+
+UNITS = ("field", "si")
+"""Data-sheet units (IEEE Std 952 / 1554), or SI."""
+
+_UNITS = {"N": "u/sqrt(Hz)", "K": "u/s/sqrt(Hz)", "sigma": "u", "tau": "s", "initial_sd": "u"}
+_NAN = float("nan")
+
+
+def _alias(key: str) -> Any:
+    """Mark of a field that has another key in documents."""
+    return Field(validation_alias=key, serialization_alias=key)
+
+
+class _StoredTerms:
+    """Mark of a model in a document: the list of its terms."""
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> Any:
+        def read(value: Any) -> Model:
+            return value if isinstance(value, Model) else model_from_list(value)
+
+        return plain_schema(read, lambda model: [term.to_dict() for term in model.terms])
 
 
 @dataclass(frozen=True)
 class Predicted:
     """How well a filter with these numbers knows its error, after some time without aiding.
 
-    It is the expected one of the filter of `gmwm.filter_numbers.chain.Chain`, by covariance
-    analysis; of one integral, that of what it gains where this is the worse.
+    It is the expectation for the filter of `gmwm.filter_numbers.Chain`, by covariance analysis; of
+    one integral, that of its gain since the last fix where this is the worse.
 
     time: Without aiding, s.
     nees: Normalised error squared per degree of freedom; 1 if the filter is consistent, above if it
-        is too optimistic. NaN where a term of the truth has no state-space form.
+        is overconfident. NaN where a term of the truth has no state-space form.
     tightness: Predicted over true standard deviation, of the last integral of the sensor's error.
     """
 
-    time: float
-    nees: float
-    tightness: float
+    time: Positive
+    nees: Annotated[NotNegative, NoneIs(_NAN)]
+    tightness: Annotated[NotNegative, NoneIs(_NAN)]
 
 
 @dataclass(frozen=True, repr=False)
 class FilterNumbers(Document, Printed):
-    """What a small filter should believe of one axis.
+    """The numbers that a small filter should believe of one axis.
 
     Attributes
     ----------
@@ -66,9 +86,9 @@ class FilterNumbers(Document, Printed):
     predicted : tuple of Predicted
         At the horizon and at ten times the horizon.
     notices : tuple of Notice
-        What of the error model the numbers leave out, and why.
+        Terms of the error model that the numbers leave out, and why.
     quantity : {"gyro", "accel", ""}
-        What the axis measures; empty if it is not known.
+        Of the axis; empty if unknown.
     stderr : dict
         Standard errors of the N and K that bound a valid fit, from those of the fit; empty for
         other forms, for models, and where a level covers them.
@@ -76,15 +96,15 @@ class FilterNumbers(Document, Printed):
 
     SCHEMA: ClassVar[str] = "gmwm.axis-numbers"
 
-    form: str
-    model: Model
-    horizon: float
-    initial_sd: float
-    method: str
-    predicted: tuple[Predicted, ...] = ()
+    form: Text
+    model: Annotated[Model, _StoredTerms()]
+    horizon: Annotated[Positive, _alias("horizon_s")]
+    initial_sd: NotNegative
+    method: Text
+    predicted: Annotated[tuple[Predicted, ...], MaxLen(100)] = ()
     notices: tuple[Notice, ...] = ()
-    quantity: str = ""
-    stderr: Mapping[str, float] = field(default_factory=dict)
+    quantity: Text = ""
+    stderr: Mapping[Text, NotNegative] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         freeze(self, "stderr")
@@ -93,7 +113,7 @@ class FilterNumbers(Document, Printed):
 
     @property
     def unit(self) -> str:
-        """Of the axis, SI; "u" if the quantity is not known."""
+        """Of the axis, SI; "u" if the quantity is unknown."""
         return SI_UNIT.get(self.quantity, "u")
 
     @property
@@ -137,7 +157,7 @@ class FilterNumbers(Document, Printed):
         return self.text()
 
     def text(self, units: str = "field") -> str:
-        """What `print` shows, in the units of the field or, with ``"si"``, in SI.
+        """The text of `print`, in data-sheet units or, with ``"si"``, in SI.
 
         Raises
         ------
@@ -145,7 +165,7 @@ class FilterNumbers(Document, Printed):
             If the units are neither.
         """
         lines = [f"{self.form} for {self.horizon:g} s, {self.method}"]
-        for key, value in self._shown():
+        for key, value in self._shown().items():
             unit, per_si = shown_unit(key, self.quantity, units)
             error = f" +- {self.stderr[key] * per_si:.2g}" if key in self.stderr else ""
             lines.append(f"  {key:<10} {value * per_si:>11.4g}{error} {unit}")
@@ -154,94 +174,54 @@ class FilterNumbers(Document, Printed):
                 f"  after {each.time:g} s without aiding: NEES {each.nees:.3g} per degree of "
                 f"freedom, predicted/true standard deviation {each.tightness:.3g}"
             )
-        lines += bullets(self.notices)
-        return "\n".join(lines)
+        return "\n".join([*lines, *bullets(self.notices)])
 
-    def _shown(self) -> list[tuple[str, float]]:
-        values = [(key, float(value or 0.0)) for key, value in self.model.params.items()]
-        return [*values, ("initial_sd", self.initial_sd)]
-
-    def _columns(self) -> tuple[dict[str, float], dict[str, float]]:
-        """Of the table of a sensor: values with their errors, and predictions."""
-        errors = {f"{key} +-": value for key, value in self.stderr.items()}
-        return {**dict(self._shown()), **errors}, {
-            **{f"NEES {each.time:g} s": each.nees for each in self.predicted},
-            **{f"sd {each.time:g} s": each.tightness for each in self.predicted},
-        }
+    def _shown(self) -> dict[str, float]:
+        values = {key: float(value or 0.0) for key, value in self.model.params.items()}
+        return values | {"initial_sd": self.initial_sd}
 
     def row(self) -> dict[str, Any]:
-        """What `to_frame` shows of it, SI."""
-        first = self.predicted[0] if self.predicted else None
+        """A row of `SensorNumbers.to_frame`, SI."""
+        first = self.predicted[0] if self.predicted else Predicted(self.horizon, _NAN, _NAN)
         return {
             "form": self.form,
-            **dict(self._shown()),
+            **self._shown(),
             **{f"{key}_stderr": value for key, value in self.stderr.items()},
             "horizon": self.horizon,
-            "nees": first.nees if first else float("nan"),
-            "tightness": first.tightness if first else float("nan"),
+            "nees": first.nees,
+            "tightness": first.tightness,
             "method": self.method,
         }
-
-    # -- files ------------------------------------------------------------------------------------
-
-    def content(self) -> dict[str, Any]:
-        return {
-            "form": self.form,
-            "model": [term.to_dict() for term in self.model.terms],
-            "horizon_s": self.horizon,
-            "initial_sd": self.initial_sd,
-            "method": self.method,
-            "predicted": [stored(each) for each in self.predicted],
-            "notices": [notice.to_dict() for notice in self.notices],
-            "quantity": self.quantity,
-            "stderr": dict(self.stderr),
-        }
-
-    @classmethod
-    def document_form(cls) -> type[Form]:
-        from gmwm.filter_numbers.form import FilterNumbersForm
-
-        return FilterNumbersForm
-
-    @classmethod
-    def from_content(cls, content: Mapping[str, Any]) -> Self:
-        return cls(
-            form=str(content["form"]),
-            model=model_from_list(content["model"]),
-            horizon=float(content["horizon_s"]),
-            initial_sd=float(content["initial_sd"]),
-            method=str(content["method"]),
-            predicted=tuple(Predicted(**restored(each)) for each in content["predicted"]),
-            notices=tuple(map(Notice.from_dict, content["notices"])),
-            quantity=str(content["quantity"]),
-            stderr={str(k): float(v) for k, v in content.get("stderr", {}).items()},
-        )
 
 
 @dataclass(frozen=True, repr=False)
 class SensorNumbers(Mapping[str, FilterNumbers], Document, Printed):
-    """What a small filter should believe of a sensor: a mapping of channels to `FilterNumbers`.
+    """The numbers that a small filter should believe of a sensor: channel -> `FilterNumbers`.
 
     Attributes
     ----------
     axes : dict
         Channel name -> `FilterNumbers`.
     source : str
-        What was calibrated.
+        Of the calibration.
     rate : float
-        Sampling rate, Hz; NaN if it is not known.
+        Sampling rate, Hz; NaN if unknown.
     duration : float
-        Length of the recording, s; NaN if it is not known.
+        Length of the recording, s; NaN if unknown.
     shared : bool
         Whether the axes of a quantity have the same numbers.
     """
 
     SCHEMA: ClassVar[str] = "gmwm.filter-numbers"
 
-    axes: Mapping[str, FilterNumbers]
-    source: str = ""
-    rate: float = float("nan")
-    duration: float = float("nan")
+    axes: Annotated[Mapping[Text, FilterNumbers], MinLen(1), MaxLen(10_000), _alias("channels")]
+    source: Text = ""
+    rate: Annotated[Rate, NoneIs(_NAN), _alias("rate_hz")] = _NAN
+    duration: Annotated[
+        Positive,
+        NoneIs(_NAN),
+        Field(validation_alias="duration_s", serialization_alias="duration_s"),
+    ] = _NAN
     shared: bool = False
 
     def __post_init__(self) -> None:
@@ -261,7 +241,7 @@ class SensorNumbers(Mapping[str, FilterNumbers], Document, Printed):
         return len(self.axes)
 
     def of(self, quantity: str) -> dict[str, FilterNumbers]:
-        """Those of the gyros ("gyro") or accelerometers ("accel")."""
+        """The axes of the gyros ("gyro") or accelerometers ("accel")."""
         return {name: each for name, each in self.items() if each.quantity == quantity}
 
     @property
@@ -276,7 +256,7 @@ class SensorNumbers(Mapping[str, FilterNumbers], Document, Printed):
 
     @property
     def notices(self) -> tuple[Notice, ...]:
-        """Those of all axes, with the channel as the place."""
+        """Notices of all axes, with the channel as the place."""
         return tuple(
             replace(notice, where=name) for name, each in self.items() for notice in each.notices
         )
@@ -289,7 +269,7 @@ class SensorNumbers(Mapping[str, FilterNumbers], Document, Printed):
         return self.text()
 
     def text(self, units: str = "field") -> str:
-        """What `print` shows, in the units of the field or, with ``"si"``, in SI.
+        """The text of `print`, in data-sheet units or, with ``"si"``, in SI.
 
         Raises
         ------
@@ -300,18 +280,14 @@ class SensorNumbers(Mapping[str, FilterNumbers], Document, Printed):
         head = f"{self.form} for {self.horizon:g} s, {first.method}"
         lines = [f"{self.source}: {head}" if self.source else head]
         for quantity in dict.fromkeys(each.quantity for each in self.values()):
-            rows = {name: each._columns() for name, each in self.of(quantity).items()}
-            lines += ["", *stacked(quantity or "channel", rows, quantity, units)]
+            lines += ["", *_tables(self.of(quantity), quantity, units)]
         if first.predicted:
             lines += ["", *wrapped(
                 "NEES: predicted, per degree of freedom, after a time without aiding; sd: "
                 "predicted over true standard deviation then."
             )]  # fmt: skip
         if first.form != "N+GM":
-            lines += wrapped(
-                "N and the slow terms belong together: where one is smaller, a larger other pays "
-                "for it."
-            )
+            lines += wrapped("N and the slow terms belong together: use them as a pair.")
         places: dict[str, list[str]] = {}
         for notice in self.notices:
             places.setdefault(str(replace(notice, where="")), []).append(notice.where)
@@ -323,40 +299,48 @@ class SensorNumbers(Mapping[str, FilterNumbers], Document, Printed):
         rows = [{"channel": name, **each.row()} for name, each in self.items()]
         return frame(rows, tuple(dict.fromkeys(key for row in rows for key in row)))
 
-    # -- files ------------------------------------------------------------------------------------
 
-    def content(self) -> dict[str, Any]:
-        return {
-            "source": self.source,
-            "rate_hz": plain(self.rate),
-            "duration_s": plain(self.duration),
-            "shared": self.shared,
-            "channels": {name: each.to_dict() for name, each in self.items()},
-        }
+def shown_unit(key: str, quantity: str, units: str) -> tuple[str, float]:
+    """The unit in which a number is shown, and its value per SI unit.
 
-    @classmethod
-    def document_form(cls) -> type[Form]:
-        from gmwm.filter_numbers.form import SensorNumbersForm
-
-        return SensorNumbersForm
-
-    @classmethod
-    def from_content(cls, content: Mapping[str, Any]) -> Self:
-        known = restored(content)
-        return cls(
-            axes={name: FilterNumbers.from_dict(each) for name, each in known["channels"].items()},
-            source=known["source"],
-            rate=known["rate_hz"],
-            duration=known["duration_s"],
-            shared=known["shared"],
-        )
+    Raises InputError if ``units`` is not one of `UNITS`.
+    """
+    unit = _UNITS[key if key in _UNITS else key.partition("_")[0]]
+    known = field_units(unit, quantity) if checks.choice("units", units, UNITS) == "field" else ()
+    return (known[0].unit, known[0].per_si) if known else (si_parameter_unit(unit, quantity), 1.0)
 
 
-def stored(row: Any) -> dict[str, Any]:
-    """Fields of a dataclass in JSON types: None for a number that is not known."""
-    return {k: plain(v) if isinstance(v, float) else v for k, v in asdict(row).items()}
+def _tables(axes: Mapping[str, FilterNumbers], quantity: str, units: str) -> list[str]:
+    """The values of axes with their units, and the predictions below them."""
+    longest = max(axes.values(), key=lambda each: len(each._shown()) + len(each.stderr))
+    heads, columns = [quantity or "channel"], [list(axes)]
+    for key in longest._shown():
+        unit, scale = shown_unit(key, quantity, units)
+        heads.append(f"{key}\n{unit}")
+        columns.append([cell(each._shown().get(key), scale=scale) for each in axes.values()])
+        if key in longest.stderr:
+            heads.append("+-")
+            columns.append([cell(each.stderr.get(key), 2, scale) for each in axes.values()])
+    lines = _table(heads, columns)
+    times = max((list(each.nees) for each in axes.values()), key=len)
+    if not times:
+        return lines
+    heads, columns = ["predicted"], [list(axes)]
+    for name in ("nees", "tightness"):
+        for time in times:
+            heads.append(f"{'NEES' if name == 'nees' else 'sd'} {time:g} s")
+            columns.append([cell(getattr(each, name).get(time), 3) for each in axes.values()])
+    return lines + _table(heads, columns)
 
 
-def restored(row: Mapping[str, Any]) -> dict[str, Any]:
-    """Inverse of `stored`."""
-    return {k: float("nan") if v is None else v for k, v in row.items()}
+def _table(heads: Sequence[str], columns: Sequence[Sequence[str]]) -> list[str]:
+    """Lines of a table; in two parts beneath each other where it is wider than a page."""
+    widths = [
+        2 + max(map(len, [*head.split("\n"), *column]))
+        for head, column in zip(heads, columns, strict=True)
+    ]
+    if sum(widths) > WIDTH and len(heads) > 2:
+        half = (len(heads) + 2) // 2
+        rest = [heads[0], *heads[half:]], [columns[0], *columns[half:]]
+        return _table(heads[:half], columns[:half]) + _table(*rest)
+    return plain_table(heads, list(zip(*columns, strict=True))).splitlines()

@@ -25,21 +25,21 @@ from .imu.emulation import Imu as Imu, emulate as emulate
 from .imu.preintegration import Preintegration as Preintegration, preintegrate as preintegrate
 from .imu.recorded import Recorded as Recorded
 from .imu.sensors import SensorErrors as SensorErrors, SensorModels as SensorModels
-from .montecarlo.consistency import (
+from .simulation.consistency import (
     Consistency as Consistency,
     at_epoch as at_epoch,
     innovation_test as innovation_test,
     over_time as over_time,
 )
-from .montecarlo.filter_errors import FilterErrors as FilterErrors
-from .montecarlo.outage_errors import difference as difference, spread as spread
-from .montecarlo.scenario import (
+from .simulation.filter_errors import FilterErrors as FilterErrors
+from .simulation.outage_errors import difference as difference, spread as spread
+from .simulation.scenario import (
     Experiment as Experiment,
     Scenario as Scenario,
     Simulated as Simulated,
 )
-from .montecarlo.trials import MonteCarlo as MonteCarlo, monte_carlo as monte_carlo
-from .montecarlo.validation import Validation as Validation
+from .simulation.trials import MonteCarlo as MonteCarlo, monte_carlo as monte_carlo
+from .simulation.validation import Validation as Validation
 from .spec.experiment import experiment_from as experiment_from
 from .trajectory.manoeuvres import (
     Accelerate as Accelerate,

@@ -56,9 +56,17 @@ def deviation(
         _, ax = plt.subplots(figsize=(7.0, 4.6), layout="constrained")
     bars = np.stack([np.maximum(value - lower, 0.0), np.maximum(upper - value, 0.0)])
     ax.errorbar(
-        tau, value, yerr=bars, fmt="o", color=DATA_COLOUR, markersize=4.5, capsize=2.5,
-        elinewidth=1.0, label=f"data, {interval} interval", zorder=4,
-    )  # fmt: skip
+        tau,
+        value,
+        yerr=bars,
+        fmt="o",
+        color=DATA_COLOUR,
+        markersize=4.5,
+        capsize=2.5,
+        elinewidth=1.0,
+        label=f"data, {interval} interval",
+        zorder=4,
+    )
     _label(ax, f"Allan deviation [{unit}]", title)
     return ax
 
@@ -101,10 +109,17 @@ def deviations(
         # bars stand side by side.
         behind = len(kinds) - 1 - i
         ax.plot(
-            tau, value, color=colour, linewidth=1.2 + 0.6 * behind, marker=marker,
-            markersize=4.0 + 1.8 * behind, markerfacecolor="none", markeredgewidth=1.2,
-            label=label, zorder=3 + 0.1 * i,
-        )  # fmt: skip
+            tau,
+            value,
+            color=colour,
+            linewidth=1.2 + 0.6 * behind,
+            marker=marker,
+            markersize=4.0 + 1.8 * behind,
+            markerfacecolor="none",
+            markeredgewidth=1.2,
+            label=label,
+            zorder=3 + 0.1 * i,
+        )
         beside = tau * _BESIDE ** (i - 0.5 * (len(kinds) - 1))
         ax.vlines(beside, lower, upper, color=colour, linewidth=1.0, zorder=2)
         shown.append(value)
@@ -162,10 +177,19 @@ def straight_lines(ax: Axes, lines: Mapping[str, tuple[float, float, float, floa
     for colour, (label, line) in zip(_cycle(len(lines)), lines.items(), strict=True):
         slope, coefficient, first, last = line
         region = np.array([first, last])
-        ax.plot(ends, coefficient * ends**slope, color=colour, linewidth=1.0, linestyle="--",
-                zorder=2)  # fmt: skip
-        ax.plot(region, coefficient * region**slope, color=colour, linewidth=4.5, alpha=0.8,
-                solid_capstyle="round", label=label, zorder=3.5)  # fmt: skip
+        ax.plot(
+            ends, coefficient * ends**slope, color=colour, linewidth=1.0, linestyle="--", zorder=2
+        )
+        ax.plot(
+            region,
+            coefficient * region**slope,
+            color=colour,
+            linewidth=4.5,
+            alpha=0.8,
+            solid_capstyle="round",
+            label=label,
+            zorder=3.5,
+        )
     ax.set_xlim(*ends)
     ax.set_ylim(*limits)
     ax.legend(fontsize="small", framealpha=0.9)
@@ -196,10 +220,15 @@ def residuals(
     ax.plot(tau[shown], residual[shown], "o", color=COMPONENT_COLOURS[0], markersize=4.5)
     for time, height, share in zip(tau[shown], residual[shown], misfit[shown], strict=True):
         ax.annotate(
-            f"{100.0 * share:+.2g}", (time, height), xytext=(0.0, 5.0 if height >= 0.0 else -5.0),
-            textcoords="offset points", ha="center", va="bottom" if height >= 0.0 else "top",
-            fontsize="x-small", color=DATA_COLOUR,
-        )  # fmt: skip
+            f"{100.0 * share:+.2g}",
+            (time, height),
+            xytext=(0.0, 5.0 if height >= 0.0 else -5.0),
+            textcoords="offset points",
+            ha="center",
+            va="bottom" if height >= 0.0 else "top",
+            fontsize="x-small",
+            color=DATA_COLOUR,
+        )
     largest = max(float(np.max(np.abs(residual[shown]), initial=0.0)), 2.5)
     if largest > LINEAR_RESIDUAL:
         # Beside a residual of 50 at the finest level those at long times would be flat.
@@ -210,8 +239,9 @@ def residuals(
     ax.set_xscale("log")
     ax.set_xlabel("averaging time [s]")
     ax.set_ylabel("residual [standard errors]")
-    ax.set_title(f"{title}: misfit of the deviation in %" if title else "misfit in %",
-                 fontsize="medium")  # fmt: skip
+    ax.set_title(
+        f"{title}: misfit of the deviation in %" if title else "misfit in %", fontsize="medium"
+    )
     return ax
 
 
@@ -280,9 +310,14 @@ def _panel(ax: Axes, samples: Mapping[str, FloatArray], truth: float) -> None:
             if count:
                 arrow = "\u2191" if align == "top" else "\u2193"
                 ax.annotate(
-                    f"{count}{arrow}", (place, y), xycoords=("data", "axes fraction"),
-                    ha="center", va=align, fontsize="small", color=COMPONENT_COLOURS[1],
-                )  # fmt: skip
+                    f"{count}{arrow}",
+                    (place, y),
+                    xycoords=("data", "axes fraction"),
+                    ha="center",
+                    va=align,
+                    fontsize="small",
+                    color=COMPONENT_COLOURS[1],
+                )
     ax.ticklabel_format(axis="y", style="sci", scilimits=(-2, 3), useMathText=True)
     ax.grid(True, axis="y", color="#dddddd", linewidth=0.6)
     ax.set_axisbelow(True)

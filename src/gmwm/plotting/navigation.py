@@ -17,8 +17,12 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_DASHES: tuple[str | tuple[int, tuple[float, ...]], ...] = ("-", (0, (5, 1.5)), (0, (3, 1, 1, 1)),
-                                                          (0, (1, 1)))  # fmt: skip
+_DASHES: tuple[str | tuple[int, tuple[float, ...]], ...] = (
+    "-",
+    (0, (5, 1.5)),
+    (0, (3, 1, 1, 1)),
+    (0, (1, 1)),
+)
 _PANEL = (3.4, 2.1)  # inches, of one panel among several
 _BESIDE = 3  # panels in a row
 _BAND = "#9ecae1"
@@ -56,8 +60,14 @@ def track(
         ax.plot(part[:, 0], part[:, 1], color=_BAND, linewidth=5.0, label=_TRUE)
         for colour, dash, (name, paths) in _styles(solutions):
             path = paths[i]
-            ax.plot(path[:, 0], path[:, 1], color=colour, linestyle=dash, linewidth=1.4,
-                    label=literal(name, _IN_LEGEND))  # fmt: skip
+            ax.plot(
+                path[:, 0],
+                path[:, 1],
+                color=colour,
+                linestyle=dash,
+                linewidth=1.4,
+                label=literal(name, _IN_LEGEND),
+            )
             ax.plot(*path[-1:].T, marker="o", color=colour, markersize=4)
         ax.set_title(f"outage {i + 1}" if len(outages) > 1 else "outage", fontsize="medium")
     for ax in axes[0]:
@@ -85,9 +95,13 @@ def errors(
     blocks = -(-len(panels) // _BESIDE)
     columns = -(-len(panels) // blocks)
     figure, axes = plt.subplots(
-        blocks * d, columns, figsize=(_PANEL[0] * columns + 0.6, _PANEL[1] * blocks * d),
-        sharex=True, layout="constrained", squeeze=False,
-    )  # fmt: skip
+        blocks * d,
+        columns,
+        figsize=(_PANEL[0] * columns + 0.6, _PANEL[1] * blocks * d),
+        sharex=True,
+        layout="constrained",
+        squeeze=False,
+    )
     top = _largest(panels)
     for place, (name, (time, error, sd)) in enumerate(panels.items()):
         first, column = d * (place // columns), place % columns
@@ -126,8 +140,16 @@ def _draw_bands(
     ax: Axes, time: FloatArray, sd: FloatArray, what: str, rasterized: bool = False
 ) -> None:
     for factor, alpha in ((3.0, 0.45), (1.0, 0.9)):
-        ax.fill_between(time, -factor * sd, factor * sd, color=_BAND, alpha=alpha, linewidth=0,
-                        label=f"{factor:g} sigma {what}", rasterized=rasterized)  # fmt: skip
+        ax.fill_between(
+            time,
+            -factor * sd,
+            factor * sd,
+            color=_BAND,
+            alpha=alpha,
+            linewidth=0,
+            label=f"{factor:g} sigma {what}",
+            rasterized=rasterized,
+        )
 
 
 def growth(
@@ -144,9 +166,13 @@ def growth(
 
     rows, columns = len(labels), len(panels)
     figure, axes = plt.subplots(
-        rows, columns, figsize=(max(4.6 * columns, 5.6), 2.9 * rows), layout="constrained",
-        squeeze=False, sharex="col",
-    )  # fmt: skip
+        rows,
+        columns,
+        figsize=(max(4.6 * columns, 5.6), 2.9 * rows),
+        layout="constrained",
+        squeeze=False,
+        sharex="col",
+    )
     for column, (title, filters) in enumerate(panels.items()):
         for row, label in enumerate(labels):
             ax = axes[row, column]
@@ -154,8 +180,13 @@ def growth(
                 reversed(range(len(filters))), _styles(filters), strict=True
             ):
                 # Wider the farther behind: filters that err alike are all seen.
-                ax.plot(time, rms[:, row], color=colour, linewidth=1.4 + 0.9 * behind,
-                        label=literal(name, _IN_LEGEND))  # fmt: skip
+                ax.plot(
+                    time,
+                    rms[:, row],
+                    color=colour,
+                    linewidth=1.4 + 0.9 * behind,
+                    label=literal(name, _IN_LEGEND),
+                )
                 ax.plot(time, predicted[:, row], color=colour, linewidth=1.2, linestyle=":")
             _plain(ax)
             _from_zero(ax, [each[1][:, row] for each in filters.values()])
@@ -212,8 +243,14 @@ def _map(ax: Axes) -> None:
 
 def _legend_above(figure: Figure, ax: Axes, title: str | None = None) -> None:
     """Of one panel, where it hides none."""
-    figure.legend(*ax.get_legend_handles_labels(), fontsize="x-small", ncols=4, title=title,
-                  title_fontsize="x-small", loc="outside upper center")  # fmt: skip
+    figure.legend(
+        *ax.get_legend_handles_labels(),
+        fontsize="x-small",
+        ncols=4,
+        title=title,
+        title_fontsize="x-small",
+        loc="outside upper center",
+    )
 
 
 def _plain(ax: Axes) -> None:
@@ -240,18 +277,37 @@ def measured_track(track: FloatArray, fixes: FloatArray, without: FloatArray) ->
 def _draw_solution(
     ax: Axes, track: FloatArray, fixes: FloatArray, without: FloatArray, label: str, size: int
 ) -> None:
-    ax.plot(fixes[:, 0], fixes[:, 1], ".", color=DATA_COLOUR, markersize=size, label="fixes",
-            rasterized=len(fixes) > _DENSE)  # fmt: skip
+    ax.plot(
+        fixes[:, 0],
+        fixes[:, 1],
+        ".",
+        color=DATA_COLOUR,
+        markersize=size,
+        label="fixes",
+        rasterized=len(fixes) > _DENSE,
+    )
     ax.plot(without[:, 0], without[:, 1], color=COMPONENT_COLOURS[1], linewidth=3.5, label=label)
-    ax.plot(track[:, 0], track[:, 1], color=COMPONENT_COLOURS[0], linewidth=1.1, label="solution",
-            rasterized=len(track) > _DENSE)  # fmt: skip
+    ax.plot(
+        track[:, 0],
+        track[:, 1],
+        color=COMPONENT_COLOURS[0],
+        linewidth=1.1,
+        label="solution",
+        rasterized=len(track) > _DENSE,
+    )
     _map(ax)
 
 
 def measured_outage(
-    *, track: FloatArray, without: FloatArray, fixes: FloatArray, time: FloatArray, sd: FloatArray,
-    fix_time: FloatArray, error: FloatArray,
-) -> Figure:  # fmt: skip
+    *,
+    track: FloatArray,
+    without: FloatArray,
+    fixes: FloatArray,
+    time: FloatArray,
+    sd: FloatArray,
+    fix_time: FloatArray,
+    error: FloatArray,
+) -> Figure:
     """A time without fixes: its track, and errors of three components with their bands.
 
     track, without, fixes: (n, 2), (j, 2), (k, 2), east and north, m: of the solution, of its part
@@ -266,12 +322,20 @@ def measured_outage(
     figure, axes = plt.subplots(2, 2, figsize=(7.4, 5.6), layout="constrained")
     _draw_solution(axes[0, 0], track, fixes, without, "without fixes", 4)
     axes[0, 0].legend(fontsize="x-small")
-    for i, (ax, name) in enumerate(zip((axes[0, 1], axes[1, 0], axes[1, 1]),
-                                       ("north", "east", "down"), strict=True)):  # fmt: skip
-        ax.fill_between(time, -sd[:, i], sd[:, i], color=_BAND, linewidth=0,
-                        label="1 sigma predicted")  # fmt: skip
-        ax.plot(fix_time, error[:, i], ".", color=COMPONENT_COLOURS[1], markersize=5,
-                label="fix less expected")  # fmt: skip
+    for i, (ax, name) in enumerate(
+        zip((axes[0, 1], axes[1, 0], axes[1, 1]), ("north", "east", "down"), strict=True)
+    ):
+        ax.fill_between(
+            time, -sd[:, i], sd[:, i], color=_BAND, linewidth=0, label="1 sigma predicted"
+        )
+        ax.plot(
+            fix_time,
+            error[:, i],
+            ".",
+            color=COMPONENT_COLOURS[1],
+            markersize=5,
+            label="fix less expected",
+        )
         ax.set_title(f"{name} [m]", fontsize="medium")
         ax.set_xlabel("s since the last fix")
         _plain(ax)
@@ -288,15 +352,26 @@ def innovations(panels: Mapping[str, tuple[FloatArray, FloatArray, FloatArray]])
     import matplotlib.pyplot as plt
 
     figure, axes = plt.subplots(
-        3, len(panels), figsize=(1.4 * _PANEL[0] * len(panels) + 0.6, 3.0 * _PANEL[1]),
-        sharex=True, layout="constrained", squeeze=False,
-    )  # fmt: skip
+        3,
+        len(panels),
+        figsize=(1.4 * _PANEL[0] * len(panels) + 0.6, 3.0 * _PANEL[1]),
+        sharex=True,
+        layout="constrained",
+        squeeze=False,
+    )
     for column, (title, (time, value, sd)) in enumerate(panels.items()):
         for row, label in enumerate(("north", "east", "down")):
             ax = axes[row, column]
             _draw_bands(ax, time, sd[:, row], "expected", rasterized=time.size > _DENSE)
-            ax.plot(time, value[:, row], ".", color=COMPONENT_COLOURS[1], markersize=3,
-                    rasterized=time.size > _DENSE, label="innovation")  # fmt: skip
+            ax.plot(
+                time,
+                value[:, row],
+                ".",
+                color=COMPONENT_COLOURS[1],
+                markersize=3,
+                rasterized=time.size > _DENSE,
+                label="innovation",
+            )
             _plain(ax)
             if column == 0:
                 ax.set_ylabel(label)
@@ -321,14 +396,18 @@ def outages_compared(
 
     count = len(panels)
     figure, axes = plt.subplots(
-        count + 1, 1, figsize=(7.4, 2.1 * count + 0.9 + 0.25 * len(ratios)),
-        height_ratios=[2.0] * count + [0.4 + 0.25 * len(ratios)], layout="constrained",
-    )  # fmt: skip
+        count + 1,
+        1,
+        figsize=(7.4, 2.1 * count + 0.9 + 0.25 * len(ratios)),
+        height_ratios=[2.0] * count + [0.4 + 0.25 * len(ratios)],
+        layout="constrained",
+    )
     for ax, (title, solutions) in zip(axes, panels.items(), strict=False):
         for i, (name, (error, predicted)) in enumerate(solutions.items()):
             colour = COMPONENT_COLOURS[i % len(COMPONENT_COLOURS)]
-            ax.plot(time / 60.0, error, "osD^"[i % 4], color=colour, markersize=3.5,
-                    label=literal(name))  # fmt: skip
+            ax.plot(
+                time / 60.0, error, "osD^"[i % 4], color=colour, markersize=3.5, label=literal(name)
+            )
             ax.axhline(predicted, color=colour, linestyle=_DASHES[i % len(_DASHES)], linewidth=1.1)
         ax.set_ylim(bottom=0.0)
         ax.set_ylabel(title)

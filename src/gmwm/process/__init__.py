@@ -1,29 +1,20 @@
 """What an error process is: parameters, spectrum, wavelet variance, state space, simulation."""
 
 from gmwm.process.base import Process as Process, Shape as Shape
-from gmwm.process.catalogue import (
-    CATALOGUE as CATALOGUE,
+from gmwm.process.kinds import *  # noqa: F403 - the table of built-in processes
+from gmwm.process.kinds import CATALOGUE as CATALOGUE
+from gmwm.process.kinds.curves import (
     compiled_levels as compiled_levels,
-    model_from_list as model_from_list,
     shaped_curve as shaped_curve,
     shaped_slope as shaped_slope,
 )
-from gmwm.process.kinds.arma import AR as AR, ARIMA as ARIMA, ARMA as ARMA, MA as MA
-from gmwm.process.kinds.gauss_markov import GaussMarkov as GaussMarkov, Resonance as Resonance
-from gmwm.process.kinds.low_pass import (
-    BUTTERWORTH as BUTTERWORTH,
-    AveragedNoise as AveragedNoise,
-    LowPassNoise as LowPassNoise,
+from gmwm.process.kinds.low_pass import BUTTERWORTH as BUTTERWORTH
+from gmwm.process.model import (
+    Model as Model,
+    as_model as as_model,
+    model_from_list as model_from_list,
+    simulate as simulate,
 )
-from gmwm.process.kinds.noise import (
-    BiasInstability as BiasInstability,
-    QuantizationNoise as QuantizationNoise,
-    RandomWalk as RandomWalk,
-    RateRamp as RateRamp,
-    WhiteNoise as WhiteNoise,
-)
-from gmwm.process.kinds.sinusoid import Sinusoid as Sinusoid
-from gmwm.process.model import Model as Model, as_model as as_model, simulate as simulate
 from gmwm.process.parameter import Parameter as Parameter, parameter as parameter
 from gmwm.process.spectral import (
     PSD as PSD,

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable
-from inspect import Signature, signature
-from typing import Any, ClassVar, Self
+from itertools import product
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 
@@ -15,7 +16,8 @@ from gmwm.process import spectral, synthesis
 from gmwm.process.parameter import Parameter
 from gmwm.process.state_space import StateSpace
 
-_INTERVAL = "give a positive sampling interval in seconds"
+if TYPE_CHECKING:
+    from gmwm.process.model import Model
 
 Shape = tuple[float, ...]
 """Values of a process's shape parameters, in the order of ``parameters``."""
@@ -25,9 +27,13 @@ class Process:
     """A zero-mean Gaussian error process with stationary Haar wavelet coefficients.
 
     A subclass declares its parameters and gives ``psd``; wavelet variance, simulation and
-    everything else follow. Where a closed form is known, it overrides ``haar_variance``,
-    ``autocovariance``, ``state_space`` or ``draw``. A process without a spectrum in closed form
-    gives ``draw`` alone and is fitted by simulated moments.
+    everything else follow. Where a closed form is known, it overrides ``haar_variance`` (or
+    ``unit_haar_variance``, if it has a shape), ``autocovariance``, ``state_space`` or ``draw``. A
+    process without a spectrum in closed form gives ``draw`` alone and is fitted by simulated
+    moments.
+
+    What other rooms need to know of a kind is one of the attributes below. A built-in kind is
+    registered in ``gmwm.process.kinds`` and needs no entry elsewhere.
 
     A parameter is *given* (a number) or *open* (``None``, to be estimated). Instances do not
     change.
@@ -45,25 +51,22 @@ class Process:
     """
 
     parameters: tuple[Parameter, ...] = ()
-    """Those declared, in order; at most one of them linear, see `Parameter.role`."""
+    """The declared parameters, in order; at most one of them linear, see `Parameter.role`."""
 
     label: ClassVar[str] = ""
-    """Name for tables and legends; the class name where empty."""
+    """Name in tables and legends; the class name where empty."""
+
+    short_name: ClassVar[str] = ""
+    """Name on the command line and in study files, e.g. ``"N"``; by default the class name."""
 
     prefix: ClassVar[str] = ""
     """Put before parameter names in ``params`` of a model, e.g. ``"resonance_"``."""
 
-    repeatable: ClassVar[bool | None] = None
-    """Whether a model can hold two of them; by default if there is a shape parameter."""
-
-    separable_shape: ClassVar[bool] = True
-    """Whether each shape parameter maps to the real line by itself (see `shape_to_free`)."""
-
-    ordered_by: ClassVar[str] = ""
-    """Shape parameter by which several terms of this kind are ordered and distinguished."""
+    is_candidate: ClassVar[bool] = False
+    """Whether `gmwm.select` tries it unasked, and mixtures that follow any curve are made of it."""
 
     is_white: ClassVar[bool] = False
-    """Whether it is white at any rate: noise of a measurement, which needs no state."""
+    """Whether it is white at any rate: measurement noise, which needs no state."""
 
     is_band_limited: ClassVar[bool] = False
     """Whether it is white noise that the sensor filtered: white beyond the memory of the filter,
@@ -72,27 +75,34 @@ class Process:
     is_walk: ClassVar[bool] = False
     """Whether it wanders off from where it starts, so that its start is a parameter of its own."""
 
+    is_flicker: ClassVar[bool] = False
+    """Whether it is 1/f noise, a plateau of the Allan deviation that no few states describe."""
+
+    is_exponential: ClassVar[bool] = False
+    """Whether ``sigma`` and ``tau`` are those of an autocovariance ``sigma^2 exp(-lag / tau)``."""
+
     is_drift: ClassVar[bool] = False
     """Whether it is a deterministic slope: a regressor, no noise."""
 
     is_line: ClassVar[bool] = False
     """Whether all of its variance is in spectral lines."""
 
-    is_textbook: ClassVar[bool] = False
-    """Whether it is one of the kinds whose sums follow almost any noise: first weights of a fit
-    and the candidates of a selection are made of them."""
+    repeatable: ClassVar[bool | None] = None
+    """Whether a model can hold two of them; by default if there is a shape parameter."""
 
-    is_exponential: ClassVar[bool] = False
-    """Whether ``sigma`` and ``tau`` are those of an autocovariance ``sigma^2 exp(-lag / tau)``."""
+    ordered_by: ClassVar[str] = ""
+    """Shape parameter by which several terms of this kind are ordered and distinguished."""
+
+    separable_shape: ClassVar[bool] = True
+    """Whether each shape parameter maps to the real line by itself (see `shape_to_free`)."""
 
     has_finite_state_space: ClassVar[bool] = True
     """Whether `state_space`, where there is one, is exact."""
 
     compiled_kind: ClassVar[int] = 0
-    """Number of its curve in `gmwm.process.catalogue.shaped_curve`, of this very class; 0 if it has
-    none."""
+    """Number of its curve in `gmwm.process.shaped_curve`, of this very class; 0 if it has none."""
 
-    _constructor: ClassVar[Signature] = Signature()
+    _constructor: ClassVar[inspect.Signature] = inspect.Signature()
     _accepted: ClassVar[tuple[str, ...]] = ()  # names of its arguments
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
@@ -104,9 +114,15 @@ class Process:
             if isinstance(value, Parameter)
         }
         cls.parameters = tuple(declared.values())
-        cls._constructor = signature(cls.__init__)
+        cls._constructor = inspect.signature(cls.__init__)
+        if cls.__init__ is Process.__init__:
+            kind = inspect.Parameter.POSITIONAL_OR_KEYWORD
+            names = [inspect.Parameter(name, kind) for name in ("self", *declared)]
+            cls._constructor = inspect.Signature(names)
         cls._accepted = tuple(cls._constructor.parameters)[1:]
+        # Neither is inherited: a subclass has another curve, and another name.
         cls.compiled_kind = vars(cls).get("compiled_kind", 0)
+        cls.short_name = vars(cls).get("short_name", cls.__name__)
 
     def __new__(cls, *args: Any, **kwargs: Any) -> Self:
         # A constructor that names its parameters would answer with a TypeError.
@@ -121,19 +137,9 @@ class Process:
 
     def __init__(self, *args: float | None, **kwargs: float | None) -> None:
         names = [parameter.name for parameter in self.parameters]
-        if len(args) > len(names):
-            raise InputError(f"{type(self).__name__} takes {len(names)} parameters: {names}")
-        values: dict[str, float | None] = dict.fromkeys(names)
-        values.update(zip(names, args, strict=False))
-        for name, value in kwargs.items():
-            if name not in values or name in names[: len(args)]:
-                raise InputError(
-                    f"{type(self).__name__} has no parameter {name!r} left to give: "
-                    f"its parameters are {', '.join(names) or 'none'}"
-                )
-            values[name] = value
+        values = dict(zip(names, args, strict=False)) | kwargs
         for parameter in self.parameters:
-            value = values[parameter.name]
+            value = values.get(parameter.name)
             if value is not None:
                 self.__dict__[parameter.name] = parameter.checked(value, type(self).__name__)
 
@@ -151,6 +157,11 @@ class Process:
     def is_open(self) -> bool:
         """Whether any parameter is left open."""
         return any(parameter.name not in self.__dict__ for parameter in self.parameters)
+
+    @property
+    def is_repeatable(self) -> bool:
+        """Whether two of this kind in one model can be distinguished."""
+        return bool(self.shape_parameters) if self.repeatable is None else self.repeatable
 
     @property
     def linear_parameter(self) -> Parameter | None:
@@ -254,7 +265,12 @@ class Process:
         ndarray
             Same shape as ``tau``, in u^2.
         """
-        return spectral.haar_variance(self.psd, np.asarray(tau, dtype=float), dt)
+        tau, linear = np.asarray(tau, dtype=float), self.linear_parameter
+        if type(self).unit_haar_variance is Process.unit_haar_variance or linear is None:
+            return spectral.haar_variance(self.psd, tau, dt)
+        shape = tuple(getattr(self, parameter.name) for parameter in self.shape_parameters)
+        amplitude: float = getattr(self, linear.name) ** linear.power
+        return amplitude * self.unit_haar_variance(shape, tau, dt)
 
     def wavelet_variance(self, tau: FloatArray, dt: float, wavelet: str = "haar") -> FloatArray:
         """Wavelet variance by any Daubechies filter.
@@ -346,16 +362,13 @@ class Process:
             subclass gives no series.
         """
         self._require_given()
-        n, dt = checks.samples(n), checks.positive("dt", dt, _INTERVAL)
+        n = checks.samples(n)
+        dt = checks.positive("dt", dt, "give a positive sampling interval in seconds")
+        where = f"draw of {type(self).__name__}"
         try:
-            drawn = self.draw(n, dt, checks.generator(seed))
+            drawn: Any = self.draw(n, dt, checks.generator(seed))
         except MemoryError:
             raise InputError(f"n = {n:,}: the memory does not hold so many, give less") from None
-        return self._series(drawn, n)
-
-    def _series(self, drawn: Any, n: int) -> FloatArray:
-        """What ``draw`` of any subclass gave, as a series."""
-        where = f"draw of {type(self).__name__}"
         if drawn is None:
             raise InputError(f"{where} returns nothing: let it return {n:,} samples")
         series = checks.real_numbers(drawn, f"what {where} returns")
@@ -384,11 +397,8 @@ class Process:
         The default is a logarithmic grid over each parameter's range where that is finite, with
         times taken between ``dt`` and the length of the record and frequencies up to 1/(2 dt).
         """
-        axes = [parameter.grid(dt, n) for parameter in self.shape_parameters]
-        mesh = np.meshgrid(*axes, indexing="ij")
-        return [
-            tuple(float(v) for v in point) for point in np.stack(mesh, -1).reshape(-1, len(axes))
-        ]
+        axes = [parameter.grid(dt, n).tolist() for parameter in self.shape_parameters]
+        return list(product(*axes))
 
     def shape_to_free(self, shape: Shape) -> FloatArray:
         """Map shape parameters to the whole real line."""
@@ -409,20 +419,19 @@ class Process:
 
     # -- sums, looks, equality --------------------------------------------------------------------
 
-    def __add__(self, other: Any) -> Any:
-        from gmwm.process.model import Model
+    def _alone(self) -> Model:
+        from gmwm.process.model import Model  # a sum of processes, which make sums
 
-        return Model((self,)) + other
+        return Model((self,))
 
-    def __radd__(self, other: Any) -> Any:
-        from gmwm.process.model import Model
+    def __add__(self, other: Any) -> Model:
+        return self._alone() + other
 
-        return Model((self,)).__radd__(other)
+    def __radd__(self, other: Any) -> Model:
+        return self._alone().__radd__(other)
 
-    def __rmul__(self, times: int) -> Any:
-        from gmwm.process.model import Model
-
-        return times * Model((self,))
+    def __rmul__(self, times: int) -> Model:
+        return times * self._alone()
 
     def __repr__(self) -> str:
         given = ", ".join(f"{k}={v:.12g}" for k, v in self.values.items() if v is not None)
@@ -433,11 +442,6 @@ class Process:
 
     def __hash__(self) -> int:
         return hash((type(self), *self.values.items()))
-
-    @property
-    def is_repeatable(self) -> bool:
-        """Whether two of this kind in one model can be distinguished."""
-        return bool(self.shape_parameters) if self.repeatable is None else self.repeatable
 
     def named(self) -> str:
         """The term as a reader finds it in a model: ``Gauss-Markov term of tau = 0.52 s``."""

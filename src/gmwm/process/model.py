@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -11,11 +11,12 @@ from typing import Any
 import numpy as np
 
 from gmwm._core import checks
+from gmwm._core.documents import plain_schema
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.process.base import Process
 from gmwm.process.parameter import Parameter
-from gmwm.process.state_space import StateSpace
+from gmwm.process.state_space import StateSpace, numbered_names
 
 
 @dataclass(frozen=True)
@@ -171,12 +172,16 @@ class Model:
         return total
 
     def _require_given(self) -> None:
-        if self.is_open:
-            missing = [key for key, value in self.params.items() if value is None]
+        missing = [key for key, value in self.params.items() if value is None]
+        if missing:
             raise InputError(
                 f"the model {self!r} has free parameters ({', '.join(missing)}): "
                 "give them a value, or estimate them with gmwm.fit"
             )
+
+    @classmethod
+    def __get_pydantic_core_schema__(cls, source: Any, handler: Any) -> Any:
+        return plain_schema(model_from_list, lambda model: [t.to_dict() for t in model.terms])
 
     # -- looks ------------------------------------------------------------------------------------
 
@@ -187,14 +192,7 @@ class Model:
 
     def term_labels(self) -> list[str]:
         """One label per term, numbered where a kind occurs more than once."""
-        counts = Counter(term.title() for term in self.terms)
-        seen: Counter[str] = Counter()
-        labels = []
-        for term in self.terms:
-            title = term.title()
-            seen[title] += 1
-            labels.append(f"{title} {seen[title]}" if counts[title] > 1 else title)
-        return labels
+        return numbered_names([term.title() for term in self.terms])
 
     def __add__(self, other: Any) -> Model:
         if isinstance(other, Process):
@@ -243,55 +241,71 @@ def as_model(model: Process | Model) -> Model:
     )
 
 
+def model_from_list(content: Sequence[Mapping[str, Any]]) -> Model:
+    """The model whose terms were written with ``to_dict``.
+
+    Raises InputError for a process that is neither built in nor defined in a module imported so
+        far, or parameters it does not have.
+    """
+    kinds, found = {}, Process.__subclasses__()
+    while found:
+        kind = found.pop()
+        kinds[kind.__name__] = kind
+        found += kind.__subclasses__()
+    terms = []
+    for item in content:
+        arguments = dict(item)
+        name = arguments.pop("process", None)
+        if name not in kinds:
+            raise InputError(
+                f"unknown process {name!r}: import the module that defines it, then load"
+            )
+        try:
+            terms.append(kinds[name](**arguments))
+        except TypeError as error:
+            raise InputError(f"{name}: {error}") from None
+    return Model(tuple(terms))
+
+
 def _in_order(terms: tuple[Process, ...]) -> tuple[Process, ...]:
-    """Sort terms of a kind that has an order, in the places they have, where all are known."""
+    """Terms of a kind that has an order sorted within their places, where all are known."""
     ordered = list(terms)
     for kind in {type(term) for term in terms if term.ordered_by}:
         places = [i for i, term in enumerate(terms) if type(term) is kind]
         keys = {i: terms[i].values[kind.ordered_by] for i in places}
-        if None in keys.values():
-            continue
-        ranked = sorted(places, key=lambda i: keys[i] or 0.0)
-        for place, source in zip(places, ranked, strict=True):
-            ordered[place] = terms[source]
+        if None not in keys.values():
+            ranked = sorted(places, key=lambda i: keys[i] or 0.0)
+            for place, source in zip(places, ranked, strict=True):
+                ordered[place] = terms[source]
     return tuple(ordered)
 
 
 def _check_distinct(terms: tuple[Process, ...]) -> None:
-    for i, term in enumerate(terms):
-        for other in terms[:i]:
-            if type(term) is not type(other):
-                continue
-            name = type(term).__name__
-            if not term.is_repeatable:
-                raise InputError(
-                    f"two {name} in one model cannot be distinguished: keep one (variances add up)"
-                )
-            shapes = [tuple(t.values[p.name] for p in t.shape_parameters) for t in (term, other)]
-            if shapes[0] == shapes[1] and None not in shapes[0]:
-                values = ", ".join(
-                    f"{p.name} = {v:g}"
-                    for p, v in zip(term.shape_parameters, shapes[0], strict=True)
-                )
-                raise InputError(
-                    f"two {name} of equal {values} in one model cannot be distinguished: keep one "
-                    "(variances add up)"
-                )
+    seen: set[Any] = set()
+    for term in terms:
+        kind, name = type(term), type(term).__name__
+        shape = {p.name: term.values[p.name] for p in term.shape_parameters}
+        if (kind in seen and not term.is_repeatable) or (kind, *shape.values()) in seen:
+            values = ", ".join(f"{key} = {value:g}" for key, value in shape.items())
+            equal = f" of equal {values}" if term.is_repeatable else ""
+            raise InputError(
+                f"two {name}{equal} in one model cannot be distinguished: keep one "
+                "(variances add up)"
+            )
+        seen.add(kind)
+        if None not in shape.values():
+            seen.add((kind, *shape.values()))
 
 
 def _number(terms: tuple[Process, ...]) -> tuple[ModelParameter, ...]:
     """Keys: prefix and name, with _1, _2, ... where several terms would share one."""
-    counts = Counter(term.prefix + p.name for term in terms for p in term.parameters)
-    seen: Counter[str] = Counter()
-    result = []
-    for index, term in enumerate(terms):
-        for parameter in term.parameters:
-            key = term.prefix + parameter.name
-            if counts[key] > 1:
-                seen[key] += 1
-                key = f"{key}_{seen[key]}"
-            result.append(ModelParameter(key, index, parameter, term.values[parameter.name]))
-    return tuple(result)
+    keys = [term.prefix + p.name for term in terms for p in term.parameters]
+    numbered = iter(numbered_names(keys, "_"))
+    return tuple(
+        ModelParameter(next(numbered), index, p, term.values[p.name])
+        for index, term in enumerate(terms)
+        for p in term.parameters
+    )
 
 
 def simulate(

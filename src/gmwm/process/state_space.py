@@ -76,7 +76,7 @@ class StateSpace:
             float(sum(part.measurement_noise for part in parts)),
             np.concatenate([part.initial_mean for part in parts]),
             block_diagonal([part.initial_covariance for part in parts]),
-            _numbered([name for part in parts for name in part.names]),
+            tuple(numbered_names([name for part in parts for name in part.names])),
         )
 
     def output_variance(self, n: int) -> FloatArray:
@@ -101,12 +101,12 @@ def block_diagonal(blocks: Sequence[FloatArray]) -> FloatArray:
     return result
 
 
-def _numbered(names: Sequence[str]) -> tuple[str, ...]:
+def numbered_names(names: Sequence[str], joint: str = " ") -> list[str]:
     """Names that occur more than once get a number, in order."""
     seen: Counter[str] = Counter()
     total = Counter(names)
     result = []
     for name in names:
         seen[name] += 1
-        result.append(f"{name} {seen[name]}" if total[name] > 1 else name)
-    return tuple(result)
+        result.append(f"{name}{joint}{seen[name]}" if total[name] > 1 else name)
+    return result

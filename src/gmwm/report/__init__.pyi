@@ -1,14 +1,11 @@
 from .answer import verdict as verdict
 from .calibration import fragment as fragment, write_report as write_report
+from .compared import write_sensor_comparison_report as write_sensor_comparison_report
 from .datasheet import read_datasheet as read_datasheet
-from .navigated import (
+from .fleet import fleet_fragment as fleet_fragment, write_fleet_report as write_fleet_report
+from .navigation import (
     write_comparison_report as write_comparison_report,
     write_navigated_report as write_navigated_report,
-)
-from .several.compared import write_sensor_comparison_report as write_sensor_comparison_report
-from .several.fleet import (
-    fleet_fragment as fleet_fragment,
-    write_fleet_report as write_fleet_report,
+    write_validation_report as write_validation_report,
 )
 from .text import duration_text as duration_text
-from .validation import write_validation_report as write_validation_report

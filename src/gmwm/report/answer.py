@@ -7,56 +7,17 @@ from typing import Any
 
 import numpy as np
 
-from gmwm._core.notices import Notice
 from gmwm._core.pages import page_of
 from gmwm._core.text import brief, per_cent
 from gmwm._core.units import field_units, si_parameter_unit
-from gmwm.calibration import AMBIGUITY, DEPARTURES, Calibration, floor
+from gmwm.calibration import AMBIGUITY, Calibration, floor
 from gmwm.diagnosis import gathered
 from gmwm.estimate import Fit
 from gmwm.export import Axis, Triad
+from gmwm.issues import Notice
 from gmwm.report.health import counted, findings
 from gmwm.report.length import length_sentence, parameters_sentence
 from gmwm.report.numbers import SHOWN, Certified, certified
-
-_WHY = {
-    "misfit": "the model misses the data",
-    "level-missed": "the model misses one level",
-    "amplitude-bound": "a term was not found",
-    "search-limit": "a correlation time beyond reach",
-    "redundant-term": "a term is not needed",
-    "undetermined": "record too short for model",
-    "indistinct-terms": "two terms look alike",
-    "confounded": "terms cannot be separated",
-    "too-few-levels": "record too short",
-    "not-converged": "the search did not converge",
-    "no-curvature": "the search did not converge",
-    "drift-in-state": "the drift is no ramp",
-    "no-region": "no straight region found",
-    "wrong-slope": "slopes contradict the model",
-    "recordings-differ": "the recordings disagree",
-    "not-static": "the sensor moved",
-    "tilt": "the sensor tilted",
-    "rate-changes": "the sampling rate changed",
-    "counts": "counts, not in the unit given",
-    "gravity": "gravity contradicts the unit",
-    "swapped": "gyro and accelerometer swapped",
-    "rounding": "steps coarser than the noise",
-    "saturation": "samples cut off at range",
-    "abrupt-end": "samples that end abruptly",
-    "stuck": "values that stick",
-    "held": "samples that repeat the one before",
-    "filled": "samples put between others",
-    "value-repeated": "one value stands for many",
-    "variance": "the noise comes and goes",
-    "step": "the bias stepped",
-    "transient": "a transient at the start",
-    "drift-at-start": "drift after switching on",
-    "slow-period": "a slow period stands out",
-    "departures-many": "the bias steps to and fro",
-    "unsteady": "slow noise changes its size",
-}
-"""Code of a notice that makes a fit invalid -> why, in about five words."""
 
 _COVERS = ("more-than-white-noise", "more-than-random-walk")
 
@@ -72,11 +33,13 @@ def answer(calibration: Calibration, numbers: Mapping[float, Certified]) -> dict
         "trusted": [row["name"] for row in rows if row["valid"]],
         "causes": [(", ".join(names), why) for why, names in _causes(calibration).items()],
         "rows": rows,
-        "bounds": {"B": any(map(_is_bound, (row["B"] for row in rows))),
-                   "N or K": any(map(_is_bound, values))},
+        "bounds": {
+            "B": any(map(_is_bound, (row["B"] for row in rows))),
+            "N or K": any(map(_is_bound, values)),
+        },
         "parameters": parameters_sentence(calibration),
         "boxes": boxes,
-    }  # fmt: skip
+    }
 
 
 def _causes(calibration: Calibration) -> dict[str, list[str]]:
@@ -125,11 +88,11 @@ def _counted(notices: Sequence[Notice], severity: str, channels: Iterable[str]) 
 
 def trust(name: str, fit: Fit, calibration: Calibration) -> tuple[bool, str]:
     """Whether the numbers of a channel can be used, and why, in about five words."""
-    codes = [notice.code for notice in fit.notices if notice.severity == "bad"]
-    if codes:
-        # What departs from noise is why a model misses levels too.
-        code = next((code for code in codes if code in DEPARTURES), codes[0])
-        return False, _WHY.get(code, code.replace("-", " "))
+    bad = [notice.issue for notice in fit.notices if notice.severity == "bad"]
+    if bad:
+        # A departure from noise is why the model misses levels too.
+        issue = next((each for each in bad if each.topic == "departure"), bad[0])
+        return False, issue.reason or issue.code.replace("-", " ")
     at = fit.goodness
     fits = "fits the data"
     if at.worst is not None:

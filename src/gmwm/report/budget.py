@@ -6,7 +6,9 @@ from collections.abc import Set
 from typing import Any
 
 from gmwm._core.text import brief
-from gmwm.budget import (
+from gmwm.calibration import Calibration
+from gmwm.errors import InputError
+from gmwm.filter_numbers import (
     FIELD_UNITS,
     HORIZONTAL,
     QUANTITIES,
@@ -17,8 +19,6 @@ from gmwm.budget import (
     is_steep,
     per_si,
 )
-from gmwm.calibration import Calibration
-from gmwm.errors import InputError
 from gmwm.report.figure import growth_figure
 
 _COASTING = 60.0  # s, the coasting time of the sentence

@@ -12,11 +12,11 @@ from typing import Any
 
 from gmwm._core.files import writable_file, written
 from gmwm._core.jobs import shared
-from gmwm._core.notices import worst_first
 from gmwm._core.pages import page_of
 from gmwm._core.text import brief, per_cent
 from gmwm.calibration import Calibration, floor, sentence, white_density
 from gmwm.estimate import Estimate, Fit
+from gmwm.issues import worst_first
 from gmwm.readers import Channel, Recording
 from gmwm.report.answer import (
     answer,
@@ -226,9 +226,14 @@ def _sliders(fit: Fit, numbers: tuple[float, float] | None) -> list[dict[str, st
     shown = []
     for letter, value, unit in zip("NK", numbers, ("u/sqrt(Hz)", "u/s/sqrt(Hz)"), strict=True):
         text = quantity_text(1.0, unit, fit)
-        shown.append({"letter": letter, "value": f"{value:.6e}", **{
-            key: each.split(" ", 1)[1] for key, each in text.items()
-        }, "per_si": f"{per_si(unit, fit):.9e}"})  # fmt: skip
+        shown.append(
+            {
+                "letter": letter,
+                "value": f"{value:.6e}",
+                **{key: each.split(" ", 1)[1] for key, each in text.items()},
+                "per_si": f"{per_si(unit, fit):.9e}",
+            }
+        )
     return shown
 
 

@@ -14,10 +14,10 @@ import numpy as np
 
 from gmwm._core.typing import FloatArray
 from gmwm._core.units import field_units, si_parameter_unit
-from gmwm.budget import FIELD_UNITS, ErrorBudget, root_sum
 from gmwm.calibration import Calibration, floor
 from gmwm.estimate import Fit
 from gmwm.estimate.result import dense_curves
+from gmwm.filter_numbers import FIELD_UNITS, ErrorBudget, root_sum
 from gmwm.plotting import COMPONENT_COLOURS, DATA_COLOUR, SUM_COLOUR, deviation_range
 from gmwm.process import Model
 from gmwm.readers import Channel
@@ -94,10 +94,20 @@ def deviation_figure(
     tau, components = dense_curves(fitted)
     total = root_sum(list(components.values()))
     traces = [
-        {**_line(at, factor * root_sum(list(parts.values())), "other models that fit alike",
-                 "#777777", "solid", 1.0), "opacity": 0.85, "legendgroup": "ties"}
+        {
+            **_line(
+                at,
+                factor * root_sum(list(parts.values())),
+                "other models that fit alike",
+                "#777777",
+                "solid",
+                1.0,
+            ),
+            "opacity": 0.85,
+            "legendgroup": "ties",
+        }
         for at, parts in (dense_curves(fitted, rival) for rival in rivals)
-    ]  # fmt: skip
+    ]
     toggles = [0] if traces else []
     for (label, curve), colour in zip(components.items(), _colours(len(components)), strict=True):
         if np.any(curve > 0.0):
@@ -114,10 +124,14 @@ def deviation_figure(
     traces.append(
         {
             **_points(wv.tau, value, f"data, {100.0 * wv.confidence:g} % interval", DATA_COLOUR, 6),
-            "error_y": _bars(value, factor * np.sqrt(2.0 * wv.lower),
-                             factor * np.sqrt(2.0 * wv.upper), DATA_COLOUR),
+            "error_y": _bars(
+                value,
+                factor * np.sqrt(2.0 * wv.lower),
+                factor * np.sqrt(2.0 * wv.upper),
+                DATA_COLOUR,
+            ),
         }
-    )  # fmt: skip
+    )
     more: Figure = {}
     if filter_numbers is not None:
         more["whatif"] = {"curve": WHATIF, "factor": factor}
@@ -176,8 +190,13 @@ def residual_figure(fitted: Fit) -> Figure:
     reach = float(min(1.15 * np.max([5.0, *well, *np.abs(misfit)]), _SHARE))
     inside = np.abs(misfit) <= reach
     points = {
-        **_points(at.tau[shown], np.clip(misfit, -0.96 * reach, 0.96 * reach), "data over model",
-                  COMPONENT_COLOURS[0], 7),
+        **_points(
+            at.tau[shown],
+            np.clip(misfit, -0.96 * reach, 0.96 * reach),
+            "data over model",
+            COMPONENT_COLOURS[0],
+            7,
+        ),
         "error_y": _bars(misfit, low, high, COMPONENT_COLOURS[0]),
         "customdata": [
             [float(f"{value:.4g}") for value in row]
@@ -186,7 +205,7 @@ def residual_figure(fitted: Fit) -> Figure:
         "hovertemplate": "%{x:.4g} s: deviation %{customdata[0]:+.2g} % off the model, "
         "%{customdata[1]:+.2f} standard errors, %{customdata[2]:.3g} degrees of freedom"
         "<extra></extra>",
-    }  # fmt: skip
+    }
     points["mode"] = "markers+text"
     points["text"] = [
         "" if ok else f"{value:+.0f} %" for ok, value in zip(inside, misfit, strict=True)
@@ -253,22 +272,38 @@ def series_figure(fitted: Fit, channel: Channel, spans: Spans) -> Figure:
     edge = {"type": "scatter", "mode": "lines", "x": _plain(time), "hoverinfo": "skip"}
     traces: list[Figure] = [
         {**edge, "name": "smallest", "y": _plain(factor * found.low), "line": {"width": 0}},
-        {**edge, "name": "largest", "y": _plain(factor * found.high), "line": {"width": 0},
-         "fill": "tonexty", "fillcolor": "rgba(0,114,178,0.35)"},
-        {**_line(time, factor * found.mean, "mean of the bin", SUM_COLOUR, "solid", 1.2),
-         "hovertemplate": f"%{{y:.4g}} at %{{x:.4g}} {unit}<extra></extra>"},
-    ]  # fmt: skip
+        {
+            **edge,
+            "name": "largest",
+            "y": _plain(factor * found.high),
+            "line": {"width": 0},
+            "fill": "tonexty",
+            "fillcolor": "rgba(0,114,178,0.35)",
+        },
+        {
+            **_line(time, factor * found.mean, "mean of the bin", SUM_COLOUR, "solid", 1.2),
+            "hovertemplate": f"%{{y:.4g}} at %{{x:.4g}} {unit}<extra></extra>",
+        },
+    ]
     units = _units("signal less mean", "u", fitted)
     layout = {
         "height": 220,
         "xaxis": _linear(f"time [{unit}]"),
         "yaxis": _linear(units[0][0]),
         "shapes": [
-            {"type": "rect", "yref": "paper", "y0": _TICK, "y1": 1, "x0": first / scale,
-             "x1": last / scale, "fillcolor": "#d55e00", "line": {"width": 0}}
+            {
+                "type": "rect",
+                "yref": "paper",
+                "y0": _TICK,
+                "y1": 1,
+                "x0": first / scale,
+                "x1": last / scale,
+                "fillcolor": "#d55e00",
+                "line": {"width": 0},
+            }
             for first, last in found.left_out[:500]
         ],
-    }  # fmt: skip
+    }
     return _figure(traces, layout, units=units)
 
 

@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from gmwm._core.notices import Notice, worst_first
 from gmwm._core.text import per_cent
-from gmwm.calibration import AMBIGUITY, DEPARTURES, LONGEST_PART, Calibration
+from gmwm.calibration import AMBIGUITY, LONGEST_PART, Calibration
 from gmwm.diagnosis import gathered
 from gmwm.errors import InputError
 from gmwm.estimate import Fit
 from gmwm.filter_numbers import bound
+from gmwm.issues import Notice, worst_first
 from gmwm.process import Model
 from gmwm.report.length import part_sentence
 from gmwm.report.numbers import SHOWN
@@ -76,7 +76,8 @@ def findings_of_fits(calibration: Calibration) -> list[Notice]:
         replace(notice, where=" ".join(part for part in (name, notice.where) if part))
         for name, fit in calibration.items()
         for notice in fit.notices
-        if notice.code in DEPARTURES or (notice.severity == "bad" and notice.code not in known)
+        if notice.issue.topic == "departure"
+        or (notice.severity == "bad" and notice.code not in known)
     ]
 
 

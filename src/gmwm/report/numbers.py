@@ -19,9 +19,11 @@ SHOWN = 60.0
 """s: the horizon that a page opens with."""
 
 _TITLES = {
-    "kalibr": "YAML, Kalibr", "gtsam": "Python, GTSAM", "gtsam-cpp": "C++, GTSAM",
+    "kalibr": "YAML, Kalibr",
+    "gtsam": "Python, GTSAM",
+    "gtsam-cpp": "C++, GTSAM",
     "matlab": "MATLAB",
-}  # fmt: skip
+}
 """Of the files of programs, by their languages."""
 
 _NOT_VALID = "not valid: the fit is not, nor are numbers from it"

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from itertools import product
-from typing import Any
+from typing import Annotated
 
 import numpy as np
+from annotated_types import Ge, Le
 
 from gmwm._core import checks
 from gmwm._core.distributions import chi2
+from gmwm._core.documents import NotNegative
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.estimate.moments import Design, Point, Profile, Reference, dictionary_fit, search
@@ -33,7 +35,6 @@ from gmwm.process import (
     RandomWalk,
     RateRamp,
     WhiteNoise,
-    model_from_list,
 )
 from gmwm.selection import tuning
 from gmwm.selection.bandwidth import Bandwidth, sensor_bandwidth
@@ -134,21 +135,11 @@ class Candidate:
 
     model: Model
     criterion: float
-    objective: float
-    chi_square: float
-    n_parameters: int
-    dof: int
+    objective: NotNegative
+    chi_square: NotNegative
+    n_parameters: Annotated[int, Ge(1), Le(1_000_000)]
+    dof: Annotated[int, Ge(-checks.MOST_SAMPLES), Le(checks.MOST_SAMPLES)]
     compared_only: bool = False
-
-    def to_dict(self) -> dict[str, Any]:
-        """In JSON types."""
-        values = {f.name: getattr(self, f.name) for f in fields(self)}
-        return values | {"model": [term.to_dict() for term in self.model.terms]}
-
-    @classmethod
-    def from_dict(cls, content: Mapping[str, Any]) -> Candidate:
-        """Inverse of `to_dict`."""
-        return cls(**{**content, "model": model_from_list(content["model"])})
 
     @property
     def p_value(self) -> float:

@@ -31,8 +31,6 @@ from gmwm.variance import PooledVariance, WaveletVariance, as_wavelet_variance
 if TYPE_CHECKING:
     import pandas
 
-    from gmwm._core.forms import Form
-
 RULES = ("criterion", "merge")
 _SHOWN = 12
 _REDUNDANT = (
@@ -151,24 +149,15 @@ class Selection(Document, Printed):
         return frame(rows, ("model", *names, "chosen", "tie", "compared_only"))
 
     def content(self) -> dict[str, Any]:
-        """What it cannot be rebuilt without, in JSON types."""
-        return {
-            "ranking": [item.to_dict() for item in self.ranking],
-            "chosen": self.ranking.index(self.chosen),
-            "fit": self.fit.to_dict(),
-        }
-
-    @classmethod
-    def document_form(cls) -> type[Form]:
-        from gmwm.selection.form import SelectionForm
-
-        return SelectionForm
+        return super().content() | {"chosen": self.ranking.index(self.chosen)}
 
     @classmethod
     def from_content(cls, content: Mapping[str, Any]) -> Self:
-        """Inverse of `content`."""
-        ranking = tuple(map(Candidate.from_dict, content["ranking"]))
-        return cls(ranking, ranking[content["chosen"]], Fit.from_dict(content["fit"]))
+        ranking, index = content["ranking"], content["chosen"]
+        if not isinstance(index, int) or index not in range(len(ranking)):
+            raise InputError("the chosen model is not in the ranking")
+        found = super().from_content({**content, "chosen": ranking[index]})
+        return replace(found, chosen=found.ranking[index])
 
     def __repr__(self) -> str:
         return f"<Selection of {self.fit.model!r} among {len(self.ranking)}>"
@@ -216,7 +205,7 @@ def select(
     Parameters
     ----------
     data : WaveletVariance, Channel or (n,) array_like, or a list of them
-        Several recordings have one model; see `gmwm.estimate.result.joint.JointFit`.
+        Several recordings have one model; see `gmwm.JointFit`.
     dt : float, optional
         Sampling interval, s; needed for an array.
     max_gauss_markov : int, optional
@@ -242,7 +231,7 @@ def select(
     -----
     All candidates are compared under the same weights, those of a rich mixture fitted to the
     wavelet variances, with the discrepancy that this mixture shows. The criterion is the chi-square
-    on cube roots (see `gmwm.estimate.problem.whitening.chi_square`) with the penalty ``2 c p ln ln
+    on cube roots (see `gmwm.estimate.problem.chi_square`) with the penalty ``2 c p ln ln
     n``, c = 1.5, of Hannan & Quinn (1979, *JRSS B* 41, 190-195), consistent for moment selection
     (Andrews 1999, *Econometrica* 67, 543-564). A rate ramp adds one moment, its slope, so a model
     without one pays the squared slope over its variance; it must win by a margin of 6, and its

@@ -11,11 +11,11 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from gmwm._core.notices import Notice
 from gmwm._core.text import brief
 from gmwm._core.units import customary_unit, field_units
 from gmwm.estimate.problem import Slope
 from gmwm.estimate.result import Fit
+from gmwm.issues import Notice, notice
 from gmwm.process import Model, Process
 from gmwm.selection import tuning
 
@@ -65,16 +65,12 @@ def ramp_or_walk(fitted: Fit, slope: Slope) -> Notice:
         times = {term.values.get("tau") or 0.0: term for term in fitted.model.terms}
         longest = max(times)
         walk = times[longest].named() if longest > 0.0 else "a walk too slow to be resolved"
-    return Notice(
-        "ramp-or-walk", "note", "",
-        f"a rate ramp of {ramp} or slow noise ({walk}): this record cannot tell them apart, "
-        "so the model has no ramp",
-        {
-            "slope": slope.value,
-            "slope_error": float(np.sqrt(slope.variance)),
-            "walk": fitted.params.get("K", float("nan")),
-        },
-    )  # fmt: skip
+    values = {
+        "slope": slope.value,
+        "slope_error": float(np.sqrt(slope.variance)),
+        "walk": fitted.params.get("K", float("nan")),
+    }
+    return notice("ramp-or-walk", "", values, ramp=ramp, slow=walk)
 
 
 def _partners(model: Model, other: Model) -> list[int | None]:

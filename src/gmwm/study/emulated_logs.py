@@ -31,9 +31,19 @@ VEHICLES: dict[str, Callable[..., Trajectory]] = {
 }
 
 FAULTS = (
-    "coloured", "stamps", "leap seconds", "clock step", "lever arm", "off-grid", "one far",
-    "outliers", "mounting", "clock drift", "gyro scale", "accel scale",
-)  # fmt: skip
+    "coloured",
+    "stamps",
+    "leap seconds",
+    "clock step",
+    "lever arm",
+    "off-grid",
+    "one far",
+    "outliers",
+    "mounting",
+    "clock drift",
+    "gyro scale",
+    "accel scale",
+)
 """Coloured GNSS; stamps 0.2 s late; stamps in GPS time, 18 s late; stamps a second late from the
 middle on; lever arm left out; fixes between samples; one fix 500 m off; 3 % outliers of 50 m; IMU
 turned by 90 deg about its vertical axis; the fixes' clock 500 ppm fast; 3 % too much of all gyros,
@@ -98,10 +108,13 @@ def emulated_log(
     imu = imu.with_errors(errors[:, :3], errors[:, 3:])
     late = fine.dt if finer > 1 else 0.0
     aiding = gnss(
-        fine.segment(late, duration), velocity_sd=(0.1, 0.1, 0.15) if velocity else None,
-        lever_arm=LEVER_ARM, coloured_sd=(2.0, 2.0, 3.0) if "coloured" in faults else (0, 0, 0),
-        coloured_tau=60.0, imu=_part(ideal, round(late / fine.dt)),
-    ).noisy(rng)  # fmt: skip
+        fine.segment(late, duration),
+        velocity_sd=(0.1, 0.1, 0.15) if velocity else None,
+        lever_arm=LEVER_ARM,
+        coloured_sd=(2.0, 2.0, 3.0) if "coloured" in faults else (0, 0, 0),
+        coloured_tau=60.0,
+        imu=_part(ideal, round(late / fine.dt)),
+    ).noisy(rng)
     aiding = replace(aiding, coloured_sd=(0.0, 0.0, 0.0))
     by = late + (0.2 if "stamps" in faults else 0.0) + (18.0 if "leap seconds" in faults else 0.0)
     step = 1.0 if "clock step" in faults else 0.0

@@ -24,7 +24,7 @@ from gmwm.estimate.result import Fit
 from gmwm.ins import tuning
 from gmwm.ins.filter import Outage, gnss
 from gmwm.ins.imu import AXES, Recorded, SensorModels
-from gmwm.ins.montecarlo import Experiment, Scenario, Simulated, Validation
+from gmwm.ins.simulation import Experiment, Scenario, Simulated, Validation
 from gmwm.ins.trajectory import car_drive, helicopter_mapping
 from gmwm.process import BiasInstability, GaussMarkov, Model, Process, RandomWalk, WhiteNoise
 from gmwm.readers import Recording

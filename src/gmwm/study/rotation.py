@@ -14,11 +14,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gmwm._core.distributions import norm
-from gmwm._core.notices import Notice
 from gmwm._core.text import bullets, wrapped
 from gmwm._core.typing import FloatArray
 from gmwm.ins import tuning
-from gmwm.ins.montecarlo import GROUPS, FilterErrors, Validation
+from gmwm.ins.simulation import GROUPS, FilterErrors, Validation
+from gmwm.issues import Notice
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -206,14 +206,23 @@ class Rotation:
 
     def markdown(self) -> str:
         """All turns together, as a table for a page."""
-        head = ["filter", "horizontal error against GMWM", "NEES horizontal", "NEES vertical",
-                "NEES position", "within 95 %: horizontal", "vertical"]  # fmt: skip
+        head = [
+            "filter",
+            "horizontal error against GMWM",
+            "NEES horizontal",
+            "NEES vertical",
+            "NEES position",
+            "within 95 %: horizontal",
+            "vertical",
+        ]
         rows = [head, ["---"] * len(head)]
         for name in self.names:
             ratio = "1" if name == FIRST else _of(self.ratio(name, "horizontal"))
             judged = [_of(self.nees(name, each)) for each in ("horizontal", "vertical", "position")]
-            shares = [f"{100.0 * self.coverage(name, each).value:.0f} %"
-                      for each in ("horizontal", "vertical")]  # fmt: skip
+            shares = [
+                f"{100.0 * self.coverage(name, each).value:.0f} %"
+                for each in ("horizontal", "vertical")
+            ]
             rows.append([name, ratio, *judged, *shares])
         return "\n".join("| " + " | ".join(row) + " |" for row in rows)
 
@@ -237,13 +246,15 @@ class Rotation:
         return plotting.intervals(
             {
                 title: {
-                    name: ([each.value for each in found[1:]],
-                           (found[0].value, found[0].lower, found[0].upper))
+                    name: (
+                        [each.value for each in found[1:]],
+                        (found[0].value, found[0].lower, found[0].upper),
+                    )
                     for name, found in rows.items()
                 }
                 for title, rows in panels.items()
             }
-        )  # fmt: skip
+        )
 
 
 @lru_cache(maxsize=16)

@@ -61,9 +61,12 @@ def _estimate(study: Study, series: FloatArray, by: Estimation) -> Fit:
         return estimate(model, series, study.dt, by.method)
     of_data = isinstance(by.method, GMWM) and by.method.weights == "data"
     wv = wavelet_variance(
-        series, study.dt, wavelet=by.wavelet, robust=by.robust,
+        series,
+        study.dt,
+        wavelet=by.wavelet,
+        robust=by.robust,
         data_covariance="octave" if of_data else None,
-    )  # fmt: skip
+    )
     return estimate(model, wv, method=by.method)
 
 
@@ -116,10 +119,15 @@ def run_study(
         raise InputError(f"runs = {runs!r}: give a positive integer")
     what = {"study": study.name, "seed": seed, "methods": list(chosen)}
     found = do_runs(
-        partial(one_run, study.name, chosen, seed), runs, what,
-        folder=folder / f"{study.name}-runs", earlier="resume" if resume else "refuse",
-        jobs=jobs, cluster=cluster, progress=progress,
-    )  # fmt: skip
+        partial(one_run, study.name, chosen, seed),
+        runs,
+        what,
+        folder=folder / f"{study.name}-runs",
+        earlier="resume" if resume else "refuse",
+        jobs=jobs,
+        cluster=cluster,
+        progress=progress,
+    )
     columns = {"run": np.repeat(np.arange(runs), len(chosen))}
     columns |= {name: values.ravel() for name, values in found.items()}
     table = pa.table(columns, metadata={"gmwm": json.dumps(what)})

@@ -73,17 +73,15 @@ TABLE_2 = Study(
     dt=1.0,
     runs=200,
     quantities=(
-        Quantity("sigma2_WN", "N", 2,
-                 {"EM": 1.92e-2, "EM*": 1.00, "AV": 2.27e-2, "GMWM": 2.15e-2}),
-        Quantity("sigma2_RW", "K", 2,
-                 {"EM": 2.93e-2, "EM*": 0.809, "AV": 1.11, "GMWM": 0.150}),
-        Quantity("omega", "R", 1,
-                 {"EM": 8.4e-2, "EM*": 7.88e-2, "AV": 0.394, "GMWM": 0.176}),
+        Quantity("sigma2_WN", "N", 2, {"EM": 1.92e-2, "EM*": 1.00, "AV": 2.27e-2, "GMWM": 2.15e-2}),
+        Quantity("sigma2_RW", "K", 2, {"EM": 2.93e-2, "EM*": 0.809, "AV": 1.11, "GMWM": 0.150}),
+        Quantity("omega", "R", 1, {"EM": 8.4e-2, "EM*": 7.88e-2, "AV": 0.394, "GMWM": 0.176}),
     ),
     methods={
         "EM": Estimation(EM(start=WhiteNoise(0.5) + RandomWalk(1e-4))),
-        "EM*": Estimation(EM(start=WhiteNoise(5.0) + RandomWalk(10.0),
-                            accelerate=False, tolerance=1e-3)),
+        "EM*": Estimation(
+            EM(start=WhiteNoise(5.0) + RandomWalk(10.0), accelerate=False, tolerance=1e-3)
+        ),
         "AV": Estimation(AllanLines(regions={"N": (1, 4), "K": (16, 32), "R": (128, 2048)})),
         "MLE": Estimation(MLE()),
         "GMWM": Estimation(),
@@ -99,7 +97,7 @@ TABLE_2 = Study(
         "The published error of AV in omega is four times that of lines over 128-2048 s; the "
         "paper does not give its region.",
     ),
-)  # fmt: skip
+)
 
 TABLE_3 = Study(
     name="table3",

@@ -17,14 +17,14 @@ import numpy as np
 from gmwm import filter_numbers
 from gmwm._core.documents import Document
 from gmwm._core.files import folder_to_fill, written
-from gmwm._core.notices import Notice
 from gmwm._core.runs import Earlier
 from gmwm._core.typing import Progress
 from gmwm.calibration import Calibration, calibrate
 from gmwm.errors import InputError
 from gmwm.filter_numbers import SensorNumbers
 from gmwm.ins.imu import AXES, Recorded, SensorModels
-from gmwm.ins.montecarlo import Experiment, Validation
+from gmwm.ins.simulation import Experiment, Validation
+from gmwm.issues import Notice
 from gmwm.readers import Recording
 from gmwm.study.figures import saved
 from gmwm.study.navigation import TEN, Calibrated, aligned, scenario_of, times
@@ -123,9 +123,15 @@ def reproduce_rotation(
                 f"{', '.join(AXES)}"
             )
     rotation = rotate(
-        "car" if figure == "fig9" else "helicopter", recordings, folder, runs=runs, seed=seed,
-        jobs=jobs, earlier="resume" if resume else "refuse", progress=progress,
-    )  # fmt: skip
+        "car" if figure == "fig9" else "helicopter",
+        recordings,
+        folder,
+        runs=runs,
+        seed=seed,
+        jobs=jobs,
+        earlier="resume" if resume else "refuse",
+        progress=progress,
+    )
     text, paths = str(rotation), []
     for suffix, content in (("txt", text), ("md", rotation.markdown())):
         paths.append(folder / f"{figure}-rotated.{suffix}")
@@ -159,13 +165,18 @@ def _filters(
     }
     bound, reduce = filter_numbers.bound, filter_numbers.reduce
     for name, numbers in {
-        "N+K bound": kept(SensorNumbers, f"bound-N+K-{horizon:g}",
-                          lambda: bound(calibration, "N+K", horizon)),
-        "N+K+GM bound": kept(SensorNumbers, f"bound-N+K+GM-{horizon:g}",
-                             lambda: bound(calibration, "N+K+GM", horizon)),
-        "N+K reduced": kept(SensorNumbers, f"reduce-N+K-{horizon:g}",
-                            lambda: reduce(calibration, "N+K", [horizon])),
-    }.items():  # fmt: skip
+        "N+K bound": kept(
+            SensorNumbers, f"bound-N+K-{horizon:g}", lambda: bound(calibration, "N+K", horizon)
+        ),
+        "N+K+GM bound": kept(
+            SensorNumbers,
+            f"bound-N+K+GM-{horizon:g}",
+            lambda: bound(calibration, "N+K+GM", horizon),
+        ),
+        "N+K reduced": kept(
+            SensorNumbers, f"reduce-N+K-{horizon:g}", lambda: reduce(calibration, "N+K", [horizon])
+        ),
+    }.items():
         models = {axis: numbers[axis].model for axis in AXES}
         filters[name] = SensorModels(models, {axis: numbers[axis].initial_sd for axis in AXES})
     axes = found.lineless()

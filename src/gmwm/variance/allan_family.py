@@ -1,9 +1,9 @@
-"""Relatives of the Allan deviation, computed by allantools, with intervals of their own.
+"""The Allan family of deviations, computed by allantools, with intervals of their own.
 
 They see the same noise through other filters: the modified deviation distinguishes quantization
-from white noise, the Hadamard deviation does not see a drift, the total deviation reads long
-averaging times off a short record. Fits go by the wavelet variance, which is half the overlapping
-Allan variance; these serve those who compare with figures given in such terms.
+from white noise, the Hadamard deviation ignores a drift, the total deviation reaches long averaging
+times in a short record. Fits use the wavelet variance, half the overlapping Allan variance; these
+are for comparison with published figures.
 """
 
 from __future__ import annotations
@@ -17,18 +17,19 @@ import numpy as np
 
 from gmwm._core import checks
 from gmwm._core.distributions import chi2
+from gmwm._core.tables import cell, plain_table
 from gmwm._core.typing import FloatArray
 from gmwm._core.units import shown_unit
 from gmwm.errors import InputError
 from gmwm.readers import Channel
 from gmwm.variance import tuning
-from gmwm.variance.series import as_channel, checked_samples
+from gmwm.variance.series import as_channel, checked_samples, where_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-# Of the total variance, by the power law of the spectrum: degrees of freedom b T/tau - c, and bias
-# 1 - a tau/T (Greenhall, Howe & Percival 1999, IEEE Trans. UFFC 46, 1183-1191).
+# The total variance by power law of the spectrum: b T/tau - c degrees of freedom, bias 1 - a tau/T
+# (Greenhall, Howe & Percival 1999, IEEE Trans. UFFC 46, 1183-1191).
 _TOTAL = {0: (1.5, 0.0, 0.0), -1: (1.17, 0.22, 1.0 / (3.0 * np.log(2.0))), -2: (0.93, 0.36, 0.75)}
 _TAUS = {"octave": (1.0,), "decade": (1.0, 2.0, 4.0)}
 
@@ -38,12 +39,14 @@ class _Kind:
     """How a deviation is computed.
 
     label: In legends.
+    function: Of allantools.
     reach: Averaging times that its filter spans.
     differences: Of the integrated series, that its filter takes.
     modified: Whether the filter averages the integrated series too.
     """
 
     label: str
+    function: str
     reach: int
     differences: int
     modified: bool = False
@@ -54,10 +57,10 @@ class _Kind:
 
 
 _KINDS = {
-    "overlapping": _Kind("overlapping Allan", 2, 2),
-    "modified": _Kind("modified Allan", 3, 2, modified=True),
-    "hadamard": _Kind("overlapping Hadamard", 3, 3),
-    "total": _Kind("total", 2, 2),
+    "overlapping": _Kind("overlapping Allan", "oadev", 2, 2),
+    "modified": _Kind("modified Allan", "mdev", 3, 2, modified=True),
+    "hadamard": _Kind("overlapping Hadamard", "ohdev", 3, 3),
+    "total": _Kind("total", "totdev", 2, 2),
 }
 
 
@@ -98,48 +101,39 @@ class Deviations:
         return tuple(self.tau)
 
     def __str__(self) -> str:
-        head = f"{self.name or 'series'}: {self.n:,} samples at {1.0 / self.dt:g} Hz"
-        lines = [
-            f"{head}, deviations in {self.unit}",
-            f"{'tau [s]':>12}" + "".join(f" {kind:>16}" for kind in self.kinds),
-        ]
-        columns = {
-            kind: dict(zip(self.tau[kind].tolist(), self.deviation[kind].tolist(), strict=True))
+        columns = [
+            dict(zip(self.tau[kind].tolist(), self.deviation[kind].tolist(), strict=True))
             for kind in self.kinds
-        }
-        for tau in sorted(set().union(*columns.values())):
-            cells = (f"{c[tau]:>16.5g}" if tau in c else f"{'-':>16}" for c in columns.values())
-            lines.append(f"{tau:12.6g} " + " ".join(cells))
-        return "\n".join(lines)
+        ]
+        rows = [
+            [f"{tau:.6g}", *(cell(column.get(tau), 5) for column in columns)]
+            for tau in sorted(set().union(*columns))
+        ]
+        head = f"{self.name or 'series'}: {self.n:,} samples at {1.0 / self.dt:g} Hz"
+        table = plain_table(["tau [s]", *self.kinds], rows)
+        return f"{head}, deviations in {self.unit}\n{table}"
 
     def to_dict(self) -> dict[str, Any]:
         """Everything in JSON types, SI units."""
+        parts = ("tau", "deviation", "lower", "upper")
         return {
-            "n": self.n,
-            "dt": self.dt,
-            "name": self.name,
-            "quantity": self.quantity,
-            "unit": self.unit,
-            "confidence": self.confidence,
+            name: getattr(self, name)
+            for name in ("n", "dt", "name", "quantity", "unit", "confidence")
+        } | {
             "kinds": {
-                kind: {
-                    "tau": self.tau[kind].tolist(),
-                    "deviation": self.deviation[kind].tolist(),
-                    "lower": self.lower[kind].tolist(),
-                    "upper": self.upper[kind].tolist(),
-                }
+                kind: {part: getattr(self, part)[kind].tolist() for part in parts}
                 for kind in self.kinds
-            },
+            }
         }
 
     def plot(self, ax: Axes | None = None, *, units: str = "field") -> Axes:
-        """All kinds against averaging time, into new axes or those of another deviation plotting.
+        """All kinds against averaging time; returns the axes.
 
         Parameters
         ----------
         ax : matplotlib.axes.Axes, optional
-            E.g. what ``wavelet_variance(...).plot()`` returns; that has the overlapping Allan
-            deviation already.
+            E.g. those of ``wavelet_variance(...).plot()``, which has the overlapping Allan
+            deviation already; by default new ones.
         units : {"field", "si"}, optional
             deg/h and ug, or SI.
         """
@@ -162,7 +156,7 @@ class Deviations:
             interval=f"{100 * self.confidence:g} %",
             title=self.name,
             ax=ax,
-        )  # fmt: skip
+        )
 
 
 def deviations(
@@ -202,14 +196,26 @@ def deviations(
     and (25) for the deviations; equivalent degrees of freedom of Greenhall & Riley (2003), of the
     total deviation by its table 7, for the power law that the lag-1 autocorrelation of the
     averages shows (Riley & Greenhall 2004); with fewer than 100 averages that of the next shorter
-    averaging time. The total deviation is given as it is defined, low by up to 13 % where flicker
+    averaging time. The total deviation follows its definition, low by up to 13 % where flicker
     noise dominates and 21 % where a random walk does; its intervals allow for that.
 
-    Every averaging time costs a pass over the data, for the total deviation over three times as
-    many: a million samples need some two seconds for all four kinds.
+    A million samples take some two seconds for all four kinds.
     """
-    allantools = _allantools()
-    channel, values = _checked(data, dt)
+    try:
+        import allantools
+        import allantools.ci
+    except ImportError:
+        raise InputError(
+            "these deviations are computed by allantools, which is not installed: install it with "
+            "pip install 'gmwm[allan]'"
+        ) from None
+    channel = data if isinstance(data, Channel) else as_channel(data, dt)
+    values, runs, _ = checked_samples(channel)
+    if not runs.is_complete:
+        raise InputError(
+            f"{where_of(channel)} has {runs.n - runs.present:,} missing samples: cut it to a part "
+            "without any, or use gmwm.wavelet_variance, whose Allan deviation copes with gaps"
+        )
     confidence = checks.share("confidence", confidence, 0.95)
     chosen = _chosen_kinds(kinds)
     averaging = _averaging(tau, channel)
@@ -223,7 +229,10 @@ def deviations(
                 f"tau = {averaging[0] * channel.dt:g} s is too long for the {kind.label} deviation "
                 f"of {values.size:,} samples: give at most {longest * channel.dt:g} s"
             )
-        estimate = _deviation(allantools, name, values, m)
+        # Deviations of rates do not depend on the unit of time; at a rate of 1 the averaging times
+        # are whole numbers, which no rounding can spoil.
+        compute = getattr(allantools, kind.function)
+        estimate = np.asarray(compute(values, rate=1.0, data_type="freq", taus=m)[1], dtype=float)
         dof, bias = _distribution(allantools, name, values.size, m, slopes[: m.size])
         found[name] = [m * channel.dt, estimate]
         for probability in (0.5 + 0.5 * confidence, 0.5 - 0.5 * confidence):
@@ -243,32 +252,6 @@ def deviations(
         quantity=channel.quantity,
         unit=channel.unit or "u",
     )
-
-
-def _allantools() -> ModuleType:
-    try:
-        import allantools
-        import allantools.ci
-    except ImportError:
-        raise InputError(
-            "these deviations are computed by allantools, which is not installed: install it with "
-            "pip install 'gmwm[allan]'"
-        ) from None
-    return allantools
-
-
-def _checked(data: Channel | FloatArray, dt: float | None) -> tuple[Channel, FloatArray]:
-    if not isinstance(data, Channel) and dt is None:
-        raise InputError("give the sampling interval of the array: deviations(x, dt=0.01)")
-    channel = data if isinstance(data, Channel) else as_channel(data, dt)
-    where = f"channel {channel.name!r}" if channel.name else "the series"
-    missing = np.count_nonzero(np.isnan(checks.real_numbers(channel.values, where)))
-    if missing:
-        raise InputError(
-            f"{where} has {missing:,} missing samples: cut it to a part without any, or "
-            "use gmwm.wavelet_variance, whose Allan deviation copes with gaps"
-        )
-    return channel, checked_samples(channel)[0]
 
 
 def _chosen_kinds(kinds: Sequence[str]) -> dict[str, _Kind]:
@@ -299,19 +282,6 @@ def _averaging(tau: str | Sequence[float] | FloatArray, channel: Channel) -> Flo
     if times.ndim != 1 or not times.size or not np.all((times > 0.0) & np.isfinite(times)):
         raise InputError("tau: give positive averaging times in seconds, in one sequence")
     return np.unique(np.maximum(np.rint(times / channel.dt), 1.0))
-
-
-def _deviation(allantools: ModuleType, name: str, values: FloatArray, m: FloatArray) -> FloatArray:
-    functions = {
-        "overlapping": allantools.oadev,
-        "modified": allantools.mdev,
-        "hadamard": allantools.ohdev,
-        "total": allantools.totdev,
-    }
-    # The deviations of rates do not depend on the unit of time; at a rate of 1 the averaging times
-    # are whole numbers, which no rounding can spoil.
-    _, deviation, _, _ = functions[name](values, rate=1.0, data_type="freq", taus=m)
-    return np.asarray(deviation, dtype=float)
 
 
 def _noise_slopes(values: FloatArray, averaging: FloatArray) -> list[int]:

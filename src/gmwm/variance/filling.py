@@ -1,9 +1,9 @@
-"""What short gaps are filled with, and how that changes the expected wavelet variance.
+"""Filling of short gaps, and how it changes the expected wavelet variance.
 
-All samples of a gap get one value: a weighted mean of pairs of boxes of samples on both sides, the
-ones at the same distance before and after the gap. The weights sum to one and make the mean square
-difference to the mean of what is missing least under a given spectrum (ordinary kriging). A known
-drift goes on through the gap.
+All samples of a gap get one value: a weighted mean of pairs of boxes of samples, at the same
+distance before and after the gap. The weights sum to one and minimize the mean square difference to
+the mean of the missing samples under a given spectrum (ordinary kriging). A known drift goes on
+through the gap.
 
 With x a series without gaps and e the error of the filling (zero outside gaps), a level whose Haar
 filter has the autocorrelation r and the squared gain H gains, summed over all its windows,
@@ -18,9 +18,9 @@ all |k| <= m, so that the expectation is the integral over the spectrum of
 
 where T, T_1, T_0 are sums over k, k' in the gap, counted from its middle, of |k - k'| times
 cos 2 pi f (k - k'), cos 2 pi f k, and 1. It is exact and finite for a random walk. Short gaps near
-each other look at the same samples: each pair of them adds the covariance of the errors of their
-sums, times twice r at their distance. Gaps of 64 samples or more are taken in means of blocks of
-samples, and their errors as independent.
+each other use the same samples: each pair of them adds the covariance of the errors of their sums,
+times twice r at their distance. Gaps of 64 samples or more are treated in means of blocks of
+samples, with independent errors.
 """
 
 from __future__ import annotations
@@ -30,16 +30,15 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gmwm._core.distributions import student
-from gmwm._core.typing import FloatArray
+from gmwm._core.typing import BoolArray, FloatArray, IntArray
 from gmwm.process import PSD, haar_gain, quadrature
 from gmwm.variance import tuning
 from gmwm.variance.covariance.lags import block_density
 from gmwm.variance.gap_kernels import fill, neighbours
-from gmwm.variance.gaps import Gaps, IntArray, window_count
-from gmwm.variance.kernels import cumulative
+from gmwm.variance.gaps import Gaps, window_count
+from gmwm.variance.kernels import accumulate, cumulative
 
 _REACH = 256.0  # blocks: what the frequencies resolve
 _LOWEST = 2.0**-26  # cycles per block
@@ -67,7 +66,7 @@ def _nodes() -> tuple[FloatArray, FloatArray]:
 
 @lru_cache(maxsize=1)
 def _cosines() -> FloatArray:
-    """Of all lags of half a sample within the neighbourhood, (F, lags)."""
+    """Cosines for all lags of half a sample within the neighbourhood, (F, lags)."""
     f, _ = _nodes()
     return np.asarray(np.cos(np.outer(np.pi * f, np.arange(tuning.NEIGHBOURHOOD))))
 
@@ -112,19 +111,18 @@ def _gain(m: float) -> FloatArray:
 
 def levels_apart(
     gaps: Gaps, values: FloatArray, slope: float, psd: PSD, dt: float, longest: float
-) -> NDArray[np.bool_]:
+) -> BoolArray:
     """Gaps in which the level of a series changes by what its noise does not explain, (G,).
 
-    The difference of the means on both sides, as far as a filling looks, over its standard
-    deviation under the spectrum, which is known from as many windows as there are: Student's t.
-    Noise has one such gap in a series with a chance of `tuning.APART`. Beyond the averaging times
-    that the spectrum is known from, the noise is taken as if it drifted. A change must show in
-    means over wider stretches as well.
+    A Student's t test of the difference of the means on both sides, as far as a filling looks,
+    against its standard deviation under the spectrum. Noise has one such gap in a series with a
+    probability of `tuning.APART`. Beyond the averaging times that the spectrum is known for, the
+    noise is treated as a drift. A change must show in means over wider stretches as well.
 
     values: (n,), NaN where samples are missing.
-    slope: Of the series, per sample.
-    psd: Of its noise between the gaps.
-    longest: Averaging time that the spectrum is known for, samples.
+    slope: Drift of the series, per sample.
+    psd: Spectrum of its noise between the gaps.
+    longest: Averaging time up to which the spectrum is known, samples.
     """
     first, last = gaps.edges.T
     there = np.zeros(values.size + 1, dtype=np.int64)
@@ -132,7 +130,7 @@ def levels_apart(
     sums = cumulative(values, 0.0)
 
     def ratio(width: IntArray, deviation: FloatArray) -> FloatArray:
-        """Of the differences of means of ``width`` to what noise has by chance, (G,)."""
+        """Differences of means of ``width`` over the limit for noise, (G,)."""
         before, after = (
             (sums[b] - sums[a]) / np.maximum(there[b] - there[a], 1)
             for a, b in (
@@ -155,7 +153,7 @@ def levels_apart(
     apart = (near > 1.0) & (gaps.boxes > 0)
     if not np.any(apart):
         return apart
-    # A change of the level stays; what a narrow peak of the spectrum makes does not.
+    # A change of the level lasts, a narrow peak of the spectrum does not.
     room = np.minimum(first - gaps.runs.edges[0, 0], gaps.runs.edges[-1, 1] - last)
     wide = np.minimum(tuning.WIDER * width[kind], room)
     deviations = np.ones(wide.size)
@@ -167,7 +165,7 @@ def levels_apart(
 
 
 def _deviation(psd: PSD, dt: float, block: int, length: int, width: int) -> float:
-    """Of the difference of the means of so many blocks before and after a gap."""
+    """Standard deviation of the difference of means of blocks before and after a gap."""
     f, quadrature_weight = _nodes()
     power = quadrature_weight * block_density(psd, dt, f, block)
     total = _sum_response(np.array(width), f) / width
@@ -178,7 +176,7 @@ def _deviation(psd: PSD, dt: float, block: int, length: int, width: int) -> floa
 class Filling:
     """How the gaps of a series are filled under a spectrum.
 
-    weights: (K, most boxes), of the means of the pairs of boxes, for each kind of gap.
+    weights: (K, most boxes), weights of the pairs of boxes, for each kind of gap.
     """
 
     gaps: Gaps
@@ -188,7 +186,7 @@ class Filling:
 
     @classmethod
     def under(cls, psd: PSD, dt: float, gaps: Gaps) -> Filling:
-        """The best one for noise of spectrum ``psd``."""
+        """The best filling for noise of spectrum ``psd``."""
         kinds, _ = gaps.kinds
         weights = np.zeros((kinds.shape[0], max(int(np.max(kinds[:, 2])), 1)))
         f, quadrature_weight = _nodes()
@@ -200,41 +198,39 @@ class Filling:
         return cls(gaps, weights, psd, dt)
 
     def series(
-        self, values: FloatArray, averaging: FloatArray, slope: float
-    ) -> Iterator[tuple[NDArray[np.intp], FloatArray, FloatArray]]:
+        self, values: FloatArray, integral: FloatArray, averaging: FloatArray, slope: float
+    ) -> Iterator[tuple[IntArray, FloatArray, FloatArray]]:
         """The series as the levels need it, from the finest on.
 
         values: (n,), NaN where samples are missing.
+        integral: (n + 1,), its cumulative sum, starting with 0.
         averaging: (J,), ascending, in samples.
-        slope: Of a drift that goes on through the gaps, per sample.
-        Yields: ndarray, (n,), (n + 1,), levels, the series with what is filled for them, and its
-            cumulative sum; first those for which nothing is filled, if only none. The series is
-            changed when the next one is asked for.
+        slope: Drift that goes on through the gaps, per sample.
+        Yields: levels, the series with the gaps filled for them, and its cumulative sum. The first
+            levels, perhaps none, have nothing filled. The series changes when the next is asked
+            for.
         """
-        values = values.copy()
-        integral = cumulative(values, 0.0)
-        done = np.zeros(self.gaps.octave.size, dtype=bool)
+        gaps, done = self.gaps, np.zeros(self.gaps.octave.size, dtype=bool)
         levels: list[int] = []
         for j, m in enumerate(averaging):
-            new = self.gaps.filled(m) & ~done
+            new = gaps.filled(m) & ~done
             if np.any(new):
                 yield np.array(levels, dtype=int), values, integral
                 levels = []
+                if not np.any(done):
+                    values, integral = values.copy(), integral.copy()
                 # By rising length: a gap looks across those that are much shorter.
-                for octave in np.unique(self.gaps.octave[new]):
-                    self._fill(new & (self.gaps.octave == octave), values, integral, slope)
-                    integral = cumulative(values, 0.0)
+                for octave in np.unique(gaps.octave[new]):
+                    own = new & (gaps.octave == octave)
+                    weights = self.weights[gaps.kinds[1][own]]
+                    fill(
+                        values, integral, gaps.edges[own], gaps.block[own], gaps.boxes[own],
+                        weights, slope,
+                    )  # fmt: skip
+                    accumulate(values, 0.0, integral)
                 done |= new
             levels.append(j)
         yield np.array(levels, dtype=int), values, integral
-
-    def _fill(
-        self, chosen: NDArray[np.bool_], values: FloatArray, integral: FloatArray, slope: float
-    ) -> None:
-        gaps = self.gaps
-        weights = self.weights[gaps.kinds[1][chosen]]
-        edges, block, boxes = gaps.edges[chosen], gaps.block[chosen], gaps.boxes[chosen]
-        fill(values, integral, edges, block, boxes, weights, slope)
 
     def change(self, averaging: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Relative change of the expected wavelet variances, and that by the error alone, (J,).
@@ -272,7 +268,7 @@ class Filling:
     def _of_pairs(
         self, averaging: FloatArray, covered: FloatArray, power: FloatArray
     ) -> FloatArray:
-        """What the correlation of the errors of neighbouring short gaps adds, (J,)."""
+        """Contribution of the correlated errors of neighbouring short gaps, (J,)."""
         total = np.zeros(averaging.size)
         kinds, kind = self.gaps.kinds
         number = np.bincount(kind, minlength=kinds.shape[0])
@@ -301,7 +297,7 @@ class Filling:
         return total
 
     def _kernels(self, row: np.intp) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-        """What is multiplied by 2 H, 1/(2 m) and -3/(4 m^2), and the error of the gap's sum."""
+        """Factors of 2 H, 1/(2 m) and -3/(4 m^2), and the error of the gap's sum, (F,) each."""
         _, length, boxes = self.gaps.kinds[0][row].tolist()
         shape = _shape(length)
         response = self.weights[row, :boxes] @ shape.boxes[:boxes]

@@ -3,23 +3,22 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gmwm._core.compiled import compiled
-from gmwm._core.typing import FloatArray
+from gmwm._core.typing import FloatArray, IntArray
 
 
 @compiled()
 def fill(
     values: FloatArray,
     integral: FloatArray,
-    edges: NDArray[np.int64],
-    block: NDArray[np.int64],
-    boxes: NDArray[np.int64],
+    edges: IntArray,
+    block: IntArray,
+    boxes: IntArray,
     weights: FloatArray,
     slope: float,
 ) -> None:
-    """Put into gaps a weighted mean of what lies on either side, and a line of no mean.
+    """Fill gaps with a weighted mean of the samples on either side, and a line of no mean.
 
     values: (n,), changed in place.
     integral: (n + 1,), their cumulative sum before, starting with 0.
@@ -46,7 +45,7 @@ def fill(
 
 
 @compiled()
-def pairs_at_lag(first: NDArray[np.int64], second: NDArray[np.int64], lag: int) -> int:
+def pairs_at_lag(first: IntArray, second: IntArray, lag: int) -> int:
     """Number of places t within the first intervals such that t + lag is within the second.
 
     first, second: (P, 2), (Q, 2), ascending intervals, their ends excluded.
@@ -66,10 +65,8 @@ def pairs_at_lag(first: NDArray[np.int64], second: NDArray[np.int64], lag: int) 
 
 
 @compiled()
-def neighbours(
-    centre: NDArray[np.int64], kind: NDArray[np.int64], kinds: int, reach: int
-) -> NDArray[np.int64]:
-    """How many pairs of gaps of two kinds are so far apart, (kinds, kinds, reach).
+def neighbours(centre: IntArray, kind: IntArray, kinds: int, reach: int) -> IntArray:
+    """Number of pairs of gaps by kinds and distance, (kinds, kinds, reach).
 
     centre: (G,), ascending, in half samples.
     kind: (G,), from 0; negative ones are left out.

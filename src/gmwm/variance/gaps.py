@@ -1,27 +1,24 @@
-"""Which gaps a series has, which of them are filled at which level, and what that costs.
+"""Missing samples: the runs between them, the gaps that are filled, and what gaps cost.
 
-A coefficient of averaging time m is made of 2 m samples, so that a few missing ones would take all
-long averaging times from a record. Gaps of up to m/4 samples are therefore filled before the
-coefficients of that level are taken, see `gmwm.variance.filling`; longer ones split the
-record, as do those in which the level changes by what the noise does not explain: coefficients that
-they take part in are left out.
+A coefficient of averaging time m is made of 2 m samples, so a few missing ones would take all long
+averaging times from a record. Gaps of up to m/4 samples are therefore filled before the
+coefficients of that level are computed, see `gmwm.variance.filling`. Longer gaps split the record,
+and so do gaps in which the level changes by more than the noise explains: coefficients that contain
+them are left out.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gmwm._core.typing import FloatArray
+from gmwm._core.documents import Array, check_covariance
+from gmwm._core.typing import BoolArray, FloatArray, IntArray
 from gmwm.variance import tuning
 from gmwm.variance.gap_kernels import pairs_at_lag
-
-IntArray = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -38,7 +35,7 @@ class Runs:
 
     @classmethod
     def of(cls, values: FloatArray) -> Runs:
-        """Those of a series (n,) in which NaN stands for missing samples."""
+        """The runs of a series (n,) in which NaN stands for missing samples."""
         present = np.concatenate([[False], ~np.isnan(values), [False]])
         edges = np.flatnonzero(present[1:] != present[:-1])
         return cls(tuple(edges[::2].tolist()), tuple(edges[1::2].tolist()), int(values.size))
@@ -49,7 +46,7 @@ class Runs:
         return self.starts == (0,) and self.stops == (self.n,)
 
     @cached_property
-    def edges(self) -> NDArray[np.int64]:
+    def edges(self) -> IntArray:
         """Starts and stops, (runs, 2)."""
         return np.stack([self.starts, self.stops], axis=1).astype(np.int64)
 
@@ -66,11 +63,11 @@ class Runs:
 
 @dataclass(frozen=True, eq=False)
 class Gaps:
-    """Gaps within a series, each with the samples around it that predict what it held.
+    """Gaps within a series, with the samples around each that predict what it held.
 
     runs: The samples that exist.
     edges: (G, 2), first sample of each gap that has samples on both sides, and the one after its
-        last. Runs that are very short beside the gaps around them are parts of a gap.
+        last. Runs that are very short beside the gaps around them belong to the gap.
     octave: (G,), lengths rounded up to a power of two, as its exponent.
     apart: (G,) of bool, gaps with another level on either side, which are never filled.
     """
@@ -78,14 +75,13 @@ class Gaps:
     runs: Runs
     edges: IntArray
     octave: IntArray
-    apart: NDArray[np.bool_]
+    apart: BoolArray
 
     @classmethod
     def of(cls, runs: Runs) -> Gaps:
-        """Those between the first and the last sample that exist."""
-        edges = _without_islands(np.stack([runs.edges[:-1, 1], runs.edges[1:, 0]], axis=1))
-        length = edges[:, 1] - edges[:, 0]
-        octave = np.ceil(np.log2(length)).astype(np.int64)
+        """The gaps between the first and the last sample that exist."""
+        edges = _merge_over_islands(np.stack([runs.edges[:-1, 1], runs.edges[1:, 0]], axis=1))
+        octave = np.ceil(np.log2(edges[:, 1] - edges[:, 0])).astype(np.int64)
         return cls(runs, edges, octave, np.zeros(octave.size, dtype=bool))
 
     @property
@@ -97,13 +93,12 @@ class Gaps:
     def block(self) -> IntArray:
         """Samples of the unit in which each gap is less than 64 long, (G,)."""
         length = self.edges[:, 1] - self.edges[:, 0]
-        return 2 ** np.floor(np.log2(np.maximum(2 * length / tuning.GAP_BLOCKS, 1.0))).astype(
-            np.int64
-        )
+        octave = np.floor(np.log2(np.maximum(2 * length / tuning.GAP_BLOCKS, 1.0)))
+        return 2 ** octave.astype(np.int64)
 
     @cached_property
     def length(self) -> IntArray:
-        """Of each gap, in blocks, (G,)."""
+        """Length of each gap in blocks, (G,)."""
         return np.rint((self.edges[:, 1] - self.edges[:, 0]) / self.block).astype(np.int64)
 
     @cached_property
@@ -132,33 +127,31 @@ class Gaps:
         base = 2 * tuning.GAP_BLOCKS  # more than any length or number of boxes
         code = (self.block * base + self.length) * base + self.boxes
         found, kind = np.unique(code, return_inverse=True)
-        table = [found // base**2, found // base % base, found % base]
-        return np.stack(table, axis=1), kind
+        return np.stack([found // base**2, found // base % base, found % base], axis=1), kind
 
-    def filled(self, m: float) -> NDArray[np.bool_]:
+    def filled(self, m: float) -> BoolArray:
         """Which gaps are filled for averaging times of ``m`` samples, (G,)."""
         short = self.octave <= np.log2(m / tuning.AVERAGES_OF_GAP)
         return np.asarray(short & (self.boxes > 0) & ~self.apart)
 
     def joined(self, m: float) -> IntArray:
         """Runs of samples that exist or are filled for averaging times of ``m`` samples, (P, 2)."""
-        largest = int(np.max(self.octave, initial=-1, where=self.filled(m)))
+        filled = self.filled(m)
+        largest = int(np.max(self.octave, initial=-1, where=filled))
         if largest not in self._joined:
-            self._joined[largest] = self._join(self.edges[self.filled(m)])
+            starts, stops = self.runs.edges.T
+            first, last = self.edges[filled].T
+            beside = np.searchsorted(first, starts, "left") - 1
+            kept = starts[(beside < 0) | (starts > last[beside])]
+            beside = np.searchsorted(first, stops, "right") - 1
+            ends = stops[(beside < 0) | (stops >= last[beside])]
+            self._joined[largest] = np.stack([kept, ends], axis=1)
         return self._joined[largest]
 
     @cached_property
     def _joined(self) -> dict[int, IntArray]:
         """Runs by the octave of the longest gaps that are filled."""
         return {-1: self.runs.edges}
-
-    def _join(self, filled: IntArray) -> IntArray:
-        starts, stops = self.runs.edges.T
-        first, last = filled.T
-        beside = np.searchsorted(first, starts, "left") - 1
-        kept = starts[(beside < 0) | (starts > last[beside])]
-        beside = np.searchsorted(first, stops, "right") - 1
-        return np.stack([kept, stops[(beside < 0) | (stops >= last[beside])]], axis=1)
 
     def covered(self, m: int) -> FloatArray:
         """Number of kept windows of 2 m samples that cover each gap filled for it, over 2 m."""
@@ -171,8 +164,8 @@ class Gaps:
         return np.asarray(np.maximum(last - first + 1, 0) / (2.0 * m))
 
 
-def _without_islands(edges: IntArray) -> IntArray:
-    """Gaps of which none has a run beside it that is very short against it."""
+def _merge_over_islands(edges: IntArray) -> IntArray:
+    """Merge gaps that are separated by very short runs."""
     while edges.shape[0] > 1:
         length = edges[:, 1] - edges[:, 0]
         apart = edges[1:, 0] - edges[:-1, 1]
@@ -190,30 +183,23 @@ class GapEffects:
 
     missing: Number of missing samples.
     counts: (J,), number of coefficients.
-    change: (J,), by which the filling of short gaps changed the expected variance, relative to it;
-        it has been taken off. Zero where no gap was filled.
+    change: (J,), relative change of the expected variance by filling short gaps; it has been
+        subtracted. Zero where no gap was filled.
     inflation: (J, J), growth of the covariance over that of a complete record.
     """
 
     missing: int
-    counts: FloatArray
-    change: FloatArray
-    inflation: FloatArray
+    counts: Array
+    change: Array
+    inflation: Array
 
-    def to_dict(self) -> dict[str, Any]:
-        """In JSON types; see `from_dict`."""
-        return {
-            "missing": self.missing,
-            "counts": self.counts.tolist(),
-            "change": self.change.tolist(),
-            "inflation": self.inflation.tolist(),
-        }
-
-    @classmethod
-    def from_dict(cls, content: Mapping[str, Any]) -> GapEffects:
-        """Inverse of `to_dict`."""
-        arrays = {k: np.array(content[k], dtype=float) for k in ("counts", "change", "inflation")}
-        return cls(int(content["missing"]), **arrays)
+    def check(self, n: int, levels: int) -> None:
+        """Raise ValueError if these are not the gaps of so many samples and levels."""
+        if not (0 <= self.missing < n and self.counts.shape == self.change.shape == (levels,)):
+            raise ValueError("gaps are those of another series")
+        if not (np.all(self.counts > 0.0) and np.all(self.change > -1.0)):
+            raise ValueError("gaps leave no coefficients, or less than no variance")
+        check_covariance(self.inflation.tolist(), levels, "inflation")
 
 
 def window_count(runs: IntArray, width: float) -> float:
@@ -230,13 +216,13 @@ def window_centres(runs: IntArray, width: int) -> IntArray:
 def pair_factor(centres: IntArray, m: int, n: int) -> float:
     """Sampling variance of a Haar level by windows at these centres, over that of n samples.
 
-    By the pairs of coefficients at the lags at which those of white noise are correlated.
+    From the pairs of coefficients at the lags at which those of white noise are correlated.
     """
     return _mean_variance(centres, m) / _mean_variance(window_centres(np.array([[0, n]]), 2 * m), m)
 
 
 def _mean_variance(centres: IntArray, m: int) -> float:
-    """Of the mean of squares at these centres, over that of one of them."""
+    """Variance of the mean of squares at these centres, over that of one of them."""
     # Some lags of an average, or of the most windows in a row where these are fewer.
     widest = min(m, int(np.max(centres[:, 1] - centres[:, 0])))
     step = max(widest // tuning.LAGS_PER_AVERAGE, 1)
@@ -248,7 +234,7 @@ def _mean_variance(centres: IntArray, m: int) -> float:
 
 
 def common_share(centres: Sequence[IntArray], width: FloatArray, n: int) -> FloatArray:
-    """How far the levels whose windows have these centres have them in common, (J, J).
+    """How far the levels whose windows have these centres share them, (J, J).
 
     For two levels the number of common centres over the geometric mean of both numbers, counted
     where a record of n samples without gaps has centres of both: 1 there, positive semi-definite.

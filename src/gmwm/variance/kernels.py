@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gmwm._core.compiled import compiled
-from gmwm._core.typing import FloatArray
+from gmwm._core.typing import FloatArray, IntArray
 
 CHUNK = 1 << 14
 FINE = 12  # levels of averaging times 1 ... 2048 samples, of one chunk at a time
@@ -15,15 +14,15 @@ _LEAST_COLUMNS = 8
 _ROW = 1 << FINE  # shortest averaging time of the other levels
 _PIECE = 256
 
-# Sums in any order, so that they run on vector registers.
 ANY_ORDER = {"reassoc", "contract", "nsz"}
+"""Sums in any order, so that they run on vector registers."""
 
 
 @compiled(fastmath=ANY_ORDER)
 def summed_with_moments(
     out: FloatArray, first: FloatArray, second: FloatArray
 ) -> tuple[float, float]:
-    """Of two series the sum; returns the sum and the sum of squares of the difference."""
+    """Add two series; returns the sum of their differences, and of the squares of these."""
     total, square = 0.0, 0.0
     for i in range(out.size):
         out[i] = first[i] + second[i]
@@ -35,7 +34,7 @@ def summed_with_moments(
 
 @compiled()
 def summed(out: FloatArray, first: FloatArray, second: FloatArray) -> None:
-    """Of two series."""
+    """Add two series."""
     for i in range(out.size):
         out[i] = first[i] + second[i]
 
@@ -58,8 +57,8 @@ def fine_moments(
 ) -> None:
     """Sums over the windows of a run that begin at certain places, for levels from 1 sample on.
 
-    Sums of 2 m samples are those of m samples, m apart: all levels are taken of a chunk that stays
-    in the cache, and nothing cancels.
+    Sums of 2 m samples are those of m samples, m apart: all levels use a chunk that stays in the
+    cache, and nothing cancels.
 
     values: (n,), about their mean.
     start, stop: First window, and the one after the last.
@@ -96,12 +95,12 @@ def coarse_moments(
     start: int,
     end: int,
     columns: tuple[int, int],
-    averaging: NDArray[np.int64],
+    averaging: IntArray,
     found: FloatArray,
 ) -> None:
-    """The same for longer averaging times, of some columns of the run in rows of `_ROW` samples.
+    """The same for longer averaging times, for some columns of the run in rows of `_ROW` samples.
 
-    All levels are taken of a tile of some columns that stays in the cache: one read of the data.
+    All levels use a tile of some columns that stays in the cache: one read of the data.
 
     integral: (n + 1,), cumulative sum of the series, starting with 0.
     start, end: Of the run.
@@ -158,13 +157,13 @@ def haar_coefficients(integral: FloatArray, start: int, stop: int, m: int) -> Fl
 def cumulative(values: FloatArray, mean: float) -> FloatArray:
     """Cumulative sum of ``values - mean``, starting with 0; missing samples (NaN) add nothing."""
     result = np.empty(values.size + 1)  # numpy asks for large pages, compiled code does not
-    _accumulate(values, mean, result)
+    accumulate(values, mean, result)
     return result
 
 
 @compiled()
-def _accumulate(values: FloatArray, mean: float, result: FloatArray) -> None:
-    """What pieces of 256 samples add is compensated.
+def accumulate(values: FloatArray, mean: float, result: FloatArray) -> None:
+    """Cumulative sum with compensation between pieces of 256 samples.
 
     Within a piece the sum begins anew, in four of them at a time, since each addition waits for the
     one before.
@@ -204,8 +203,8 @@ def _accumulate(values: FloatArray, mean: float, result: FloatArray) -> None:
 
 
 @compiled(fastmath=ANY_ORDER)
-def slope(values: FloatArray, parts: NDArray[np.int64]) -> float:
-    """Of the least-squares lines of one slope through the samples of the parts, per sample.
+def slope(values: FloatArray, parts: IntArray) -> float:
+    """Slope of the least-squares lines, one level a part, through the samples, per sample.
 
     values: (n,), NaN where missing.
     parts: (P,), first sample of each part.

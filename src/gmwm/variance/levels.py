@@ -1,17 +1,16 @@
-"""The series as each level sees it: which samples exist or are filled, and the coefficients."""
+"""The levels of a series: which samples exist or are filled for each, and the coefficients."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gmwm._core.typing import FloatArray, IntArray
+from gmwm._core.typing import BoolArray, FloatArray, IntArray
 from gmwm.process import wavelet as known_wavelet
 from gmwm.variance import tuning
 from gmwm.variance.covariance.haar import dyadic_levels
@@ -33,6 +32,7 @@ from gmwm.variance.kernels import (
     haar_coefficients,
     slope,
 )
+from gmwm.variance.modwt import coefficients
 from gmwm.variance.pilot import pilot_psd
 
 _ROW = 1 << FINE
@@ -41,13 +41,12 @@ _ROW = 1 << FINE
 def haar_moments(
     values: FloatArray, integral: FloatArray, runs: IntArray, averaging: FloatArray
 ) -> FloatArray:
-    """Mean and mean square of the Haar MODWT coefficients that lie within a run, (L, 2).
+    """Mean and mean square of the Haar MODWT coefficients that lie within runs, (L, 2).
 
     values: (n,), about their mean.
     integral: (n + 1,), their cumulative sum, starting with 0.
     runs: (P, 2), first sample of each run, and the one after its last.
-    averaging: (L,), averaging times in samples: powers of two in a row, of each of which a window
-        fits a run.
+    averaging: (L,), averaging times in samples: powers of two in a row, each with a coefficient.
     """
     m = averaging.astype(np.int64)
     first = int(m[0]).bit_length() - 1
@@ -67,24 +66,15 @@ def haar_moments(
                 coarse_moments(integral, start, stop, columns, coarse, found[first + fine.size :])
         return found[first:]
 
-    number, total, square = np.sum(_in_threads(of_part, values.size), axis=0).T
-    return np.stack([total, square], axis=1) / number[:, None]
-
-
-def _in_threads(work: Callable[[int, int], FloatArray], n: int) -> list[FloatArray]:
-    """What each part gives; a short series is one part."""
-    parts = min(_processors(), n // tuning.SAMPLES_PER_THREAD)
+    has_affinity = hasattr(os, "sched_getaffinity")  # not on Windows
+    processors = len(os.sched_getaffinity(0)) if has_affinity else os.cpu_count() or 1
+    parts = min(processors, values.size // tuning.SAMPLES_PER_THREAD)
     if parts < 2:
-        return [work(0, 1)]
-    with ThreadPoolExecutor(parts) as pool:
-        return list(pool.map(work, range(parts), [parts] * parts))
-
-
-def _processors() -> int:
-    """Those that this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
+        found = of_part(0, 1)
+    else:
+        with ThreadPoolExecutor(parts) as pool:
+            found = np.sum(list(pool.map(of_part, range(parts), [parts] * parts)), axis=0)
+    return found[:, 1:] / found[:, :1]
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,11 +85,10 @@ class Levels:
     runs: The samples that exist.
     averaging: (J,), averaging times, in samples, of the levels with a coefficient.
     filling: How short gaps are filled; ``None`` where none are.
-    change: (J,), of the expected variances by filling, relative.
-    error: (J,), wavelet variances of the error of the filling, relative.
+    change: (J,), relative change of the expected variances by filling.
+    error: (J,), relative wavelet variances of the error of the filling.
     filled: (J,) of bool, levels for which gaps are filled.
-    parts: (P,), where the series begins anew with another level; its line has one level in each
-        part.
+    parts: (P,), first samples of parts with levels of their own, between which its line jumps.
     """
 
     values: FloatArray
@@ -109,12 +98,12 @@ class Levels:
     filling: Filling | None
     change: FloatArray
     error: FloatArray
-    filled: NDArray[np.bool_]
+    filled: BoolArray
     parts: IntArray = field(default_factory=lambda: np.zeros(1, dtype=np.int64))
 
     @classmethod
     def of(cls, values: FloatArray, runs: Runs, wavelet: str, dt: float) -> Levels:
-        """Those with a coefficient; of a Haar wavelet, with short gaps filled."""
+        """The levels with a coefficient; for the Haar wavelet, with short gaps filled."""
         m = dyadic_levels(runs.longest)
         if wavelet != "haar":
             kind = known_wavelet(wavelet)
@@ -142,8 +131,8 @@ class Levels:
         variance = np.append(variance, first._pilot_variance(variance.size))
         return whole._filled_under(variance, scarcity, gaps, dt)
 
-    def _apart(self, gaps: Gaps, dt: float) -> NDArray[np.bool_]:
-        """Gaps that the level changes in, judged by what the series is between them."""
+    def _apart(self, gaps: Gaps, dt: float) -> BoolArray:
+        """Gaps in which the level changes, judged by the series between them, (G,)."""
         between = replace(self, parts=self.runs.edges[:, 0])
         variance = between._pilot_variance(0)
         known = self.averaging[: variance.size]
@@ -151,10 +140,7 @@ class Levels:
         return levels_apart(gaps, self.values, between.slope, psd, dt, float(known[-1]))
 
     def _pilot_variance(self, start: int) -> FloatArray:
-        """Variances without the drift of the levels from ``start`` on that are well known.
-
-        One at least of the finest.
-        """
+        """Driftless variances of the well-known levels from ``start`` on; the finest always is."""
         windows = self.counts / (2.0 * self.averaging)
         known = max(int(np.sum(np.cumprod(windows >= tuning.PILOT_WINDOWS))), 1)
         part = replace(
@@ -169,9 +155,9 @@ class Levels:
     def _filled_under(self, variance: FloatArray, scarcity: float, gaps: Gaps, dt: float) -> Levels:
         """With the gaps filled under the spectrum that these variances of fine levels imply.
 
-        The averaging time over the number of windows goes with the relative sampling variance.
-        Where that of the fine levels, ``scarcity``, makes the change known worse than the level
-        itself, as where hardly two samples follow each other, the level is not filled.
+        The averaging time over the number of windows is proportional to the relative sampling
+        variance. Where that of the fine levels, ``scarcity``, leaves the change less certain than
+        the level itself, the level is not filled: hardly two samples follow each other there.
         """
         psd = pilot_psd(variance, self.averaging[: variance.size], dt)
         filling = Filling.under(psd, dt, gaps)
@@ -180,7 +166,7 @@ class Levels:
         own = self.averaging / np.maximum(found.counts, 1.0)
         filled = np.abs(change) <= tuning.LARGEST_CHANGE
         filled &= change**2 * scarcity <= (1.0 + change) ** 2 * own
-        # Of the coarsest levels the pilot knows too little to decide anew.
+        # The pilot knows too little of the coarsest levels to decide anew.
         decided = max(
             int(np.sum(found.counts >= tuning.DECIDING_WINDOWS * 2.0 * self.averaging)), 1
         )
@@ -199,10 +185,8 @@ class Levels:
 
     @cached_property
     def slope(self) -> float:
-        """Of the least-squares line through the samples that exist, per sample."""
+        """Slope of the least-squares line through the samples that exist, per sample."""
         return slope(self.values, self.parts)
-
-    # -- what exists -------------------------------------------------------------------------------
 
     def edges(self, level: int) -> IntArray:
         """Runs of samples that exist or are filled for a level, (P, 2)."""
@@ -212,7 +196,7 @@ class Levels:
 
     @property
     def width(self) -> FloatArray:
-        """Number of samples that a coefficient is made of, (J,)."""
+        """Number of samples in a coefficient, (J,)."""
         if self.wavelet == "haar":
             return 2.0 * self.averaging
         kind = known_wavelet(self.wavelet)
@@ -221,19 +205,17 @@ class Levels:
     @cached_property
     def counts(self) -> FloatArray:
         """Number of coefficients, (J,)."""
-        pairs = enumerate(self.width)
-        return np.array([window_count(self.edges(j), width) for j, width in pairs])
+        return np.array([window_count(self.edges(j), width) for j, width in enumerate(self.width)])
 
     def effects(self) -> GapEffects | None:
-        """What the gaps do to the variances; ``None`` of a complete series."""
+        """What the gaps do to the variances; ``None`` for a complete series."""
         n = self.runs.n
         if self.runs.is_complete:
             return None
         widths = self.width
         centres = [window_centres(self.edges(j), int(width)) for j, width in enumerate(widths)]
         if self.wavelet == "haar":
-            averaging = self.averaging.astype(int).tolist()
-            pairs = zip(centres, averaging, strict=True)
+            pairs = zip(centres, self.averaging.astype(int).tolist(), strict=True)
             growth = np.array([pair_factor(own, m, n) for own, m in pairs])
         else:
             growth = (n - widths + 1.0) / self.counts
@@ -246,55 +228,46 @@ class Levels:
         """Cumulative sum of the series without filled gaps."""
         return cumulative(self.values, 0.0)
 
-    # -- coefficients ------------------------------------------------------------------------------
-
-    def _series(self) -> Iterator[tuple[NDArray[np.intp], FloatArray, FloatArray]]:
-        """Levels, the series that they are made of, and its cumulative sum."""
-        if self.filling is not None:
-            yield from self.filling.series(self.values, self.averaging, self.slope)
+    def _series(self) -> Iterator[tuple[IntArray, FloatArray, FloatArray]]:
+        """Levels in groups, the series that they are made of, and its cumulative sum."""
+        if self.filling is None:
+            yield np.arange(self.averaging.size), self.values, self._integral
             return
-        yield np.arange(self.averaging.size), self.values, self._integral
+        series = self.filling.series(self.values, self._integral, self.averaging, self.slope)
+        for levels, values, integral in series:
+            for own in np.split(levels, np.flatnonzero(np.diff(self.filled[levels])) + 1):
+                if own.size and self.filled[own[0]]:
+                    yield own, values, integral
+                elif own.size:
+                    yield own, self.values, self._integral
 
     def moments(self) -> FloatArray:
         """Mean and mean square of each level's coefficients, (J, 2)."""
         if self.wavelet != "haar":
             return np.array([(np.mean(w), np.mean(w * w)) for w in self.coefficients()])
-        found = [np.zeros((0, 2))]
-        plain = None
-        for levels, values, integral in self._series():
-            plain = integral if plain is None else plain
-            # Neighbours that are made of the same series, all together.
-            for own in np.split(levels, np.flatnonzero(np.diff(self.filled[levels])) + 1):
-                if own.size:
-                    series = (values, integral) if self.filled[own[0]] else (self.values, plain)
-                    edges = self.edges(int(own[0]))
-                    found.append(haar_moments(*series, edges, self.averaging[own]))
-        return np.concatenate(found)
+        found = [
+            haar_moments(values, integral, self.edges(int(levels[0])), self.averaging[levels])
+            for levels, values, integral in self._series()
+        ]
+        return np.concatenate([np.zeros((0, 2)), *found])
 
     def coefficients(self, *, level: bool = False) -> Iterator[FloatArray]:
         """The coefficients of each level, over all runs; without the series' line if ``level``."""
         line = self.slope * np.arange(self.runs.n) if level else 0.0
         if self.wavelet != "haar":
-            yield from self._other_coefficients(self.values - line)
+            number = self.averaging.size
+            parts = [
+                coefficients((self.values - line)[a:b], self.wavelet, number)
+                for a, b in self.runs.edges
+            ]
+            for _ in range(number):
+                yield np.concatenate([next(part, np.zeros(0)) for part in parts])
             return
-        plain = None
         for levels, values, integral in self._series():
-            there = cumulative(values - line, 0.0) if level else integral
-            plain = there if plain is None else plain
+            own = cumulative(values - line, 0.0) if level else integral
             for j in levels:
                 m = int(self.averaging[j])
-                own = there if self.filled[j] else plain
                 yield np.concatenate([haar_coefficients(own, a, b, m) for a, b in self.edges(j)])
-
-    def _other_coefficients(self, values: FloatArray) -> Iterator[FloatArray]:
-        from gmwm.variance.modwt import coefficients
-
-        number = self.averaging.size
-        series = [coefficients(values[a:b], self.wavelet, number) for a, b in self.runs.edges]
-        for _ in range(number):
-            yield np.concatenate([next(part, np.zeros(0)) for part in series])
-
-    # -- what is made of them ----------------------------------------------------------------------
 
     def driftless(self, moments: FloatArray) -> FloatArray:
         """Expected variances without the filling and without the least-squares line, (J,)."""
@@ -304,14 +277,17 @@ class Levels:
         )
 
     def unfilled(self, moments: FloatArray) -> FloatArray:
-        """Variances without what filling added; it took nothing from a drift, (J,)."""
+        """Variances without what filling added, (J,); it took nothing from a drift."""
         if not np.any(self.change):
             return moments[:, 1]
         return moments[:, 1] - self.change * self.driftless(moments)
 
     def block_means(self) -> tuple[FloatArray, int]:
         """Means of blocks, NaN where a gap is not filled for the coarsest level, and their size."""
-        values, integral = self._coarsest()
+        values, integral = self.values, self._integral
+        if self.filling is not None and self.filled[-1]:
+            coarsest = self.averaging[-1:]
+            *_, (_, values, integral) = self.filling.series(values, integral, coarsest, self.slope)
         n = self.runs.n
         whole = self.runs.is_complete or not np.any(np.isnan(values))
         most = tuning.MOST_BLOCKS if whole else tuning.MOST_BLOCKS_WITH_GAPS
@@ -321,12 +297,3 @@ class Levels:
         if not whole:
             means[np.any(np.isnan(values[:end]).reshape(-1, block), axis=1)] = np.nan
         return means, block
-
-    def _coarsest(self) -> tuple[FloatArray, FloatArray]:
-        """The series that the coarsest level is made of, and its cumulative sum."""
-        if self.filling is None or not self.filled[-1]:
-            return self.values, self._integral
-        *_, (_, values, integral) = self.filling.series(
-            self.values, self.averaging[-1:], self.slope
-        )
-        return values, integral

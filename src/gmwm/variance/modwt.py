@@ -11,15 +11,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from gmwm._core import checks
-from gmwm._core.compiled import compiled
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.process import wavelet as wavelet_of
-
-_CHUNK = 4096  # samples that stay in the cache while all taps pass over them
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,41 +42,6 @@ class Modwt:
         return imodwt(self.detail, self.smooth, self.wavelet)
 
 
-@compiled()
-def _add(out: FloatArray, values: FloatArray, factor: float) -> None:
-    # On slices of equal length the loop has no index arithmetic and runs on vector registers.
-    for t in range(out.size):
-        out[t] += factor * values[t]
-
-
-@compiled()
-def _add_circular(
-    out: FloatArray, values: FloatArray, taps: FloatArray, offsets: npt.NDArray[np.int64]
-) -> None:
-    """out[t] += sum_l taps[l] values[t - offsets[l]], indices taken modulo the length."""
-    n = values.size
-    for begin in range(0, n, _CHUNK):
-        end = min(begin + _CHUNK, n)
-        for i in range(taps.size):
-            offset = offsets[i]
-            turn = min(max(offset, begin), end)
-            _add(out[begin:turn], values[begin - offset + n : turn - offset + n], taps[i])
-            _add(out[turn:end], values[turn - offset : end - offset], taps[i])
-
-
-@compiled()
-def _filtered(values: FloatArray, taps: FloatArray, step: int) -> FloatArray:
-    """sum_l taps[l] values[t - step l] where all of these exist."""
-    reach = step * (taps.size - 1)
-    out = np.zeros(values.size - reach)
-    for begin in range(0, out.size, _CHUNK):
-        end = min(begin + _CHUNK, out.size)
-        for i in range(taps.size):
-            offset = reach - step * i
-            _add(out[begin:end], values[begin + offset : end + offset], taps[i])
-    return out
-
-
 def modwt(x: FloatArray, wavelet: str = "haar", levels: int | None = None) -> Modwt:
     """Maximal overlap discrete wavelet transform of a series taken as periodic.
 
@@ -102,14 +63,17 @@ def modwt(x: FloatArray, wavelet: str = "haar", levels: int | None = None) -> Mo
     filters = wavelet_of(wavelet)
     smooth = _series(x)
     n = smooth.size
-    count = max(filters.levels(n), 1) if levels is None else _checked_levels(levels, n)
+    count, most = max(filters.levels(n), 1), n.bit_length()
+    if levels is not None:
+        if not (_is_count(levels) and levels <= most):
+            raise InputError(
+                f"levels = {levels!r}: give an integer from 1 to {most} for {n} samples"
+            )
+        count = int(levels)
     detail = np.zeros((count, n))
     for row in range(count):
-        offsets = _offsets(filters.scaling.size, row, n)
-        _add_circular(detail[row], smooth, filters.detail, offsets)
-        coarser = np.zeros(n)
-        _add_circular(coarser, smooth, filters.scaling, offsets)
-        smooth = coarser
+        detail[row] = _circular(smooth, filters.detail, 1 << row)
+        smooth = _circular(smooth, filters.scaling, 1 << row)
     return Modwt(filters.name, detail, smooth)
 
 
@@ -141,20 +105,16 @@ def imodwt(detail: FloatArray, smooth: FloatArray, wavelet: str = "haar") -> Flo
             "coefficients a level"
         )
     for row in range(rows.shape[0] - 1, -1, -1):
-        back = (n - _offsets(filters.scaling.size, row, n)) % n
-        finer = np.zeros(n)
-        _add_circular(finer, np.ascontiguousarray(rows[row]), filters.detail, back)
-        _add_circular(finer, result, filters.scaling, back)
-        result = finer
+        step = -(1 << row)
+        detailed = _circular(rows[row], filters.detail, step)
+        result = _circular(result, filters.scaling, step, detailed)
     return result
 
 
 def coefficients(
     values: FloatArray, wavelet: str, levels: int | None = None
 ) -> Iterator[FloatArray]:
-    """Wavelet coefficients free of end effects, level by level.
-
-    Only one level is in memory at a time.
+    """Wavelet coefficients free of end effects, level by level; one level at a time is in memory.
 
     values: (n,), finite numbers.
     levels: At most so many; by default all that have such a coefficient. A short series has fewer.
@@ -169,16 +129,33 @@ def coefficients(
         if not _is_count(levels):
             raise InputError(f"levels = {levels!r}: give an integer from 1")
         count = min(count, int(levels))
-    return _levels(smooth, filters.detail, filters.scaling, count)
+
+    def level_by_level(smooth: FloatArray) -> Iterator[FloatArray]:
+        for row in range(count):
+            yield _filtered(smooth, filters.detail, 1 << row)
+            if row + 1 < count:
+                smooth = _filtered(smooth, filters.scaling, 1 << row)
+
+    return level_by_level(smooth)
 
 
-def _levels(
-    smooth: FloatArray, detail: FloatArray, scaling: FloatArray, count: int
-) -> Iterator[FloatArray]:
-    for row in range(count):
-        yield _filtered(smooth, detail, 2**row)
-        if row + 1 < count:
-            smooth = _filtered(smooth, scaling, 2**row)
+def _circular(
+    values: FloatArray, taps: FloatArray, step: int, start: FloatArray | None = None
+) -> FloatArray:
+    """start[t] + sum_l taps[l] values[t - step l], indices taken modulo the length."""
+    out = np.zeros(values.size) if start is None else start
+    for i, tap in enumerate(taps.tolist()):
+        out += tap * np.roll(values, i * step)
+    return out
+
+
+def _filtered(values: FloatArray, taps: FloatArray, step: int) -> FloatArray:
+    """sum_l taps[l] values[t - step l] where all of these exist."""
+    reach = step * (taps.size - 1)
+    out = np.zeros(values.size - reach)
+    for i, tap in enumerate(taps.tolist()):
+        out += tap * values[reach - step * i : values.size - step * i]
+    return out
 
 
 def _series(x: FloatArray) -> FloatArray:
@@ -197,15 +174,3 @@ def _series(x: FloatArray) -> FloatArray:
 def _is_count(levels: Any) -> bool:
     whole = isinstance(levels, int | np.integer) and not isinstance(levels, bool)
     return whole and int(levels) >= 1
-
-
-def _checked_levels(levels: Any, n: int) -> int:
-    most = n.bit_length()
-    if not (_is_count(levels) and levels <= most):
-        raise InputError(f"levels = {levels!r}: give an integer from 1 to {most} for {n} samples")
-    return int(levels)
-
-
-def _offsets(taps: int, row: int, n: int) -> npt.NDArray[np.int64]:
-    """Delays of the taps of level ``row + 1``, modulo the length."""
-    return np.array([(tap << row) % n for tap in range(taps)], dtype=np.int64)

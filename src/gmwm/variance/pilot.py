@@ -1,6 +1,6 @@
 """A smooth spectrum that has given wavelet variances: the data's own, before any model.
 
-It serves the equivalent degrees of freedom of the estimates and the first weights of a fit.
+It gives the equivalent degrees of freedom of the estimates and the first weights of a fit.
 """
 
 from __future__ import annotations
@@ -24,11 +24,10 @@ def pilot_psd(variance: FloatArray, averaging: FloatArray, dt: float) -> PSD:
     """
     x, weight = _points(tuple(averaging.tolist()))
     knots = np.log(tuning.HAAR_PEAK / averaging)[::-1]  # rising frequency
-    node = _Places(x, knots)
+    places = _Places(x, knots)
     level = np.log(2.0 * variance * averaging)
     for _ in range(tuning.PILOT_ITERATIONS):
-        density = np.exp(node.interpolated(level[::-1]))
-        implied = weight @ density
+        implied = weight @ np.exp(places.interpolated(level[::-1]))
         level = level + np.clip(tuning.PILOT_STEP * np.log(variance / implied), -1.0, 1.0)
         level = _limit_slopes(level)
 
@@ -40,7 +39,7 @@ def pilot_psd(variance: FloatArray, averaging: FloatArray, dt: float) -> PSD:
 
 @lru_cache(maxsize=32)  # gaps hide other levels in each channel; 0.1 MB each
 def _points(averaging: tuple[float, ...]) -> tuple[FloatArray, FloatArray]:
-    """Logarithms of frequencies (cycles per sample), and weights of a spectrum there, a level each.
+    """Logarithms of frequencies (cycles per sample), and weights of a spectrum there by level.
 
     A power law on an octave is a polynomial of its points to rounding.
     """
@@ -54,7 +53,7 @@ def _points(averaging: tuple[float, ...]) -> tuple[FloatArray, FloatArray]:
 
 
 class _Places:
-    """Where values lie between knots: piecewise linear interpolation, again and again.
+    """Places of values between knots, for repeated piecewise linear interpolation.
 
     It is quick where many values in a row lie in one piece.
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -18,8 +19,8 @@ from gmwm.variance.wavelet import WaveletVariance
 class PooledVariance(WaveletVariance):
     """Mean wavelet variance of several recordings, level by level.
 
-    parts: Of the recordings. All other attributes are as in `WaveletVariance`; there are as many
-        levels as the longest recording has, and ``n`` is the length of that one.
+    parts: Those of the recordings. All other attributes are as in `WaveletVariance`; there are as
+        many levels as the longest recording has, and ``n`` is its length.
     """
 
     parts: tuple[WaveletVariance, ...] = ()
@@ -41,22 +42,26 @@ class PooledVariance(WaveletVariance):
                         f"and {getattr(longest, name)!r}"
                     )
         shares = _shares(parts, longest.tau.size)
-        driftless = None
-        if all(part.driftless is not None for part in parts):
-            driftless = _mean([np.asarray(part.driftless) for part in parts], shares)
-        covariance = None
-        if all(part.data_covariance is not None for part in parts):
-            given = [np.asarray(part.data_covariance) for part in parts]
-            covariance = _combined(given, shares)
+
+        def mean_of(values: Sequence[FloatArray | None]) -> FloatArray | None:
+            """Weighted mean of what all recordings have."""
+            total = np.zeros(shares.shape[1])
+            for value, share in zip(values, shares, strict=True):
+                if value is None:
+                    return None
+                total[: value.size] += share[: value.size] * value
+            return total
+
+        covariances = [part.data_covariance for part in parts if part.data_covariance is not None]
         own = {each.name: getattr(longest, each.name) for each in fields(WaveletVariance)}
         pooled = {
-            "variance": _mean([part.variance for part in parts], shares),
-            "mean": _mean([part.mean for part in parts], shares),
-            "driftless": driftless,
-            "fourth_cumulant": 0.0,
-            "data_covariance": covariance,
+            name: mean_of([getattr(part, name) for part in parts])
+            for name in ("variance", "mean", "driftless")
         }
-        return cls(**{**own, **pooled}, parts=tuple(parts))
+        pooled["data_covariance"] = (
+            _combined(covariances, shares) if len(covariances) == len(parts) else None
+        )
+        return cls(**{**own, **pooled, "fourth_cumulant": 0.0}, parts=tuple(parts))
 
     @cached_property
     def shares(self) -> FloatArray:
@@ -84,19 +89,18 @@ class PooledVariance(WaveletVariance):
         """Covariance of ``mean``, u^2, (J, J)."""
         return _combined([part.mean_covariance_under(psd) for part in self.parts], self.shares)
 
+    def content(self) -> dict[str, Any]:
+        """As that of one recording."""
+        found = super().content()
+        del found["parts"]
+        return found
+
 
 def _shares(parts: Sequence[WaveletVariance], levels: int) -> FloatArray:
     shares = np.zeros((len(parts), levels))
     for row, part in zip(shares, parts, strict=True):
         row[: part.tau.size] = part.dof
     return np.asarray(shares / np.sum(shares, axis=0))
-
-
-def _mean(values: Sequence[FloatArray], shares: FloatArray) -> FloatArray:
-    total = np.zeros(shares.shape[1])
-    for value, share in zip(values, shares, strict=True):
-        total[: value.size] += share[: value.size] * value
-    return total
 
 
 def _combined(matrices: Sequence[FloatArray], shares: FloatArray) -> FloatArray:

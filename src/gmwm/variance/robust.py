@@ -17,10 +17,9 @@ and the efficiency at independent Gaussian coefficients, 2 nu^4 over its varianc
 
     E[(Z^2 - 1) chi(Z)]^2 / (2 var chi(Z)).
 
-What it can do has a limit. Outliers are rare in the coefficients of fine levels only: a coefficient
-of averaging time m is made of 2 m samples, and where most of them hold an outlier, their mean is
-nearly Gaussian with the raised variance, which no estimate from the coefficients of that level can
-tell from noise.
+It has a limit. Outliers are rare in the coefficients of fine levels only: a coefficient of
+averaging time m is made of 2 m samples. Where most of these coefficients contain an outlier, they
+are nearly Gaussian with the raised variance, which no estimate from that level can tell from noise.
 """
 
 from __future__ import annotations
@@ -33,7 +32,7 @@ from scipy.optimize import brentq
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.process import legendre
-from gmwm.variance.robust_kernels import biweight_means, middle_bin
+from gmwm.variance.robust_kernels import biweight_means
 
 EFFICIENCY = 0.6
 """Efficiency at Gaussian data by default."""
@@ -43,7 +42,6 @@ _TAIL = 13.0  # the normal density beyond is below double precision
 _NODES = 256
 _SMALLEST_C, _LARGEST_C = 2.0, 1e4  # efficiency 0 is at c = 2.395; 1 - 1e-7 is below 1e4
 _TOLERANCE = 1e-7  # of the last Newton step in log nu^2; the error left is its square
-_FEW = 2**14  # coefficients; below, counting costs more than it saves
 _ZERO = 1e-6  # times the root mean square: a median below counts as zero
 _NARROW = 1e-4  # in log nu^2: a maximum below zero, so close, is not a solution
 _LARGEST_STEP = np.log(2.0)
@@ -97,38 +95,21 @@ def tuning_constant(efficiency: float = EFFICIENCY) -> float:
 
 
 def robust_variance(coefficients: FloatArray, efficiency: float = EFFICIENCY) -> float:
-    """Robust variance, about zero, of the wavelet coefficients of one level.
+    """Robust variance, about zero, of the wavelet coefficients of one level, u^2.
 
     The equation has a second, meaningless solution far below, and may have more in contaminated
-    data: taken is the one found first from the squared median of \\|W\\| over 0.6745, on the branch
-    on which the equation falls with nu^2, as it does for Gaussian data.
+    data. The solution is the one found first from the squared median of \\|W\\| over 0.6745, on the
+    branch on which the equation falls with nu^2, as it does for Gaussian data. Where more than half
+    of the coefficients are zero, the search starts from their mean square. Without a solution the
+    start itself is returned: at an efficiency of 0.6 with more than a quarter of far outliers, or
+    of zeros beside noise. With few independent coefficients the estimate is biased, as any
+    non-linear function of them. Independent uniform rounding errors give 15 % more than their
+    variance, a level that holds nothing but a periodic line 40 % more.
 
-    Parameters
-    ----------
-    coefficients : (M,) array_like
-        Coefficients free of end effects, in u; at least one.
-    efficiency : float, optional
-        At Gaussian data, between 0 and 1; see `tuning_constant`.
-
-    Returns
-    -------
-    float
-        In u^2. Where more than half of the coefficients are zero (coarsely rounded data; below a
-        millionth of their root mean square), the search starts from their mean square. Where the
-        equation has no solution, the start itself is returned: at an efficiency of 0.6 with more
-        than a quarter of far outliers, or of zeros beside noise.
-
-    Raises
-    ------
-    InputError
-        For coefficients that are not one series of finite numbers, or an efficiency outside (0, 1).
-
-    Notes
-    -----
-    With few independent coefficients (coarse levels) the estimate is biased, as any non-linear
-    function of them: at a single one it is W^2 over a constant. It stands for the variance of
-    Gaussian coefficients: independent uniform rounding errors give 15 % more than their variance,
-    and a level that holds nothing but a periodic line gives 40 % more.
+    coefficients: (M,), free of end effects, in u; at least one.
+    efficiency: See `tuning_constant`.
+    Raises InputError for coefficients that are not one series of finite numbers, or an efficiency
+        outside (0, 1).
     """
     c = tuning_constant(efficiency)
     w = np.ascontiguousarray(coefficients, dtype=float)
@@ -149,8 +130,8 @@ def _start(w: FloatArray, largest: float) -> float:
     Coefficients that are zero come out as rounding errors of the cumulative sum: with long slow
     series up to about a millionth of the others.
     """
-    size, rank = (np.abs(w), w.size // 2) if w.size < _FEW else middle_bin(w)
-    scale = float(np.partition(size, rank)[rank]) / _QUARTILE
+    rank = w.size // 2
+    scale = float(np.partition(np.abs(w), rank)[rank]) / _QUARTILE
     if scale > _ZERO * largest:  # which is at least the root mean square
         return scale
     square = largest * float(np.sqrt(np.mean((w / largest) ** 2)))

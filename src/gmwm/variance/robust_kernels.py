@@ -2,45 +2,12 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from gmwm._core.compiled import compiled
 from gmwm._core.typing import FloatArray
-
-_DROPPED_BITS = 46  # of the 52 of a mantissa: bins of 1.6 %
-_BIN_MASK = (1 << 17) - 1  # without the sign
+from gmwm.variance.kernels import ANY_ORDER
 
 
-@compiled()
-def middle_bin(values: FloatArray) -> tuple[FloatArray, int]:
-    """The absolute values next to that of rank ``values.size // 2``, and its rank among them.
-
-    The leading bits of a floating-point number order it by size. Counted by these, only the
-    values that share those of the wanted one need to be sorted: several times faster than to
-    partition all.
-
-    values: (M,), contiguous, without NaN.
-    """
-    bits = values.view(np.int64)
-    counts = np.zeros(_BIN_MASK + 1, np.int64)
-    for i in range(bits.size):
-        counts[(bits[i] >> _DROPPED_BITS) & _BIN_MASK] += 1
-    rank = values.size // 2
-    place = 0
-    while rank >= counts[place]:
-        rank -= counts[place]
-        place += 1
-    same = np.empty(counts[place])
-    number = 0
-    for i in range(bits.size):
-        if (bits[i] >> _DROPPED_BITS) & _BIN_MASK == place:
-            same[number] = abs(values[i])
-            number += 1
-    return same, rank
-
-
-# Sums may be taken in any order, so that they are vectorised; infinities stay what they are.
-@compiled(fastmath={"reassoc", "contract", "nsz"})
+@compiled(fastmath=ANY_ORDER)
 def biweight_means(coefficients: FloatArray, factor: float) -> tuple[float, float]:
     """Means of u t^4 and of its derivative by log u, with u = (factor W)^2 and t = max(1 - u, 0).
 
@@ -59,7 +26,7 @@ def biweight_means(coefficients: FloatArray, factor: float) -> tuple[float, floa
     return value / coefficients.size, slope / coefficients.size
 
 
-@compiled(fastmath={"reassoc", "contract", "nsz"})
+@compiled(fastmath=ANY_ORDER)
 def weighted_series(correlation: FloatArray, weight: FloatArray, series: FloatArray) -> float:
     """Sum over lags of weight times sum_p series[p] correlation^(2 p + 4).
 

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from gmwm._core import checks
+from gmwm._core.spool import scaled
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.process import wavelet as known_wavelet
@@ -52,7 +53,7 @@ def wavelet_variance(
     robust : bool, optional
         Whether to bound the influence of outliers, see `gmwm.variance.robust`.
     efficiency : float, optional
-        Of the robust estimate where there are no outliers, between 0 and 1.
+        Efficiency of the robust estimate where there are no outliers, between 0 and 1.
     data_covariance : {"none", "octave"}, optional
         Estimate the covariance of the variances from the coefficients too, over all lags or with
         a lag window (see `gmwm.variance.covariance.empirical`), for ``fit(weights="data")``.
@@ -79,11 +80,14 @@ def wavelet_variance(
     if data_covariance is not None:
         checks.choice("data_covariance", data_covariance, WINDOWS)
     wavelet = "haar" if wavelet == "db1" else wavelet
-    _check_width(channel, runs, wavelet)
-    values = values - mean
+    if (width := known_wavelet(wavelet).width(1)) > runs.longest:
+        raise InputError(
+            f"{where_of(channel)} has no {width} samples in a row, which {wavelet} needs: "
+            "take a shorter wavelet, e.g. haar"
+        )
+    values = scaled(values, 1.0, -mean)
     levels = Levels.of(values, runs, wavelet, channel.dt)
-    moments = levels.moments()
-    driftless = None
+    moments, driftless = levels.moments(), None
     if robust:
         moments = _robust_moments(levels.coefficients(), efficiency)
         driftless = _robust_moments(levels.coefficients(level=True), efficiency)[:, 1]
@@ -91,7 +95,7 @@ def wavelet_variance(
     blocks, block = levels.block_means()
     found = None
     if data_covariance is not None:
-        # What is subtracted for the filling leaves the error of that which it is subtracted from.
+        # The bias of the filling is subtracted, its error stays.
         factor = (1.0 + levels.error) / (1.0 + levels.change)
         longest = int(np.max(levels.counts))
         found = covariance_of_data(levels.coefficients(), longest, data_covariance)
@@ -123,17 +127,23 @@ def wavelet_variance(
     )
 
 
+def _robust_moments(parts: Iterable[FloatArray], efficiency: float) -> FloatArray:
+    """Mean and robust mean square of each level's coefficients, (J, 2)."""
+    from gmwm.variance.robust import robust_variance
+
+    return np.array([(np.mean(w), robust_variance(w, efficiency)) for w in parts])
+
+
 def fourth_cumulant(values: FloatArray) -> float:
-    """Of the independent part of a series, NaN where samples are missing, u^4."""
+    """Fourth cumulant of the independent part of a series, NaN where samples are missing, u^4."""
     count, square, fourth = difference_powers(values)
     return cumulant_of_powers(square / count, fourth / count, count)
 
 
 def cumulant_of_powers(square: float, fourth: float, count: float) -> float:
-    """Of the independent part of a series, u^4; 0 if not above chance.
+    """Fourth cumulant of the independent part of a series, u^4; 0 if it may be chance.
 
-    Cumulants of independent samples add up, so that first differences have twice that of the
-    samples.
+    Cumulants of independent samples add up: first differences have twice that of the samples.
 
     square, fourth: Mean second and fourth power of the first differences, u^2 and u^4.
     count: Number of the first differences.
@@ -144,7 +154,7 @@ def cumulant_of_powers(square: float, fourth: float, count: float) -> float:
 
 
 def where_of(channel: Channel) -> str:
-    """How messages call a channel."""
+    """Name of a channel in messages."""
     return f"channel {channel.name!r}" if channel.name else "the series"
 
 
@@ -152,7 +162,7 @@ def checked_samples(channel: Channel) -> tuple[FloatArray, Runs, float]:
     """The samples of a channel, which of them exist, and their mean.
 
     Raises InputError if they are no series of numbers, too few, infinite, constant or of no
-        sensor's size, or the sampling interval is none.
+        sensor's size, or the sampling interval is not positive.
     """
     where = where_of(channel)
     checks.sampling_interval(channel.dt)
@@ -179,10 +189,7 @@ def checked_samples(channel: Channel) -> tuple[FloatArray, Runs, float]:
 
 
 def check_varies(channel: Channel) -> None:
-    """Refuse a channel that is constant or varies by what no sensor does.
-
-    Raises InputError.
-    """
+    """Raise InputError if a channel is constant or varies by an amount that no sensor does."""
     where = where_of(channel)
     if channel.is_constant:
         raise InputError(
@@ -193,22 +200,6 @@ def check_varies(channel: Channel) -> None:
         raise InputError(
             f"{where} varies by {channel.spread:.1g}: that is not sensor noise, check the unit"
         )
-
-
-def _check_width(channel: Channel, runs: Runs, wavelet: str) -> None:
-    width = known_wavelet(wavelet).width(1)
-    if width > runs.longest:
-        raise InputError(
-            f"{where_of(channel)} has no {width} samples in a row, which {wavelet} needs: "
-            "take a shorter wavelet, e.g. haar"
-        )
-
-
-def _robust_moments(parts: Iterable[FloatArray], efficiency: float) -> FloatArray:
-    """Mean, and the robust stand-in for the mean square, of each level's coefficients, (J, 2)."""
-    from gmwm.variance.robust import robust_variance
-
-    return np.array([(np.mean(w), robust_variance(w, efficiency)) for w in parts])
 
 
 def as_wavelet_variance(

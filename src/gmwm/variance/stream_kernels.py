@@ -80,7 +80,7 @@ class Sums(NamedTuple):
 
 
 @compiled(fastmath=ANY_ORDER)
-def _total(values: FloatArray) -> float:
+def sum_of(values: FloatArray) -> float:
     total = 0.0
     for i in range(values.size):
         total += values[i]
@@ -132,7 +132,7 @@ def add(array: FloatArray, place: int, lost: int, value: float) -> None:
 
 
 @compiled()
-def _complete_windows(
+def complete_windows(
     values: FloatArray, new: int, row: int, sums: Sums, scratch: FloatArray
 ) -> None:
     """Add the windows that end at place ``new`` or later; no sample is missing.
@@ -166,7 +166,7 @@ def _complete_windows(
 
 
 @compiled()
-def _gappy_windows(
+def gappy_windows(
     values: FloatArray, present: FloatArray, new: int, row: int, sums: Sums, scratch: FloatArray
 ) -> None:
     """Add the windows that end at place ``new`` or later, where samples may be missing.
@@ -180,7 +180,7 @@ def _gappy_windows(
     centre = 0.0
     for i in range(number):
         centre += present[i] * values[i]
-    centre /= max(_total(present), 1.0)
+    centre /= max(sum_of(present), 1.0)
     integral[0], there[0] = 0.0, 0.0
     for i in range(number):
         integral[i + 1] = integral[i] + present[i] * (values[i] - centre)
@@ -272,7 +272,7 @@ def _mark(values: FloatArray, begin: int, before: float, marks: FloatArray) -> N
         done, known = begin, before
         index = at + _offset(place)
         while index <= end:
-            known += _total(values[done - begin : index - begin])
+            known += sum_of(values[done - begin : index - begin])
             marks[i, 1 + place] = known
             done, place = index, place + 1
             index = at + _offset(place)
@@ -329,11 +329,11 @@ def work_off(least: int, rows: Rows, sums: Sums, scratch: FloatArray) -> None:
         if row == 0:
             before = sums.totals[SUM] + sums.totals[LOST_SUM]
             _mark(values[old:], state[row, ORIGIN] + old, before, sums.marks)
-            add(sums.totals, SUM, LOST_SUM, _total(values[old:]))
+            add(sums.totals, SUM, LOST_SUM, sum_of(values[old:]))
         if state[row, GAPPY]:
-            _gappy_windows(values, present[row, :filled], old, row, sums, scratch)
+            gappy_windows(values, present[row, :filled], old, row, sums, scratch)
         else:
-            _complete_windows(values, old, row, sums, scratch)
+            complete_windows(values, old, row, sums, scratch)
         if row + 1 < data.shape[0]:
             _pass_on(row, rows, sums)
         _shift(row, rows)
@@ -452,7 +452,7 @@ def first_infinite(samples: FloatArray) -> int:
     """Place of the first infinite sample, or -1."""
     for begin in range(0, samples.size, CHUNK):
         part = samples[begin : begin + CHUNK]
-        if not np.isfinite(_total(part)):
+        if not np.isfinite(sum_of(part)):
             for i in range(part.size):
                 if np.isinf(part[i]):
                     return begin + i

@@ -1,21 +1,34 @@
-"""The Haar wavelet variance of a series."""
+"""The wavelet variance of a series, with what a fit needs to know of it."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any, Self
 
 import numpy as np
+from annotated_types import Gt, Le
 
 from gmwm._core.distributions import chi2
-from gmwm._core.frames import frame
-from gmwm._core.notices import Notice
+from gmwm._core.documents import (
+    Array,
+    Document,
+    Fraction,
+    Interval,
+    NotNegative,
+    Samples,
+    Text,
+    check_covariance,
+)
+from gmwm._core.tables import frame, plain_table
 from gmwm._core.text import Printed
 from gmwm._core.typing import FloatArray
 from gmwm._core.units import shown_unit
-from gmwm.process import PSD
+from gmwm.errors import InputError
+from gmwm.issues import Notice, notice
+from gmwm.process import PSD, wavelet as known_wavelet
+from gmwm.variance import tuning
 from gmwm.variance.covariance.haar import haar_covariance, line_covariance, mean_covariance
 from gmwm.variance.gaps import GapEffects
 from gmwm.variance.pilot import pilot_psd
@@ -25,20 +38,12 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 _LEAST_DOF, _LEAST_QUANTILE = 0.01, 1e-9  # keep intervals that say nothing in numbers
-
-
-def _complete_levels(n: int, wavelet: str) -> int:
-    """Number of levels of a series without gaps."""
-    if wavelet == "haar":
-        return n.bit_length() - 1
-    from gmwm.process import wavelet as known_wavelet
-
-    return known_wavelet(wavelet).levels(n)
+_DYADIC = 1e-6  # relative; averaging times are exact but for rounding
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class WaveletVariance(Printed):
-    """Haar MODWT wavelet variance of a series, level by level, with what a fit needs to know.
+class WaveletVariance(Printed, Document):
+    """MODWT wavelet variance of a series, level by level.
 
     Attributes
     ----------
@@ -49,7 +54,7 @@ class WaveletVariance(Printed):
     mean : (J,) ndarray
         Mean of these coefficients, u; R tau/2 under a drift of R.
     blocks : (B,) ndarray
-        Means of blocks of samples about the mean of the series, u: what a drift is estimated from;
+        Means of blocks of samples about the mean of the series, u, from which a drift is estimated;
         NaN where samples are missing.
     block : int
         Samples per block.
@@ -72,31 +77,31 @@ class WaveletVariance(Printed):
     gaps : GapEffects or None
         What missing samples do to the levels; ``None`` if there are none.
     fourth_cumulant : float
-        Of the independent part of the samples, u^4: what makes the variance of noise with heavy
-        tails less certain than that of Gaussian noise; 0 where they are not heavier, and for robust
+        Of the independent part of the samples, u^4. It makes the variance of heavy-tailed noise
+        less certain than that of Gaussian noise; 0 where tails are not heavier, and for robust
         estimates.
     data_covariance : (J, J) ndarray or None
         Covariance of ``variance`` estimated from the coefficients themselves, u^4, where it was
         asked for.
     """
 
-    tau: FloatArray
-    variance: FloatArray
-    mean: FloatArray
-    blocks: FloatArray
-    block: int
-    n: int
-    dt: float
-    confidence: float = 0.95
-    name: str = ""
-    quantity: str | None = None
-    unit: str = "u"
-    wavelet: str = "haar"
-    efficiency: float = 1.0
-    driftless: FloatArray | None = None
+    tau: Array
+    variance: Array
+    mean: Array
+    blocks: Array
+    block: Samples
+    n: Samples
+    dt: Interval
+    confidence: Fraction = 0.95
+    name: Text = ""
+    quantity: Text | None = None
+    unit: Text = "u"
+    wavelet: Text = "haar"
+    efficiency: Annotated[float, Gt(0.0), Le(1.0)] = 1.0
+    driftless: Array | None = None
     gaps: GapEffects | None = None
-    fourth_cumulant: float = 0.0
-    data_covariance: FloatArray | None = None
+    fourth_cumulant: Annotated[NotNegative, Le(tuning.LARGEST_VARIANCE**2)] = 0.0
+    data_covariance: Array | None = None
 
     @property
     def n_all(self) -> int:
@@ -115,23 +120,18 @@ class WaveletVariance(Printed):
 
     @property
     def width(self) -> FloatArray:
-        """Number of samples that a coefficient is made of, (J,)."""
+        """Number of samples in a coefficient, (J,)."""
         if self.wavelet == "haar":
             return 2.0 * self.averaging
-        from gmwm.process import wavelet
-
-        kind = wavelet(self.wavelet)
+        kind = known_wavelet(self.wavelet)
         return np.array([kind.width(j + 1) for j in range(self.tau.size)], dtype=float)
 
     @property
     def drift_response(self) -> FloatArray:
         """Mean of the coefficients per unit of drift (u/s), s, (J,)."""
-        if self.wavelet == "haar":
-            return 0.5 * self.tau
-        from gmwm.process import wavelet
-
-        moments = wavelet(self.wavelet).vanishing_moments
-        return 0.5 * self.tau if moments < 2 else np.zeros_like(self.tau)
+        if self.wavelet != "haar" and known_wavelet(self.wavelet).vanishing_moments > 1:
+            return np.zeros_like(self.tau)
+        return 0.5 * self.tau
 
     @property
     def allan_variance(self) -> FloatArray:
@@ -144,26 +144,30 @@ class WaveletVariance(Printed):
         return np.sqrt(self.allan_variance)
 
     @property
+    def _complete_levels(self) -> int:
+        """Levels of a record of as many samples without gaps."""
+        if self.wavelet == "haar":
+            return int(self.n).bit_length() - 1
+        return known_wavelet(self.wavelet).levels(self.n)
+
+    @property
     def notices(self) -> tuple[Notice, ...]:
-        """What missing samples took from it."""
-        whole = _complete_levels(self.n, self.wavelet)
-        lost = whole - self.tau.size
+        """Whether missing samples shorten the curve."""
+        lost = self._complete_levels - self.tau.size
         if self.gaps is None or lost <= 0:
             return ()
-        ends, complete = float(self.tau[-1]), self.dt * 2.0 ** (whole - 1)
-        text = (
-            f"missing samples shorten the curve: it ends at tau = {ends:.3g} s, that of a complete "
-            f"record at {complete:.3g} s"
-        )
+        ends, complete = float(self.tau[-1]), self.dt * 2.0 ** (self._complete_levels - 1)
         values = {"levels": lost, "tau": ends, "complete": complete}
-        return (Notice("curve-shortened", "warning", self.name, text, values),)
+        return (notice("curve-shortened", self.name, values),)
+
+    # -- uncertainty -------------------------------------------------------------------------------
 
     @cached_property
     def covariance(self) -> FloatArray:
         """Covariance of ``variance``, u^4, (J, J).
 
-        That of a Gaussian series with the smooth spectrum that the wavelet variances themselves
-        imply; no model is assumed.
+        For a Gaussian series with the smooth spectrum that the wavelet variances themselves imply;
+        no model is assumed.
         """
         psd = pilot_psd(self._positive, self.averaging, self.dt)
         return self.covariance_under(psd)
@@ -171,9 +175,9 @@ class WaveletVariance(Printed):
     def covariance_under(self, psd: PSD, lines: Sequence[tuple[float, float]] = ()) -> FloatArray:
         """Covariance of ``variance`` for noise of a given spectrum, u^4, (J, J).
 
-        Gaussian but for its white part, whose fourth cumulant c_4 makes the mean square of n
-        samples vary by c_4 / n more. Levels of m samples have 1/(2 m) of that mean square, all of
-        them together.
+        The noise is Gaussian but for its white part, whose fourth cumulant c_4 adds c_4 / n to the
+        variance of the mean square of n samples. A level of m samples has 1/(2 m) of that mean
+        square, all levels together.
 
         Parameters
         ----------
@@ -183,7 +187,12 @@ class WaveletVariance(Printed):
             Spectral lines beside it: frequency (Hz), amplitude (u).
         """
         if self.wavelet != "haar":
-            covariance = self._of_other_wavelet(psd, lines)
+            from gmwm.variance.covariance.daubechies import wavelet_covariance
+
+            covariance = wavelet_covariance(
+                psd, self.n, self.dt, self.wavelet, self.tau.size, tuple(lines)
+            )
+            covariance = self._with_gaps(covariance)
         else:
             covariance = self._with_gaps(haar_covariance(psd, self.n, self.dt))
             if lines:
@@ -201,13 +210,6 @@ class WaveletVariance(Printed):
             covariance = covariance + self.fourth_cumulant / self.counts[0] * np.outer(share, share)
         return covariance
 
-    def _of_other_wavelet(self, psd: PSD, lines: Sequence[tuple[float, float]]) -> FloatArray:
-        from gmwm.variance.covariance.daubechies import wavelet_covariance
-
-        levels = self.tau.size
-        covariance = wavelet_covariance(psd, self.n, self.dt, self.wavelet, levels, tuple(lines))
-        return self._with_gaps(covariance)
-
     def mean_covariance_under(self, psd: PSD) -> FloatArray:
         """Covariance of ``mean`` at the coarse levels, zero at the others, u^2, (J, J)."""
         if not np.any(self.drift_response):
@@ -215,7 +217,7 @@ class WaveletVariance(Printed):
         return self._with_gaps(mean_covariance(psd, self.n, self.dt))
 
     def _with_gaps(self, complete: FloatArray) -> FloatArray:
-        """A covariance of all levels of a complete record, for those that the series has."""
+        """The covariance of a complete record, for the levels and gaps of this one."""
         if self.gaps is None:
             return complete
         levels = slice(0, self.tau.size)
@@ -250,12 +252,14 @@ class WaveletVariance(Printed):
     def detrended(self, slope: float) -> FloatArray:
         """Wavelet variances of the series less a drift of ``slope`` (u/s), u^2, (J,).
 
-        Exactly; of robust estimates, those less the least-squares line.
+        Exact; for robust estimates, those less the least-squares line.
         """
         if self.driftless is not None:
             return self.driftless
         step = slope * self.drift_response
         return self.variance - 2.0 * step * self.mean + step**2
+
+    # -- printed, stored, drawn --------------------------------------------------------------------
 
     def __repr__(self) -> str:
         size = f"{self.n:,} samples at {1.0 / self.dt:g} Hz"
@@ -264,73 +268,62 @@ class WaveletVariance(Printed):
         )
 
     def __str__(self) -> str:
-        head = f"{self.name or 'series'}: {self.n:,} samples at {1.0 / self.dt:g} Hz{self._how()}"
-        unit = self.unit or "u"
-        lines = [head, f"{'tau [s]':>12} {f'Allan dev. [{unit}]':>22} {'95 % interval':>27}  dof"]
-        lines[1] = lines[1].replace("95 %", f"{100 * self.confidence:g} %")
-        low, high = np.sqrt(2.0 * self.lower), np.sqrt(2.0 * self.upper)
-        for row in zip(self.tau, self.allan_deviation, low, high, self.dof, strict=True):
-            tau, dev, a, b, dof = row
-            lines.append(f"{tau:12.6g} {dev:22.5g} {f'{a:.5g} .. {b:.5g}':>27} {dof:4.3g}")
-        return "\n".join(lines)
-
-    def _how(self) -> str:
-        """What differs from the usual, for the head of a table."""
-        parts = []
+        head = f"{self.name or 'series'}: {self.n:,} samples at {1.0 / self.dt:g} Hz"
         if self.gaps is not None:
-            parts.append(f"{self.gaps.missing:,} of them missing")
+            head += f", {self.gaps.missing:,} of them missing"
         if self.wavelet != "haar":
-            parts.append(self.wavelet)
+            head += f", {self.wavelet}"
         if self.efficiency < 1.0:
-            parts.append(f"robust, efficiency {self.efficiency:g}")
-        return "".join(f", {part}" for part in parts)
+            head += f", robust, efficiency {self.efficiency:g}"
+        interval = f"{100 * self.confidence:g} % interval"
+        low, high = np.sqrt(2.0 * self.lower), np.sqrt(2.0 * self.upper)
+        columns = zip(self.tau, self.allan_deviation, low, high, self.dof, strict=True)
+        rows = [
+            [f"{tau:.6g}", f"{dev:.5g}", f"{a:.5g} .. {b:.5g}", f"{dof:.3g}"]
+            for tau, dev, a, b, dof in columns
+        ]
+        heads = ["tau [s]", f"Allan dev. [{self.unit}]", interval, "dof"]
+        return f"{head}\n{plain_table(heads, rows)}"
 
     def to_dict(self) -> dict[str, Any]:
-        """All that is needed to make the object again, in JSON types; see `from_dict`."""
-        return {
-            "n": self.n,
-            "dt": self.dt,
-            "name": self.name,
-            "quantity": self.quantity,
-            "unit": self.unit,
-            "confidence": self.confidence,
-            "tau": self.tau.tolist(),
-            "variance": self.variance.tolist(),
-            "mean": self.mean.tolist(),
-            "block": self.block,
-            "blocks": [None if np.isnan(mean) else mean for mean in self.blocks.tolist()],
-            "wavelet": self.wavelet,
-            "efficiency": self.efficiency,
-            "driftless": None if self.driftless is None else self.driftless.tolist(),
-            "gaps": None if self.gaps is None else self.gaps.to_dict(),
-            "fourth_cumulant": self.fourth_cumulant,
-            "data_covariance": (
-                None if self.data_covariance is None else self.data_covariance.tolist()
-            ),
-        }
+        """Everything needed to make the object again, in JSON types; see `from_dict`."""
+        return self.content()
 
     @classmethod
-    def from_dict(cls, content: dict[str, Any]) -> WaveletVariance:
+    def from_dict(cls, content: Mapping[str, Any]) -> Self:
         """Inverse of `to_dict`.
 
         Raises
         ------
         InputError
-            With the place of the first thing that cannot be used.
+            With the place of the first value that cannot be used.
         """
-        from gmwm.variance.form import WaveletVarianceForm
+        try:
+            return cls.from_content(content)
+        except InputError:
+            raise
+        except (LookupError, TypeError, ValueError, ArithmeticError) as error:
+            raise InputError(f"the wavelet variance cannot be used ({error})") from None
 
-        content = WaveletVarianceForm.checked(content)
-        arrays = {
-            k: np.array(content[k], dtype=float) for k in ("tau", "variance", "mean", "blocks")
-        }
-        found: dict[str, Any] = {**content, **arrays}
-        if content.get("gaps") is not None:
-            found["gaps"] = GapEffects.from_dict(content["gaps"])
-        for name in ("data_covariance", "driftless"):
-            if content.get(name) is not None:
-                found[name] = np.array(content[name], dtype=float)
-        return cls(**found)
+    def check_content(self) -> None:
+        size, complete = self.tau.size, self._complete_levels
+        if not 1 <= size <= complete or (self.gaps is None and size < complete):
+            raise ValueError(f"{size} levels where {self.n:,} samples have {complete}")
+        for name in ("tau", "variance", "mean", "driftless"):
+            values = getattr(self, name)
+            if values is not None and not (values.shape == (size,) and np.all(np.isfinite(values))):
+                raise ValueError(f"{name} is no list of {size} numbers")
+        if not np.all((self.variance >= 0.0) & (self.variance <= tuning.LARGEST_VARIANCE)):
+            raise ValueError("a variance is negative or too large")
+        if not np.allclose(self.tau, self.dt * 2.0 ** np.arange(size), rtol=_DYADIC, atol=0.0):
+            raise ValueError("averaging times are not octaves of the sampling interval")
+        fits = self.blocks.ndim == 1 and 1 <= self.blocks.size <= tuning.MOST_BLOCKS
+        if not fits or self.block * self.blocks.size > self.n:
+            raise ValueError("blocks hold more samples than there are, or none")
+        if self.gaps is not None:
+            self.gaps.check(self.n, size)
+        if self.data_covariance is not None:
+            check_covariance(self.data_covariance.tolist(), size, "data_covariance")
 
     def to_frame(self) -> pandas.DataFrame:
         """A table of the levels, one a row, in SI units; needs pandas."""
@@ -342,15 +335,17 @@ class WaveletVariance(Printed):
     def plot(self, ax: Axes | None = None, *, units: str = "field") -> Axes:
         """Allan deviation with error bars against averaging time; returns the axes.
 
-        In the units of the field (deg/h, ug), or in SI if ``units`` is "si".
+        In data-sheet units (deg/h, ug), or in SI if ``units`` is "si".
         """
         from gmwm import plotting
 
         unit, factor = shown_unit(self.quantity, self.unit, units)
-        values = (
-            factor * np.sqrt(2.0 * curve) for curve in (self.variance, self.lower, self.upper)
-        )
+        curves = (self.variance, self.lower, self.upper)
         return plotting.deviation(
-            self.tau, *values, unit=unit, interval=f"{100 * self.confidence:g} %",
-            title=self.name, ax=ax,
-        )  # fmt: skip
+            self.tau,
+            *(factor * np.sqrt(2.0 * curve) for curve in curves),
+            unit=unit,
+            interval=f"{100 * self.confidence:g} %",
+            title=self.name,
+            ax=ax,
+        )

@@ -2,10 +2,11 @@
 
 import numpy as np
 import pytest
+from examining import examined, only
 
 from gmwm.diagnosis import tuning
-from gmwm.diagnosis.events import _LISTED, event_notice, find_events
-from gmwm.diagnosis.innovations import Innovations, Signal
+from gmwm.diagnosis.events import _LISTED, event, find_events
+from gmwm.diagnosis.innovations import Innovations
 
 N, G = 1000, tuning.GUARD
 
@@ -56,7 +57,7 @@ def test_one_of_a_thousand_records_of_noise_has_an_event(n, size, found):
 
 
 def notice(values, events, scatter=0.1):
-    return event_notice(Signal("gyro_x", "rad/s", 0.01, scatter=scatter), values, tuple(events))
+    return only(event(examined(values, scatter=scatter, events=events)))
 
 
 def test_what_is_said_of_an_event():

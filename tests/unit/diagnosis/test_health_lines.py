@@ -18,8 +18,8 @@ from gmwm import (
 )
 from gmwm._core.notices import Notice
 from gmwm.diagnosis import gathered
-from gmwm.diagnosis.spectral.lines import find_lines, line_notices
-from gmwm.diagnosis.spectral.spectrum import background, bands, spectrum
+from gmwm.diagnosis.lines import find_lines, line_notices
+from gmwm.diagnosis.spectrum import background, bands, spectrum
 from gmwm.diagnosis.tuning import FALSE_ALARM
 from gmwm.process import as_model
 

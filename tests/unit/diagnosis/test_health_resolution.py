@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
+from examining import examined, only
 from hypothesis import given, settings, strategies as st
 
 import gmwm
-from gmwm.diagnosis.innovations import Signal
-from gmwm.diagnosis.resolution import rounding_notice, step_size, widest_step
+from gmwm.diagnosis.resolution import rounding, step_size, widest_step
 
 
 @settings(max_examples=60, deadline=None)
@@ -142,7 +142,8 @@ def test_constant_has_no_step():
 def test_severity_rises_with_the_step():
     def severity(ratio):
         scatter = np.sqrt(1.0 + ratio**2 / 12.0)
-        return rounding_notice(Signal("accel_x", "m/s^2", step=ratio, scatter=scatter)).severity
+        fine = np.random.default_rng(1).integers(-9, 9, 2000) * ratio
+        return only(rounding(examined(fine, step=ratio, scatter=scatter))).severity
 
     assert [severity(r) for r in (0.1, 0.8, 1.5, 5.0)] == ["good", "note", "warning", "bad"]
 

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
+from examining import examined, only
 
 import gmwm
 from gmwm import RandomWalk, WhiteNoise
-from gmwm.diagnosis.innovations import Signal
-from gmwm.diagnosis.samples import abrupt_end_notice
+from gmwm.diagnosis.samples import cut_off_or_abrupt_end
 
 SEEDS = range(60)
 
@@ -115,9 +115,9 @@ def test_noise_that_thins_out_has_no_abrupt_end(step):
         "accel_y": rng.normal(size=5000) + 30.0 * np.sin(time / 40.0),
         "accel_z": rng.normal(size=5000) + 0.01 * time,
     }
-    for name, x in laws.items():
+    for x in laws.values():
         x = np.rint(x / step + 0.2) * step if step else x
-        assert abrupt_end_notice(Signal(name, "u", step=step, scatter=1.0), x) is None
+        assert only(cut_off_or_abrupt_end(examined(x, unit="u", step=step))) is None
 
 
 @pytest.mark.parametrize("step", STEPS[:2])
@@ -125,7 +125,7 @@ def test_the_ends_at_which_samples_are_cut_are_named(step):
     x = white(100_000, 9) + 0.3 * np.sin(np.arange(100_000) / 500.0)
 
     def ends(values):
-        found = abrupt_end_notice(Signal("gyro_x", "u", step=step, scatter=1.0), values)
+        found = only(cut_off_or_abrupt_end(examined(values, unit="u", step=step)))
         return found.severity, found.values["lowest"], found.values["highest"]
 
     x = np.rint(x / step) * step if step else x

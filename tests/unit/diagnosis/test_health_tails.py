@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 import gmwm
-from gmwm.diagnosis.contamination import Tails, contamination_notice, heavy_tails
 from gmwm.diagnosis.events import find_events
 from gmwm.diagnosis.innovations import innovations
+from gmwm.diagnosis.tails import Tails, heavy_tails
 from marks import slow
 
 N = 36_000
@@ -104,7 +104,3 @@ def test_what_outliers_leave_is_white(record, size):
     level = 8
     ratio = wv.variance[level] / wv.variance[0] * 2.0**level
     assert abs(ratio - 1.0) < 4.0 * np.sqrt(2.0 / wv.dof[level])
-
-
-def test_a_notice_has_the_share_of_gaussian_noise_beyond_four_standard_deviations():
-    assert "where noise has 0.0063 %" in contamination_notice("gyro_x", 0.01).text

@@ -5,10 +5,9 @@ import pytest
 
 from gmwm import Resonance
 from gmwm.diagnosis import tuning
-from gmwm.diagnosis.spectral.lines import Line, _families, find_lines, line_notices
-from gmwm.diagnosis.spectral.peaks import peaks
-from gmwm.diagnosis.spectral.resonances import Bump, _same, _sides, resonance_notice
-from gmwm.diagnosis.spectral.spectrum import background, bands, spectrum
+from gmwm.diagnosis.lines import Line, find_lines, line_notices
+from gmwm.diagnosis.resonances import peaks, resonance_notice
+from gmwm.diagnosis.spectrum import background, bands, spectrum
 
 DT, N = 0.01, 20_000
 TIME = DT * np.arange(N)
@@ -57,19 +56,6 @@ def line(frequency, amplitude=1.0, width=0.01):
     return Line(frequency, amplitude, 50.0, width, 0, 1)
 
 
-@pytest.mark.parametrize(
-    ("frequency", "is_harmonic"),
-    [(20.0, True), (30.0, True), (70.0, True), (15.0, False), (20.029, True), (20.031, False),
-     (50.06, False), (30.039, True), (30.041, False), (10.0, False)],
-)  # fmt: skip
-def test_a_harmonic_is_a_multiple_to_its_width(frequency, is_harmonic):
-    # Twice a width of 0.01 Hz, and its own.
-    found = _families((line(frequency, 0.5), line(10.0)))
-    assert (len(found) == 1) is is_harmonic
-    if is_harmonic:
-        assert found == [(line(10.0), [line(frequency, 0.5)])]
-
-
 def test_families_are_named_by_their_strongest():
     strong = [line(10.0 + 7.1 * k, 10.0 - k) for k in range(tuning.NAMED_LINES)]
     weak = [line(3.17, 0.4), line(4.31, 0.6)]
@@ -116,18 +102,3 @@ def test_peaks_need_half_of_a_series_that_is_long_enough():
     values[least] = np.nan
     assert peaks(values, DT) == ((), ())
     assert peaks(np.zeros(2 * least), DT) == ((), ())
-
-
-def test_sides_are_where_a_peak_has_fallen_to_a_third():
-    height = np.array([0.0, 2.0, 1.0, 3.1, 9.0, 3.0, 2.9, 8.0])
-    assert _sides(height, 4) == (3, 6)
-    assert _sides(height, 7) == (3, 8)
-    assert _sides(height, 1) == (1, 8)
-    assert _sides(height[1:5], 3) == (2, 4)
-    assert _sides(np.array([5.0, 6.0, 5.0]), 1) == (0, 3)
-
-
-@pytest.mark.parametrize(("other", "same"), [(11.9, True), (12.1, False), (8.1, True)])
-def test_resonances_are_the_same_within_twice_their_width(other, same):
-    first, second = Bump(10.0, 0.1, 1.0, 2.0), Bump(other, 0.01, 1.0, 2.0)
-    assert _same(first, second) is _same(second, first) is same

@@ -4,24 +4,9 @@ import numpy as np
 import pytest
 
 import gmwm
-from gmwm.diagnosis import tuning
-from gmwm.diagnosis.motion.motion import (
-    Motion,
-    Move,
-    _angle,
-    _changing,
-    _fastest,
-    _runs,
-    _still,
-    _white,
-    find_motion,
-    is_moved_with,
-)
-from gmwm.diagnosis.motion.notices import motion_notices
+from gmwm.diagnosis.motion import Motion, Move, find_motion, is_moved_with
 
 G, DT = 9.80665, 0.05
-SIZE = max(round(tuning.MOTION_BLOCK / DT), tuning.FEWEST_OF_MOTION)
-K = tuning.SHORTEST_STATIC
 
 
 def record(rate=(), tilt=(), seconds=120.0, seed=1):
@@ -40,67 +25,6 @@ def record(rate=(), tilt=(), seconds=120.0, seed=1):
     names = [f"{sensor}_{axis}" for sensor in ("gyro", "accel") for axis in "xyz"]
     units = {"gyro": "rad/s", "accel": "m/s^2"}
     return gmwm.Recording.from_arrays(dict(zip(names, [*gyro, *accel], strict=True)), 1 / DT, units)
-
-
-@pytest.mark.parametrize(("angle", "blocks"), [(0.3, 2 * K), (-0.02, 3 * K), (3.0, 2 * K)])
-def test_the_angle_of_gravity_between_the_first_and_the_last_blocks(angle, blocks):
-    force = np.tile([0.0, 0.0, G], (blocks, 1))
-    force[-K:] = G * np.array([np.sin(angle), 0.0, np.cos(angle)])
-    assert _angle(force) == pytest.approx(abs(angle))
-    assert _angle(0.51 * force) == pytest.approx(abs(angle))
-    assert _angle(0.49 * force) == 0.0  # no gravity
-    assert _angle(force[:, :2]) == 0.0
-    assert _angle(force[-(2 * K - 1) :]) == 0.0
-
-
-def test_runs_are_long_enough_to_know_a_level():
-    chosen = np.zeros(100, dtype=bool)
-    chosen[:K] = chosen[20 : 19 + K] = chosen[100 - K :] = True
-    assert _runs(chosen) == [(0, K), (100 - K, 100)]
-    assert _runs(np.ones(K, dtype=bool)) == [(0, K)]
-    assert _runs(np.ones(K - 1, dtype=bool)) == []
-
-
-def test_still_are_the_runs_nearest_to_no_rate():
-    rate = np.zeros((60, 3))
-    runs = [(0, 20), (20, 40), (40, 60)]
-    for size, still in ((0.98, runs), (1.02, [runs[0], runs[2]])):
-        rate[20:40, 1] = size * tuning.TURNS
-        assert _still(rate, runs) == still
-    rate[20:40] = [0.0, 0.0, 0.3]
-    rate[40:] = [0.0, 0.0, 0.31]
-    assert _still(rate, runs) == [runs[0]]
-    rate[:20] = [0.0, -0.5, 0.0]
-    assert _still(rate, runs) == runs[1:]
-    assert _still(rate[:, :0], runs) == runs and _still(rate, []) == []
-
-
-def test_the_fastest_rate_is_that_beyond_rest():
-    rate = np.tile([0.1, 0.0, 0.0], (50, 1))
-    rate[30] = [0.1, 3.0, 4.0]
-    assert _fastest(rate, [(0, 20)]) == pytest.approx(5.0)
-    assert _fastest(rate, [(0, 20)], slice(0, 30)) == pytest.approx(0.0)
-    assert _fastest(rate, []) == pytest.approx(5.0)
-    assert _fastest(rate[:, :0], []) == 0.0
-
-
-@pytest.mark.parametrize(("change", "found"), [(1.01, True), (0.99, False), (-1.01, True)])
-def test_blocks_across_which_the_level_changes(change, found):
-    series = np.where(np.arange(60) >= 30, change, 0.0)
-    expected = np.zeros(60, dtype=bool)
-    expected[25:35] = found  # a difference over five blocks has both of its ends
-    assert _changing(series, 1.0, 0.0).tolist() == expected.tolist()
-    assert not np.any(_changing(series, 1.0, 0.2))  # noise does that
-
-
-@pytest.mark.parametrize("size", [1, 16])
-def test_the_deviation_of_a_mean_by_the_fast_noise(size):
-    rng = np.random.default_rng(2)
-    values = 3.0 * rng.normal(size=100_000) + np.linspace(0.0, 100.0, 100_000)
-    values[500:5000] = 7.0
-    values[::7] = np.nan
-    assert _white(values, size) == pytest.approx(3.0 / np.sqrt(size), rel=0.02)
-    assert _white(np.ones(10), size) == 0.0
 
 
 def test_a_channel_says_something_of_motion_if_half_of_it_is_there_and_in_range():
@@ -156,16 +80,8 @@ def test_what_touches_a_move():
     assert Motion((tilt, turn), ()).outside(events, 0.1) == events
 
 
-@pytest.mark.parametrize(
-    ("count", "words"),
-    [
-        (2, "from 10 to 12 s, 20 to 23 s"),
-        (3, "from 10 to 12 s, 20 to 23 s, 30 to 34 s"),
-        (4, "from 20 to 23 s, 30 to 34 s, 40 to 45 s, and 1 shorter one"),
-        (5, "from 30 to 34 s, 40 to 45 s, 50 to 56 s, and 2 shorter ones"),
-    ],
-)
-def test_the_three_longest_moves_are_named_and_the_others_counted(count, words):
-    moves = [Move(10.0 * k, 11.0 * k + 1.0, k + 1.0, 0.3, 0.0) for k in range(1, count + 1)]
-    (notice,) = motion_notices(Motion(tuple(moves), ()))
-    assert notice.text.endswith(words)
+def test_the_three_longest_moves_are_named_and_the_others_counted():
+    turns = [(60.0 * k, 60.0 * k + 5.0 * k, 0.3) for k in range(1, 6)]
+    (notice,) = gmwm.health(record(rate=turns, seconds=420.0)).of(code="not-static")
+    assert notice.values["moves"] == 5
+    assert notice.text.endswith(", and 2 shorter ones")

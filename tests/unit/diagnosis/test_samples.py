@@ -2,21 +2,19 @@
 
 import numpy as np
 import pytest
+from examining import examined, only
 
 from gmwm import Channel
 from gmwm._core.text import per_cent
 from gmwm.diagnosis import tuning
-from gmwm.diagnosis.innovations import Signal
-from gmwm.diagnosis.resolution import is_coarse, rounding_notice, step_size
+from gmwm.diagnosis.repeats import held_samples, repetition, thinned
+from gmwm.diagnosis.resolution import is_coarse, rounding, step_size
 from gmwm.diagnosis.samples import (
+    cut_off_or_abrupt_end,
     gap_notices,
     is_dithered,
-    length_notice,
-    repeated_value_notice,
-    run_lengths,
-    saturation_notice,
+    repeated_value,
 )
-from gmwm.diagnosis.unmeasured import held_share, leaves_runs, repetition, thinned
 
 
 def channel(values, name="gyro_x", dt=0.01):
@@ -37,7 +35,7 @@ def test_gaps_are_counted():
         {"missing": 6.0, "share": 0.06, "gaps": 3.0, "longest": 0.3}
     )
     assert (found.where, found.severity) == ("gyro_x", "note")
-    assert "6 of 100 samples missing (0.06 of all) in 3 gaps, the longest 0.3 s" in found.text
+    assert "6 of 100 samples missing (6 %) in 3 gaps, the longest 0.3 s" in found.text
     values[:] = 1.0
     values[7] = np.nan
     assert "in 1 gap," in gap_notices([channel(values)], 0.1)[0].text
@@ -68,18 +66,6 @@ def test_gaps_of_all_channels_are_those_of_the_recording():
     ]  # fmt: skip
 
 
-def test_an_hour_is_long():
-    assert length_notice(360_000, 100.0).severity == "good"
-    short = length_notice(359_999, 100.0)
-    assert short.severity == "note"
-    assert short.values == {"duration": 3599.99, "rate": 100.0}
-
-
-def test_runs_of_equal_samples():
-    assert run_lengths(np.array([5.0, 5, 1, 2, 2, 2])).tolist() == [2, 1, 3]
-    assert run_lengths(np.array([5.0])).tolist() == [1]
-
-
 def test_noise_is_as_wide_as_its_steps_between_runs():
     noise = np.tile([0.0, 2.0, 0.0, 1.0], 16)
     assert is_dithered(noise[: tuning.LONG_RUN + 1], 0.0)
@@ -97,7 +83,7 @@ def test_noise_is_as_wide_as_its_steps_between_runs():
 @pytest.mark.parametrize(("last", "found"), [(7, False), (28, False), (34, True), (2000, True)])
 def test_more_samples_at_the_end_than_before_it(sign, last, found):
     values = sign * shuffled([last, 20, 60, 400, 2000, 5000, 2000, 400, 60, 20, 4])
-    notice = saturation_notice(Signal("gyro_x", "rad/s", step=1.0), values, values)
+    notice = only(cut_off_or_abrupt_end(examined(values, step=1.0)))
     assert (notice is not None) is found
     if found:
         assert notice.values == pytest.approx({
@@ -106,14 +92,13 @@ def test_more_samples_at_the_end_than_before_it(sign, last, found):
         })  # fmt: skip
         assert notice.severity == ("bad" if last > 1e-3 * values.size else "warning")
         quiet = values[np.abs(values) > 0.0]
-        assert (
-            saturation_notice(Signal("x", "rad/s", step=1.0), values, quiet).severity == "warning"
-        )
+        calm = examined(values, step=1.0, quiet=quiet)
+        assert only(cut_off_or_abrupt_end(calm)).severity == "warning"
 
 
 def test_both_ends_are_counted():
     values = shuffled([80, 20, 60, 400, 2000, 400, 60, 20, 90])
-    notice = saturation_notice(Signal("gyro_x", "rad/s", step=1.0), values, values)
+    notice = only(cut_off_or_abrupt_end(examined(values, step=1.0)))
     assert notice.values["samples"] == 170.0
     assert "170 samples" in notice.text and " and " in notice.text
 
@@ -131,7 +116,7 @@ def test_a_value_that_comes_far_more_often_than_those_beside_it(most, severity):
     values[free] = np.resize(rest[rest != 4.0], free.size)
     often = np.unique(values[np.diff(values, prepend=-1) != 0], return_counts=True)[1]
     scale = np.max(np.delete(often, 4)[2:6]) / 100.0
-    notice = repeated_value_notice(Signal("gyro_x", "rad/s", step=1.0, scatter=2.0), values)
+    notice = only(repeated_value(examined(values, step=1.0, scatter=2.0)))
     enough = most - 4.0 * 100.0 * scale >= tuning.LONG_RUN
     assert (notice is not None) is bool(enough)
     if enough:
@@ -155,17 +140,6 @@ def test_samples_that_are_repeated_are_counted(times, first):
     assert repetition(channel(values[: last + 1])) is not None
 
 
-def test_samples_left_between_those_that_are_held():
-    values = np.arange(100.0)
-    values[17::17] = values[16::17][: values[17::17].size]
-    assert leaves_runs(values)
-    values = np.arange(100.0)
-    values[16::16] = values[15::16][: values[16::16].size]
-    assert not leaves_runs(values)
-    values[16::16] = np.nan
-    assert not leaves_runs(values)
-
-
 @pytest.mark.parametrize("held", [0.0, 0.01, 0.1])
 @pytest.mark.parametrize("step", [0.0, 0.25])
 def test_the_share_of_samples_that_are_held(held, step):
@@ -174,7 +148,7 @@ def test_the_share_of_samples_that_are_held(held, step):
     values = np.rint(values / step) * step if step else values
     again = np.flatnonzero(rng.random(values.size) < held)[1:]
     values[again] = values[again - 1]
-    share, chance = held_share(values, step, 1.0)
+    share, chance, _ = held_samples(examined(values, step=step))
     assert share == pytest.approx(held, rel=0.25, abs=1e-9)
     by_chance = 0.0 if step == 0.0 or held == 0.0 else 0.25 / np.sqrt(4.0 * np.pi)
     assert chance == pytest.approx(by_chance, rel=0.2)
@@ -199,15 +173,15 @@ def test_the_step_of_samples(step, digits):
      (0.34, "warning"), (0.32, "bad")],
 )  # fmt: skip
 def test_how_coarse_a_step_is_beside_the_noise(scatter, severity):
-    found = rounding_notice(
-        Signal("gyro_x", "rad/s", step=1.0, scatter=float(np.hypot(scatter, 12**-0.5)))
-    )
+    fine = np.random.default_rng(1).integers(-9, 9, 2000)
+    usual = float(np.hypot(scatter, 12**-0.5))
+    found = only(rounding(examined(fine, step=1.0, scatter=usual)))
     assert found.severity == severity
     assert found.values == pytest.approx({"lsb": 1.0, "noise": scatter})
     if scatter > 1.0:
         share = per_cent(1.0 / 12.0 / (scatter**2 + 1.0 / 12.0))
-        assert found.hint == f"counted as white noise: {share} of it"
-    assert rounding_notice(Signal("gyro_x", "rad/s", scatter=1.0)) is None
+        assert found.hint == f"rounding is treated as white noise: {share} of it"
+    assert only(rounding(examined(fine))) is None
 
 
 def test_two_levels_are_coarse_wherever_they_are():

@@ -5,8 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from gmwm.diagnosis import tuning
-from gmwm.diagnosis.spectral.spectrum import _edges, _running_median, background, bands, spectrum
+from gmwm.diagnosis.spectrum import background, bands, spectrum
 
 DT = 0.02
 
@@ -39,26 +38,6 @@ def test_the_area_of_a_line_is_half_its_square(cycles):
 def test_a_straight_line_has_no_spectrum():
     found = spectrum(np.linspace(-4.0, 9.0, 1000), DT)
     assert np.max(found.density) < 1e-20
-
-
-@pytest.mark.parametrize("last", [12, 500, 100_000])
-def test_bands_are_a_part_of_an_octave_and_eight_bins_at_least(last):
-    edges = _edges(last)
-    widths = np.diff(edges)
-    assert edges[0] == 4 and edges[-1] <= last
-    ratio = 2.0 ** (1.0 / tuning.BANDS_PER_OCTAVE) - 1.0
-    np.testing.assert_array_equal(widths, np.maximum(np.rint(edges[:-1] * ratio), 8))
-    assert last - edges[-1] < max(8, round(edges[-1] * ratio))
-
-
-def test_the_running_median_of_a_line_is_the_line():
-    line = 2.0 - 0.3 * np.arange(200.0)
-    np.testing.assert_allclose(_running_median(line)[1:-1], line[1:-1])
-    bump = line.copy()
-    bump[100:110] += 50.0  # narrower than half an octave
-    np.testing.assert_allclose(_running_median(bump)[1:80], line[1:80])
-    assert np.max(np.abs(_running_median(bump) - line)) < 3.1  # ten steps of the line
-    np.testing.assert_allclose(_running_median(line[:5])[1:-1], line[1:4])
 
 
 def test_levels_are_mean_logarithms_and_left_out_bins_do_not_count():

@@ -9,7 +9,7 @@ import pytest
 
 import gmwm
 from gmwm.diagnosis import find_still, rest_of
-from gmwm.diagnosis.still.loudness import loudness
+from gmwm.diagnosis.still import loudness
 from gmwm.errors import InputError
 from gmwm.process import Resonance, WhiteNoise
 from marks import slow

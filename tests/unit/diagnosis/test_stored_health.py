@@ -5,8 +5,7 @@ from copy import deepcopy
 import pytest
 
 from gmwm import InputError
-from gmwm.diagnosis import Health
-from gmwm.diagnosis.result import ChannelHealth, Repetition
+from gmwm.diagnosis import ChannelHealth, Health, Repetition
 
 GOOD = Health(
     (),

@@ -18,9 +18,8 @@ from gmwm import (
     WhiteNoise,
     cramer_rao,
 )
-from gmwm.estimate.cramer_rao import CramerRao
-from gmwm.estimate.problem.information import spectral_information
-from gmwm.estimate.problem.parameters import Coordinates
+from gmwm.estimate import CramerRao
+from gmwm.estimate.problem import Coordinates, spectral_information
 
 MODELS = {
     "white": WhiteNoise(0.3),

@@ -21,7 +21,7 @@ from gmwm import (
     WhiteNoise,
 )
 from gmwm.errors import InputError
-from gmwm.estimate.result.fit import Fit
+from gmwm.estimate import Fit
 from gmwm.process import as_model
 
 ALL = QuantizationNoise() + WhiteNoise() + BiasInstability() + RandomWalk() + RateRamp()

@@ -12,8 +12,8 @@ import yaml
 import gmwm
 import marks
 from gmwm import Channel, GaussMarkov, InputError, RandomWalk, Recording, WhiteNoise, bound, reduce
-from gmwm._core.notices import Notice
 from gmwm.export import TARGETS, axis_of
+from gmwm.issues import Notice
 from gmwm.process import as_model
 from imu_numbers import numbers
 

@@ -197,7 +197,7 @@ def test_text_and_files(sheet, tmp_path):
     text = str(sheet)
     for part in (
         "Without aiding", "INS/GNSS filter", "Relative pose between keyframes",
-        "gyro, all axes: what N [deg/sqrt(h)]", "after 120 s of fixes every 1 s",
+        "gyro, all axes: N [deg/sqrt(h)]", "after 120 s of fixes every 1 s",
         "Recommended: N+K for 60 s", "position by tilt [m]", "angle [deg]",
     ):  # fmt: skip
         assert part in text
@@ -209,7 +209,7 @@ def test_text_and_files(sheet, tmp_path):
     assert float(in_use[0]) == pytest.approx(3437.75 * sheet.causes[0].N, rel=1e-3)
     assert float(model[3]) == pytest.approx(cause.K_factor, rel=1e-2)
     assert model[4:] == in_use[2:4] == ["1", "1"]
-    assert "gyro, all axes: what N [rad/s/sqrt(Hz)]" in sheet.text("si")
+    assert "gyro, all axes: N [rad/s/sqrt(Hz)]" in sheet.text("si")
     assert max(map(len, (text + sheet.text("si")).splitlines())) <= 80
     again = gmwm.load(sheet.save(tmp_path / "certificate.json"))
     assert isinstance(again, Certificate)
@@ -291,3 +291,32 @@ def test_the_demo_sensor_explains_times_ten():
         N, K = factors(found, quantity)["error model with slow terms"]
         assert N > 1.0
         assert K > 50.0
+
+
+# ---- Numbers in use ----
+
+
+def test_numbers_by_axis_or_kind():
+    truth = {"gyro_x": WhiteNoise(1e-4) + RandomWalk(1e-6), "gyro_z": WhiteNoise(1e-4)}
+    given = {"gyro": (1e-4, 1e-6), "gyro_x": (2e-4, 2e-6)}
+    found = gmwm.certify(truth, given, outages=(60.0,)).numbers
+    one = found["gyro_x"]
+    assert (one.form, one.N, one.K, one.horizon) == ("N+K", 2e-4, 2e-6, 60.0)
+    assert (one.method, found["gyro_z"].N) == ("given", 1e-4)
+    model = WhiteNoise(1e-4) + RandomWalk(1e-6) + GaussMarkov(1e-5, 10.0)
+    assert gmwm.certify(ONE, {"": model}).numbers[""].form == "N+K+GM"
+    assert gmwm.certify(truth, found, outages=(10.0,)).numbers["gyro_x"] is one
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"accel": (1e-4, 1e-6)}, "no numbers for gyro_x: give them by axis, or for gyro"),
+        ({"gyro": (1e-4, -1e-6)}, "N and K of gyro_x = -1e-06"),
+        ({"gyro": 1e-4}, "not what a filter believes"),
+        ({"gyro": WhiteNoise(1e-4) + QuantizationNoise(1e-4)}, "form = 'N'"),
+    ],
+)
+def test_numbers_that_cannot_be_used(given, message):
+    with pytest.raises(InputError, match=message):
+        gmwm.certify({"gyro_x": ONE}, given)

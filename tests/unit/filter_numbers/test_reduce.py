@@ -16,7 +16,7 @@ from gmwm import (
     WhiteNoise,
 )
 from gmwm.filter_numbers import Chain, tuning
-from gmwm.filter_numbers.axes import Axes
+from gmwm.filter_numbers.axes import SensorAxes
 from gmwm.ins import Outage, Scenario, SensorModels, covariance_analysis, fixed_wing_loiter, gnss
 from gmwm.study.sensor_tables import TABLE_6
 from marks import slow
@@ -227,7 +227,7 @@ def test_coarse_steps_of_a_heading_are_white_noise_to_one_outage(coarse):
     assert pytest.approx(np.sqrt(2.0 / 60.0) * coarse * N, rel=0.2) == found.N
     heading, gained = (
         chain.errors(truth, found.model, 0.01, [60.0], believed_sd=found.initial_sd).nees()[0]
-        for chain in Axes.of({"gyro_z": truth}, None, 0.0).axes[0].chain.judged
+        for chain in SensorAxes.of({"gyro_z": truth}, None, 0.0).axes[0].chain.judged
     )
     # Half a degree of a fix is no more than a coarse step: both cannot be right.
     assert abs(np.log(heading)) + abs(np.log(gained)) < (0.15 if coarse < 1000.0 else 0.8)

@@ -51,7 +51,7 @@ from gmwm.ins import (
     standstills,
     through,
 )
-from gmwm.ins.montecarlo.outage_errors import sizes
+from gmwm.ins.simulation.outage_errors import sizes
 from gmwm.readers import Recording
 from recorded import Pictures, assert_as_recorded, summed
 

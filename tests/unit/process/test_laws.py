@@ -10,13 +10,7 @@ from hypothesis import given, settings, strategies as st
 import gmwm
 from gmwm.process import CATALOGUE, Process
 from gmwm.process.spectral import haar_gain, haar_variance
-from gmwm.variance.analysis import wavelet_variance
-from gmwm.variance.covariance.haar import (
-    dyadic_levels,
-    haar_counts,
-    haar_covariance,
-    line_covariance,
-)
+from gmwm.variance import haar_covariance, wavelet_variance
 from marks import slow
 from places import GOLDEN
 
@@ -275,11 +269,9 @@ def test_line_covariance_against_simulation():
     model = gmwm.WhiteNoise(1.0) + gmwm.Sinusoid(2.0, 0.03)
     n, runs = 1024, 400
     rng = np.random.default_rng(8)
-    waves = [wavelet_variance(model.simulate(n, 1.0, rng), 1.0).variance for _ in range(runs)]
-    m = dyadic_levels(n)
-    predicted = haar_covariance(model.psd, n, 1.0) + line_covariance(
-        model.lines(), model.psd, 1.0, m, haar_counts(n, m)
-    )
+    found = [wavelet_variance(model.simulate(n, 1.0, rng), 1.0) for _ in range(runs)]
+    waves = [each.variance for each in found]
+    predicted = found[0].covariance_under(model.psd, model.lines())
     ratio = np.var(waves, axis=0, ddof=1)[:7] / np.diag(predicted)[:7]
     assert np.all(np.abs(ratio - 1.0) < 4.5 * np.sqrt(2.5 / runs)), ratio
 

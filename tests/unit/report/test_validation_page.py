@@ -3,7 +3,7 @@ from pathlib import Path
 
 import pytest
 
-from gmwm.report.validation import write_validation_report
+from gmwm.report import write_validation_report
 from marks import slow
 
 

@@ -5,6 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from gmwm.variance.analysis import wavelet_variance
 
 from gmwm import GaussMarkov, RandomWalk, WhiteNoise
 from gmwm.calibration.calibration import Calibration
@@ -13,12 +14,11 @@ from gmwm.estimate.entrance import fit
 from gmwm.ins import car_drive, gnss
 from gmwm.ins.filter.aiding import Outage
 from gmwm.ins.imu.sensors import AXES
-from gmwm.ins.montecarlo.scenario import Scenario
+from gmwm.ins.simulation.scenario import Scenario
 from gmwm.readers.recording import Recording
 from gmwm.study import turns
 from gmwm.study.rotation import Rotation, crossed_weights
 from gmwm.study.turns import reproduce_rotation, rotate
-from gmwm.variance.analysis import wavelet_variance
 
 FACTORS = {"GMWM": 1.0, "lines": 2.0}
 STRETCHES = (6, 8, 7)

@@ -5,7 +5,7 @@ import pytest
 
 import gmwm
 from gmwm import RandomWalk, WhiteNoise
-from gmwm.variance.analysis import fourth_cumulant
+from gmwm.variance.series import fourth_cumulant
 
 N, DT = 4000, 0.01
 

@@ -20,7 +20,6 @@ from gmwm.variance.covariance.robust import (
 )
 from gmwm.variance.kernels import cumulative, haar_coefficients
 from gmwm.variance.robust import consistency, robust_variance, tuning_constant
-from gmwm.variance.robust_kernels import middle_bin
 from marks import slow
 from places import SHARED
 
@@ -220,17 +219,6 @@ def test_coefficients_are_left_as_they_are():
     before = w.copy()
     robust_variance(w)
     np.testing.assert_array_equal(w, before)
-
-
-@settings(max_examples=60, deadline=None)
-@given(
-    st.lists(st.floats(allow_nan=False, allow_infinity=False), min_size=1, max_size=60),
-    st.integers(1, 50),
-)
-def test_middle_bin_holds_the_order_statistic(values, copies):
-    w = np.array(values * copies)
-    near, rank = middle_bin(w)
-    assert np.sort(near)[rank] == np.sort(np.abs(w))[w.size // 2]
 
 
 @pytest.mark.parametrize("size", [2**14 - 1, 2**14, 2**14 + 1])

@@ -4,7 +4,9 @@ from gmwm.estimate.likelihood.em import EM as EM
 from gmwm.estimate.likelihood.kalman import filtered as filtered
 from gmwm.estimate.likelihood.likelihood import (
     Columns as Columns,
+    KalmanLikelihood as KalmanLikelihood,
     Regression as Regression,
+    arrays_of as arrays_of,
     stacked as stacked,
     whitened as whitened,
 )

@@ -8,65 +8,20 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy
 
-from gmwm._core.notices import Notice
 from gmwm._core.typing import FloatArray
 from gmwm.estimate import tuning
 from gmwm.estimate.likelihood.likelihood import Columns, LogLikelihood, defined, objective_of
-from gmwm.estimate.likelihood.scoring import Maximum, maximise
+from gmwm.estimate.likelihood.scoring import Maximum, maximise, regular_inverse
 from gmwm.estimate.likelihood.series import Series
 from gmwm.estimate.moments import suffices
-from gmwm.estimate.problem import Coordinates, Moments, density, frequency_nodes
-from gmwm.estimate.result import Comparison, Estimates, Fit, conclude, no_test_notice
+from gmwm.estimate.problem import Coordinates, Moments, Slope, density, frequency_nodes
+from gmwm.estimate.result import Comparison, Estimates, Fit, conclude
+from gmwm.issues import Notice, notice
 from gmwm.process import Model, Process
-
-
-def conclude_likelihood(
-    series: Series,
-    found: Estimates,
-    *,
-    method: str,
-    log_likelihood: float,
-    notices: Sequence[Notice] = (),
-    trace: Sequence[float] = (),
-) -> Fit:
-    """Make the `Fit` of estimates that maximise a likelihood.
-
-    Where the wavelet variances are those of a series whose gaps are bridged by lines, nothing is
-    concluded from how the model agrees with them.
-
-    series: What was fitted; its wavelet variances test the fit.
-    notices, trace: See `Fit`.
-    """
-    comparison, agrees = _compared(series, found)
-    misfits = not (agrees or series.is_bridged)
-    if series.is_bridged:
-        untested = float("nan")
-        comparison = replace(comparison, chi_square=untested, chi_square_allowed=untested)
-        notices = (*notices, no_test_notice())
-    return conclude(
-        found, comparison, series.wv, method=method, misfits=misfits, notices=notices,
-        log_likelihood=log_likelihood, trace=trace,
-    )  # fmt: skip
-
-
-def _compared(series: Series, found: Estimates) -> tuple[Comparison, bool]:
-    """How the wavelet variances agree with the fitted noise, and whether they do."""
-    wv = series.wv
-    moments = Moments.of(wv, found.coordinates.model)
-    if found.slope is not None:
-        moments = Moments(wv, found.slope, True, moments.scales)
-    present = (p for i, p in enumerate(found.processes) if i not in found.absent)
-    noise = Model(tuple(present))
-    covariance, target = moments.covariance(noise), moments.target
-    implied = noise.wavelet_variance(wv.tau, wv.dt, wv.wavelet)
-    comparison = Comparison.of(target, implied, covariance, implied, len(found.present))
-    agrees = suffices(0.0, target - implied, covariance, target, implied, max(comparison.dof, 1))
-    return comparison, agrees
-
 
 _CLOSE = 0.02  # twice the error of the profile likelihood
 _STEPS = 6  # to each of its points, which lie near each other
-_FALL = 6.0  # log-likelihood below its maximum from where on nothing counts
+_FALL = 6.0  # log-likelihood below its maximum that counts as zero
 _DOUBLINGS = 20
 _INTERVALS = 16
 _FINE = 2000
@@ -76,15 +31,71 @@ _FINE = 2000
 class Top:
     """The maximum of a likelihood over the open parameters of some terms.
 
+    coordinates: Of these terms.
     processes: The terms at the maximum.
     information: (d, d), observed information of the coordinates.
     likelihood: The log-likelihood of any processes.
     """
 
+    coordinates: Coordinates
     processes: tuple[Process, ...]
     maximum: Maximum
     information: FloatArray
     likelihood: LogLikelihood
+
+
+@dataclass(frozen=True, eq=False)
+class Report:
+    """The part of a `Fit` that only the method itself knows."""
+
+    method: str
+    log_likelihood: float
+    notices: Sequence[Notice] = ()
+    trace: Sequence[float] = ()
+
+
+def conclude_likelihood(
+    series: Series,
+    processes: Sequence[Process],
+    absent: Sequence[int],
+    top: Top,
+    slope: Slope | None,
+    report: Report,
+) -> Fit:
+    """Make the `Fit` of a maximum.
+
+    Where straight lines bridge the gaps, the wavelet variances do not test the model.
+
+    processes: All noise terms with their values.
+    absent: Those among them that the likelihood can do without.
+    top: The maximum over the other terms.
+    """
+    found = Estimates(
+        coordinates=series.coordinates,
+        processes=[p.with_amplitude(0.0) if i in absent else p for i, p in enumerate(processes)],
+        covariance=regular_inverse(top.information),
+        absent={i: _upper_limit(processes[i], top, series.columns) for i in absent},
+        slope=slope,
+        method=report.method,
+        notices=report.notices,
+        log_likelihood=report.log_likelihood,
+        trace=report.trace,
+    )
+    wv = series.wv
+    moments = Moments.of(wv, found.coordinates.model)
+    if slope is not None:
+        moments = Moments(wv, slope, True, moments.scales)
+    noise = Model(top.processes)
+    covariance, target = moments.covariance(noise), moments.target
+    implied = noise.wavelet_variance(wv.tau, wv.dt, wv.wavelet)
+    comparison = Comparison.of(target, implied, covariance, implied, len(found.present))
+    if series.is_bridged:
+        untested = float("nan")
+        comparison = replace(comparison, chi_square=untested, chi_square_allowed=untested)
+        found = replace(found, notices=(*found.notices, notice("no-test")))
+        return conclude(found, comparison, wv, misfits=False)
+    agrees = suffices(0.0, target - implied, covariance, target, implied, max(comparison.dof, 1))
+    return conclude(found, comparison, wv, misfits=not agrees)
 
 
 def redundant_term(
@@ -99,17 +110,15 @@ def redundant_term(
     return None
 
 
-def upper_bound(process: Process, coordinates: Coordinates, top: Top, columns: Columns) -> float:
-    """95 % upper bound of the scale of a term whose amplitude is zero, at its present shape.
+def _upper_limit(process: Process, top: Top, columns: Columns) -> float:
+    """95 % upper limit of the scale of a term whose amplitude is zero, at its present shape.
 
     The quantile of the profile likelihood as a density of the scale. A random walk that can hardly
     be seen shows in few degrees of freedom, so that the likelihood falls off much slower than its
-    curvature at zero shows.
+    curvature at zero suggests.
 
     process: The term; its amplitude does not matter.
-    coordinates: Of the other terms.
     top: Of the other terms.
-    columns: The series.
     """
     power = next(p.power for p in process.parameters if p.linear)
 
@@ -119,7 +128,7 @@ def upper_bound(process: Process, coordinates: Coordinates, top: Top, columns: C
         def likelihood(others: Sequence[Process]) -> float:
             return top.likelihood([*others, raised])
 
-        objective = objective_of(likelihood, coordinates, top.processes)
+        objective = objective_of(likelihood, top.coordinates, top.processes)
         start, information = top.maximum.z, top.information
         return maximise(objective, start, information, close=_CLOSE, max_steps=_STEPS).value
 

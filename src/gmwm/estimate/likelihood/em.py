@@ -6,68 +6,58 @@ Series Analysis* 3, 253-264; for inertial sensors Stebler, Guerrier, Skaloud & V
 flat priors, so that the iteration climbs the likelihood of `gmwm.estimate.likelihood.likelihood`.
 Its steps are extrapolated (the squared iterative method of Varadhan & Roland 2008, *Scandinavian
 Journal of Statistics* 35, 335-353), as plain EM needs thousands of them.
+
+White noise, random walks and Gauss-Markov processes have an M step in closed form. The stationary
+first state of a Gauss-Markov process takes part in it, so that the iteration climbs the exact
+likelihood; its maximum is the root of a cubic (Beach & MacKinnon 1978, *Econometrica* 46, 51-58).
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
+from numpy.polynomial import Polynomial
 
 from gmwm._core import checks
-from gmwm._core.notices import Notice
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.estimate import tuning
 from gmwm.estimate.likelihood.conclusion import (
+    Report,
     Top,
     conclude_likelihood,
     redundant_term,
-    upper_bound,
 )
-from gmwm.estimate.likelihood.expectation import Expectation, expect
+from gmwm.estimate.likelihood.kalman import smooth
 from gmwm.estimate.likelihood.likelihood import (
     Columns,
     KalmanLikelihood,
-    LogLikelihood,
+    Regression,
+    arrays_of,
     objective_of,
+    stacked,
 )
-from gmwm.estimate.likelihood.maximization import (
-    StateMoments,
-    check_supported,
-    em_space,
-    updated,
-    white,
-)
-from gmwm.estimate.likelihood.scoring import Maximum, observed_information, regular_inverse
+from gmwm.estimate.likelihood.scoring import Maximum, observed_information
 from gmwm.estimate.likelihood.series import Series
-from gmwm.estimate.problem import Coordinates, Slope, spectral_information
-from gmwm.estimate.result import Estimates, Fit
+from gmwm.estimate.problem import Slope, spectral_information
+from gmwm.estimate.result import Fit
+from gmwm.issues import notice
 from gmwm.process import Model, Process, StateSpace, as_model
 from gmwm.readers import Channel
 
 DRIFTS = ("ramp", "state")
 _TINY = 1e-12  # keeps the stopping rule defined where the log-likelihood is zero
-
-
-@dataclass(frozen=True, eq=False)
-class Stage:
-    """Parameters during the iteration.
-
-    initial, drive: (p,) or None, mean of the first state and input of each step, where the drift
-        enters a state.
-    """
-
-    processes: tuple[Process, ...]
-    initial: FloatArray | None = None
-    drive: FloatArray | None = None
+_FASTEST, _SLOWEST = 1.0 - 1e-12, 1e-12  # of 1 - phi
 
 
 @dataclass(frozen=True)
 class EM:
     """Expectation-maximization, ``method="em"``.
+
+    For white noise, random walk, Gauss-Markov processes and a rate ramp.
 
     Parameters
     ----------
@@ -106,12 +96,107 @@ class EM:
 
     def estimate(self, model: Model, channel: Channel) -> Fit:
         """Fit the open parameters of a model to samples, some of which may be missing."""
-        for process in Coordinates(model).noise:
-            check_supported(process)
+        for term in model.terms:
+            if not (term.is_white or term.is_walk or term.is_exponential or term.is_drift):
+                raise InputError(
+                    f'method = "em" does not know {term!r}: it takes WhiteNoise, RandomWalk, '
+                    'RateRamp and GaussMarkov; "mle" takes the others, "gmwm" a Sinusoid too'
+                )
         series = Series.of(model, channel, self.start, gaps=True)
         iteration = Iteration(series, self.drift == "state")
-        run = iteration.run(self.tolerance, int(self.max_iterations), self.accelerate)
-        return _concluded(series, iteration, *run)
+        return _conclude(series, iteration, *iteration.run(self))
+
+
+@dataclass(frozen=True, eq=False)
+class Stage:
+    """Parameters during the iteration.
+
+    initial, drive: (p,), mean of the first state and input of each step, where the drift enters a
+        state; zero otherwise.
+    """
+
+    processes: tuple[Process, ...]
+    initial: FloatArray
+    drive: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Expectation:
+    """The moments that the M step needs, for p states.
+
+    later, cross, earlier: (p, p), sums over k of E x[k+1] x[k+1]', E x[k+1] x[k]' and E x[k] x[k]'.
+    first: (p, p), E x[0] x[0]'.
+    start, later_sum, earlier_sum: (p,), E x[0] and the sums of E x[k+1] and E x[k].
+    steps: Number of transitions, n - 1.
+    residual: Sum of the expected squares of the measurement noise.
+    count: Number of samples that are not missing.
+    log_likelihood: Of the parameters that the expectation was taken under.
+    """
+
+    later: FloatArray
+    cross: FloatArray
+    earlier: FloatArray
+    first: FloatArray
+    start: FloatArray
+    later_sum: FloatArray
+    earlier_sum: FloatArray
+    steps: int
+    residual: float
+    count: int
+    log_likelihood: float
+
+
+def expect(
+    columns: Columns, space: StateSpace, initial: FloatArray, drive: FloatArray
+) -> Expectation:
+    """Smooth the series under a state space, with the regressors' coefficients integrated out.
+
+    initial, drive: (p,), mean of the first state and constant input of each step.
+    """
+    y, h, p = columns.matrix, space.output, space.n_states
+    n, m = y.shape
+    starts, inputs = np.zeros((m, p)), np.zeros((m, p))
+    starts[0], inputs[0] = initial, drive
+    x, c, d, v, s = smooth(arrays_of(space), y, starts, inputs)
+    present = np.isfinite(s)
+    innovations = v[present] / np.sqrt(s[present])[:, None]
+    regression = Regression.of(innovations.T @ innovations)
+    weights = np.concatenate([[1.0], -regression.beta])
+    mean = np.einsum("c,kci->ki", weights, x)
+    # The uncertainty of the coefficients adds to the covariance of the states.
+    root = np.linalg.cholesky(regression.covariance) if m > 1 else np.zeros((0, 0))
+    spread = np.einsum("kci,ce->kei", x[:, 1:], root)
+
+    def second(a: slice, b: slice, covariance: FloatArray) -> FloatArray:
+        total = mean[a].T @ mean[b] + covariance.sum(axis=0)
+        return np.asarray(total + np.tensordot(spread[a], spread[b], axes=([0, 1], [0, 1])))
+
+    last, first = slice(1, None), slice(None, -1)
+    seen = y[present]
+    residual = seen @ weights - mean[present] @ h
+    unknown = seen[:, 1:] @ root - spread[present] @ h
+    of_states = np.einsum("i,kij,j->", h, c[present], h)
+    count = int(np.sum(present))
+    free = count - regression.beta.size
+    log_likelihood = -0.5 * (
+        free * np.log(2.0 * np.pi)
+        + float(np.sum(np.log(s[present])))
+        + regression.log_determinant
+        + regression.residual
+    )
+    return Expectation(
+        later=second(last, last, c[1:]),
+        cross=second(last, first, d),
+        earlier=second(first, first, c[:-1]),
+        first=second(slice(0, 1), slice(0, 1), c[:1]),
+        start=mean[0],
+        later_sum=mean[1:].sum(axis=0),
+        earlier_sum=mean[:-1].sum(axis=0),
+        steps=n - 1,
+        residual=float(residual @ residual + np.sum(unknown**2) + of_states),
+        count=count,
+        log_likelihood=log_likelihood,
+    )
 
 
 class Iteration:
@@ -126,7 +211,7 @@ class Iteration:
     def __init__(self, series: Series, in_state: bool) -> None:
         self.series, self.in_state = series, in_state
         self._terms = series.coordinates.noise
-        self.columns = series.columns
+        self.columns, self.dt = series.columns, series.columns.dt
         if in_state:
             if not self.columns.drift_is_free:
                 raise InputError('drift = "state" needs a RateRamp() of free slope in the model')
@@ -134,84 +219,60 @@ class Iteration:
                 raise InputError('drift = "state" needs a RandomWalk or GaussMarkov to drive')
             self.columns = Columns.without_regressors(series.columns.centred, self.dt)
 
-    @property
-    def dt(self) -> float:
-        """Sampling interval, s."""
-        return self.series.columns.dt
-
     def expectation(self, stage: Stage) -> Expectation:
         """The E step."""
-        space = StateSpace.stack([em_space(p, self.dt) for p in stage.processes])
-        if not self.in_state:
-            return expect(self.columns, space)
-        held = StateSpace(
-            space.transition,
-            space.process_noise,
-            space.output,
-            space.measurement_noise,
-            space.initial_mean,
-            space.process_noise,
-            space.names,
-        )
-        return expect(self.columns, held, stage.initial, stage.drive)
+        space = stacked(stage.processes, self.dt)
+        if self.in_state:
+            space = replace(space, initial_covariance=space.process_noise)
+        return expect(self.columns, space, stage.initial, stage.drive)
 
     def maximization(self, stage: Stage, e: Expectation) -> Stage:
-        """The M step."""
-        later, cross = e.later, e.cross
+        """The M step: open parameters in closed form, given ones stay."""
         drive = stage.drive
-        if drive is not None:
-            # Remove the input from what follows: E (x[k+1] - u)(...)'.
-            later = later - np.outer(drive, e.later_sum) - np.outer(e.later_sum, drive)
-            later = later + e.steps * np.outer(drive, drive)
-            cross = cross - np.outer(drive, e.earlier_sum)
-        processes = []
-        position = 0
+        # Remove the input from the later state: E (x[k+1] - u)(...)'.
+        later = e.later - np.outer(drive, e.later_sum) - np.outer(e.later_sum, drive)
+        later = later + e.steps * np.outer(drive, drive)
+        cross = e.cross - np.outer(drive, e.earlier_sum)
+        processes, k = [], 0
         for process, like in zip(stage.processes, self._terms, strict=True):
             if process.is_white:
-                processes.append(white(process, like, e.residual, e.count, self.dt))
+                if like.values["N"] is None:
+                    density = float(np.sqrt(e.residual / e.count * self.dt))
+                    process = process.with_values(N=density)
+                processes.append(process)
                 continue
-            size = em_space(process, self.dt).n_states
-            block = np.ix_(*[range(position, position + size)] * 2)
-            moments = StateMoments(
-                later[block], cross[block], e.earlier[block], e.first[block], e.steps
-            )
-            processes.append(updated(process, like, moments, self.dt))
-            position += size
+            a, b, c, d = (float(m[k, k]) for m in (later, cross, e.earlier, e.first))
+            update = _walk if process.is_walk else _gauss_markov
+            processes.append(update(process, like, StateMoments(a, b, c, d, e.steps), self.dt))
+            k += 1
         if not self.in_state:
-            return Stage(tuple(processes))
-        space = StateSpace.stack([em_space(p, self.dt) for p in processes])
-        drift = (e.later_sum - space.transition @ e.earlier_sum) / e.steps
-        drive = np.zeros(space.n_states)
-        drive[0] = drift[0]
-        return Stage(tuple(processes), e.start, drive)
+            return Stage(tuple(processes), stage.initial, drive)
+        transition = stacked(processes, self.dt).transition
+        drift = (e.later_sum - transition @ e.earlier_sum) / e.steps
+        return Stage(tuple(processes), e.start, np.where(np.arange(drift.size) == 0, drift, 0.0))
 
-    def run(
-        self, tolerance: float, max_iterations: int, accelerate: bool
-    ) -> tuple[Stage, list[float], bool]:
+    def run(self, method: EM) -> tuple[Stage, list[float], bool]:
         """Iterate; returns the best stage, the log-likelihoods, and whether it converged.
 
         Each of the log-likelihoods is after one M step; none is below the one before.
         """
-        stage = Stage(self.series.start)
-        if self.in_state:
-            size = sum(em_space(p, self.dt).n_states for p in stage.processes)
-            stage = Stage(stage.processes, np.zeros(size), np.zeros(size))
+        nothing = np.zeros(sum(not process.is_white for process in self._terms))
+        stage = Stage(self.series.start, nothing, nothing)
         e = self.expectation(stage)
         trace: list[float] = []
-        while len(trace) < max_iterations:
+        while len(trace) < method.max_iterations:
             previous, before = stage, e.log_likelihood
             first = self.maximization(stage, e)
             after = self.expectation(first)
-            if not after.log_likelihood > before:
-                # Rounding errors, or an M step that leaves the first state out, at the top.
+            if not after.log_likelihood > before:  # rounding errors, at the top
                 return stage, [*trace, before], True
             trace.append(after.log_likelihood)
             stage, e = first, after
-            if accelerate and len(trace) < max_iterations:
+            if method.accelerate and len(trace) < method.max_iterations:
                 stage, e = self._extrapolated(previous, first, e)
                 trace.append(e.log_likelihood)
             gain = e.log_likelihood - before
-            if gain < tolerance * (0.5 * abs(e.log_likelihood + before) + _TINY):
+            if gain < method.tolerance * (0.5 * abs(e.log_likelihood + before) + _TINY):
                 return stage, trace, True
         return stage, trace, False
 
@@ -226,96 +287,124 @@ class Iteration:
         coordinates = self.series.coordinates
         zs = [coordinates.pack(s.processes) for s in (stage, first, second)]
         r, v = zs[1] - zs[0], zs[2] - 2.0 * zs[1] + zs[0]
-        norm = float(np.linalg.norm(v))
-        length = (
-            min(float(np.linalg.norm(r)) / norm, tuning.LONGEST_EXTRAPOLATION)
-            if norm > 0.0
-            else 1.0
-        )
+        norm, length = float(np.linalg.norm(v)), 1.0
+        if norm > 0.0:
+            length = min(float(np.linalg.norm(r)) / norm, tuning.LONGEST_EXTRAPOLATION)
         step = 2.0 * length * r + length**2 * v
         # Where an amplitude has all but vanished EM hardly moves: do not jump there.
-        if (
-            length > 1.0
-            and not self.in_state
-            and np.max(np.abs(step)) < tuning.FARTHEST_EXTRAPOLATION
-        ):
-            there = self._reached(zs[0] + step, stage)
-            if there is not None and there[1].log_likelihood >= reached.log_likelihood:
-                return there
+        is_near = np.max(np.abs(step), initial=0.0) < tuning.FARTHEST_EXTRAPOLATION
+        if length > 1.0 and not self.in_state and is_near:
+            try:
+                far = replace(stage, processes=coordinates.processes(zs[0] + step, stage.processes))
+                with np.errstate(all="ignore"):
+                    e = self.expectation(far)
+                if e.log_likelihood >= reached.log_likelihood:
+                    return far, e
+            except (InputError, np.linalg.LinAlgError, ZeroDivisionError):
+                pass  # no parameters there
         e = self.expectation(second)
         return (second, e) if e.log_likelihood >= reached.log_likelihood else (first, reached)
 
-    def _reached(self, z: FloatArray, like: Stage) -> tuple[Stage, Expectation] | None:
-        """The stage of these coordinates, where it is one."""
-        try:
-            stage = Stage(self.series.coordinates.processes(z, like.processes))
-            with np.errstate(all="ignore"):
-                return stage, self.expectation(stage)
-        except (InputError, np.linalg.LinAlgError, ZeroDivisionError):
-            return None
+
+@dataclass(frozen=True)
+class StateMoments:
+    """Second moments of the state of one process, see `Expectation`."""
+
+    later: float
+    cross: float
+    earlier: float
+    first: float
+    steps: int
 
 
-def _concluded(
+def _walk(process: Process, like: Process, m: StateMoments, dt: float) -> Process:
+    """A random walk with K of the M step, where ``like`` has it open."""
+    if like.values["K"] is not None:
+        return process
+    squares = m.later - 2.0 * m.cross + m.earlier
+    return process.with_values(K=float(np.sqrt(squares / m.steps / dt)))
+
+
+def _gauss_markov(process: Process, like: Process, m: StateMoments, dt: float) -> Process:
+    """A Gauss-Markov process with the parameters of the M step that ``like`` has open."""
+    n, sigma = m.steps + 1, like.values["sigma"]
+    delta = -float(np.expm1(-dt / float(process.values["tau"] or np.inf)))  # 1 - phi
+    drift = Polynomial([1.0, -1.0])  # phi in terms of 1 - phi, whose digits matter
+    loss = Polynomial([0.0, 2.0, -1.0])  # 1 - phi^2
+    squares = m.later - 2.0 * m.cross * drift + m.earlier * drift**2
+    if like.values["tau"] is None:
+        if sigma is None:
+            total = squares + m.first * loss
+            condition = n * total.deriv() * loss - total * loss.deriv()
+
+            def log_likelihood(delta: float) -> float:
+                return float(-0.5 * (n * np.log(total(delta)) - np.log(loss(delta))))
+        else:
+            variance = sigma**2
+            condition = m.steps * variance * loss.deriv() * loss
+            condition = condition + squares.deriv() * loss - squares * loss.deriv()
+
+            def log_likelihood(delta: float) -> float:
+                size = float(loss(delta))
+                return -0.5 * (m.steps * np.log(size) + float(squares(delta)) / variance / size)
+
+        delta = _best_root(condition, log_likelihood, min(delta, _FASTEST))
+        process = process.with_values(tau=float(-dt / np.log1p(-delta)))
+    if sigma is None:
+        variance = (float(squares(delta)) / float(loss(delta)) + m.first) / n
+        process = process.with_values(sigma=float(np.sqrt(variance)))
+    return process
+
+
+def _best_root(
+    condition: Polynomial, log_likelihood: Callable[[float], float], present: float
+) -> float:
+    """The root between 0 and 1 of highest likelihood; the present value where there is none."""
+    roots = condition.roots()
+    inside = [
+        float(root.real)
+        for root in np.atleast_1d(roots)
+        if abs(root.imag) < 1e-9 * max(abs(root), 1e-300) and _SLOWEST < root.real < _FASTEST
+    ]
+    return max([*inside, present], key=log_likelihood)
+
+
+def _conclude(
     series: Series, iteration: Iteration, stage: Stage, trace: Sequence[float], converged: bool
 ) -> Fit:
-    coordinates, columns = series.coordinates, series.columns
+    coordinates, columns, processes = series.coordinates, series.columns, stage.processes
+    likelihood = KalmanLikelihood(columns)
     notices = []
     if not converged:
-        text = f"EM did not converge in {len(trace)} iterations: allow more, or start closer"
-        notices.append(Notice("not-converged", "bad", "", text, {"iterations": len(trace)}))
-    absent: list[int] = []
-    if converged and not iteration.in_state:
-        absent = _vanishing(coordinates, stage.processes, KalmanLikelihood(columns))
-    part = coordinates.without(absent)
-    top = _top(part, [p for i, p in enumerate(stage.processes) if i not in absent], columns)
-    if not top.maximum.converged:
-        text = "EM did not reach a maximum of the likelihood: lower the tolerance"
-        notices.append(Notice("not-converged", "bad", "", text))
-    slope = None
-    if columns.drift_is_free:
-        regression = KalmanLikelihood(columns).regression(top.processes)
-        slope = Slope(*columns.slope(regression))
-    if iteration.in_state and stage.drive is not None and slope is not None:
-        slope = Slope(float(stage.drive[0]) / iteration.dt, slope.variance)
-        first = next(p for p in stage.processes if not p.is_white)
-        if not first.is_walk:
-            text = f"a drift that enters the {first.title()} state is not a ramp of the signal"
-            notices.append(Notice("drift-in-state", "bad", "", text))
-    found = Estimates(
-        coordinates=coordinates,
-        processes=[
-            p.with_amplitude(0.0) if i in absent else p for i, p in enumerate(stage.processes)
-        ],
-        covariance=regular_inverse(top.information),
-        absent={i: upper_bound(stage.processes[i], part, top, columns) for i in absent},
-        slope=slope,
-    )
-    return conclude_likelihood(
-        series, found, method="em", log_likelihood=trace[-1], notices=notices, trace=trace
-    )
-
-
-def _top(coordinates: Coordinates, processes: Sequence[Process], columns: Columns) -> Top:
-    """Where EM has arrived; the expected information where there is no maximum."""
-    likelihood = KalmanLikelihood(columns)
-    objective, z = objective_of(likelihood, coordinates, processes), coordinates.pack(processes)
-    expected = spectral_information(coordinates, processes, columns.n, columns.dt)
+        values, hint = {"iterations": len(trace)}, "allow more, or start closer"
+        notices.append(notice("not-converged", "", values, variant="em", hint=hint))
+    absent: list[int] = []  # terms on their way to zero, which EM never reaches
+    while True:
+        present = [i for i in range(len(processes)) if i not in absent]
+        part, left = coordinates.without(absent), tuple(processes[i] for i in present)
+        if not converged or iteration.in_state:
+            break
+        redundant = redundant_term(part, left, likelihood)
+        if redundant is None:
+            break
+        absent.append(present[redundant])
+    # The expected information stands in where there is no maximum.
+    objective, z = objective_of(likelihood, part, left), part.pack(left)
+    expected = spectral_information(part, left, columns.n, columns.dt)
     observed = observed_information(objective, z, expected)
     is_maximum = bool(np.all(np.linalg.eigvalsh(observed) > 0.0))
     information = observed if is_maximum else expected
-    return Top(tuple(processes), Maximum(z, objective(z), is_maximum), information, likelihood)
-
-
-def _vanishing(
-    coordinates: Coordinates, processes: Sequence[Process], likelihood: LogLikelihood
-) -> list[int]:
-    """Terms on their way to zero, which EM never reaches."""
-    absent: list[int] = []
-    while True:
-        present = [i for i in range(len(processes)) if i not in absent]
-        redundant = redundant_term(
-            coordinates.without(absent), [processes[i] for i in present], likelihood
-        )
-        if redundant is None:
-            return absent
-        absent.append(present[redundant])
+    top = Top(part, left, Maximum(z, objective(z), is_maximum), information, likelihood)
+    if not is_maximum:
+        hint = "lower the tolerance"
+        notices.append(notice("not-converged", variant="no-maximum", hint=hint))
+    slope = None
+    if columns.drift_is_free:
+        slope = Slope(*columns.slope(likelihood.regression(left)))
+    if iteration.in_state and slope is not None:
+        slope = Slope(float(stage.drive[0]) / iteration.dt, slope.variance)
+        first = next(p for p in processes if not p.is_white)
+        if not first.is_walk:
+            notices.append(notice("drift-in-state", term=first.title()))
+    report = Report("em", trace[-1], notices, trace)
+    return conclude_likelihood(series, processes, absent, top, slope, report)

@@ -1,7 +1,7 @@
 """Kalman filter and smoother of one series, compiled.
 
 The state-space form is ``y[k] = h' x[k] + v[k]``, ``x[k+1] = F x[k] + w[k]`` with ``x[0]`` of
-covariance P0 (`gmwm.StateSpace`). Several columns are filtered at once with the same
+covariance P0 (`gmwm.StateSpace`). Several columns Y (n, m) are filtered at once with the same
 gains: the series, and regressors (a constant, a ramp) whose coefficients are profiled out
 afterwards (Rosenberg 1973, *Annals of Economic and Social Measurement* 2, 399-428; de Jong 1991,
 *Annals of Statistics* 19, 1073-1083). A NaN in the first column is a missing sample.
@@ -9,12 +9,46 @@ afterwards (Rosenberg 1973, *Annals of Economic and Social Measurement* 2, 399-4
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from gmwm._core.compiled import compiled
 from gmwm._core.typing import FloatArray
 
 _STEADY = 1e-13  # relative change of the predicted covariance from sample to sample
+
+
+class Space(NamedTuple):
+    """The arrays of a state space.
+
+    F, Q, P0: (p, p), transition, covariance of w, initial covariance.
+    h: (p,), output.
+    r: Variance of v.
+    """
+
+    F: FloatArray
+    Q: FloatArray
+    h: FloatArray
+    r: float
+    P0: FloatArray
+
+
+class Filtered(NamedTuple):
+    """One-step predictions of each column, and what the smoother needs of the filter.
+
+    states: (n, m, p), predicted.
+    covariances: (n, p, p), of the predicted states.
+    gains: (n, p), F P h / s.
+    innovations: (n, m).
+    variances: (n,), of the innovations, infinite where the sample is missing.
+    """
+
+    states: FloatArray
+    covariances: FloatArray
+    gains: FloatArray
+    innovations: FloatArray
+    variances: FloatArray
 
 
 @compiled()
@@ -50,15 +84,14 @@ def _propagate(
 
 
 @compiled()
-def whiten(
-    F: FloatArray, Q: FloatArray, h: FloatArray, r: float, P0: FloatArray, Y: FloatArray
-) -> tuple[FloatArray, float, int]:
+def whiten(space: Space, Y: FloatArray) -> tuple[FloatArray, float, int]:
     """Innovations of the columns of ``Y`` (n, m) over their standard deviation.
 
     Returns them with zero rows for missing samples, the sum of the logarithms of the innovation
     variances, and the number of samples. Once the predicted covariance has settled, the gain is
     kept until a sample is missing.
     """
+    F, Q, h, r, P0 = space
     n, m = Y.shape
     p = h.size
     E = np.zeros((n, m))
@@ -117,21 +150,9 @@ def whiten(
 
 
 @compiled()
-def filtered(
-    F: FloatArray,
-    Q: FloatArray,
-    h: FloatArray,
-    r: float,
-    P0: FloatArray,
-    Y: FloatArray,
-    A0: FloatArray,
-    U: FloatArray,
-) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
-    """One-step predictions and what the smoother needs of the filter.
-
-    Returns predicted states (n, m, p) and covariances (n, p, p), gains F P h / s (n, p),
-    innovations (n, m) and their variances (n,), infinite where the sample is missing.
-    """
+def filtered(space: Space, Y: FloatArray, A0: FloatArray, U: FloatArray) -> Filtered:
+    """Filter columns with initial mean ``A0`` (m, p) and constant input ``U`` (m, p) of each."""
+    F, Q, h, r, P0 = space
     n, m = Y.shape
     p = h.size
     X = np.zeros((n, m, p))
@@ -170,37 +191,26 @@ def filtered(
                 for j in range(p):
                     x[c, i] += F[i, j] * X[k, c, j]
         _propagate(F, Q, updated, half, P)
-    return X, PP, G, V, S
+    return Filtered(X, PP, G, V, S)
 
 
 @compiled()
 def smooth(
-    F: FloatArray,
-    Q: FloatArray,
-    h: FloatArray,
-    r: float,
-    P0: FloatArray,
-    Y: FloatArray,
-    A0: FloatArray,
-    U: FloatArray,
+    space: Space, Y: FloatArray, A0: FloatArray, U: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
     """Smoothed states given all samples, with their covariances at lags zero and one.
 
-    The backward recursion of de Jong (1989, *JASA* 84, 1085-1088) gives what that of Rauch, Tung
-    and Striebel does without inverting a covariance.
+    The backward recursion of de Jong (1989, *JASA* 84, 1085-1088) gives the result of Rauch, Tung
+    and Striebel's without inverting a covariance.
 
-    F, Q: (p, p).
-    h: (p,).
-    P0: (p, p).
-    Y: (n, m), columns; NaN in the first one is a missing sample.
-    A0, U: (m, p), initial mean and constant input of each column.
+    Y, A0, U: As of `filtered`.
     Returns: X (n, m, p), smoothed states of each column; C (n, p, p), their covariance; D (n - 1,
-        p, p), covariance of state k+1 with state k; V, S, innovations (n, m) and their variances
-        (n,), infinite where missing.
+        p, p), covariance of state k+1 with state k; V, S, innovations and their variances.
     """
+    F, h = space.F, space.h
     n, m = Y.shape
     p = h.size
-    X, C, G, V, S = filtered(F, Q, h, r, P0, Y, A0, U)
+    X, C, G, V, S = filtered(space, Y, A0, U)
     D = np.zeros((max(n - 1, 0), p, p))
     R = np.zeros((m, p))
     N = np.zeros((p, p))

@@ -1,9 +1,19 @@
-"""Exact Gaussian likelihood of a series by the Kalman filter.
+"""Gaussian likelihood of a series: exact by the Kalman filter, or debiased Whittle by one FFT.
 
 The series is ``c + R t + noise``. The constant and the slope have flat priors and are integrated
 out (the diffuse, or restricted, likelihood: Harville 1974, *Biometrika* 61, 383-385; Durbin &
 Koopman 2012, *Time Series Analysis by State Space Methods*, ch. 5), so that correlation times of
 the order of the record are not taken for a drift that was removed.
+
+Whittle's likelihood (1953, *Arkiv for Matematik* 2, 423-434) compares the periodogram with the
+spectrum, frequency by frequency. The periodogram of a series with a steep spectrum is biased by
+leakage, and so are the estimates (Sykulski, Olhede, Guillaumin, Lilly & Early 2019, *Biometrika*
+106, 251-266). Here the series is first filtered to its innovations under starting values that are
+close (prewhitening: Percival & Walden 1993, *Spectral Analysis for Physical Applications*,
+sec. 6.5), which leaves no leakage; the periodogram is that of the zero-padded innovations, so that
+the end of the series does not meet its beginning; and its expectation at the starting values, one
+less the share that the regression on a constant and a ramp has taken, is exact. The filter is
+renewed until its values are the estimates.
 """
 
 from __future__ import annotations
@@ -12,17 +22,22 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
+from scipy import fft
 
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
-from gmwm.estimate.likelihood.kalman import whiten
+from gmwm.estimate.likelihood.kalman import Space, whiten
 from gmwm.estimate.likelihood.scoring import Objective
-from gmwm.estimate.problem import Coordinates
+from gmwm.estimate.problem import Coordinates, density
 from gmwm.process import Process, StateSpace
 
 LogLikelihood = Callable[[Sequence[Process]], float]
 
 _NO_VARIANCE = 1e-12  # of a first sample, as a share of that of one step
+_SINGLE = 2048  # lowest frequencies kept one by one
+_BINS_PER_OCTAVE = 256  # above them
+_CHUNK = 4096
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +69,7 @@ class Regression:
 
 
 class Columns:
-    """A series beside its regressors: a constant and, where the model has one, a ramp.
+    """A series and its regressors: a constant and, where the model has one, a ramp.
 
     values: (n,), NaN where missing.
     dt: Sampling interval, s.
@@ -107,30 +122,21 @@ def stacked(processes: Sequence[Process], dt: float) -> StateSpace:
     return StateSpace.stack([process.state_space(dt) for process in processes])
 
 
-def started(space: StateSpace) -> FloatArray:
-    """Covariance of the first state that leaves the first sample a variance, (p, p).
+def arrays_of(space: StateSpace) -> Space:
+    """The arrays of a state space, with a first state that leaves the first sample a variance.
 
-    A walk from zero with (next to) no other noise leaves it none. As the series begins at an
-    unknown constant, the walk can as well have made a step before; no contrast knows of it.
+    A walk from zero with (almost) no other noise leaves it none. As the series begins at an unknown
+    constant, the walk can as well have made a step before; no contrast depends on it.
     """
-    h = space.output
-    first = space.measurement_noise + h @ space.initial_covariance @ h
-    if first > _NO_VARIANCE * (h @ space.process_noise @ h):
-        return space.initial_covariance
-    return space.initial_covariance + space.process_noise
+    h, noise, first = space.output, space.process_noise, space.initial_covariance
+    if not space.measurement_noise + h @ first @ h > _NO_VARIANCE * (h @ noise @ h):
+        first = first + noise
+    return Space(space.transition, noise, h, space.measurement_noise, first)
 
 
 def whitened(columns: Columns, processes: Sequence[Process]) -> tuple[FloatArray, float, int]:
     """`gmwm.estimate.likelihood.kalman.whiten` of the columns under a sum of processes."""
-    space = stacked(processes, columns.dt)
-    return whiten(
-        space.transition,
-        space.process_noise,
-        space.output,
-        space.measurement_noise,
-        started(space),
-        columns.matrix,
-    )
+    return whiten(arrays_of(stacked(processes, columns.dt)), columns.matrix)
 
 
 class KalmanLikelihood:
@@ -155,6 +161,86 @@ class KalmanLikelihood:
         """Constant and slope under these processes."""
         innovations, _, _ = whitened(self.columns, processes)
         return Regression.of(innovations.T @ innovations)
+
+
+class WhittleLikelihood:
+    """Log-likelihood of a series near some values of its noise.
+
+    Parameters
+    ----------
+    columns : Columns
+        Without missing samples.
+    filters : sequence of Process
+        Processes with a state space, close to the noise, that whiten the series.
+
+    Notes
+    -----
+    With e the innovations over their standard deviations, zero-padded to 2 n samples, I their
+    periodogram, c the share of its expectation that the regression takes, and rho the spectrum
+    over that of the filter, the log-likelihood is ``-1/4 sum (1 - c) log rho + I / rho`` over all
+    2 n frequencies. As rho is smooth and close to one, frequencies are grouped in narrow bins.
+    """
+
+    def __init__(self, columns: Columns, filters: Sequence[Process]) -> None:
+        innovations, log_variance, _ = whitened(columns, filters)
+        products = innovations.T @ innovations
+        self.regression = Regression.of(products)
+        n = columns.n
+        residual = innovations[:, 0] - innovations[:, 1:] @ self.regression.beta
+        size = fft.next_fast_len(2 * n, real=True)
+        edges = _edges(size // 2 + 1)
+        share = np.ones(size // 2 + 1)
+        share[0] = 0.5
+        if size % 2 == 0:
+            share[-1] = 0.5
+        share *= 2.0 * n / size  # as if of 2 n frequencies
+        index = np.arange(size // 2 + 1)
+        weight = np.add.reduceat(share, edges)
+        self._frequency = np.add.reduceat(share * index, edges) / weight / size / columns.dt
+        self._frequency[0] = 0.25 / size / columns.dt  # spectra may be infinite at zero
+        power = share * np.abs(fft.rfft(residual, size)) ** 2 / n
+        self._power = np.add.reduceat(power, edges)
+        root = np.linalg.cholesky(self.regression.covariance)
+        for column in (innovations[:, 1:] @ root).T:
+            share = share - share * np.abs(fft.rfft(column, size)) ** 2 / n
+        self._share = np.add.reduceat(share, edges)
+        self._dt = columns.dt
+        self._filter = _transfer(stacked(filters, columns.dt), self._frequency * columns.dt)
+        free = n - self.regression.beta.size
+        self._constant = -0.5 * (
+            free * np.log(2.0 * np.pi) + log_variance + self.regression.log_determinant
+        )
+
+    def __call__(self, processes: Sequence[Process]) -> float:
+        """Log-likelihood of these processes; comparable with `KalmanLikelihood`."""
+        ratio = density(processes, self._frequency, self._dt) / self._dt / self._filter
+        return self._constant - 0.5 * float(self._share @ np.log(ratio) + self._power @ (1 / ratio))
+
+
+def _edges(count: int) -> npt.NDArray[np.intp]:
+    """First indices of bins: single ones, then of equal width in the logarithm."""
+    single = np.arange(min(_SINGLE, count))
+    if count <= _SINGLE:
+        return single
+    bins = int(np.ceil(np.log2(count / _SINGLE) * _BINS_PER_OCTAVE))
+    wide = np.geomspace(_SINGLE, count, bins + 1)[:-1].round().astype(int)
+    return np.unique(np.concatenate([single, wide]))
+
+
+def _transfer(space: StateSpace, frequency: FloatArray) -> FloatArray:
+    """Spectrum of a state space at ``frequency`` (cycles per sample), u^2 per cycle per sample."""
+    p = space.n_states
+    result = np.full(frequency.size, space.measurement_noise)
+    if p == 0:
+        return result
+    for start in range(0, frequency.size, _CHUNK):
+        part = slice(start, start + _CHUNK)
+        turn = np.exp(2j * np.pi * frequency[part])
+        matrices = turn[:, None, None] * np.eye(p) - space.transition
+        rows = np.broadcast_to(space.output, (turn.size, p))[:, :, None]
+        gain = np.linalg.solve(matrices.transpose(0, 2, 1), rows)[:, :, 0]
+        result[part] += np.einsum("ki,ij,kj->k", gain, space.process_noise, gain.conj()).real
+    return result
 
 
 def defined(likelihood: LogLikelihood, processes: Sequence[Process]) -> float:

@@ -9,20 +9,20 @@ from typing import ClassVar
 import numpy as np
 import scipy
 
-from gmwm._core.notices import Notice
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.estimate import tuning
 from gmwm.estimate.likelihood.conclusion import (
+    Report,
     Top,
     conclude_likelihood,
     redundant_term,
-    upper_bound,
 )
 from gmwm.estimate.likelihood.likelihood import (
     Columns,
     KalmanLikelihood,
     Regression,
+    WhittleLikelihood,
     defined,
     objective_of,
     whitened,
@@ -36,7 +36,6 @@ from gmwm.estimate.likelihood.scoring import (
     regular_inverse,
 )
 from gmwm.estimate.likelihood.series import Series
-from gmwm.estimate.likelihood.whittle import WhittleLikelihood
 from gmwm.estimate.moments import Design
 from gmwm.estimate.problem import (
     Coordinates,
@@ -46,11 +45,15 @@ from gmwm.estimate.problem import (
     solve_nonnegative,
     spectral_information,
 )
-from gmwm.estimate.result import Estimates, Fit
-from gmwm.process import Model, Process, Shape, as_model
+from gmwm.estimate.result import Fit
+from gmwm.issues import notice
+from gmwm.process import Model, Process, as_model
 from gmwm.readers import Channel
 
 _SEGMENT = 1 << 16  # samples whose likelihood is computed exactly, for the beginning
+_LOG2_COUNT = 3  # of the candidates
+_LEAST_LEFT = 0.01  # share of a wavelet variance that is left after removing a drift
+_SMALL = 0.1  # share of the variance that a term which is not needed starts with
 
 Climb = Callable[[Coordinates, tuple[Process, ...]], Top]
 
@@ -100,7 +103,8 @@ class MLE:
             objective = objective_of(likelihood, coordinates, first)
             found = maximise(objective, coordinates.pack(first), information)
             observed = observed_information(objective, found.z, information)
-            return Top(coordinates.processes(found.z, first), found, observed, likelihood)
+            processes = coordinates.processes(found.z, first)
+            return Top(coordinates, processes, found, observed, likelihood)
 
         return _fit(series, climb, self.name)
 
@@ -141,39 +145,63 @@ def _climb_whittle(columns: Columns, coordinates: Coordinates, first: tuple[Proc
     processes = first
     for _ in range(tuning.PREWHITENING_ROUNDS):
         whittle = WhittleLikelihood(columns, processes)
-        z = coordinates.pack(processes)
+        origin = coordinates.pack(processes)
         residual = columns.matrix[:_SEGMENT, 0] - columns.matrix[:_SEGMENT, 1:] @ (
             whittle.regression.beta
         )
         part = Columns.without_regressors(residual, columns.dt)
         exact = objective_of(KalmanLikelihood(part), coordinates, processes)
         spectral = objective_of(WhittleLikelihood(part, processes), coordinates, processes)
-        tilt = gradient(exact, z, alone) - gradient(spectral, z, alone)
-        objective = _tilted(objective_of(whittle, coordinates, processes), z, tilt)
-        found = maximise(objective, z, information)
+        tilt = gradient(exact, origin, alone) - gradient(spectral, origin, alone)
+        objective = _tilted(objective_of(whittle, coordinates, processes), origin, tilt)
+        found = maximise(objective, origin, information)
         reached = coordinates.processes(found.z, processes)
         if not np.isfinite(defined(KalmanLikelihood(columns), reached)):
-            # Along what the data hardly know, only the exact likelihood ends the climb.
-            found = replace(found, z=z, converged=False)
+            # Only the exact likelihood ends a climb along a direction that the data hardly know.
+            found = replace(found, z=origin, converged=False)
             break
         processes = reached
-        if np.all(np.abs(found.z - z) < tuning.PREWHITENING_SETTLED * deviation):
+        if np.all(np.abs(found.z - origin) < tuning.PREWHITENING_SETTLED * deviation):
             break
     observed = observed_information(objective, found.z, information)
-    return Top(processes, found, observed, whittle)
+    return Top(coordinates, processes, found, observed, whittle)
 
 
 def _tilted(objective: Objective, origin: FloatArray, tilt: FloatArray) -> Objective:
     return lambda z: objective(z) + float(tilt @ (z - origin))
 
 
-def _or_higher(top: Top, series: Series, climb: Climb) -> Top:
-    """The top, or the one reached from another candidate that lies above it already.
+def _fit(series: Series, climb: Climb, method: str) -> Fit:
+    """Climb, drop terms that the likelihood can do without, and climb again."""
+    coordinates, processes = series.coordinates, list(series.start)
+    absent: list[int] = []
+    while True:
+        present = [i for i in range(len(processes)) if i not in absent]
+        part = coordinates.without(absent)
+        top = climb(part, tuple(processes[i] for i in present))
+        if not absent and not series.start_is_valid:
+            top = _or_higher(top, series, climb)
+        for i, process in zip(present, top.processes, strict=True):
+            processes[i] = process
+        redundant = redundant_term(part, top.processes, top.likelihood)
+        if redundant is None:
+            break
+        absent.append(present[redundant])
+    notices = []
+    if not top.maximum.converged:
+        notices.append(notice("not-converged"))
+    if np.any(np.linalg.eigvalsh(top.information) <= 0.0):
+        notices.append(notice("no-curvature"))
+    slope = None
+    if series.columns.drift_is_free:
+        regression = KalmanLikelihood(series.columns).regression(top.processes)
+        slope = Slope(*series.columns.slope(regression))
+    report = Report(method, top.maximum.value, notices)
+    return conclude_likelihood(series, processes, absent, top, slope, report)
 
-    None is looked for where the start describes the data.
-    """
-    if series.start_is_sound:
-        return top
+
+def _or_higher(top: Top, series: Series, climb: Climb) -> Top:
+    """The top, or the one reached from another candidate that lies above it already."""
     likelihood = KalmanLikelihood(series.columns)
     reached = defined(likelihood, top.processes)
     places = [_rescaled(point, series) for point in candidates(series)]
@@ -185,7 +213,7 @@ def _or_higher(top: Top, series: Series, climb: Climb) -> Top:
 
 
 def _rescaled(processes: tuple[Process, ...], series: Series) -> tuple[float, tuple[Process, ...]]:
-    """The terms with all variances times the factor of highest likelihood, and that likelihood.
+    """Likelihood and terms with all variances times the factor of highest likelihood.
 
     Innovations keep their proportions when all variances grow alike, so that the factor is their
     mean square. Where an amplitude is given nothing is changed.
@@ -211,49 +239,6 @@ def _rescaled(processes: tuple[Process, ...], series: Series) -> tuple[float, tu
     return float(height) if np.isfinite(height) else -np.inf, moved
 
 
-def _fit(series: Series, climb: Climb, method: str) -> Fit:
-    coordinates, processes = series.coordinates, list(series.start)
-    absent: list[int] = []
-    while True:
-        present = [i for i in range(len(processes)) if i not in absent]
-        part = coordinates.without(absent)
-        top = climb(part, tuple(processes[i] for i in present))
-        if not absent:
-            top = _or_higher(top, series, climb)
-        for i, process in zip(present, top.processes, strict=True):
-            processes[i] = process
-        redundant = redundant_term(part, top.processes, top.likelihood)
-        if redundant is None:
-            break
-        absent.append(present[redundant])
-    notices = []
-    if not top.maximum.converged:
-        text = "the maximum of the likelihood was not reached"
-        notices.append(Notice("not-converged", "bad", "", text))
-    if np.any(np.linalg.eigvalsh(top.information) <= 0.0):
-        text = "the likelihood has no curvature in some direction: too many parameters"
-        notices.append(Notice("no-curvature", "bad", "", text))
-    slope = None
-    if series.columns.drift_is_free:
-        regression = KalmanLikelihood(series.columns).regression(top.processes)
-        slope = Slope(*series.columns.slope(regression))
-    found = Estimates(
-        coordinates=coordinates,
-        processes=[p.with_amplitude(0.0) if i in absent else p for i, p in enumerate(processes)],
-        covariance=regular_inverse(top.information),
-        absent={i: upper_bound(processes[i], part, top, series.columns) for i in absent},
-        slope=slope,
-    )
-    return conclude_likelihood(
-        series, found, method=method, log_likelihood=top.maximum.value, notices=notices
-    )
-
-
-_LOG2_COUNT = 3
-_LEAST_LEFT = 0.01  # of a wavelet variance, after removing a drift
-_SMALL = 0.1  # of the variance that is all of the data: of terms that are not needed
-
-
 def candidates(series: Series) -> list[tuple[Process, ...]]:
     """Values of the noise terms of a series' model, eight sets where a shape is open.
 
@@ -266,33 +251,23 @@ def candidates(series: Series) -> list[tuple[Process, ...]]:
     try:
         design = Design(Model(series.coordinates.noise), Scales.of(series.wv))
     except InputError:
-        return []  # coefficients of which some are given span no grid
+        return []  # no grid for coefficients of which only some are given
     moments = Moments.of(series.wv, series.coordinates.model)
     target = np.maximum(moments.target, _LEAST_LEFT * series.wv.variance)
-    if not design.shaped:
-        return [_with_amplitudes(design, _at(design, np.zeros(0)), target)]
-    points = scipy.stats.qmc.Sobol(len(design.shaped), scramble=False).random_base2(_LOG2_COUNT)
-    centred = points + 0.5 / 2**_LOG2_COUNT
-    return [_with_amplitudes(design, _at(design, point), target) for point in centred]
-
-
-def _at(design: Design, point: np.ndarray) -> list[Shape]:
-    """The shapes at these fractions (0 to 1) of the grids of the terms with an open shape."""
-    fractions = dict(zip(design.shaped, point, strict=True))
-    shapes = []
-    for i in range(len(design.terms)):
-        grid = design.grid(i)
-        shapes.append(grid[int(fractions.get(i, 0.0) * len(grid))])
-    return shapes
-
-
-def _with_amplitudes(
-    design: Design, shapes: list[Shape], target: np.ndarray
-) -> tuple[Process, ...]:
-    """The terms with the amplitudes of least relative squares, all of them positive."""
-    curves = design.curves(shapes) / target[:, None]
+    points = np.zeros((1, 0))
+    if design.shaped:
+        sequence = scipy.stats.qmc.Sobol(len(design.shaped), scramble=False)
+        points = sequence.random_base2(_LOG2_COUNT) + 0.5 / 2**_LOG2_COUNT
     given = [i for i in range(len(design.terms)) if i not in design.linear]
-    free = curves[:, list(design.linear)]
-    x, _ = solve_nonnegative(free, 1.0 - curves[:, given].sum(axis=1))
-    highest = np.maximum(np.max(free, axis=0, initial=0.0), np.finfo(float).tiny)
-    return tuple(design.fitted_processes(np.maximum(x, _SMALL / highest), shapes))
+    found = []
+    for point in points:
+        fractions = dict(zip(design.shaped, point, strict=True))
+        grids = [design.grid(i) for i in range(len(design.terms))]
+        shapes = [grid[int(fractions.get(i, 0.0) * len(grid))] for i, grid in enumerate(grids)]
+        # Amplitudes of least relative squares, all of them positive.
+        curves = design.curves(shapes) / target[:, None]
+        free = curves[:, list(design.linear)]
+        x, _ = solve_nonnegative(free, 1.0 - curves[:, given].sum(axis=1))
+        highest = np.maximum(np.max(free, axis=0, initial=0.0), np.finfo(float).tiny)
+        found.append(tuple(design.fitted_processes(np.maximum(x, _SMALL / highest), shapes)))
+    return found

@@ -24,11 +24,11 @@ class Series:
 
     columns: The samples and regressors.
     wv: Of the samples; where gaps leave none, of the series bridged by straight lines.
-    is_bridged: Whether it is the latter: fine levels are then too low, so that it is a starting
-        point but no test of a fit.
+    is_bridged: Whether ``wv`` is of the bridged series: fine levels are then too low, so that it is
+        a starting point but no test of a fit.
     coordinates: Of the model's noise.
     start: Starting values of its terms, all of them positive.
-    start_is_sound: Whether they are valid estimates by the method of moments.
+    start_is_valid: Whether they are valid estimates by the method of moments.
     """
 
     columns: Columns
@@ -36,7 +36,7 @@ class Series:
     is_bridged: bool
     coordinates: Coordinates
     start: tuple[Process, ...]
-    start_is_sound: bool
+    start_is_valid: bool
 
     @classmethod
     def of(
@@ -57,25 +57,29 @@ class Series:
         missing = _missing(channel)
         if missing and not gaps:
             raise InputError(
-                f"the series misses {missing:,} samples, which a Fourier "
-                'transform needs: take method = "mle" or "gmwm"'
+                f"the series misses {missing:,} samples, which a Fourier transform needs: take "
+                'method = "mle" or "gmwm"'
             )
-        bridged = wavelet_variance(_bridged(channel) if missing else channel)
-        is_bridged = missing > 0 and not _has_run(channel)
-        wv = wavelet_variance(channel) if missing and not is_bridged else bridged
+        values = np.asarray(channel.values, dtype=float)
+        bridged, is_bridged = channel, False
+        if missing:
+            # Scattered gaps leave no wavelet coefficients at coarse levels, or none at all.
+            k = np.arange(values.size)
+            known = k[~np.isnan(values)]
+            filled = np.interp(k, known, values[known])[known[0] : known[-1] + 1]
+            bridged = replace(channel, values=filled)
+            is_bridged = Runs.of(values).longest < MIN_SAMPLES
+        to_start = wavelet_variance(bridged)
+        wv = wavelet_variance(channel) if missing and not is_bridged else to_start
         ramp = next((term for term in model.terms if term.is_drift), None)
-        columns = Columns(
-            np.asarray(channel.values, dtype=float),
-            channel.dt,
-            None if ramp is None or ramp.is_open else ramp.drift_rate(),
-            ramp is not None,
-        )
+        given = None if ramp is None or ramp.is_open else ramp.drift_rate()
+        columns = Columns(values, channel.dt, given, ramp is not None)
         if start is None:
-            fit = GMWM().estimate(model, bridged)
-            first, is_sound = _from_moments(fit, coordinates), fit.valid
+            fit = GMWM().estimate(model, to_start)
+            first, is_valid = _from_moments(fit, coordinates), fit.valid
         else:
-            first, is_sound = _from_user(model, as_model(start), coordinates), False
-        return cls(columns, wv, is_bridged, coordinates, first, is_sound)
+            first, is_valid = _from_user(model, as_model(start), coordinates), False
+        return cls(columns, wv, is_bridged, coordinates, first, is_valid)
 
 
 def _missing(channel: Channel) -> int:
@@ -85,7 +89,7 @@ def _missing(channel: Channel) -> int:
     """
     values = np.asarray(channel.values, dtype=float)
     if values.ndim != 1 or np.any(np.isinf(values)):
-        return 0  # no series, as the wavelet variance will say
+        return 0  # no series: the wavelet variance reports it
     missing = int(np.sum(np.isnan(values)))
     if missing and values.size - missing < MIN_SAMPLES:
         where = f"channel {channel.name!r}" if channel.name else "the series"
@@ -96,28 +100,11 @@ def _missing(channel: Channel) -> int:
     return missing
 
 
-def _has_run(channel: Channel) -> bool:
-    """Whether some samples follow each other without a gap, as a wavelet variance needs."""
-    return Runs.of(np.asarray(channel.values, dtype=float)).longest >= MIN_SAMPLES
-
-
-def _bridged(channel: Channel) -> Channel:
-    """The series with gaps bridged by straight lines, near enough to start from.
-
-    Scattered gaps leave no wavelet coefficient of the coarse levels, or none at all.
-    """
-    values = np.asarray(channel.values, dtype=float)
-    k = np.arange(values.size)
-    known = k[~np.isnan(values)]
-    bridged = np.interp(k, known, values[known])[known[0] : known[-1] + 1]
-    return replace(channel, values=bridged)
-
-
 def _from_moments(fit: Fit, coordinates: Coordinates) -> tuple[Process, ...]:
     """Estimates by the method of moments, with amplitudes of zero replaced by small ones."""
     level = float(np.sqrt(np.min(fit.wv.variance)))
     fitted = list(fit.model.terms)
-    # Gauss-Markov terms were put in order; any that has the kind and the given values will do.
+    # The model has sorted its terms; any with the kind and the given values will do.
     found = []
     for term in coordinates.noise:
         match = next(p for p in fitted if _same_given(term, p))
@@ -129,10 +116,8 @@ def _from_moments(fit: Fit, coordinates: Coordinates) -> tuple[Process, ...]:
                 for item in fit.model.parameters
                 if fit.model.terms[item.term] is match and item.parameter.name == linear.name
             )
-            bound = fit.upper_bounds.get(key, np.inf)
-            small = (
-                tuning.SMALL_START * bound if np.isfinite(bound) and bound > 0.0 else 1e-3 * level
-            )
+            limit = fit.upper_bounds.get(key, np.inf)
+            small = tuning.SMALL_START * limit if 0.0 < limit < np.inf else 1e-3 * level
             match = match.with_values(**{linear.name: small})
         found.append(match)
     return tuple(found)

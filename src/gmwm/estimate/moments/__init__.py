@@ -1,7 +1,6 @@
 """The Generalized Method of Wavelet Moments."""
 
 from gmwm.estimate.moments.design import Design as Design
-from gmwm.estimate.moments.discrepancy import suffices as suffices
 from gmwm.estimate.moments.gmwm import GMWM as GMWM, SimulatedMoments as SimulatedMoments
 from gmwm.estimate.moments.profile import (
     Point as Point,
@@ -9,10 +8,11 @@ from gmwm.estimate.moments.profile import (
     compile_search as compile_search,
     compile_steps as compile_steps,
 )
-from gmwm.estimate.moments.start import (
+from gmwm.estimate.moments.reference import (
+    TEXTBOOK as TEXTBOOK,
     Reference as Reference,
     dictionary as dictionary,
     dictionary_fit as dictionary_fit,
-    search as search,
 )
-from gmwm.estimate.moments.weights import Weights as Weights
+from gmwm.estimate.moments.start import search as search
+from gmwm.estimate.moments.weights import Weights as Weights, suffices as suffices

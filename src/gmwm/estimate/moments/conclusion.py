@@ -1,23 +1,21 @@
-"""From the minimum of the method of moments to a result."""
+"""From the minimum of the method of moments to a fit, without terms that the data do not need."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from itertools import islice
 
 import numpy as np
 
+from gmwm._core.distributions import chi2
 from gmwm._core.typing import FloatArray
-from gmwm.estimate.moments.checks import (
-    level_notices,
-    limit_notices,
-    redundant_notices,
-    with_doubtful_terms,
-)
+from gmwm.estimate import tuning
 from gmwm.estimate.moments.design import Design
-from gmwm.estimate.moments.profile import Point
+from gmwm.estimate.moments.profile import Point, Profile
 from gmwm.estimate.moments.weights import Weights
-from gmwm.estimate.problem import FittedMoments, Moments, drift_key, weight_root
+from gmwm.estimate.problem import FittedMoments, Moments, Slope, drift_key, weight_root
 from gmwm.estimate.result import (
     Comparison,
     Estimates,
@@ -26,84 +24,101 @@ from gmwm.estimate.result import (
     conclude,
     upper_amplitude,
 )
+from gmwm.issues import Notice, notice
+from gmwm.process import Model, Process
 from gmwm.variance import WaveletVariance
 
 
+@dataclass(frozen=True, eq=False)
+class Converged:
+    """The minimum of a fit, without the series: it is cached with that and must not keep it.
+
+    slope: Drift removed from the wavelet variances.
+    covariance: (J, J), of the moments, with the discrepancy, u^4.
+    statistical: (J, J), the same without it.
+    point: The minimum under ``covariance``.
+    basis: (J,), the wavelet variances to which the covariance belongs, u^2.
+    discrepancy: Relative error allowed for at each level.
+    """
+
+    design: Design
+    slope: Slope | None
+    covariance: FloatArray
+    statistical: FloatArray
+    point: Point
+    basis: FloatArray
+    discrepancy: float
+
+    def moments(self, wv: WaveletVariance) -> Moments:
+        """The moments that were fitted."""
+        return replace(Moments.of(wv, self.design.model, self.design.scales), slope=self.slope)
+
+    def goodness(self, wv: WaveletVariance) -> Goodness:
+        """How well the minimum describes the data: `Fit.goodness` of its fit."""
+        slope = self.slope if self.moments(wv).slope_is_free else None
+        processes = self.design.fitted_processes(self.point.x, self.point.shapes)
+        value = None if slope is None else slope.value
+        model, keys = self.design.coordinates.fitted(processes, value)
+        error = 0.0
+        if slope is not None:
+            keys.append(str(drift_key(model)))
+            error = float(np.sqrt(slope.variance))
+        at = FittedMoments.of(model, wv, keys, error, self.discrepancy)
+        return Goodness.of(at, wv, is_tested=True)
+
+
 def conclude_moments(
-    design: Design,
-    moments: Moments,
-    covariance: FloatArray,
-    statistical: FloatArray,
-    point: Point,
-    basis: FloatArray,
+    end: Converged,
+    wv: WaveletVariance,
     weights: Weights,
     method: str,
-    discrepancy: float,
-    without: Callable[[int], Goodness | None],
+    goodness_without: Callable[[int], Goodness | None],
 ) -> Fit:
     """Make the `Fit` of a minimum.
 
-    moments: What was fitted.
-    covariance: (J, J), of the moments under the fitted model, with the discrepancy, u^4.
-    statistical: (J, J), the same without it.
-    point: The minimum.
-    basis: (J,), the wavelet variances to which ``covariance`` belongs, u^2.
-    discrepancy: Relative error allowed for at each level, part of ``covariance``.
-    without: How well the fit without a noise term describes the data: whether it is needed.
+    goodness_without: How well the fit without a noise term describes the data; None if nothing is
+        left to fit. It shows whether a doubtful term is needed.
     """
-    target = moments.target
+    design, point, moments = end.design, end.point, end.moments(wv)
+    target, implied = moments.target, design.implied(point.x, point.shapes)
     curves, amplitudes = design.curves(point.shapes), design.amplitudes(point.x)
-    implied = curves @ amplitudes
     absent = [i for i in design.linear if amplitudes[i] == 0.0]
     jacobian = _jacobian(design, point, curves, absent)
+    processes = design.fitted_processes(point.x, point.shapes)
+    limits = {}
+    for i in absent:
+        estimate = _unrestricted(jacobian, curves[:, i], target - implied, end.covariance)
+        others = [k for k in absent if k != i]
+        part = [k for k in range(len(design.terms)) if k not in others]
+        limit = upper_amplitude(
+            design.coordinates.without(others),
+            [processes[k] for k in part],
+            part.index(i),
+            (*estimate, 0.0),
+            wv,
+        )
+        limits[i] = float(max(limit, 0.0) ** (1.0 / design.terms[i].linear.power))
+    notices = limit_notices(design, point)
+    if target.size < design.n_free:
+        values = {"levels": target.size, "parameters": design.n_free}
+        notices.append(notice("too-few-levels", "", values))
     found = Estimates(
         coordinates=design.coordinates,
-        processes=design.fitted_processes(point.x, point.shapes),
-        covariance=_sandwich(jacobian, covariance, weights),
-        absent={
-            i: _upper_scale(
-                design,
-                point,
-                i,
-                absent,
-                moments.wv,
-                *_unrestricted(jacobian, curves[:, i], target - implied, covariance),
-            )
-            for i in absent
-        },
+        processes=processes,
+        covariance=_sandwich(jacobian, end.covariance, weights),
+        absent=limits,
         slope=moments.slope if moments.slope_is_free else None,
+        method=method,
+        weights=weights.name,
+        discrepancy=end.discrepancy,
+        notices=notices,
     )
-    comparison = Comparison.of(target, implied, covariance, basis, jacobian.shape[1], statistical)
-    fit = conclude(
-        found, comparison, moments.wv, method=method, weights=weights.name,
-        discrepancy=discrepancy, misfits=discrepancy > 0.0,
-        notices=[
-            *limit_notices(design, point.shapes, point.x),
-            *level_notices(target.size, design.n_free),
-        ],
-    )  # fmt: skip
-    keys = design.coordinates.fitted(found.processes, None)[1]
-    places = {
-        key: i
-        for key, (i, is_amplitude) in zip(keys, design.coordinates.owners, strict=True)
-        if is_amplitude
-    }
-    judged = replace(point, objective=comparison.objective)
-    redundant = redundant_notices(design, judged, target, covariance)
-    return with_doubtful_terms(fit, redundant, places, without)
-
-
-def goodness_of(design: Design, moments: Moments, point: Point, discrepancy: float) -> Goodness:
-    """How well a minimum describes the data: what `Fit.goodness` of its fit is."""
-    slope = moments.slope if moments.slope_is_free else None
-    processes = design.fitted_processes(point.x, point.shapes)
-    model, keys = design.coordinates.fitted(processes, None if slope is None else slope.value)
-    error = 0.0
-    if slope is not None:
-        keys.append(str(drift_key(model)))
-        error = float(np.sqrt(slope.variance))
-    at = FittedMoments.of(model, moments.wv, keys, error, discrepancy)
-    return Goodness.of(at, moments.wv, is_tested=True)
+    comparison = Comparison.of(
+        target, implied, end.covariance, end.basis, jacobian.shape[1], end.statistical
+    )
+    fit = conclude(found, comparison, wv, misfits=end.discrepancy > 0.0)
+    redundant = _redundant_terms(design, point, comparison.objective, target, end.covariance)
+    return _with_doubtful_terms(fit, redundant, design, processes, goodness_without)
 
 
 def _jacobian(design: Design, point: Point, curves: FloatArray, absent: list[int]) -> FloatArray:
@@ -146,21 +161,84 @@ def _unrestricted(
     return float(column @ (root @ residual)) / information, 1.0 / float(np.sqrt(information))
 
 
-def _upper_scale(
+def limit_notices(design: Design, point: Point) -> list[Notice]:
+    """Shapes at the limit of the search."""
+    z = design.pack(point.shapes)
+    low, high = design.bounds
+    amplitudes = design.amplitudes(point.x)
+    at_limit = (z <= low + tuning.SEARCH_MARGIN) | (z >= high - tuning.SEARCH_MARGIN)
+    notices = []
+    for k, i in enumerate(design.owners()):
+        if amplitudes[i] > 0.0 and at_limit[k]:
+            process = design.at_shape(i, point.shapes[i])
+            values = {"process": type(process).__name__, "shape": point.shapes[i][0]}
+            notices.append(notice("search-limit", "", values, term=process.named()))
+    return notices
+
+
+def _redundant_terms(
+    design: Design, point: Point, objective: float, target: FloatArray, covariance: FloatArray
+) -> list[tuple[float, int]]:
+    """Gain and place of terms that do not improve the fit significantly, the least useful first.
+
+    Only terms with free shapes are tested. Their amplitude alone does not show it: among all shapes
+    one always fits some accident. The objective without the term does, at one per cent shared among
+    the levels where a term of this kind might have been found.
+
+    objective: Of the point under ``covariance``, whatever the weights of the estimate were.
+    """
+    root, amplitudes = weight_root(covariance), design.amplitudes(point.x)
+    redundant: list[tuple[float, int]] = []
+    for i in design.shaped:
+        others = [k for k in range(len(design.terms)) if k != i]
+        if amplitudes[i] == 0.0 or i not in design.linear or not others:
+            continue
+        model = Model(tuple(design.terms[k].process for k in others))
+        reduced = Profile(Design(model, design.scales), target, root)
+        without = reduced.refine(reduced.at([point.shapes[k] for k in others])).objective
+        gain, freed = without - objective, 1 + design.terms[i].n_shapes
+        if gain < chi2.isf(tuning.REDUNDANT_P / target.size, freed):
+            redundant.append((gain, i))
+    return sorted(redundant)
+
+
+def _with_doubtful_terms(
+    fit: Fit,
+    redundant: Sequence[tuple[float, int]],
     design: Design,
-    point: Point,
-    term: int,
-    absent: list[int],
-    wv: WaveletVariance,
-    centre: float,
-    deviation: float,
-) -> float:
-    """95 % upper bound of the scale of a term whose amplitude came out as zero."""
-    others = [i for i in absent if i != term]
-    part = [i for i in range(len(design.terms)) if i not in others]
-    processes = design.fitted_processes(point.x, point.shapes)
-    bound = upper_amplitude(
-        design.coordinates.without(others), [processes[i] for i in part], part.index(term),
-        centre, deviation, 0.0, wv,
-    )  # fmt: skip
-    return float(max(bound, 0.0) ** (1.0 / design.terms[term].linear.power))
+    processes: Sequence[Process],
+    goodness_without: Callable[[int], Goodness | None],
+) -> Fit:
+    """A fit with the notice of the term that the data can do without, if there is one.
+
+    A slow term raises the errors of the very levels that show it, so that neither its gain nor its
+    amplitude looks significant under the noise that it is part of. It is needed all the same where
+    the model without it, by its own errors, misses an averaging time (`Goodness.loses_to`). Several
+    similar terms can stand in for each other: one of them is too many, not all.
+
+    processes: The noise terms with their values.
+    """
+    present = [key for key in fit.upper_bounds if fit.params[key] > 0.0]
+    if not redundant and not present:
+        return fit
+
+    @lru_cache
+    def is_needed(i: int) -> bool:
+        if not fit.goodness.describes_all:
+            return False
+        reduced = goodness_without(i)
+        return reduced is not None and reduced.loses_to(fit.goodness)
+
+    keys = design.coordinates.fitted(processes)[1]
+    places: Mapping[str, int] = {
+        key: i for key, (i, _) in zip(keys, design.coordinates.owners, strict=True)
+    }
+    found = {key for key in present if is_needed(places[key])}
+    notices = [n for n in fit.notices if n.code != "amplitude-bound" or n.where not in found]
+    for gain, i in islice(((gain, i) for gain, i in redundant if not is_needed(i)), 1):
+        process = processes[i]
+        shape = {p.name: process.values[p.name] for p in process.shape_parameters}
+        values = {"process": type(process).__name__, "gain": gain, **shape}
+        notices.append(notice("redundant-term", "", values, term=process.named()))
+    bounds = {key: bound for key, bound in fit.upper_bounds.items() if key not in found}
+    return replace(fit, notices=tuple(notices), upper_bounds=bounds)

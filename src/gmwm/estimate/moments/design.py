@@ -3,7 +3,7 @@
 The wavelet variance of a model is ``offset(z) + U(z) x``: the columns of U are the curves of the
 terms at unit amplitude, x >= 0 their free squared scales (or variances), z the free shape
 parameters mapped to the real line, and the offset holds the terms of fixed amplitude. Rate ramps
-take no part: they are deterministic, see `gmwm.estimate.problem.ramp`.
+are regressors, see `gmwm.estimate.problem.ramp`.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ import numpy as np
 from gmwm._core.typing import FloatArray, IntArray
 from gmwm.errors import InputError
 from gmwm.estimate import tuning
+from gmwm.estimate.moments.kernels import Shaped
 from gmwm.estimate.problem import Coordinates, Scales, Term, is_plain, shape_of
 from gmwm.process import Model, Process, Shape, compiled_levels
 
@@ -28,10 +29,10 @@ _SIMULATED_STEP = 0.05  # where a simulation may move in jumps
 
 
 class Compiled(NamedTuple):
-    """A design for `gmwm.estimate.moments.refinement_kernels.refined`."""
+    """The part of a design that `gmwm.estimate.moments.kernels.refined` takes."""
 
-    terms: tuple[Any, ...]
-    amplitudes: IntArray
+    terms: Shaped
+    owners: IntArray
     levels: tuple[Any, ...]
 
 
@@ -56,8 +57,12 @@ class Design:
                 )
         self.linear = tuple(i for i, term in enumerate(self.terms) if term.free_scale)
         self.shaped = tuple(i for i, term in enumerate(self.terms) if term.n_shapes)
-        self._curve_of = tuple(self._curve_at(term) for term in self.terms)
-        self._slopes_of = {i: self._slopes_at(self.terms[i]) for i in self.shaped}
+        self._curve_of = [self._curve_at(i) for i in range(len(self.terms))]
+        self._slopes_of = {
+            i: scales.unit_slopes(self.terms[i].process)
+            for i in self.shaped
+            if self.terms[i].free_scale
+        }
         self._owners = [i for i, is_amplitude in self.coordinates.owners if not is_amplitude]
         self._own: dict[Any, Any] = {}
         self._last: dict[int, tuple[Shape, FloatArray]] = {}
@@ -77,9 +82,7 @@ class Design:
 
     def at_shape(self, i: int, shape: Shape) -> Process:
         """Term ``i`` at a shape, with unit amplitude where that is free."""
-        return self._with_shape(self.terms[i], shape)
-
-    def _with_shape(self, term: Term, shape: Shape) -> Process:
+        term = self.terms[i]
         names = [p.name for p in term.process.shape_parameters]
         values: dict[str, float | None] = dict(zip(names, shape, strict=True))
         if term.free_scale:
@@ -93,43 +96,56 @@ class Design:
             known = self._last[i] = shape, self._curve_of[i](shape)
         return known[1]
 
-    def _curve_at(self, term: Term) -> Callable[[Shape], FloatArray]:
-        """The function of `curve` for one term: what every step of a fit asks for."""
+    def _curve_at(self, i: int) -> Callable[[Shape], FloatArray]:
+        """The function of `curve` for one term, without lookups that each step would repeat."""
+        term = self.terms[i]
         if term.free_scale:
             return self.scales.unit_curves(term.process)
-        return lambda shape: self.scales.curve(self._with_shape(term, shape))
-
-    def _slopes_at(self, term: Term) -> Callable[[Shape], FloatArray | None]:
-        """Derivatives of its curve by the coordinates of its shape, if in closed form."""
-        if term.free_scale:
-            return self.scales.unit_slopes(term.process)
-        return lambda shape: None
+        return lambda shape: self.scales.curve(self.at_shape(i, shape))
 
     def grid(self, i: int) -> list[Shape]:
-        """Starting shapes of term ``i``; terms that are alike share one list."""
-        kept, key = self.kept(i), ("grid", self.terms[i].process)
-        if key not in kept:
-            kept[key] = self._new_grid(self.terms[i])
-        found: list[Shape] = kept[key]
-        return found
+        """Starting shapes of term ``i``, with fixed parameters at their value; see `_cached`."""
+        return self._cached("grid", i, lambda: self._new_grid(self.terms[i]))
 
     def grid_curves(self, i: int) -> FloatArray:
         """Curves of term ``i`` on its grid, (J, G)."""
-        kept, key = self.kept(i), ("curves", self.terms[i].process)
-        if key not in kept:
-            columns = [self.curve(i, shape) for shape in self.grid(i)]
-            kept[key] = np.stack(columns, axis=1)
-        found: FloatArray = kept[key]
+        return self._cached("curves", i, lambda: self._stacked(i, self.grid(i)))
+
+    def dense_grid(self, i: int) -> tuple[list[Shape], FloatArray]:
+        """Shapes and curves of the grid with geometric means in between, for ordered kinds.
+
+        The finest levels of long records are known to a thousandth, and a mixture of these curves
+        must not fail because of its grid.
+        """
+        if not self.terms[i].process.ordered_by:
+            return self.grid(i), self.grid_curves(i)
+
+        def make() -> tuple[list[Shape], FloatArray]:
+            values = np.array([shape[0] for shape in self.grid(i)])
+            middle = np.sqrt(values[1:] * values[:-1])
+            shapes: list[Shape] = [(float(v),) for v in np.sort(np.concatenate([values, middle]))]
+            return shapes, self._stacked(i, shapes)
+
+        found: tuple[list[Shape], FloatArray] = self._cached("dense", i, make)
         return found
 
-    def kept(self, i: int) -> dict[Any, Any]:
-        """Where what belongs to a term is kept: with the levels, for the terms of other designs."""
-        process = self.terms[i].process
-        plain = is_plain(process) and not self.scales.is_simulated(process)
-        return self.scales.shared if plain and self.terms[i].n_shapes else self._own
+    def _stacked(self, i: int, shapes: Sequence[Shape]) -> FloatArray:
+        """Curves of term ``i`` at some shapes, (J, k)."""
+        return np.stack([self.curve(i, shape) for shape in shapes], axis=1)
+
+    def _cached(self, name: str, i: int, make: Callable[[], Any]) -> Any:
+        """A value that depends on a term and the levels only, shared by designs of these levels."""
+        term = self.terms[i]
+        plain = is_plain(term.process) and not self.scales.is_simulated(term.process)
+        kept, key = (
+            self.scales.shared if plain and term.n_shapes else self._own,
+            (name, term.process),
+        )
+        if key not in kept:
+            kept[key] = make()
+        return kept[key]
 
     def _new_grid(self, term: Term) -> list[Shape]:
-        """Starting shapes; fixed parameters have their value in all of them."""
         own = shape_of(term.process)
         if not term.n_shapes:
             return [own]
@@ -205,7 +221,8 @@ class Design:
         first = np.cumsum([0, *counts])[:-1]
         owners = np.array([self.linear.index(i) for i in self._owners])
         levels = compiled_levels(self.scales.tau, self.scales.dt, frozenset(kinds.tolist()))
-        return Compiled((kinds, np.array(self.shaped), first, free, lower, upper), owners, levels)
+        terms = Shaped(kinds, np.array(self.shaped), first, free, lower, upper)
+        return Compiled(terms, owners, levels)
 
     # -- curves -----------------------------------------------------------------------------------
 
@@ -215,6 +232,10 @@ class Design:
         for i, shape in enumerate(shapes):
             result[:, i] = self.curve(i, shape)
         return result
+
+    def implied(self, x: FloatArray, shapes: Sequence[Shape]) -> FloatArray:
+        """Wavelet variance of the noise, u^2, (J,)."""
+        return np.asarray(self.curves(shapes) @ self.amplitudes(x))
 
     def amplitudes(self, x: FloatArray) -> FloatArray:
         """Amplitudes of all terms, 1 where fixed, (terms,)."""
@@ -228,7 +249,7 @@ class Design:
         column = 0
         for i in self.shaped:
             term = self.terms[i]
-            closed = self._slopes_of[i](shapes[i])
+            closed = self._slopes_of[i](shapes[i]) if term.free_scale else None
             if closed is not None:
                 found = closed[:, term.free_shape]
                 result[:, column : column + term.n_shapes] = found

@@ -8,6 +8,12 @@ from gmwm.estimate.problem.information import (
     slope_dof as slope_dof,
     spectral_information as spectral_information,
 )
+from gmwm.estimate.problem.moments import (
+    FittedMoments as FittedMoments,
+    Moments as Moments,
+    chi_square as chi_square,
+    weight_root as weight_root,
+)
 from gmwm.estimate.problem.nonnegative import (
     objectives_with as objectives_with,
     orthogonal_to as orthogonal_to,
@@ -31,7 +37,8 @@ from gmwm.estimate.problem.ramp import (
     ols_slope as ols_slope,
     slope_p_value as slope_p_value,
 )
-from gmwm.estimate.problem.scales import Scales as Scales, is_plain as is_plain
-from gmwm.estimate.problem.simulation import Simulation as Simulation
-from gmwm.estimate.problem.targets import FittedMoments as FittedMoments, Moments as Moments
-from gmwm.estimate.problem.whitening import chi_square as chi_square, weight_root as weight_root
+from gmwm.estimate.problem.scales import (
+    Scales as Scales,
+    Simulation as Simulation,
+    is_plain as is_plain,
+)

@@ -2,7 +2,7 @@
 
 For a Gaussian series of n samples with spectrum S the information matrix tends to
 ``n int_0^{1/2} (d log S / d z) (d log S / d z)' df`` (Whittle 1953, *Arkiv for Matematik* 2,
-423-434). What is below some lowest frequency belongs to the unknown constant. With 1/(4 n dt) the
+423-434). Frequencies below some lowest one belong to the unknown constant. With 1/(4 n dt) the
 information on a random walk, beside white noise or not, is the exact one to 1 % from a thousand
 samples on; with 1/(2 n dt) a walk that is just seen loses a third.
 """
@@ -48,7 +48,7 @@ def density(processes: Sequence[Process], f: FloatArray, dt: float) -> FloatArra
     return total
 
 
-def slopes(
+def _slopes(
     coordinates: Coordinates, processes: Sequence[Process], f: FloatArray, dt: float
 ) -> tuple[FloatArray, FloatArray]:
     """Spectrum of each process at ``f`` (Hz), (terms, len(f)), and slopes dS / d z, (d, len(f))."""
@@ -68,17 +68,17 @@ def slopes(
     return own, rows
 
 
-def log_slopes(
+def _relative(slopes: FloatArray, density: FloatArray) -> FloatArray:
+    """Slopes of the logarithm; zero where the density underflows."""
+    return np.divide(slopes, density, out=np.zeros_like(slopes), where=density > 0.0)
+
+
+def _log_slopes(
     coordinates: Coordinates, processes: Sequence[Process], f: FloatArray, dt: float
 ) -> FloatArray:
-    """Slopes d log S / d z at ``f`` (Hz), shape (len(f), d)."""
-    own, rows = slopes(coordinates, processes, f, dt)
+    """Slopes d log S / d z at ``f`` (Hz), (len(f), d)."""
+    own, rows = _slopes(coordinates, processes, f, dt)
     return _relative(rows, np.sum(own, axis=0)).T
-
-
-def _relative(slopes: FloatArray, density: FloatArray) -> FloatArray:
-    """Slopes of the logarithm; none of a density below the smallest number."""
-    return np.divide(slopes, density, out=np.zeros_like(slopes), where=density > 0.0)
 
 
 def spectral_information(
@@ -86,7 +86,7 @@ def spectral_information(
 ) -> FloatArray:
     """Expected information of z, (d, d)."""
     f, weight = frequency_nodes(n, dt)
-    scaled = log_slopes(coordinates, processes, f, dt)
+    scaled = _log_slopes(coordinates, processes, f, dt)
     return np.asarray(scaled.T @ (weight[:, None] * scaled))
 
 
@@ -98,7 +98,7 @@ def information_with(
     The spectrum and the slopes of a term are proportional to its amplitude.
     """
     f, weight = frequency_nodes(n, dt)
-    own, rows = slopes(coordinates, processes, f, dt)
+    own, rows = _slopes(coordinates, processes, f, dt)
     others = np.sum(np.delete(own, term, axis=0), axis=0)
     linear = coordinates.terms[term].linear
     now = float(processes[term].values[linear.name] or 0.0) ** linear.power
@@ -127,7 +127,7 @@ def slope_dof(
     dt: Sampling interval, s.
     """
     coordinates, processes, names = _opened(model, keys)
-    if not names or not _have_spectra(processes):
+    if not names or not all(process.has_spectrum() for process in processes):
         return np.inf
     order = [list(keys).index(name) for name in names]
     f, weight = frequency_nodes(n, dt)
@@ -137,45 +137,47 @@ def slope_dof(
     if not np.all(total > 0.0):
         return np.inf
     share = weight * ramp / total
-    by_z = share @ log_slopes(coordinates, processes, f, dt) / np.sum(share)
+    by_z = share @ _log_slopes(coordinates, processes, f, dt) / np.sum(share)
     gradient = np.linalg.solve(coordinates.jacobian(processes).T, by_z)
     variance = float(gradient @ covariance[np.ix_(order, order)] @ gradient)
     return 2.0 / variance if variance > 0.0 else np.inf
 
 
 def error_growth(model: Model, keys: Sequence[str], n: int, dt: float) -> dict[str, float]:
-    """How the relative standard errors of the positive parameters go with their values.
+    """Exponents with which the relative standard errors of positive parameters grow, by key.
 
-    Between the points half a standard error below and above the estimate, along which the other
-    parameters follow as they are correlated; by the expected information.
+    A relative standard error is proportional to value^k between the points half a standard error
+    below and above the estimate, along which the other parameters follow as they are correlated; by
+    the expected information.
 
     model: With the estimates.
     keys: The estimated parameters of its noise.
     dt: Sampling interval, s.
-    Returns: key -> exponent k of the power law: relative standard error proportional to value^k.
     """
     coordinates, processes, names = _opened(model, keys)
-    if not _have_spectra(processes):
+    if not names or not all(process.has_spectrum() for process in processes):
         return {}
     positive = {i.key for i in model.parameters if i.parameter.lower == 0.0}
     with np.errstate(divide="ignore", invalid="ignore"):  # where there is no noise at all
-        information = spectral_information(coordinates, processes, n, dt)
-    if not names or not _is_regular(information):
+        covariance = _covariance(coordinates, processes, n, dt)
+    if covariance is None:
         return {}
     z = coordinates.pack(processes)
-    covariance = np.linalg.inv(information)
     result = {}
     for k, name in enumerate(names):
         if name not in positive:
             continue
         step = tuning.PROFILE_STEP * covariance[:, k] / np.sqrt(covariance[k, k])
-        step /= max(float(np.max(np.abs(step))), 1.0)  # of what is hardly known, too long
+        step /= max(float(np.max(np.abs(step))), 1.0)  # too long where hardly anything is known
         ends = []
         for moved in (z - step, z + step):
             there = coordinates.processes(moved, processes)
             i, own = coordinates.names[k]
             value = float(there[i].values[own] or 0.0)
-            error = _relative_error(coordinates, there, k, value, n, dt)
+            matrix, error = _covariance(coordinates, there, n, dt), np.nan
+            if matrix is not None:
+                slope = coordinates.jacobian(there)[k, k]
+                error = float(np.sqrt(matrix[k, k]) * abs(slope) / value)
             ends.append((np.log(value), np.log(error)))
         rise = (ends[1][1] - ends[0][1]) / (ends[1][0] - ends[0][0])
         if np.isfinite(rise):
@@ -192,23 +194,14 @@ def _opened(model: Model, keys: Sequence[str]) -> tuple[Coordinates, list[Proces
     return coordinates, [model.terms[place] for place in places], names
 
 
-def _have_spectra(processes: Sequence[Process]) -> bool:
-    return all(process.has_spectrum() for process in processes)
-
-
-def _relative_error(
-    coordinates: Coordinates, processes: Sequence[Process], k: int, value: float, n: int, dt: float
-) -> float:
+def _covariance(
+    coordinates: Coordinates, processes: Sequence[Process], n: int, dt: float
+) -> FloatArray | None:
+    """Inverse of the information; None if it is singular, as for a term of zero amplitude."""
     information = spectral_information(coordinates, processes, n, dt)
-    if not _is_regular(information):
-        return np.nan
-    slope = coordinates.jacobian(processes)[k, k]
-    return float(np.sqrt(np.linalg.inv(information)[k, k]) * abs(slope) / value)
-
-
-def _is_regular(information: FloatArray) -> bool:
-    """Whether its inverse means anything: a line, or a term of no amplitude, has no spectrum."""
     deviation = np.sqrt(np.diag(information))
     if not np.all(np.isfinite(information)) or np.any(deviation == 0.0):
-        return False
-    return bool(np.linalg.cond(information / np.outer(deviation, deviation)) < _SINGULAR)
+        return None
+    if not np.linalg.cond(information / np.outer(deviation, deviation)) < _SINGULAR:
+        return None
+    return np.asarray(np.linalg.inv(information))

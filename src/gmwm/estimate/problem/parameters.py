@@ -1,8 +1,8 @@
 """The free parameters of a model's noise: keys, coordinates, processes and the Jacobian between.
 
-A point of the whole real space stands for the parameters: scales and variances enter as the
-logarithm of the amplitude (the power of the parameter that is a factor of the spectrum), shapes as
-each process maps them. Rate ramps take no part: they are regressors.
+Coordinates are real numbers without bounds. An amplitude (the power of the scale or variance that
+is a factor of the spectrum) enters by its logarithm, shapes as each process maps them. Rate ramps
+are regressors and have no coordinate.
 """
 
 from __future__ import annotations
@@ -22,10 +22,10 @@ _STEP = 1e-6  # of central differences of a process's own map
 
 @dataclass(frozen=True, eq=False)
 class Term:
-    """A noise term of a model and what of it is free.
+    """A noise term of a model, and which of its parameters are free.
 
     process: As in the model, with open parameters.
-    place: Where it stands in the model.
+    place: Index of the term in the model.
     free_scale: Whether the linear parameter is open.
     free_shape: (s,) of bool, which shape parameters are open.
     """
@@ -77,12 +77,10 @@ class Term:
         columns = np.flatnonzero(self.free_shape)
         block = np.empty((columns.size, columns.size))
         for column, k in enumerate(columns):
-            pair = []
-            for step in (_STEP, -_STEP):
-                point = z.copy()
-                point[k] += step
-                pair.append(np.array(self.process.shape_from_free(point)))
-            block[:, column] = ((pair[0] - pair[1]) / (2.0 * _STEP))[columns]
+            step = np.zeros(z.size)
+            step[k] = _STEP
+            up, down = (np.array(self.process.shape_from_free(z + s)) for s in (step, -step))
+            block[:, column] = ((up - down) / (2.0 * _STEP))[columns]
         return block
 
 
@@ -110,12 +108,15 @@ class Coordinates:
         )
         if not self.terms:
             raise InputError(f"{model!r} has no noise process: add WhiteNoise() at least")
-        self.names = [(i, name) for i, term in enumerate(self.terms) for name in term.free_names]
-        self.owners = [
-            (i, k == 0 and term.free_scale)
-            for i, term in enumerate(self.terms)
-            for k in range(len(term.free_names))
-        ]
+        self.names: list[tuple[int, str]] = []
+        self.owners: list[tuple[int, bool]] = []
+        self._places: list[tuple[slice, slice]] = []  # coordinates of amplitude and shape, by term
+        for i, term in enumerate(self.terms):
+            start, names = len(self.names), term.free_names
+            self.names += [(i, name) for name in names]
+            self.owners += [(i, k == 0 and term.free_scale) for k in range(len(names))]
+            middle = start + int(term.free_scale)
+            self._places.append((slice(start, middle), slice(middle, start + len(names))))
 
     @property
     def noise(self) -> tuple[Process, ...]:
@@ -124,13 +125,13 @@ class Coordinates:
 
     def pack(self, processes: Sequence[Process]) -> FloatArray:
         """Coordinates of the terms with these values, (d,)."""
-        parts = [np.zeros(0)]
-        for term, process in zip(self.terms, processes, strict=True):
+        z = np.empty(len(self.owners))
+        for term, process, (scale, shape) in zip(self.terms, processes, self._places, strict=True):
             if term.free_scale:
                 value = process.values[term.linear.name] or 0.0
-                parts.append(np.array([term.linear.power * np.log(value)]))
-            parts.append(process.shape_to_free(shape_of(process))[term.free_shape])
-        return np.concatenate(parts)
+                z[scale] = term.linear.power * np.log(value)
+            z[shape] = process.shape_to_free(shape_of(process))[term.free_shape]
+        return z
 
     def processes(self, z: FloatArray, like: Sequence[Process]) -> tuple[Process, ...]:
         """The terms at ``z``; fixed parameters are taken from ``like``.
@@ -143,34 +144,28 @@ class Coordinates:
         """Term ``i`` at ``z``, as in `processes`."""
         term, (scale, shape) = self.terms[i], self._places[i]
         changes: dict[str, float] = {}
-        if term.free_scale:
-            with np.errstate(over="ignore"):
-                value = np.exp(z[scale] / term.linear.power)
-            changes[term.linear.name] = float(value[0])
-        if term.n_shapes:
-            with np.errstate(over="ignore"):
+        with np.errstate(over="ignore"):
+            if term.free_scale:
+                changes[term.linear.name] = float(np.exp(z[scale] / term.linear.power)[0])
+            if term.n_shapes:
                 found = term.moved(shape_of(like), z[shape])
-            named = zip(like.shape_parameters, found, term.free_shape, strict=True)
-            changes.update({p.name: value for p, value, is_free in named if is_free})
+                named = zip(like.shape_parameters, found, term.free_shape, strict=True)
+                changes.update({p.name: value for p, value, is_free in named if is_free})
         return like.with_values(**changes)
 
     def jacobian(self, processes: Sequence[Process]) -> FloatArray:
         """Derivative of the parameters by z at these values, (d, d), block diagonal."""
         matrix = np.zeros((len(self.owners), len(self.owners)))
-        start = 0
-        for term, process in zip(self.terms, processes, strict=True):
+        for term, process, (scale, shape) in zip(self.terms, processes, self._places, strict=True):
             if term.free_scale:
                 value = float(process.values[term.linear.name] or 0.0)
-                matrix[start, start] = value / term.linear.power
-                start += 1
-            block = slice(start, start + term.n_shapes)
+                matrix[scale, scale] = value / term.linear.power
             if term.n_shapes:
-                matrix[block, block] = term.shape_jacobian(shape_of(process))
-            start += term.n_shapes
+                matrix[shape, shape] = term.shape_jacobian(shape_of(process))
         return matrix
 
     def without(self, dropped: Sequence[int]) -> Coordinates:
-        """The same for the model less some noise terms (indices into ``terms``)."""
+        """Coordinates of the model without some noise terms (indices into ``terms``)."""
         places = {self.terms[i].place for i in dropped}
         kept = (term for place, term in enumerate(self.model.terms) if place not in places)
         return Coordinates(Model(tuple(kept)))
@@ -190,23 +185,12 @@ class Coordinates:
                 t.with_values(**{t.parameters[0].name: slope}) if t.is_drift else t for t in terms
             ]
         model = Model(tuple(terms))
-        # Terms that are ordered have changed their places, but are the same objects.
+        # The model sorts terms of a kind, but keeps the objects.
         moved = {id(term): place for place, term in enumerate(model.terms)}
         by_term = keys_by_term(model)
         return model, [
             by_term[moved[id(terms[self.terms[i].place])], name] for i, name in self.names
         ]
-
-    @cached_property
-    def _places(self) -> list[tuple[slice, slice]]:
-        """Coordinates of the amplitude (none or one) and of the shape, term by term."""
-        start, places = 0, []
-        for term in self.terms:
-            middle = start + int(term.free_scale)
-            end = middle + term.n_shapes
-            places.append((slice(start, middle), slice(middle, end)))
-            start = end
-        return places
 
 
 def keys_by_term(model: Model) -> Mapping[tuple[int, str], str]:

@@ -1,9 +1,13 @@
-"""The rate ramp: its slope by generalized least squares under the fitted noise.
+"""The rate ramp: a regressor X = t whose coefficient is estimated beside the noise.
 
-The wavelet variance knows the slope only by its square, so a moment of its own gives it: the best
-linear unbiased estimate from means of blocks of samples. Their differences are stationary whatever
-the noise, their mean is the slope times the block length, and their covariance is a Toeplitz matrix
-known from the spectrum.
+The series is ``X beta + noise`` with one regressor, time, and beta the slope in u/s. The wavelet
+variance knows the slope only by its square, so a moment of its own gives it: generalized least
+squares of differences between means of neighbouring blocks. They are stationary whatever the noise,
+and their Toeplitz covariance is known from the spectrum.
+
+Removing the fitted regressor takes the loss ``tr(V G_j)`` from the wavelet variance of level j,
+which is added again: V is the covariance of the coefficients and G_j the mean product of the
+regressors' wavelet coefficients, here ``var(slope)`` and ``r_j^2`` with r_j = tau_j / 2.
 """
 
 from __future__ import annotations
@@ -46,48 +50,49 @@ def ols_slope(wv: WaveletVariance) -> Slope:
     """
     index = _existing(wv)
     run = np.concatenate([[0], np.cumsum(np.diff(index) > 1)])
-    centred = [
+    x, y = (
         values - (np.bincount(run, values) / np.bincount(run))[run]
         for values in (index * (wv.block * wv.dt), wv.blocks[index])
-    ]
-    t, means = centred
-    return Slope(float(t @ means / (t @ t)), 0.0)
+    )
+    return Slope(float(x @ y / (x @ x)), 0.0)
 
 
 def gls_slope(wv: WaveletVariance, psd: PSD) -> Slope:
     """Generalized least-squares slope for noise of spectrum ``psd``.
 
-    Nothing is taken from a difference across a gap: the wavelet variances do not see it either.
+    Differences across a gap are left out: the wavelet variances do not see them either.
     """
     index = _existing(wv)
     first = _beside(index)
-    difference = wv.blocks[first + 1] - wv.blocks[first]
+    y = wv.blocks[first + 1] - wv.blocks[first]
+    x = np.full(first.size, wv.block * wv.dt)
     column = difference_covariance(psd, wv.dt, wv.block, wv.blocks.size)
-    weights = _solve(column, first, np.ones(first.size))
-    information = float(np.sum(weights))
-    step = wv.block * wv.dt
+    solved = _solve(column, first, x)
+    information = float(x @ solved)
     if not information > 0.0:
         raise InputError(
-            f"{wv.name or 'the series'} has means over {step:.3g} s that rounding alone tells "
-            "apart, which leaves no drift to estimate: take a model without RateRamp"
+            f"{wv.name or 'the series'} has means over {x[0]:.3g} s that differ only by rounding, "
+            "which leaves no drift to estimate: take a model without RateRamp"
         )
-    variance = _growth(wv) / information / step**2
-    return Slope(float(weights @ difference) / information / step, variance)
+    return Slope(float(solved @ y) / information, _growth(wv) / information)
 
 
 def slope_p_value(wv: WaveletVariance, psd: PSD) -> float:
     """Probability of a slope as steep without a ramp, whatever walk the record does not resolve.
 
-    A random walk that is seen once looks like a ramp, and a noise fitted to what a line leaves of
-    it holds little of it. So the two-sided p-value of the slope is taken under the noise plus a
-    random walk, and averaged over the size of the walk with the restricted likelihood of the block
-    means, in which the slope has no part (Harville 1974, *Biometrika* 61, 383-385), as weight. Its
-    prior is even in the logarithm over all sizes that matter beside the noise.
+    A random walk seen once looks like a ramp, and noise fitted to what a line leaves of it holds
+    little of it. So the two-sided p-value of the slope is taken under the noise plus a random walk,
+    and averaged over the size of the walk with the restricted likelihood of the block means, in
+    which the slope has no part (Harville 1974, *Biometrika* 61, 383-385), as weight. Its prior is
+    even in the logarithm over all sizes that matter beside the noise.
 
     psd: Spectrum ``psd(f, dt)`` of the noise without the drift, two-sided, in u^2/Hz.
     Returns: 1 where too few blocks exist.
     """
-    blocks, block = _coarser(wv)
+    # Few enough block means that dense matrices of them are quick.
+    merged = -(-wv.blocks.size // _MERGED)
+    whole = wv.blocks.size // merged * merged
+    blocks, block = wv.blocks[:whole].reshape(-1, merged).mean(axis=1), wv.block * merged
     first = _beside(np.flatnonzero(~np.isnan(blocks)))
     if first.size + 1 < tuning.FEWEST_BLOCKS:
         return 1.0
@@ -95,12 +100,12 @@ def slope_p_value(wv: WaveletVariance, psd: PSD) -> float:
         toeplitz(difference_covariance(each, wv.dt, block, blocks.size))[np.ix_(first, first)]
         for each in (psd, RandomWalk(1.0).psd)
     )
-    apart, difference = np.full(first.size, block * wv.dt), blocks[first + 1] - blocks[first]
-    alone = _restricted(noise, apart, difference)
-    unit = alone[1] * float(np.sum(apart))  # K^2 of a walk whose slope is as uncertain
+    x, y = np.full(first.size, block * wv.dt), blocks[first + 1] - blocks[first]
+    # K^2 of a walk that makes the slope as uncertain as the noise does.
+    unit = _restricted(noise, x, y)[1] * float(np.sum(x))
     found = np.array(
         [
-            _restricted(noise + ratio * unit * walk, apart, difference)
+            _restricted(noise + ratio * unit * walk, x, y)
             for ratio in np.geomspace(tuning.LEAST_WALK, tuning.LARGEST_WALK, _WALKS)
         ]
     )
@@ -109,22 +114,13 @@ def slope_p_value(wv: WaveletVariance, psd: PSD) -> float:
     return float(weight @ chance / np.sum(weight))
 
 
-def _coarser(wv: WaveletVariance) -> tuple[FloatArray, int]:
-    """At most so many block means that dense matrices of them are quick, and their samples."""
-    merged = -(-wv.blocks.size // _MERGED)
-    whole = wv.blocks.size // merged * merged
-    return wv.blocks[:whole].reshape(-1, merged).mean(axis=1), wv.block * merged
-
-
-def _restricted(
-    covariance: FloatArray, apart: FloatArray, difference: FloatArray
-) -> tuple[float, float, float]:
-    """Slope, its variance, and the restricted log-likelihood but for a constant."""
+def _restricted(covariance: FloatArray, x: FloatArray, y: FloatArray) -> tuple[float, float, float]:
+    """Coefficient of y on x, its variance, and the restricted log-likelihood up to a constant."""
     factor = cho_factor(covariance, lower=True)
-    solved = cho_solve(factor, np.column_stack([apart, difference]))
-    information = float(apart @ solved[:, 0])
-    slope = float(apart @ solved[:, 1]) / information
-    squares = float(difference @ solved[:, 1]) - slope**2 * information
+    solved = cho_solve(factor, np.column_stack([x, y]))
+    information = float(x @ solved[:, 0])
+    slope = float(x @ solved[:, 1]) / information
+    squares = float(y @ solved[:, 1]) - slope**2 * information
     half_log_determinant = float(np.sum(np.log(np.diag(factor[0]))))
     likelihood = -half_log_determinant - 0.5 * np.log(information) - 0.5 * squares
     return slope, 1.0 / information, float(likelihood)
@@ -147,7 +143,7 @@ def _beside(index: NDArray[np.intp]) -> NDArray[np.intp]:
 
 
 def _growth(wv: WaveletVariance) -> float:
-    """By how much filled samples raise the variance of block means: as that of the last level."""
+    """Growth of the variance of block means by filled samples, taken as that of the last level."""
     return 1.0 if wv.gaps is None else 1.0 + max(float(wv.gaps.change[-1]), 0.0)
 
 
@@ -166,8 +162,8 @@ def _existing(wv: WaveletVariance) -> NDArray[np.intp]:
 def _solve(column: FloatArray, first: NDArray[np.intp], right: FloatArray) -> FloatArray:
     """Solve for the covariance of differences of neighbouring blocks, at these places of all.
 
-    ``column`` is the autocovariance of all differences. What noise hardly has in some directions is
-    solved for in the others.
+    ``column`` is the autocovariance of all differences. A covariance that is singular to rounding
+    is solved by least squares.
     """
     try:
         if first.size == column.size:
@@ -178,7 +174,7 @@ def _solve(column: FloatArray, first: NDArray[np.intp], right: FloatArray) -> Fl
 
 
 def bias_of_detrending(wv: WaveletVariance, slope: Slope) -> FloatArray:
-    """What removing the estimated slope takes from each expected wavelet variance, u^2, (J,).
+    """Loss tr(V G_j) of each expected wavelet variance by removing the estimated slope, u^2, (J,).
 
     The covariance of the best linear unbiased estimate with any other unbiased one, such as twice
     the mean coefficient over tau, is its own variance; hence tau^2/4 var(slope).

@@ -1,4 +1,11 @@
-"""At which averaging times, and by which wavelet, a model meets the data."""
+"""The levels at which a model meets the data, and the model's curves there.
+
+Curves are in closed form, or simulated for processes that are known by simulation only (indirect
+inference): the mean over R series as long as the data, made with the same random numbers whatever
+the parameters, takes the place of the closed form, and the covariance of the moments grows by
+(1 + 1/R) (Gourieroux, Monfort & Renault 1993, *J. Applied Econometrics* 8, S85-S118; eq. (13) ff.
+of Stebler et al. 2012).
+"""
 
 from __future__ import annotations
 
@@ -12,11 +19,53 @@ import numpy as np
 from gmwm._core.frozen import frozen
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
-from gmwm.estimate.problem.simulation import Simulation
 from gmwm.process import PSD, Model, Process, Shape
-from gmwm.variance import WaveletVariance, pilot_psd
+from gmwm.variance import WaveletVariance, pilot_psd, wavelet_variance
 
-_USUAL = Simulation(10, 0)
+
+@dataclass(frozen=True)
+class Simulation:
+    """How moments are simulated.
+
+    replications: Number of series.
+    """
+
+    replications: int
+    seed: int
+
+    def inflation(self, lengths: float = 1.0) -> float:
+        """Growth of the covariance of the moments, for data of so many simulated lengths."""
+        return 1.0 + lengths / self.replications
+
+    def curve(
+        self, process: Process, tau: FloatArray, n: int, dt: float, wavelet: str
+    ) -> FloatArray:
+        """Mean wavelet variance over the simulated series, u^2, same shape as ``tau``.
+
+        Between levels it is interpolated in logarithms.
+        """
+        times, variance = _simulated(self, process, n, dt, wavelet)
+        if not np.any(variance > 0.0):
+            return np.zeros_like(tau)
+        level = np.log(np.maximum(variance, np.finfo(float).tiny))
+        return np.asarray(np.exp(np.interp(np.log(tau), np.log(times), level)))
+
+
+@lru_cache(maxsize=1024)
+def _simulated(
+    simulation: Simulation, process: Process, n: int, dt: float, wavelet: str
+) -> tuple[FloatArray, FloatArray]:
+    """Averaging times and mean wavelet variances; a fit asks for the same terms repeatedly."""
+    total: FloatArray | float = 0.0
+    times = np.ones(1)
+    for replication in range(simulation.replications):
+        rng = np.random.default_rng([simulation.seed, replication])
+        series = process.simulate(n, dt, rng)
+        if np.all(series == series[0]):
+            continue  # rounded to nothing: no variance
+        wv = wavelet_variance(series, dt, wavelet=wavelet)
+        times, total = wv.tau, total + wv.variance
+    return times, np.asarray(total / simulation.replications)
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,17 +75,16 @@ class Scales:
     tau: (J,), averaging times, s.
     dt: Sampling interval, s.
     n: Length of the record, samples.
-    simulation: How curves that have no closed form are found.
-    simulate_all: Whether all are found so.
-    shared: What fits of several models to these levels ask for again: starting shapes and their
-        curves, by what they belong to.
+    simulation: How curves without a closed form are simulated.
+    simulate_all: Whether all curves are simulated.
+    shared: Cache of starting shapes and their curves, for fits of several models to these levels.
     """
 
     tau: FloatArray
     dt: float
     n: int
     wavelet: str = "haar"
-    simulation: Simulation = _USUAL
+    simulation: Simulation = Simulation(10, 0)
     simulate_all: bool = False
     shared: dict[Any, Any] = field(default_factory=dict, init=False, repr=False)
 
@@ -72,7 +120,7 @@ class Scales:
         return lambda shape: process.unit_haar_slopes(shape, self.tau, self.dt)
 
     def is_simulated(self, process: Process) -> bool:
-        """Whether its curve is found by simulation."""
+        """Whether the curve of a process is simulated."""
         return self.simulate_all or not process.has_spectrum()
 
     def spectrum(self, model: Model) -> PSD:
@@ -95,5 +143,5 @@ def _of_levels(tau: tuple[float, ...], dt: float, n: int, wavelet: str) -> Scale
 
 
 def is_plain(process: Process) -> bool:
-    """Whether an instance holds nothing but parameters, so that equal ones are the same."""
+    """Whether an instance holds only parameters, so that equal ones are the same."""
     return vars(process).keys() <= {parameter.name for parameter in process.parameters}

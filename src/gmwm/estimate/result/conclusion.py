@@ -1,4 +1,4 @@
-"""From estimates of the noise, by whatever method, to a `Fit`."""
+"""The one place where the estimates of a method become a `Fit`."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gmwm._core.notices import Notice
 from gmwm._core.typing import FloatArray
 from gmwm.estimate import tuning
 from gmwm.estimate.problem import (
@@ -19,30 +18,29 @@ from gmwm.estimate.problem import (
     slope_dof,
     weight_root,
 )
-from gmwm.estimate.result.bound import upper_amplitude
 from gmwm.estimate.result.fit import Fit
+from gmwm.estimate.result.intervals import upper_amplitude
 from gmwm.estimate.result.remarks import (
-    bandwidth_notices,
-    bound_notices,
-    confounded_notices,
-    indistinct_notices,
+    estimate_notices,
     misfit_notices,
     missed_level_notices,
-    undetermined_notices,
 )
+from gmwm.issues import Notice
 from gmwm.process import Process
 from gmwm.variance import WaveletVariance
 
 
 @dataclass(frozen=True, eq=False)
 class Estimates:
-    """Estimates of the noise terms of a model.
+    """Estimates of the noise terms of a model by some method.
 
     coordinates: Of the whole model.
     processes: Its noise terms with their values, those of zero amplitude included.
     covariance: (d, d), of the coordinates of the terms that have an amplitude.
-    absent: Noise term of zero amplitude -> 95 % upper bound of its scale.
+    absent: Noise term of zero amplitude -> 95 % upper limit of its scale.
     slope: Of the rate ramp, where it is estimated.
+    method, weights, discrepancy, log_likelihood, trace: See `Fit`.
+    notices: Those that only the method finds.
     """
 
     coordinates: Coordinates
@@ -50,6 +48,12 @@ class Estimates:
     covariance: FloatArray
     absent: Mapping[int, float]
     slope: Slope | None
+    method: str
+    weights: str = ""
+    discrepancy: float = 0.0
+    notices: Sequence[Notice] = ()
+    log_likelihood: float = float("nan")
+    trace: Sequence[float] = ()
 
     @property
     def present(self) -> list[int]:
@@ -62,16 +66,10 @@ class Estimates:
 class Comparison:
     """Agreement of wavelet variances with those of a model.
 
-    Attributes
-    ----------
-    objective : float
-        Weighted sum of squares.
-    chi_square : float
-        The same on cube roots under statistical errors; NaN where it has no meaning.
-    chi_square_allowed : float
-        With the discrepancy.
-    dof : int
-        Levels less parameters.
+    objective: Weighted sum of squares.
+    chi_square: Sum of squares on cube roots under statistical errors; NaN where it has no meaning.
+    chi_square_allowed: With the discrepancy in the errors.
+    dof: Levels less parameters.
     """
 
     objective: float
@@ -104,23 +102,12 @@ class Comparison:
 
 
 def conclude(
-    found: Estimates,
-    comparison: Comparison,
-    wv: WaveletVariance,
-    *,
-    method: str,
-    weights: str = "",
-    discrepancy: float = 0.0,
-    misfits: bool = False,
-    notices: Sequence[Notice] = (),
-    log_likelihood: float = float("nan"),
-    trace: Sequence[float] = (),
+    found: Estimates, comparison: Comparison, wv: WaveletVariance, *, misfits: bool
 ) -> Fit:
-    """Make the `Fit`; see there for the arguments.
+    """Make the `Fit` of some estimates and judge it.
 
     wv: The data.
     misfits: Whether the fit fails the chi-square test.
-    notices: Those of the method; what the estimates themselves show is added.
     """
     slope = found.slope
     model, all_keys = found.coordinates.fitted(
@@ -129,7 +116,7 @@ def conclude(
     keys = [all_keys[k] for k in found.present]
     jacobian = found.coordinates.jacobian(found.processes)[np.ix_(found.present, found.present)]
     matrix = jacobian @ found.covariance @ jacobian.T
-    upper = _upper_bounds(found, all_keys, wv)
+    upper = _upper_limits(found, all_keys, wv)
     dof = float("inf")
     if slope is not None:
         dof = slope_dof(model, keys, matrix, wv.n, wv.dt)
@@ -137,6 +124,7 @@ def conclude(
         matrix = np.pad(matrix, (0, 1))
         matrix[-1, -1] = slope.variance
     ordered, matrix = in_model_order(model, keys, matrix)
+    before, after = estimate_notices(model, ordered, matrix, upper, wv)
     fit = Fit(
         model=model,
         wv=wv,
@@ -147,48 +135,42 @@ def conclude(
         chi_square=comparison.chi_square,
         chi_square_allowed=comparison.chi_square_allowed,
         dof=comparison.dof,
-        discrepancy=discrepancy,
-        method=method,
-        weights=weights,
-        notices=(
-            *bound_notices(upper),
-            *undetermined_notices(model, ordered, matrix),
-            *indistinct_notices(model, ordered, matrix),
-            *confounded_notices(model, ordered, matrix),
-            *notices,
-            *bandwidth_notices(model, wv),
-            *wv.notices,
-        ),
-        log_likelihood=log_likelihood,
-        trace=tuple(trace),
+        discrepancy=found.discrepancy,
+        method=found.method,
+        weights=found.weights,
+        notices=(*before, *found.notices, *after, *wv.notices),
+        log_likelihood=found.log_likelihood,
+        trace=tuple(found.trace),
         slope_dof=dof,
     )
     shown = missed_level_notices(fit.goodness)
     if misfits or fit.goodness.is_poor:
-        shown += misfit_notices(fit.goodness, discrepancy, failed=misfits)
+        shown += misfit_notices(fit.goodness, found.discrepancy, failed=misfits)
     return replace(fit, notices=(*fit.notices, *shown)) if shown else fit
 
 
-def _upper_bounds(found: Estimates, keys: Sequence[str], wv: WaveletVariance) -> dict[str, float]:
-    """95 % upper bounds of amplitudes that are zero, or have no shape and are not above zero."""
+def _upper_limits(found: Estimates, keys: Sequence[str], wv: WaveletVariance) -> dict[str, float]:
+    """95 % upper limits of amplitudes that are zero, or have no shape and are not significant."""
     coordinates = found.coordinates
-    bounds = {}
+    present = [j for j in range(len(coordinates.terms)) if j not in found.absent]
     rows = {k: row for row, k in enumerate(found.present)}
+    limits = {}
     for k, (i, is_amplitude) in enumerate(coordinates.owners):
-        term = coordinates.terms[i]
         if not is_amplitude:
             continue
         if i in found.absent:
-            bounds[keys[k]] = found.absent[i]
+            limits[keys[k]] = found.absent[i]
             continue
-        deviation = float(np.sqrt(found.covariance[rows[k], rows[k]]))
-        if not term.n_shapes and deviation > 1.0 / tuning.SIGNIFICANT:
-            power = term.linear.power
-            amplitude = float(found.processes[i].values[term.linear.name] or 0.0) ** power
-            part = [j for j in range(len(coordinates.terms)) if j not in found.absent]
-            bound = upper_amplitude(
-                coordinates.without(list(found.absent)), [found.processes[j] for j in part],
-                part.index(i), amplitude, deviation * amplitude, amplitude, wv,
-            )  # fmt: skip
-            bounds[keys[k]] = bound ** (1.0 / power)
-    return bounds
+        term, deviation = coordinates.terms[i], float(np.sqrt(found.covariance[rows[k], rows[k]]))
+        if term.n_shapes or not deviation > 1.0 / tuning.SIGNIFICANT:
+            continue
+        amplitude = float(found.processes[i].values[term.linear.name] or 0.0) ** term.linear.power
+        limit = upper_amplitude(
+            coordinates.without(list(found.absent)),
+            [found.processes[j] for j in present],
+            present.index(i),
+            (amplitude, deviation * amplitude, amplitude),
+            wv,
+        )
+        limits[keys[k]] = limit ** (1.0 / term.linear.power)
+    return limits

@@ -1,11 +1,15 @@
-"""One estimated parameter, for people and programs."""
+"""One estimated parameter, and where in an Allan plot it was read."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar, Literal
+from fractions import Fraction
+from typing import Annotated, Any, ClassVar, Literal
 
+from annotated_types import Ge, Le
+
+from gmwm._core.documents import Positive, Text
 from gmwm._core.units import field_units, si_parameter_unit
 from gmwm.process import Model
 
@@ -16,7 +20,7 @@ HEAD = f"{'parameter':<16} {'estimate':>11} {'std. error':>10}  {'95 % interval'
 
 @dataclass(frozen=True)
 class InUnit:
-    """An estimate in a unit of the field.
+    """An estimate in a data-sheet unit.
 
     value, lower, upper: In ``unit``.
     """
@@ -36,7 +40,7 @@ class Estimate:
     key : str
         As in ``Fit.params``.
     kind : {"estimated", "bound", "fixed", "undefined"}
-        "bound": not significantly above zero, ``upper`` is a 95 % bound; "fixed": given, not
+        "bound": not significantly above zero, ``upper`` is a 95 % upper limit; "fixed": given, not
         estimated; "undefined": the term has no amplitude, so that its shape means nothing.
     value : float
         SI.
@@ -48,7 +52,7 @@ class Estimate:
         SI.
     meaning : str
     field : tuple of InUnit
-        The same in the units of the field, the usual one first; empty where SI is usual.
+        The estimate in data-sheet units, the usual one first; empty where SI is usual.
     """
 
     COLUMNS: ClassVar = ("key", "kind", "value", "stderr", "lower", "upper", "unit", "meaning")
@@ -65,17 +69,16 @@ class Estimate:
 
     @property
     def usual(self) -> InUnit:
-        """In the unit that the field uses."""
+        """The estimate in the unit that data sheets use."""
         if self.field:
             return self.field[0]
         return InUnit(self.value, self.lower, self.upper, self.unit)
 
     def __str__(self) -> str:
         """A line under `HEAD`."""
-        error = ""
-        value = "-" if self.kind == "undefined" else f"{self.value:.5g}"
+        error, value = "", f"{self.value:.5g}"
         if self.kind == "undefined":
-            interval = "term has no amplitude"
+            value, interval = "-", "term has no amplitude"
         elif self.kind == "fixed":
             interval = "fixed"
         elif self.kind == "bound":
@@ -88,7 +91,7 @@ class Estimate:
         return f"{name}{value:>{max(28 - len(name), 0)}} {error:>10}  {interval:<22} {self.unit}"
 
     def to_dict(self) -> dict[str, Any]:
-        """In JSON types, a column each."""
+        """The columns of `Fit.to_frame`, in JSON types."""
         return {name: getattr(self, name) for name in self.COLUMNS}
 
 
@@ -106,14 +109,15 @@ def estimates_of(
     stderr, intervals, upper_bounds: By key, SI.
     """
     for item in model.parameters:
-        key, value = item.key, float(item.value or 0.0)
+        key, value, term = item.key, float(item.value or 0.0), model.terms[item.term]
         low, high = intervals.get(key, (value, value))
+        linear = term.linear_parameter
         kind: Kind = "fixed"
         if key in upper_bounds:
             kind = "bound"
         elif key in stderr:
             kind = "estimated"
-        elif _has_no_amplitude(model, item.term) and item.parameter.role == "shape":
+        elif item.parameter.role == "shape" and linear and term.values[linear.name] == 0.0:
             kind = "undefined"
         yield Estimate(
             key=key,
@@ -131,6 +135,23 @@ def estimates_of(
         )
 
 
-def _has_no_amplitude(model: Model, place: int) -> bool:
-    linear = model.terms[place].linear_parameter
-    return linear is not None and model.terms[place].values[linear.name] == 0.0
+@dataclass(frozen=True)
+class Region:
+    """A straight part of the log-log Allan plot from which a parameter was read.
+
+    key: The parameter.
+    slope: Of the Allan deviation: -1, -1/2, 0, 1/2 or 1.
+    tau_min, tau_max: First and last averaging time of the region, s.
+    coefficient: Of the line ``coefficient * tau^slope``, u/s^slope.
+    """
+
+    key: Text
+    slope: Annotated[float, Ge(-1.0), Le(1.0)]
+    tau_min: Positive
+    tau_max: Positive
+    coefficient: float
+
+
+def slope_name(slope: float) -> str:
+    """A slope of the Allan deviation as people write it: -1, -1/2, 0, +1/2, +1."""
+    return f"{'+' if slope > 0.0 else ''}{Fraction(slope)}"

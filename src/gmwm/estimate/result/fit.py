@@ -5,35 +5,39 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, ClassVar, Self
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self
 
 import numpy as np
+from annotated_types import Ge, Gt, Le, MaxLen
+from pydantic import Field
 
 from gmwm._core import checks
 from gmwm._core.distributions import chi2, norm
-from gmwm._core.documents import Document
+from gmwm._core.documents import (
+    Array,
+    Document,
+    OrInfinity,
+    OrNaN,
+    Text,
+    check_covariance,
+)
 from gmwm._core.frames import frame
 from gmwm._core.frozen import freeze, frozen
-from gmwm._core.notices import Notice
 from gmwm._core.text import Printed, bullets, per_cent, wrapped
 from gmwm._core.typing import FloatArray
 from gmwm._core.units import shown_unit
-from gmwm.errors import MissingNameError
+from gmwm.errors import InputError, MissingNameError
 from gmwm.estimate.problem import FittedMoments, Scales, drift_key, error_growth
-from gmwm.estimate.result.estimate import HEAD, Estimate, estimates_of
+from gmwm.estimate.result.estimate import HEAD, Estimate, Region, estimates_of, slope_name
 from gmwm.estimate.result.goodness import Goodness
-from gmwm.estimate.result.interval import confidence_interval
-from gmwm.estimate.result.region import Region, slope_name
-from gmwm.estimate.result.remarks import REASONS
-from gmwm.estimate.result.serialization import fields_of, fit_content, plain
+from gmwm.estimate.result.intervals import confidence_interval
+from gmwm.issues import CATALOGUE, Notice
 from gmwm.process import Model
 from gmwm.variance import WaveletVariance
 
 if TYPE_CHECKING:
     import pandas
     from matplotlib.axes import Axes
-
-    from gmwm._core.forms import Form
 
 METHOD_NAMES = {
     "gmwm": "GMWM",
@@ -43,7 +47,10 @@ METHOD_NAMES = {
     "mle": "exact maximum likelihood",
     "whittle": "debiased Whittle likelihood",
 }
-"""Methods as they are named in tables."""
+"""Names of the methods in tables."""
+
+_LARGEST_DISCREPANCY = 1000.0  # a model that is off by more describes nothing
+_PER_OCTAVE = 12  # points of a curve: with one, a line and a resonance look broken
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -67,68 +74,72 @@ class Fit(Document, Printed):
     objective : float
         Weighted sum of squares (nu_hat - nu)' Sigma^-1 (nu_hat - nu) at the estimate.
     chi_square : float
-        The same on the cube roots of the wavelet variances, which are close to normal at coarse
-        levels too: chi-square with ``dof`` degrees of freedom if the model is right. NaN where
-        there are none, or the method does not minimise it.
+        Sum of squares on the cube roots of the wavelet variances, which are close to normal at
+        coarse levels too: chi-square with ``dof`` degrees of freedom if the model is right. NaN
+        where there are none, or the method does not minimise it.
     chi_square_allowed : float
-        The same with the discrepancy in the errors; equal where there is none.
+        ``chi_square`` with the discrepancy in the errors.
     dof : int
         Levels less estimated parameters.
     discrepancy : float
         Relative error allowed for at each level, as a fraction of the variance; zero where the
         model describes the data to within their statistical errors.
     method, weights : str
-        How it was estimated; ``weights`` is empty but for the method of moments.
+        How it was estimated; only the method of moments has ``weights``.
     notices : tuple of Notice
-        What makes it invalid ("bad"), and what else there is to know.
+        Severity "bad" makes the fit not valid.
     log_likelihood : float
-        At the estimate, of the methods that maximise it; NaN for the others.
+        At the estimate; NaN for methods that do not maximise it.
     trace : tuple of float
         Log-likelihood after each iteration of EM.
     slope_dof : float
         Degrees of freedom of the variance of a ramp's slope.
     regions : tuple of Region
-        What ``method="allan"`` read the parameters from.
+        Parts of the Allan plot that ``method="allan"`` read the parameters from.
     """
 
     SCHEMA: ClassVar[str] = "gmwm.fit"
 
     model: Model
-    wv: WaveletVariance
-    keys: tuple[str, ...]
-    covariance: FloatArray
-    upper_bounds: Mapping[str, float]
-    objective: float
-    chi_square: float
-    chi_square_allowed: float
-    dof: int
-    discrepancy: float
-    method: str
-    weights: str
+    wv: Annotated[
+        WaveletVariance,
+        Field(validation_alias="wavelet_variance", serialization_alias="wavelet_variance"),
+    ]
+    keys: tuple[Text, ...]
+    covariance: Array
+    upper_bounds: Mapping[Text, Annotated[OrInfinity, Ge(0.0)]]
+    objective: OrNaN
+    chi_square: OrNaN
+    chi_square_allowed: OrNaN
+    dof: Annotated[int, Ge(-checks.MOST_SAMPLES), Le(checks.MOST_SAMPLES)]
+    discrepancy: Annotated[float, Ge(0.0), Le(_LARGEST_DISCREPANCY)]
+    method: Text
+    weights: Text
     notices: tuple[Notice, ...]
-    log_likelihood: float = float("nan")
-    trace: tuple[float, ...] = ()
-    slope_dof: float = float("inf")
+    log_likelihood: OrNaN = float("nan")
+    trace: Annotated[tuple[float, ...], MaxLen(1_000_000)] = ()
+    slope_dof: Annotated[OrInfinity, Gt(0.0)] = float("inf")
     regions: tuple[Region, ...] = ()
 
     def __post_init__(self) -> None:
         checks.choice("method", self.method, tuple(METHOD_NAMES))
+        if not self.keys:
+            object.__setattr__(self, "covariance", np.zeros((0, 0)))
         freeze(self, "covariance", "upper_bounds")
 
-    # -- can it be trusted ------------------------------------------------------------------------
+    # -- validity ---------------------------------------------------------------------------------
 
     @property
     def valid(self) -> bool:
-        """Whether every parameter is supported by the data and the model describes them."""
+        """Whether the data support every parameter and the model describes them."""
         return not any(notice.severity == "bad" for notice in self.notices)
 
     @property
     def reasons(self) -> Mapping[str, bool]:
-        """What a valid fit has, by name, and whether this one has it."""
-        lacking = {REASONS[notice.code] for notice in self.notices if notice.severity == "bad"}
-        result: Mapping[str, bool] = frozen(
-            {name: name not in lacking for name in REASONS.values()}
-        )
+        """Conditions of a valid fit by name, and whether this one meets them."""
+        lacking = {notice.issue.lacks for notice in self.notices if notice.severity == "bad"}
+        names = (issue.lacks for issue in CATALOGUE.values() if issue.lacks)
+        result: Mapping[str, bool] = frozen({name: name not in lacking for name in names})
         return result
 
     @property
@@ -138,18 +149,13 @@ class Fit(Document, Printed):
 
     @property
     def p_value(self) -> float:
-        """Of the chi-square test under statistical errors alone; NaN where there is none."""
-        return self._p_of(self.chi_square)
+        """p-value of the chi-square test under statistical errors alone; NaN without a test."""
+        return _p_value(self.chi_square, self.dof)
 
     @property
     def p_value_allowed(self) -> float:
-        """The same with the discrepancy allowed for, which is made so that it is about 0.5."""
-        return self._p_of(self.chi_square_allowed)
-
-    def _p_of(self, statistic: float) -> float:
-        if np.isnan(statistic) or self.dof <= 0:
-            return float("nan")
-        return float(chi2.sf(statistic, self.dof))
+        """p-value with the discrepancy allowed for, which is chosen to make it about 0.5."""
+        return _p_value(self.chi_square_allowed, self.dof)
 
     # -- numbers ----------------------------------------------------------------------------------
 
@@ -166,10 +172,9 @@ class Fit(Document, Printed):
 
     @cached_property
     def error_growth(self) -> Mapping[str, float]:
-        """How the relative standard error of a positive parameter goes with its value.
+        """Exponents with which relative standard errors grow with the parameters, by key.
 
-        The exponent of a power law, by key. Only intervals need it, and of the many fits among
-        which one is selected few are asked for theirs.
+        Only intervals need it, and a selection asks few of its many fits for theirs.
         """
         if self.method == "allan":
             return {}
@@ -178,10 +183,10 @@ class Fit(Document, Printed):
         return result
 
     def interval(self, level: float = 0.95) -> dict[str, tuple[float, float]]:
-        """Confidence intervals that keep to the parameters' ranges.
+        """Confidence intervals that stay in the parameters' ranges.
 
-        See `gmwm.estimate.result.interval.confidence_interval`. The interval of an amplitude that
-        is not significantly above zero goes from zero to its upper bound (which is one of 95 %).
+        See `gmwm.estimate.result.intervals.confidence_interval`. An amplitude that is not
+        significantly above zero has the interval from zero to its 95 % upper limit.
 
         Parameters
         ----------
@@ -206,16 +211,20 @@ class Fit(Document, Printed):
                 result[key] = (0.0, float(self.upper_bounds[key]))
             elif key in errors:
                 result[key] = confidence_interval(
-                    item.parameter, value, errors[key], level,
-                    growth=self.error_growth.get(key, 0.0), slope_dof=self.slope_dof,
-                )  # fmt: skip
+                    item.parameter,
+                    value,
+                    errors[key],
+                    level,
+                    growth=self.error_growth.get(key, 0.0),
+                    slope_dof=self.slope_dof,
+                )
         return result
 
     def needed_length(self, relative_error: float = 0.1) -> dict[str, float]:
         """Length of record that would give each parameter a relative standard error.
 
-        Errors go with the root of the length. That is too hopeful where a discrepancy was allowed
-        for, which no length removes.
+        Errors fall as 1/sqrt(length). That is optimistic where a discrepancy was allowed for, which
+        no length removes.
 
         Parameters
         ----------
@@ -276,8 +285,8 @@ class Fit(Document, Printed):
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Allan deviation of the fitted model with its interval, at any averaging times.
 
-        It holds if the model is the right one. Where others describe the data as well, which is
-        frequent beyond a tenth of the record, give them: the interval then reaches over all.
+        The interval holds if the model is the right one. Often others fit equally well beyond a
+        tenth of the record: give them as ``rivals``, and the interval covers all of them.
 
         Parameters
         ----------
@@ -319,7 +328,7 @@ class Fit(Document, Printed):
 
     @cached_property
     def estimates(self) -> tuple[Estimate, ...]:
-        """Every parameter with its uncertainty, in SI and field units, in the model's order."""
+        """Every parameter with its uncertainty, in SI and data-sheet units."""
         return tuple(
             estimates_of(
                 self.model, self.wv.quantity or "", self.stderr, self.interval(), self.upper_bounds
@@ -338,7 +347,12 @@ class Fit(Document, Printed):
 
     def __str__(self) -> str:
         lines = wrapped(f"{self.wv.name or 'series'}: {self.model.title()}", indent=2)
-        lines += wrapped(f"{self._size()}, {self.wv.tau.size} levels; {self._how()}", indent=2)
+        how = METHOD_NAMES[self.method]
+        if self.weights:
+            how += f", {self.weights} weights"
+        elif self.trace:
+            how += f", {len(self.trace)} iterations"
+        lines += wrapped(f"{self._size()}, {self.wv.tau.size} levels; {how}", indent=2)
         lines += ["", HEAD, *map(str, self.estimates), ""]
         fitness = f"objective {self.objective:.4g} on {self.dof} degrees of freedom"
         if np.isfinite(self.p_value):
@@ -360,21 +374,13 @@ class Fit(Document, Printed):
     def _size(self) -> str:
         return f"{self.wv.n:,} samples at {1.0 / self.wv.dt:g} Hz"
 
-    def _how(self) -> str:
-        name = METHOD_NAMES[self.method]
-        if self.weights:
-            return f"{name}, {self.weights} weights"
-        return f"{name}, {len(self.trace)} iterations" if self.trace else name
-
     def plot(self, ax: Axes | None = None, *, units: str = "field") -> Axes:
         """Allan deviation with error bars, fitted curve and components; returns the axes.
 
-        In the units of the field (deg/h, ug), or in SI if ``units`` is "si". For
-        ``method="allan"`` the lines and the regions that they were read from take the place of the
-        components.
+        In data-sheet units (deg/h, ug), or in SI if ``units`` is "si". For ``method="allan"`` the
+        lines and their regions take the place of the components.
         """
         from gmwm import plotting
-        from gmwm.estimate.result.curves import dense_curves
 
         factor = shown_unit(self.wv.quantity, self.wv.unit, units)[1]
         axes = self.wv.plot(ax, units=units)
@@ -384,20 +390,14 @@ class Fit(Document, Printed):
         shown = {} if self.regions else components
         plotting.curves(axes, tau, total, shown, factor * self.wv.allan_deviation)
         if self.regions:
-            plotting.straight_lines(axes, self._lines(factor))
+            lines = {}
+            for region in self.regions:
+                found, slope = self[region.key], slope_name(region.slope)
+                label = f"{region.key} = {found.value:.3g} {found.unit} (slope {slope})"
+                height = factor * region.coefficient
+                lines[label] = (region.slope, height, region.tau_min, region.tau_max)
+            plotting.straight_lines(axes, lines)
         return axes
-
-    def _lines(self, factor: float) -> dict[str, tuple[float, float, float, float]]:
-        """Lines of the Allan plot as `gmwm.plotting.straight_lines` takes them."""
-        lines = {}
-        for region in self.regions:
-            found = self[region.key]
-            slope = slope_name(region.slope)
-            label = f"{region.key} = {found.value:.3g} {found.unit} (slope {slope})"
-            lines[label] = (
-                region.slope, factor * region.coefficient, region.tau_min, region.tau_max
-            )  # fmt: skip
-        return lines
 
     # -- tables and files -------------------------------------------------------------------------
 
@@ -405,9 +405,8 @@ class Fit(Document, Printed):
         """A table of the parameters, one a row, in SI units; needs pandas."""
         return frame((estimate.to_dict() for estimate in self.estimates), Estimate.COLUMNS)
 
-    def content(self) -> dict[str, Any]:
-        """What it cannot be rebuilt without, and what readers of the file want, in JSON types."""
-        return fit_content(self) | {
+    def derived(self) -> dict[str, Any]:
+        return {
             "params": self.params,
             "stderr": self.stderr,
             "p_value": plain(self.p_value),
@@ -416,13 +415,47 @@ class Fit(Document, Printed):
             "units": {estimate.key: estimate.unit for estimate in self.estimates},
         }
 
-    @classmethod
-    def document_form(cls) -> type[Form]:
-        from gmwm.estimate.result.form import FitForm
-
-        return FitForm
+    def check_content(self) -> None:
+        if self.model.is_open or len({*self.keys}) != len(self.keys):
+            raise ValueError("its model has open parameters, or a key stands twice")
+        if not {*self.keys} <= {*self.params}:
+            raise ValueError("keys are not those of parameters")
+        check_covariance(self.covariance.tolist(), len(self.keys))
 
     @classmethod
     def from_content(cls, content: Mapping[str, Any]) -> Self:
-        """Inverse of `content`."""
-        return cls(**fields_of(content))
+        found = super().from_content(content)
+        if content["params"] != found.params:
+            raise InputError(f"its model {found.model!r} and its parameters do not belong together")
+        return found
+
+
+def _p_value(statistic: float, dof: int) -> float:
+    if np.isnan(statistic) or dof <= 0:
+        return float("nan")
+    return float(chi2.sf(statistic, dof))
+
+
+def plain(value: float) -> float | None:
+    """A number for JSON, which has no infinity and no NaN."""
+    return value if np.isfinite(value) else None
+
+
+def dense_curves(
+    fitted: Fit, model: Model | None = None
+) -> tuple[FloatArray, dict[str, FloatArray]]:
+    """Allan deviation of each term of a model at closely spaced whole numbers of samples.
+
+    model: The fitted one by default.
+    Returns: tau (k,), averaging times from the first to the last of the data, s, and only those of
+        the data where a term is simulated or the wavelet is not Haar's; deviations by the term's
+        label, u, the root of whose sum of squares is that of the model.
+    """
+    wv, shown = fitted.wv, fitted.model if model is None else model
+    scales = Scales.of(wv)
+    if wv.wavelet == "haar" and not any(map(scales.is_simulated, shown.terms)):
+        octaves = np.log2(wv.tau[-1] / wv.tau[0])
+        steps = 2.0 ** np.linspace(0.0, octaves, int(_PER_OCTAVE * octaves) + 1)
+        scales = replace(scales, tau=wv.dt * np.unique(np.rint(steps * wv.tau[0] / wv.dt)))
+    curves = [np.sqrt(2.0 * scales.curve(term)) for term in shown.terms]
+    return scales.tau, dict(zip(shown.term_labels(), curves, strict=True))

@@ -1,8 +1,8 @@
 """How well a fitted model describes the data, octave by octave.
 
 With a million samples any model of a real sensor fails a chi-square test: the fine levels are known
-to a tenth of a per cent. What matters is by how much the model misses the Allan deviation, and
-whether that is more than chance at averaging times that count.
+to a tenth of a per cent. So the misfit of the Allan deviation is given, and whether it exceeds
+chance at the averaging times that matter.
 """
 
 from __future__ import annotations
@@ -33,10 +33,10 @@ class Goodness:
     residual: (J,), difference of the cube roots of the variances in statistical standard errors,
         close to standard normal at every level if the model is right (Wilson & Hilferty 1931,
         *PNAS* 17, 684-688). Neighbouring levels are correlated.
-    allowed: (J,), the same in standard errors that hold the discrepancy too.
+    allowed: (J,), ``residual`` in standard errors that include the discrepancy.
     dof: (J,), equivalent degrees of freedom ``2 nu^4 / var(nu_hat^2)`` under the model.
     name, unit: Of the channel.
-    is_tested: Whether the variances are those of the data: not where gaps had to be bridged.
+    is_tested: Whether the variances are those of the data; false where gaps were bridged.
     """
 
     tau: FloatArray
@@ -93,15 +93,15 @@ class Goodness:
 
     @property
     def known_to(self) -> float:
-        """The longest averaging time (s) of those levels; NaN if there is none."""
+        """Longest averaging time (s) of levels with more than 30 degrees of freedom, or NaN."""
         known = np.flatnonzero(self.dof > tuning.WELL_KNOWN_DOF)
         return float(self.tau[known[-1]]) if known.size else float("nan")
 
     @property
     def beyond_chance(self) -> tuple[float, float, float] | None:
-        """Largest misfit that is no chance, its averaging time (s) and residual; None if none is.
+        """Largest misfit beyond chance, its averaging time (s) and residual; None if there is none.
 
-        Among levels whose residual exceeds 2.5 statistical standard errors of the model's own.
+        Among levels whose residual exceeds 2.5 statistical standard errors under the model.
         """
         far = np.abs(self.residual) > tuning.BEYOND_CHANCE
         if not self.is_tested or not np.any(far):
@@ -111,23 +111,23 @@ class Goodness:
 
     @property
     def is_poor(self) -> bool:
-        """Whether that misfit is one that predictions feel: more than 10 % of the deviation."""
+        """Whether a misfit beyond chance exceeds 10 % of the deviation: predictions suffer."""
         beyond = self.beyond_chance
         return beyond is not None and abs(beyond[0]) > tuning.POOR_DEVIATION
 
     @property
     def judged(self) -> FloatArray:
-        """The residuals that levels are judged by, (J,).
+        """Residuals that decide whether a level is missed, (J,).
 
-        With what was allowed for below 0.1 s (or ten samples), where filters and rounding show, in
-        statistical errors alone from there on.
+        The discrepancy is allowed for below 0.1 s (or ten samples), where filters and rounding
+        show; from there on errors are statistical.
         """
         fine = self.tau < max(tuning.FINEST_TIME, tuning.FINEST_SAMPLES * float(self.tau[0]))
         return np.where(fine, self.allowed, self.residual)
 
     @property
     def largest(self) -> tuple[float, float] | None:
-        """Largest of the residuals that levels are judged by, and its averaging time (s).
+        """Largest of the residuals `judged`, and its averaging time (s).
 
         Among all levels that the model gives a variance; None if there is none.
         """
@@ -141,8 +141,8 @@ class Goodness:
     def largest_p(self) -> float:
         """Probability that some level of a right model has as large a residual; NaN without one.
 
-        The levels' errors are those that the model implies itself. That of independent levels
-        (Sidak 1967, *JASA* 62, 626-633), which is an upper bound for correlated ones.
+        Errors are those that the model implies. For independent levels (Sidak 1967, *JASA* 62,
+        626-633); correlated ones have a smaller probability.
         """
         if self.largest is None:
             return float("nan")
@@ -151,27 +151,24 @@ class Goodness:
 
     @property
     def is_excluded(self) -> bool:
-        """Whether the model misses some level by more than one in a thousand right models does."""
+        """Whether the model misses a level more clearly than one in a thousand right models."""
         return self.largest_p < tuning.EXCLUDED_P
 
     @property
     def misses_a_level(self) -> bool:
-        """Whether the model misses some level by more than one in a hundred right models does.
-
-        Or by what predictions feel: see `is_poor`.
-        """
+        """Whether the model misses a level as one in a hundred right models does, or `is_poor`."""
         return self.largest_p < tuning.REDUNDANT_P or self.is_poor
 
     def loses_to(self, larger: Goodness) -> bool:
         """Whether it misses an averaging time that a larger model describes.
 
-        The sum over all levels may tie all the same.
+        Both may still have an equal sum of squares over all levels.
         """
         return self.misses_a_level and larger.describes_all
 
     @property
     def describes_all(self) -> bool:
-        """Whether the model is seen to miss no level, to one in a hundred."""
+        """Whether no level is missed, to one in a hundred."""
         return self.largest_p >= tuning.REDUNDANT_P and not self.is_poor
 
     @property
@@ -191,15 +188,12 @@ class Goodness:
             f"{self.name or 'series'}: Allan deviation of data and model",
             f"{head} {'misfit':>9} {'residual':>9} {'allowed':>8} {'dof':>8}",
         ]
-        columns = (
-            self.tau, self.data, self.model, self.misfit, self.residual, self.allowed, self.dof
-        )  # fmt: skip
-        for tau, data, model, misfit, residual, allowed, dof in zip(*columns, strict=True):
+        for j, misfit in enumerate(self.misfit):
             form = "+.2f" if abs(misfit) < 10.0 else "+,.0f" if abs(misfit) < 1e3 else "+.2g"
             share = f"{100.0 * misfit:{form}} %"
             lines.append(
-                f"{tau:>10.5g} {data:>14.4g} {model:>14.4g} {share:>9} {residual:>+9.2f} "
-                f"{allowed:>+8.2f} {dof:>8.3g}"
+                f"{self.tau[j]:>10.5g} {self.data[j]:>14.4g} {self.model[j]:>14.4g} {share:>9} "
+                f"{self.residual[j]:>+9.2f} {self.allowed[j]:>+8.2f} {self.dof[j]:>8.3g}"
             )
         return "\n".join([*lines, *wrapped(self.sentence, indent=2)])
 

@@ -3,28 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, fields
-from typing import TYPE_CHECKING, Any, ClassVar, Self
+from dataclasses import dataclass, field, fields, replace
+from typing import Annotated, Any, ClassVar, Self
 
 import numpy as np
+from annotated_types import MinLen
 
 from gmwm._core.distributions import chi2
+from gmwm._core.documents import NotNegative, OrNaN, Text
 from gmwm._core.frozen import freeze
-from gmwm._core.notices import Notice
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.estimate import tuning
 from gmwm.estimate.problem import FittedMoments, chi_square
 from gmwm.estimate.result.fit import Fit
-from gmwm.estimate.result.serialization import fields_of, or_nan, plain
+from gmwm.issues import notice
 from gmwm.process import Model
 from gmwm.variance import PooledVariance, WaveletVariance
 
-if TYPE_CHECKING:
-    from gmwm._core.forms import Form
-
 _CELLS = 4  # numbers in a line of the table
-_LEAST_SHARE = 1e-9  # of the weight in all but one recording, below which they say nothing
+_LEAST_SHARE = 1e-9  # smallest share of the weight that all recordings but one must have
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -39,20 +37,20 @@ class JointFit(Fit):
         p-value of the test that the parameters are equal in all recordings; NaN where fewer than
         two of them determine the parameters.
     curves_p : float
-        p-value of the test that the wavelet variances of each recording are those of the joint
-        model, to within the discrepancy allowed for; it judges the model too.
+        p-value of the test that each recording has the wavelet variances of the joint model, within
+        the discrepancy allowed for; it tests the model too.
     spread : dict
         Standard deviation of each parameter between recordings beyond their standard errors, by
-        key: relative for positive parameters, in its SI unit for others. Without those of which
-        one recording has all the weight.
+        key: relative for positive parameters, in SI units for others. Parameters for which one
+        recording has all the weight are left out.
     """
 
     SCHEMA: ClassVar[str] = "gmwm.joint-fit"
 
-    parts: tuple[Fit, ...] = ()
-    equality_p: float = float("nan")
-    curves_p: float = float("nan")
-    spread: Mapping[str, float] = field(default_factory=dict)
+    parts: Annotated[tuple[Fit, ...], MinLen(1)] = ()
+    equality_p: OrNaN = float("nan")
+    curves_p: OrNaN = float("nan")
+    spread: Mapping[Text, NotNegative] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -61,8 +59,13 @@ class JointFit(Fit):
     def __str__(self) -> str:
         lines = [super().__str__(), "", self.agreement]
         lines.append(f"{'parameter':<20} {'spread':>8}  of each recording")
+        positive = _positive(self.model)
         for key in self.keys:
-            head = f"{key:<20} {self._spread_text(key, self.spread.get(key)):>8}"
+            spread = "-"
+            if key in self.spread:
+                value = self.spread[key]
+                spread = f"{100.0 * value:.1f} %" if key in positive else f"{value:.2g}"
+            head = f"{key:<20} {spread:>8}"
             cells = [f" {part.params.get(key, np.nan):>10.4g}" for part in self.parts]
             for start in range(0, len(cells), _CELLS):
                 lines.append(f"{head:<29}{''.join(cells[start : start + _CELLS])}")
@@ -79,45 +82,12 @@ class JointFit(Fit):
         which = f"{len(self.parts)} recordings"
         if np.isfinite(self.equality_p):
             return f"{which}, equality of the parameters: p = {self.equality_p:.2g}"
-        return f"{which}, each as the joint model has it: p = {self.curves_p:.2g}"
-
-    def _spread_text(self, key: str, value: float | None) -> str:
-        if value is None:
-            return "-"
-        return f"{100.0 * value:.1f} %" if key in self._positive else f"{value:.2g}"
-
-    @property
-    def _positive(self) -> set[str]:
-        return {i.key for i in self.model.parameters if i.parameter.lower == 0.0}
-
-    def content(self) -> dict[str, Any]:
-        """What it cannot be rebuilt without, in JSON types."""
-        return {
-            **super().content(),
-            "parts": [part.to_dict() for part in self.parts],
-            "equality_p": plain(self.equality_p),
-            "curves_p": plain(self.curves_p),
-            "spread": dict(self.spread),
-        }
-
-    @classmethod
-    def document_form(cls) -> type[Form]:
-        from gmwm.estimate.result.form import JointFitForm
-
-        return JointFitForm
+        return f"{which}, agreement with the joint model: p = {self.curves_p:.2g}"
 
     @classmethod
     def from_content(cls, content: Mapping[str, Any]) -> Self:
-        """Inverse of `content`."""
-        parts = tuple(Fit.from_dict(part) for part in content["parts"])
-        fields = fields_of(content) | {"wv": PooledVariance.of([part.wv for part in parts])}
-        return cls(
-            **fields,
-            parts=parts,
-            equality_p=or_nan(content["equality_p"]),
-            curves_p=or_nan(content["curves_p"]),
-            spread=content["spread"],
-        )
+        found = super().from_content(content)
+        return replace(found, wv=PooledVariance.of([part.wv for part in found.parts]))
 
 
 def fit_joint(
@@ -126,44 +96,31 @@ def fit_joint(
     estimate: Callable[[Model, WaveletVariance], Fit],
     whole: Fit | None = None,
 ) -> JointFit:
-    """Fit one model to several recordings, and to each.
+    """Fit one model to several recordings together, and to each alone.
 
     model: With open parameters.
     estimate: ``estimate(model, wv) -> Fit`` of a method.
-    whole: The model fitted to all recordings, where that was done before.
+    whole: The model fitted to all recordings, if known already.
     Raises InputError if the model has a rate ramp.
     """
     if any(term.is_drift for term in model.terms) and len(parts) > 1:
         raise InputError(
-            "a rate ramp is an accident of one recording: take it out of the model, or fit the "
-            "recordings one by one"
+            "a rate ramp belongs to one recording: take it out of the model, or fit the recordings "
+            "one by one"
         )
     whole = whole or estimate(model, PooledVariance.of(parts))
     each = tuple(estimate(model, part) for part in parts)
     equality_p, spread = _heterogeneity(whole, each)
     curves_p = _curves_test(whole, each)
-    values = {f.name: getattr(whole, f.name) for f in fields(Fit)}
-    values["notices"] = (*whole.notices, *_difference_notices(equality_p, curves_p))
-    return JointFit(**values, parts=each, equality_p=equality_p, curves_p=curves_p, spread=spread)
-
-
-def _difference_notices(equality_p: float, curves_p: float) -> list[Notice]:
-    """Whether the recordings are the same noise."""
+    notices = list(whole.notices)
+    p_values = {"equality_p": equality_p, "curves_p": curves_p}
     if equality_p < tuning.RECORDINGS_DIFFER:
-        text = (
-            f"the recordings do not have the same parameters (p = {equality_p:.2g}): the joint "
-            "values are their mean, see the spread"
-        )
+        notices.append(notice("recordings-differ", "", p_values))
     elif np.isnan(equality_p) and curves_p < tuning.RECORDINGS_DIFFER:
         # Where the parameters cannot be compared, the curves can.
-        text = (
-            "the wavelet variances of the recordings are not those of the joint model (p = "
-            f"{curves_p:.2g}): the recordings differ, or the model is wrong"
-        )
-    else:
-        return []
-    values = {"equality_p": equality_p, "curves_p": curves_p}
-    return [Notice("recordings-differ", "bad", "", text, values)]
+        notices.append(notice("recordings-differ", "", p_values, variant="curves"))
+    values = {f.name: getattr(whole, f.name) for f in fields(Fit)} | {"notices": tuple(notices)}
+    return JointFit(**values, parts=each, equality_p=equality_p, curves_p=curves_p, spread=spread)
 
 
 def _curves_test(whole: Fit, each: Sequence[Fit]) -> float:
@@ -180,13 +137,13 @@ def _curves_test(whole: Fit, each: Sequence[Fit]) -> float:
 
 
 def _heterogeneity(whole: Fit, each: Sequence[Fit]) -> tuple[float, dict[str, float]]:
-    """Test of equality, and the spread of each parameter.
+    """p-value of equal parameters, and the spread of each parameter.
 
     Positive parameters are compared by their logarithm. Only recordings that determine all
     parameters of the joint fit take part.
     """
     keys = [key for key in whole.keys if key not in whole.upper_bounds]
-    positive = {i.key for i in whole.model.parameters if i.parameter.lower == 0.0}
+    positive = _positive(whole.model)
     points, matrices = [], []
     for fit in each:
         if not set(keys) <= set(fit.keys) - set(fit.upper_bounds):
@@ -217,8 +174,13 @@ def _heterogeneity(whole: Fit, each: Sequence[Fit]) -> tuple[float, dict[str, fl
     return float(chi2.sf(statistic, (len(points) - 1) * len(keys))), known
 
 
+def _positive(model: Model) -> set[str]:
+    """Keys of the parameters that cannot be negative."""
+    return {i.key for i in model.parameters if i.parameter.lower == 0.0}
+
+
 def between(values: FloatArray, variances: FloatArray) -> tuple[float, float]:
-    """Standard deviation between recordings beyond their errors, and p-value that there is none.
+    """Standard deviation between recordings beyond their errors, and p-value of equality.
 
     The moment estimate of DerSimonian & Laird (1986). NaN where one recording has all the weight.
     """

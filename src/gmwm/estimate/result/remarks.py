@@ -1,91 +1,80 @@
-"""What makes a fit untrustworthy as it stands, or less exact than it looks."""
+"""Notices about a fit: what makes it not valid, or less exact than it looks."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from itertools import pairwise
+from itertools import combinations, pairwise
+from typing import Any
 
 import numpy as np
 
-from gmwm._core.notices import Notice
 from gmwm._core.text import brief, per_cent
 from gmwm._core.typing import FloatArray
 from gmwm._core.units import customary_unit
 from gmwm.estimate import tuning
 from gmwm.estimate.result.goodness import Goodness
+from gmwm.issues import Notice, notice
 from gmwm.process import Model, Process
 from gmwm.variance import WaveletVariance
 
-REASONS = {
-    "amplitude-bound": "amplitudes_above_zero",
-    "search-limit": "shapes_within_search",
-    "redundant-term": "terms_needed",
-    "undetermined": "shapes_determined",
-    "indistinct-terms": "terms_distinct",
-    "confounded": "parameters_separable",
-    "too-few-levels": "enough_levels",
-    "misfit": "describes_data",
-    "level-missed": "describes_every_level",
-    "not-converged": "converged",
-    "no-curvature": "converged",
-    "drift-in-state": "drift_is_ramp",
-    "no-region": "regions_found",
-    "wrong-slope": "slopes_agree",
-    "recordings-differ": "recordings_agree",
-    "not-static": "recording_static",
-    "tilt": "attitude_kept",
-    "rate-changes": "rate_constant",
-    "counts": "units_agree",
-    "gravity": "units_agree",
-    "swapped": "units_agree",
-    "rounding": "resolution_fine",
-    "saturation": "within_range",
-    "abrupt-end": "within_range",
-    "stuck": "samples_change",
-    "dead": "samples_change",
-    "held": "samples_measured",
-    "filled": "samples_measured",
-    "value-repeated": "samples_measured",
-    "variance": "noise_steady",
-    "step": "stationary",
-    "transient": "stationary",
-    "drift-at-start": "stationary",
-    "slow-period": "stationary",
-    "departures-many": "stationary",
-    "unsteady": "noise_steady",
-}
-"""Code of a notice that makes a fit invalid -> the reason, as a property that the fit lacks."""
+
+def estimate_notices(
+    model: Model,
+    keys: Sequence[str],
+    matrix: FloatArray,
+    upper: Mapping[str, float],
+    wv: WaveletVariance,
+) -> tuple[list[Notice], list[Notice]]:
+    """Notices about the estimates themselves: those that make a fit not valid, and the others.
+
+    model: With the estimates.
+    keys, matrix: The estimated parameters and their covariance.
+    upper: Upper limits of amplitudes that are not significantly above zero.
+    """
+    bad = [notice("amplitude-bound", key, {"upper": limit}) for key, limit in upper.items()]
+    errors = dict(zip(keys, map(float, np.sqrt(np.diag(matrix))), strict=True))
+    for item in model.parameters:
+        parameter, error = item.parameter, errors.get(item.key, 0.0)
+        is_positive_shape = parameter.role == "shape" and parameter.lower == 0.0
+        if is_positive_shape and error > tuning.UNDETERMINED * (item.value or 0.0):
+            bad.append(notice("undetermined", item.key, {"stderr": error}))
+    bad += _indistinct_notices(model, keys, matrix)
+    for (i, first), (j, second) in combinations(enumerate(keys), 2):
+        if errors[first] == 0.0 or errors[second] == 0.0:
+            continue
+        correlation = float(matrix[i, j] / (errors[first] * errors[second]))
+        is_loose = errors[second] > tuning.LOOSE * abs(model.params[second] or 0.0)
+        if abs(correlation) > tuning.CONFOUNDED and is_loose:
+            values = {"other": first, "correlation": correlation}
+            bad.append(notice("confounded", second, values))
+    return bad, _bandwidth_notices(model, wv)
 
 
-def missed_level_notices(goodness: Goodness) -> list[Notice]:
-    """The averaging time that the model misses, if it misses one."""
-    if goodness.largest is None or not goodness.is_excluded:
-        return []
-    residual, tau = goodness.largest
-    side = "above" if residual > 0.0 else "below"
-    return [
-        Notice(
-            "level-missed", "bad", "",
-            f"at tau = {tau:.3g} s the data lie {brief(abs(residual))} standard errors {side} the "
-            "model: it lacks a term there, or the recording has a fault",
-            {"tau": tau, "residual": residual, "p_value": goodness.largest_p},
-        )
-    ]  # fmt: skip
+def _indistinct_notices(model: Model, keys: Sequence[str], matrix: FloatArray) -> list[Notice]:
+    """Neighbouring terms of a kind whose correlation times do not differ significantly."""
+    taus = [
+        (item.key, item.value or 0.0, model.terms[item.term].title())
+        for item in model.parameters
+        if item.parameter.name == model.terms[item.term].ordered_by and item.key in keys
+    ]
+    notices = []
+    for (first, a, title), (second, b, other) in pairwise(taus):
+        if title != other:
+            continue
+        i, j = keys.index(first), keys.index(second)
+        gradient = np.array([-1.0 / a, 1.0 / b])
+        error = float(np.sqrt(gradient @ matrix[np.ix_([i, j], [i, j])] @ gradient))
+        if np.log(b / a) < tuning.DISTINCT_SIGMA * error or b / a < tuning.DISTINCT_RATIO:
+            values = {"first": first, "second": second, first: a, second: b}
+            words: dict[str, Any] = {"kind": title, "one": a, "other": b}
+            notices.append(notice("indistinct-terms", second, values, **words))
+    return notices
 
 
-def no_test_notice() -> Notice:
-    """Of a fit whose wavelet variance is not that of the data."""
-    return Notice(
-        "no-test", "note", "",
-        "no test of the fit: the gaps leave no wavelet variance, the one shown bridges them by "
-        "straight lines",
-    )  # fmt: skip
+def _bandwidth_notices(model: Model, wv: WaveletVariance) -> list[Notice]:
+    """Terms that are the sensor's own filter, and the white noise that they act as.
 
-
-def bandwidth_notices(model: Model, wv: WaveletVariance) -> list[Notice]:
-    """Terms that are the sensor's own filter: what they are, and what they act as.
-
-    A Gauss-Markov process of a correlation time of a few samples is a low-pass of first order,
+    A Gauss-Markov process with a correlation time of a few samples is a low-pass of first order
     where the model has no white noise beside it.
     """
     filtered = [i for i, term in enumerate(model.terms) if term.is_band_limited]
@@ -99,18 +88,12 @@ def bandwidth_notices(model: Model, wv: WaveletVariance) -> list[Notice]:
         bandwidth = _half_power(term, wv.dt)
         low = term.psd(np.array([tuning.FOOT * bandwidth]), wv.dt)[0]
         if not low > 0.0:
-            continue  # a term of amplitude zero is no filter of the sensor's
+            continue  # a term of zero amplitude is no filter of the sensor's
         unit, factor = customary_unit("u/sqrt(Hz)", wv.quantity, wv.unit)
         density = float(np.sqrt(low))
-        notices.append(
-            Notice(
-                "sensor-bandwidth", "note", key,
-                f"the {term.title()} term is white noise of N = {density * factor:.3g} {unit} "
-                f"behind the sensor's bandwidth of {bandwidth:.3g} Hz; a filter needs no state for "
-                "it",
-                {"bandwidth": bandwidth, "density": density},
-            )
-        )  # fmt: skip
+        values = {"bandwidth": bandwidth, "density": density}
+        words: dict[str, Any] = {"term": term.title(), "size": density * factor, "unit": unit}
+        notices.append(notice("sensor-bandwidth", key, values, **words))
     return notices
 
 
@@ -125,108 +108,41 @@ def _half_power(term: Process, dt: float) -> float:
     return float(np.interp(-0.5 * density[0], -density[part], f[part]))
 
 
-def bound_notices(upper: Mapping[str, float]) -> list[Notice]:
-    """Amplitudes that are zero or not significantly above it."""
-    return [
-        Notice(
-            "amplitude-bound", "bad", key,
-            "not significantly above zero, so that only an upper bound is known",
-            {"upper": bound},
-        )
-        for key, bound in upper.items()
-    ]  # fmt: skip
-
-
-def indistinct_notices(model: Model, keys: Sequence[str], matrix: FloatArray) -> list[Notice]:
-    """Neighbouring terms of a kind whose correlation times do not differ significantly."""
-    taus = [
-        (item.key, item.value or 0.0, model.terms[item.term].title())
-        for item in model.parameters
-        if item.parameter.name == model.terms[item.term].ordered_by and item.key in keys
-    ]
-    notices = []
-    for (first, a, title), (second, b, other) in pairwise(taus):
-        if title != other:
-            continue
-        i, j = keys.index(first), keys.index(second)
-        gradient = np.array([-1.0 / a, 1.0 / b])
-        block = matrix[np.ix_([i, j], [i, j])]
-        error = float(np.sqrt(gradient @ block @ gradient))
-        if np.log(b / a) < tuning.DISTINCT_SIGMA * error or b / a < tuning.DISTINCT_RATIO:
-            notices.append(
-                Notice(
-                    "indistinct-terms", "bad", second,
-                    f"two {title} terms do not differ significantly ({first} = {a:.3g} s, "
-                    f"{second} = {b:.3g} s): use one fewer",
-                    {"first": first, "second": second, first: a, second: b},
-                )
-            )  # fmt: skip
-    return notices
-
-
-def confounded_notices(model: Model, keys: Sequence[str], matrix: FloatArray) -> list[Notice]:
-    """Parameters of which the data determine one combination only."""
-    errors = np.sqrt(np.diag(matrix))
-    notices = []
-    for i, first in enumerate(keys):
-        for j in range(i + 1, len(keys)):
-            if errors[i] == 0.0 or errors[j] == 0.0:
-                continue
-            correlation = float(matrix[i, j] / (errors[i] * errors[j]))
-            loose = errors[j] > tuning.LOOSE * abs(model.params[keys[j]] or 0.0)
-            if abs(correlation) > tuning.CONFOUNDED and loose:
-                notices.append(
-                    Notice(
-                        "confounded", "bad", keys[j],
-                        f"cannot be distinguished from {first} (their estimates have a correlation "
-                        f"of {correlation:.5f}): fix one of them",
-                        {"other": first, "correlation": correlation},
-                    )
-                )  # fmt: skip
-    return notices
-
-
-def undetermined_notices(model: Model, keys: Sequence[str], matrix: FloatArray) -> list[Notice]:
-    """Shapes whose standard error is as large as they are."""
-    errors = dict(zip(keys, map(float, np.sqrt(np.diag(matrix))), strict=True))
-    return [
-        Notice(
-            "undetermined", "bad", item.key,
-            f"not determined by this record (standard error {errors[item.key]:.2g})",
-            {"stderr": errors[item.key]},
-        )
-        for item in model.parameters
-        if item.key in errors
-        and item.parameter.role == "shape"
-        and item.parameter.lower == 0.0
-        and errors[item.key] > tuning.UNDETERMINED * (item.value or 0.0)
-    ]  # fmt: skip
+def missed_level_notices(goodness: Goodness) -> list[Notice]:
+    """The averaging time that the model misses, if it misses one."""
+    if goodness.largest is None or not goodness.is_excluded:
+        return []
+    residual, tau = goodness.largest
+    side = "above" if residual > 0.0 else "below"
+    values = {"tau": tau, "residual": residual, "p_value": goodness.largest_p}
+    return [notice("level-missed", "", values, errors=brief(abs(residual)), side=side)]
 
 
 def misfit_notices(goodness: Goodness, discrepancy: float, *, failed: bool) -> list[Notice]:
-    """What it means for prediction that a model misses an averaging time.
+    """Consequence for prediction where a model misses an averaging time.
 
     discrepancy: Relative error of the variances that was allowed for.
-    failed: Whether the chi-square test failed. If not, a misfit is bad that fewer than one in
-        twenty right models have at any level: of six axes with right models nearly one would have a
-        smaller one, which is chance.
+    failed: Whether the chi-square test failed. If not, a misfit is bad only where fewer than one in
+        twenty right models have one as clear at any level: of six axes with right models nearly one
+        has a smaller one by chance.
     """
     beyond = goodness.beyond_chance
     if beyond is None:
         return []
     misfit, tau, residual = beyond
     values = {"misfit": misfit, "tau": tau, "residual": residual, "discrepancy": discrepancy}
-    share = per_cent(abs(misfit))
-    if goodness.is_poor:
-        side, scale = ("above", "small") if misfit > 0.0 else ("below", "large")
-        text = f"the data lie {share} {side} the model's Allan deviation"
-        if failed or goodness.largest_p < tuning.POOR_P:
-            text = f"predictions over {tau:.3g} s are too {scale}: there {text}, by "
-            text += f"{brief(abs(residual))} standard errors"
-            return [Notice("misfit", "bad", "", text, values)]
-        chance = f"{100.0 * goodness.largest_p:.0f} % of right models are missed as clearly"
-        text = f"at tau = {tau:.3g} s {text}, which is no more than chance: {chance} somewhere"
-        return [Notice("misfit", "note", "", text, values)]
-    text = f"describes the Allan deviation to {share} (least well at tau = {tau:.3g} s)"
-    text += ", which the intervals allow for" if discrepancy > 0.0 else ""
-    return [Notice("misfit", "note", "", text, values)]
+    side, scale = ("above", "small") if misfit > 0.0 else ("below", "large")
+    words: dict[str, Any] = {
+        "share": per_cent(abs(misfit)),
+        "side": side,
+        "scale": scale,
+        "errors": brief(abs(residual)),
+        "chance": 100.0 * goodness.largest_p,
+    }
+    if not goodness.is_poor:
+        variant = "allowed" if discrepancy > 0.0 else "slight"
+    elif failed or goodness.largest_p < tuning.POOR_P:
+        return [notice("misfit", "", values, **words)]
+    else:
+        variant = "chance"
+    return [notice("misfit", "", values, severity="note", variant=variant, **words)]

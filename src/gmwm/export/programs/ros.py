@@ -7,7 +7,7 @@ mean that it is not known, -1 in the first place that there is no such measureme
 from __future__ import annotations
 
 from gmwm.errors import InputError
-from gmwm.export.imu import ImuNumbers, Triad
+from gmwm.export.imu import NO_RATE, ImuNumbers, Triad
 from gmwm.export.target import KEYFRAME, ImuFile
 
 
@@ -35,9 +35,7 @@ class Ros(ImuFile):
 
 def _covariance(key: str, triad: Triad, unit: str) -> list[str]:
     if not triad.rate > 0.0:
-        raise InputError(
-            "the numbers hold no sampling rate, which this file needs: export the calibration"
-        )
+        raise InputError(NO_RATE)
     x, y, z = (f"{axis.N**2 * triad.rate:.6e}" for axis in triad.xyz())
     return [
         f"{key}:  # {unit}, a sample at {triad.rate:.6g} Hz",

@@ -21,6 +21,7 @@ from gmwm._core.units import SI_UNIT
 from gmwm.calibration import Calibration
 from gmwm.errors import InputError
 from gmwm.export.comments import wrapped
+from gmwm.export.imu import NO_RATE
 from gmwm.export.numbers import numbers_of
 from gmwm.export.target import Target, json_text
 from gmwm.filter_numbers import FORMS, SensorNumbers
@@ -89,45 +90,33 @@ class StateSpaceFile(Target):
     def _channels(
         self, given: Sequence[Any], horizon: float | None, form: str | None
     ) -> dict[str, dict[str, Any]]:
+        """Matrices by channel."""
         if form is not None:
             checks.choice("form", form, FORMS)
         found: dict[str, dict[str, Any]] = {}
         for each in given:
-            for name, (model, dt, quantity, initial_sd) in self._models(
-                each, horizon, form
-            ).items():
+            models: dict[str, tuple[Model, float, str, float]]
+            if isinstance(each, Calibration) and form is None:
+                if horizon is not None:
+                    raise InputError(
+                        "the full model has no horizon: leave the horizon out, or give a form too"
+                    )
+                models = {n: (f.model, f.wv.dt, f.wv.quantity or "", 0.0) for n, f in each.items()}
+            else:
+                wanted = form or (each.form if isinstance(each, SensorNumbers) else "")
+                numbers = numbers_of(each, wanted, horizon, self.horizon)
+                if not numbers.rate > 0.0:
+                    raise InputError(NO_RATE)
+                dt = 1.0 / numbers.rate
+                models = {n: (o.model, dt, o.quantity, o.initial_sd) for n, o in numbers.items()}
+            for name, about in models.items():
                 if name in found:
                     raise InputError(f"{name} is given twice: give each sensor once")
                 try:
-                    found[name] = channel(model, dt, quantity, initial_sd)
+                    found[name] = channel(*about)
                 except InputError as error:
                     raise InputError(f"{name}: {error}") from None
         return found
-
-    def _models(
-        self, given: Any, horizon: float | None, form: str | None
-    ) -> dict[str, tuple[Model, float, str, float]]:
-        """Model, sampling interval, quantity and standard deviation at the start by channel."""
-        if isinstance(given, Calibration) and form is None:
-            if horizon is not None:
-                raise InputError(
-                    "the full model has no horizon: leave the horizon out, or give a form too"
-                )
-            return {
-                name: (fit.model, fit.wv.dt, fit.wv.quantity or "", 0.0)
-                for name, fit in given.items()
-            }
-        if form is None and isinstance(given, SensorNumbers):
-            form = given.form
-        numbers = numbers_of(given, form or "", horizon, self.horizon)
-        if not numbers.rate > 0.0:
-            raise InputError(
-                "the numbers hold no sampling rate, which this file needs: export the calibration"
-            )
-        return {
-            name: (one.model, 1.0 / numbers.rate, one.quantity, one.initial_sd)
-            for name, one in numbers.items()
-        }
 
 
 def channel(model: Model, dt: float, quantity: str, initial_sd: float = 0.0) -> dict[str, Any]:

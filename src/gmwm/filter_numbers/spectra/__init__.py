@@ -8,12 +8,12 @@ from gmwm.filter_numbers.spectra.dominance import (
     dominating as dominating,
     with_correlation_times as with_correlation_times,
 )
-from gmwm.filter_numbers.spectra.propagation import (
+from gmwm.filter_numbers.spectra.region import (
+    ParameterRegion as ParameterRegion,
+    region_spectra as region_spectra,
+)
+from gmwm.filter_numbers.spectra.required import RequiredSpectrum as RequiredSpectrum
+from gmwm.filter_numbers.spectra.standard_errors import (
     Estimated as Estimated,
     standard_errors as standard_errors,
 )
-from gmwm.filter_numbers.spectra.region import (
-    ParameterRegion as ParameterRegion,
-    region_targets as region_targets,
-)
-from gmwm.filter_numbers.spectra.target import Target as Target

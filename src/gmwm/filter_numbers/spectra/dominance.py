@@ -2,7 +2,7 @@
 
 If S_b(f) >= S(f) for all f, the covariance of any linear functional of the error is at most that
 which the larger spectrum predicts: the difference of the two is itself the spectrum of a process.
-So a filter with such numbers is never too optimistic, in any direction, aided or not. Variances
+So a filter with such numbers is never overconfident, in any direction, aided or not. Variances
 enter spectra linearly: the smallest mean of AVAR_b/AVAR over the averaging times of interest is a
 linear program, for each correlation time.
 """
@@ -19,30 +19,29 @@ from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.filter_numbers import tuning
 from gmwm.filter_numbers.spectra.least_sum import least_sum
-from gmwm.filter_numbers.spectra.target import Target
+from gmwm.filter_numbers.spectra.required import RequiredSpectrum
 from gmwm.process import GaussMarkov, Model, Process, RandomWalk, WhiteNoise
 
 KINDS = {"N+K": "NK", "N+GM": "NG", "N+K+GM": "NKG"}
 """Forms that `dominating` knows, with the kinds of their terms."""
 
 TIGHTEST = "N+K+GM"
-"""The one that holds the others."""
+"""The form that contains the others."""
 
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """Spectra to dominate by one set of numbers, and how it is judged.
+    """Spectra to dominate by one set of numbers, and the cost of these.
 
-    targets: Of one axis, or of several that share the numbers: the objective.
+    targets: Of one axis, or of several that share the numbers: the cost is relative to them.
     horizon: s.
-    region: What has to be dominated, where that is not the targets alone, but all that lies between
-        these.
-    lowest: Frequency from which on they are dominated, Hz; by default all are.
+    region: Spectra of a confidence region, to be dominated in place of the targets.
+    lowest: Frequency from which on they are dominated, Hz; by default all frequencies are.
     """
 
-    targets: tuple[Target, ...]
+    targets: tuple[RequiredSpectrum, ...]
     horizon: float
-    region: tuple[Target, ...] = ()
+    region: tuple[RequiredSpectrum, ...] = ()
     lowest: float = 0.0
     f: FloatArray = field(init=False)
     need: FloatArray = field(init=False)
@@ -50,15 +49,16 @@ class Problem:
     _allan: FloatArray = field(init=False)
 
     def __post_init__(self) -> None:
-        def put(**values: FloatArray) -> None:
-            for name, value in values.items():
-                object.__setattr__(self, name, value)
-
-        put(f=self.frequencies(tuning.POINTS))
-        put(need=self.largest(self.f))
         times = np.geomspace(0.1 * self.horizon, self.horizon, tuning.AVERAGING_TIMES)
-        put(_averaging=np.unique(np.maximum(np.rint(times / self.dt), 1.0)) * self.dt)
-        put(_allan=np.array([t.allan_variance(self._averaging) for t in self.targets]))
+        averaging = np.unique(np.maximum(np.rint(times / self.dt), 1.0)) * self.dt
+        f = self.frequencies(tuning.POINTS)
+        for name, values in (
+            ("f", f),
+            ("need", self.largest(f)),
+            ("_averaging", averaging),
+            ("_allan", np.array([each.allan_variance(averaging) for each in self.targets])),
+        ):
+            object.__setattr__(self, name, values)
 
     @property
     def dt(self) -> float:
@@ -66,22 +66,22 @@ class Problem:
         return self.targets[0].dt
 
     @property
-    def dominated(self) -> tuple[Target, ...]:
-        """What has to be dominated."""
+    def dominated(self) -> tuple[RequiredSpectrum, ...]:
+        """The spectra that have to be dominated."""
         return self.region or self.targets
 
     def frequencies(self, points: int) -> FloatArray:
-        """Those of all targets, some a decade; Hz."""
+        """Frequencies of all spectra, some a decade; Hz."""
         f = np.unique(np.concatenate([t.frequencies(points) for t in self.dominated]))
         return f[f >= self.lowest]
 
     def largest(self, f: FloatArray) -> FloatArray:
-        """Largest of the spectra at frequencies (Hz), u^2/Hz."""
+        """Largest of the spectra, u^2/Hz."""
         largest = np.max([target.psd(f) for target in self.dominated], axis=0)
         return np.asarray(largest * (tuning.ENVELOPE if self.region else 1.0))
 
     def cost(self, process: Process) -> float:
-        """Mean over averaging times and axes of its Allan variance over that of the truth."""
+        """Mean over averaging times and axes: its Allan variance over the true one."""
         variance = 2.0 * process.haar_variance(self._averaging, self.dt)
         return float(np.mean(variance / self._allan))
 
@@ -90,15 +90,15 @@ def dominating(problem: Problem, form: str, tau: float | None = None) -> Model:
     """The smallest model of a form whose spectrum lies above those of a problem.
 
     form: {"N+K", "N+GM", "N+K+GM"}.
-    tau: Correlation time of the Gauss-Markov process, s; that of the smallest model by default.
+    tau: Correlation time of the Gauss-Markov process, s; by default the smallest model's.
     Raises InputError if the form cannot dominate: "N+GM" where a spectrum has no limit at zero
         frequency.
     """
     kinds = KINDS[form]
     if "K" not in kinds and not all(target.is_stationary for target in problem.dominated):
         raise InputError(
-            f"{form} cannot dominate a model that walks off: its spectrum rises without limit "
-            "towards zero frequency; use N+K or N+K+GM"
+            f"{form} cannot dominate a model with a random walk: its spectrum rises without "
+            "limit towards zero frequency; use N+K or N+K+GM"
         )
     plain = _plain(form)
     if "G" not in kinds:
@@ -109,7 +109,7 @@ def dominating(problem: Problem, form: str, tau: float | None = None) -> Model:
 
 
 def correlation_time(problems: Sequence[Problem], form: str) -> float:
-    """The one for all of several problems that costs least over them, s."""
+    """The one correlation time for several problems that costs least over them, s."""
     fast = [columns_of(problem, _plain(form)) for problem in problems]
 
     def costs(log_taus: FloatArray) -> FloatArray:
@@ -133,7 +133,7 @@ def correlation_time(problems: Sequence[Problem], form: str) -> float:
 
 
 def _plain(form: str) -> list[Process]:
-    """What a form has beside a Gauss-Markov process, of unit amplitude."""
+    """The processes of a form beside a Gauss-Markov process, of unit amplitude."""
     return [WhiteNoise(1.0)] + [RandomWalk(1.0)] * ("K" in KINDS[form])
 
 
@@ -160,7 +160,7 @@ def with_correlation_times(problem: Problem, form: str, taus: Sequence[float]) -
 
 
 def _correlation_times(problem: Problem) -> FloatArray:
-    """Logarithms of those that are tried: a grid, and those of the truth."""
+    """Logarithms of correlation times to try: a grid, and those of the truth."""
     high = np.log(1.0 / problem.f[0])
     low = min(max(np.log(problem.horizon / tuning.SHORTEST_TAU), np.log(problem.dt)), high - 1.0)
     number = int(np.ceil((high - low) / np.log(10.0) * tuning.TAU_POINTS)) + 1
@@ -176,14 +176,14 @@ def _correlation_times(problem: Problem) -> FloatArray:
 
 
 def columns_of(problem: Problem, processes: Sequence[Process]) -> FloatArray:
-    """Spectra of processes of unit amplitude over what is needed, per unit of their cost."""
+    """Spectra of processes of unit amplitude over the required one, per unit of their cost."""
     return np.column_stack(
         [p.psd(problem.f, problem.dt) / problem.need / problem.cost(p) for p in processes]
     )
 
 
 def solved(problem: Problem, columns: FloatArray, is_walking: bool = True) -> FloatArray:
-    """The share of the least cost that each of m processes has, for each of b sets: (b, m).
+    """Shares of m processes in the least cost, for each of b sets: (b, m).
 
     Columns are those of one set, (n, m), or of several, (b, n, m).
     """

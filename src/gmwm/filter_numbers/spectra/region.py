@@ -12,7 +12,7 @@ from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.estimate import Fit
 from gmwm.filter_numbers import tuning
-from gmwm.filter_numbers.spectra.target import Target
+from gmwm.filter_numbers.spectra.required import RequiredSpectrum
 from gmwm.process import Model, Process
 
 
@@ -23,10 +23,10 @@ class ParameterRegion:
     The ball is turned by the correlation of the estimates; along each parameter it reaches to the
     ends of the interval whose half-width is that of the joint region. So the region keeps to the
     ranges of the parameters, and is longer upwards where a standard error grows with the value.
-    Amplitudes that are not significantly above zero are at their upper bounds, and rate ramps at
+    Amplitudes that are not significantly above zero are at their upper limits, and rate ramps at
     their estimates.
 
-    model: The estimate, with such amplitudes at their bounds.
+    model: The estimate, with such amplitudes at their limits.
     lower, upper: (p,), ends of the parameters.
     root: (p, p), of the correlation: rows have length 1.
     """
@@ -39,9 +39,9 @@ class ParameterRegion:
 
     @classmethod
     def of(cls, fit: Fit, level: float) -> ParameterRegion:
-        """That of a fit at a level.
+        """The region of a fit at a level.
 
-        Raises InputError if the data bound a parameter in no way.
+        Raises InputError if the data do not bound a parameter.
         """
         drifts = {p.key for p in fit.model.parameters if fit.model.terms[p.term].is_drift}
         place = [
@@ -106,10 +106,10 @@ class ParameterRegion:
 class _Spectrum:
     """Density of the models of a region, and how it grows along each parameter.
 
-    Only what a parameter changes is made anew, not the model.
+    Only the term that a parameter changes is made anew, not the model.
 
-    terms: Those that count.
-    free: Of each, the parameters of the region that it has: their numbers and names.
+    terms: Those with a spectrum.
+    free: For each term, numbers and names of its parameters in the region.
     """
 
     region: ParameterRegion
@@ -155,18 +155,20 @@ class _Spectrum:
         return -float(np.log(total)), gradient
 
 
-def region_targets(target: Target, fit: Fit, level: float) -> tuple[Target, ...]:
+def region_spectra(
+    target: RequiredSpectrum, fit: Fit, level: float
+) -> tuple[RequiredSpectrum, ...]:
     """Models of a confidence region, one of which has nearly the largest density at any frequency.
 
     They are drawn, or found by search at frequencies on a grid.
 
-    target: That of the estimate.
-    Raises InputError if the data bound a parameter in no way.
+    target: Of the estimate.
+    Raises InputError if the data do not bound a parameter.
     """
     region = ParameterRegion.of(fit, level)
     dt = target.dt
     if not region.keys:
-        return (Target.of(region.model, dt, target.horizon),)
+        return (RequiredSpectrum.of(region.model, dt, target.horizon),)
     spectrum = _Spectrum.of(region, dt)
     # Slower processes than the estimate change at lower frequencies.
     f = target.frequencies(tuning.REGION_POINTS, region.points_of_peak)
@@ -186,4 +188,5 @@ def region_targets(target: Target, fit: Fit, level: float) -> tuple[Target, ...]
         densities.append(spectrum.density(points[-1], f))
     fine = np.append(f[:2], target.frequencies(10 * tuning.REGION_POINTS))
     largest = np.unique(np.argmax([spectrum.density(point, fine) for point in points], axis=0))
-    return tuple(Target.of(region.model_at(points[i]), dt, target.horizon) for i in largest)
+    models = [region.model_at(points[i]) for i in largest]
+    return tuple(RequiredSpectrum.of(model, dt, target.horizon) for model in models)

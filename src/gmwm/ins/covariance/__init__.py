@@ -1,3 +1,13 @@
-"""Errors of filters predicted without runs, and small models found by them."""
+"""The joint covariance of a true model and a filter's model: errors of filters without runs."""
 
-from gmwm.ins.covariance.reduction import reduce as reduce
+from gmwm.ins.covariance.analysis import (
+    Analysis as Analysis,
+    CovarianceErrors as CovarianceErrors,
+    covariance_analysis as covariance_analysis,
+)
+from gmwm.ins.covariance.joint_kernels import LinearStep as LinearStep, aid_jointly as aid_jointly
+from gmwm.ins.covariance.reduction import (
+    loiter_with_outages as loiter_with_outages,
+    reduce as reduce,
+    smallest_score as smallest_score,
+)

@@ -7,16 +7,21 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
+from scipy.linalg import block_diag, eigh
 
-from gmwm._core.notices import Notice
-from gmwm._core.typing import FloatArray
+from gmwm._core.typing import BoolArray, FloatArray, IntArray
 from gmwm.errors import InputError
 from gmwm.ins import tuning
-from gmwm.ins.covariance.analysis_kernels import run_both
+from gmwm.ins.covariance.joint_kernels import (
+    JointFilter,
+    KeptCovariances,
+    Track,
+    run_jointly,
+)
 from gmwm.ins.filter import (
     NAVIGATION,
     Filter,
-    IntArray,
+    Kinematics,
     Outputs,
     SensorStates,
     modified,
@@ -24,32 +29,69 @@ from gmwm.ins.filter import (
 )
 from gmwm.ins.geometry import matrix_from_rpy
 from gmwm.ins.imu import Imu, SensorModels, emulate
-from gmwm.ins.montecarlo import Scenario
+from gmwm.ins.simulation import Scenario
+from gmwm.issues import Notice, notice
+
+_ALL, _POSITION = slice(None), slice(0, 3)
 
 
 @dataclass(frozen=True, eq=False)
-class Analysis:
-    """What a filter predicts, and what is true of it, at K epochs.
+class CovarianceErrors:
+    """What a filter predicts of its errors, and what is true of them, at T times.
+
+    time: (T,), s.
+    predicted, actual: (T, n, n), covariance of n errors: the filter's own, and the true one.
+    """
+
+    time: FloatArray
+    predicted: FloatArray
+    actual: FloatArray
+
+    def nees(self, part: slice = _ALL) -> FloatArray:
+        """Expected normalised error squared per degree of freedom, (T,); 1 if consistent.
+
+        Errors that the filter predicts to be exactly zero are left out.
+        """
+        predicted, actual = self.predicted[:, part, part], self.actual[:, part, part]
+        size = np.sqrt(np.diagonal(predicted, axis1=1, axis2=2))
+        scale = np.where(size > 0.0, size, 1.0)
+        outer = scale[:, :, None] * scale[:, None, :]
+        ratio = np.linalg.pinv(predicted / outer, hermitian=True) @ (actual / outer)
+        return np.asarray(np.trace(ratio, axis1=1, axis2=2) / predicted.shape[1])
+
+    def worst(self) -> FloatArray:
+        """NEES of the worst direction: largest eigenvalue of P_predicted^-1 P_actual, (T,)."""
+        pairs = zip(self.actual, self.predicted, strict=True)
+        return np.array([eigh(a, p, eigvals_only=True)[-1] for a, p in pairs])
+
+    def score(self, part: slice = _ALL) -> FloatArray:
+        """Expected negative logarithm of the predicted density at the truth, (T,)."""
+        predicted = self.predicted[:, part, part]
+        size = predicted.shape[1]
+        log_det = np.linalg.slogdet(predicted)[1]
+        return np.asarray(0.5 * (size * self.nees(part) + log_det + size * np.log(2.0 * np.pi)))
+
+
+@dataclass(frozen=True, eq=False)
+class Analysis(CovarianceErrors):
+    """What a navigation filter predicts, and what is true of it, at K epochs.
 
     Attributes
     ----------
     time : (K,) ndarray
         s.
-    before : (K,) ndarray of bool
-        Whether the measurements of the epoch are not in yet.
     predicted, actual : (K, 9, 9) ndarray
         Covariance of the errors of position (m), velocity (m/s) and attitude (rad): the filter's
         own, and the true one.
+    before : (K,) ndarray of bool
+        Whether the measurements of the epoch are not in yet.
     sensor_predicted, sensor_actual : (K, 6, 6) ndarray
         Of the estimated errors of the sensors, rad/s and m/s^2.
     notices : tuple of Notice
         Outages that end with errors larger than can be predicted without runs.
     """
 
-    time: FloatArray
-    before: np.typing.NDArray[np.bool_]
-    predicted: FloatArray
-    actual: FloatArray
+    before: BoolArray
     sensor_predicted: FloatArray
     sensor_actual: FloatArray
     notices: tuple[Notice, ...] = ()
@@ -77,39 +119,22 @@ class Analysis:
             raise InputError(f"nothing was kept at {time:g} s: give the end of an outage")
         return int(found[0])
 
-    def nees(self, part: slice = slice(0, 3)) -> FloatArray:
-        """Expected normalised error squared per degree of freedom, (K,); 1 if consistent."""
-        predicted, actual = self.predicted[:, part, part], self.actual[:, part, part]
-        ratio = np.linalg.solve(predicted, actual)
-        return np.asarray(np.trace(ratio, axis1=1, axis2=2) / predicted.shape[1])
+    def nees(self, part: slice = _POSITION) -> FloatArray:
+        """Expected NEES per degree of freedom, (K,), of the position or another part."""
+        return super().nees(part)
 
-    def score(self, part: slice = slice(0, 3)) -> FloatArray:
-        """Expected negative logarithm of the predicted density at the truth, (K,)."""
-        predicted = self.predicted[:, part, part]
-        size = predicted.shape[1]
-        log_det = np.linalg.slogdet(predicted)[1]
-        return np.asarray(0.5 * (size * self.nees(part) + log_det + size * np.log(2.0 * np.pi)))
+    def score(self, part: slice = _POSITION) -> FloatArray:
+        """Expected negative log density of the position or another part, (K,)."""
+        return super().score(part)
 
 
 @dataclass(frozen=True, eq=False)
 class Course:
-    """A scenario cut into steps of the covariance: what does not depend on the models.
-
-    epoch, samples: (S + 1,) of int.
-    mid_matrix, mid_v, mid_lla, end_matrix, end_v, end_rate: See
-        `gmwm.ins.covariance.analysis_kernels.run_both`.
-    """
+    """A scenario cut into steps of the covariance: what does not depend on the models."""
 
     scenario: Scenario
     outputs: Outputs
-    epoch: IntArray
-    samples: IntArray
-    mid_matrix: FloatArray
-    mid_v: FloatArray
-    mid_lla: FloatArray
-    end_matrix: FloatArray
-    end_v: FloatArray
-    end_rate: FloatArray
+    track: Track
 
     @classmethod
     def of(cls, scenario: Scenario, imu: Imu | None = None) -> Course:
@@ -119,66 +144,50 @@ class Course:
         stride = max(round(scenario.step / trajectory.dt), 1)
         outputs = scenario.outputs()
         asked = scenario.aiding.without(scenario.outages).events(trajectory.dt, trajectory.n).epoch
-        epoch = _steps(np.union1d(asked, outputs.epoch), trajectory.n, stride)
+        # Every epoch that is asked for, and none more than a stride apart.
+        marks = np.union1d(asked, np.append(outputs.epoch, [0, trajectory.n]))
+        between = [np.append(np.arange(a, b, stride), b)[1:] for a, b in pairwise(marks)]
+        epoch: IntArray = np.concatenate([np.zeros(1, dtype=np.int64), *between])
         samples = np.diff(epoch, prepend=0)
         # The middle of an odd number of samples lies between two epochs.
         early = epoch - samples + samples // 2
         late = early + samples % 2
-
-        def middle(values: FloatArray) -> FloatArray:
-            return np.ascontiguousarray(0.5 * (values[early] + values[late]))
-
+        motion = (matrix_from_rpy(trajectory.rpy), trajectory.velocity, trajectory.lla)
+        middle = (np.ascontiguousarray(0.5 * (each[early] + each[late])) for each in motion)
+        end = (np.ascontiguousarray(each[epoch]) for each in motion)
         rate = imu.rotation[np.maximum(epoch - 1, 0)] / trajectory.dt
-        return cls(
-            scenario=scenario,
-            outputs=outputs,
-            epoch=epoch,
-            samples=samples,
-            mid_matrix=middle(matrix_from_rpy(trajectory.rpy)),
-            mid_v=middle(trajectory.velocity),
-            mid_lla=middle(trajectory.lla),
-            end_matrix=matrix_from_rpy(trajectory.rpy[epoch]),
-            end_v=np.ascontiguousarray(trajectory.velocity[epoch]),
-            end_rate=rate,
-        )
+        track = Track(epoch, samples, trajectory.dt, Kinematics(*middle), Kinematics(*end), rate)
+        return cls(scenario, outputs, track)
 
     def analyse(self, truth: SensorModels, believed: SensorModels) -> Analysis:
         """True and predicted covariance of a filter; see `covariance_analysis`."""
-        scenario, dt = self.scenario, self.scenario.trajectory.dt
+        scenario, dt = self.scenario, self.track.dt
         aiding = scenario.aiding.without(scenario.outages)
         ready = Filter.of(believed, aiding, dt, scenario.step, scenario.second_order)
         real = Filter.of(truth, aiding, dt, scenario.step, drift_known=True)
         events = aiding.events(dt, scenario.trajectory.n)
         initial = scenario.trajectory.state(0)
         table, joint = ready.states, _joint(ready.states, real.states)
-        m, size = table.m, NAVIGATION + joint.m
         P = ready.covariance(initial, scenario.initial_sd)
-        J = np.zeros((size, size))
-        deviations = scenario.initial_sd.deviations
-        J[:NAVIGATION, :NAVIGATION] = modified(np.diag(deviations**2), initial.velocity)
-        J[NAVIGATION:, NAVIGATION:] = joint.covariance + np.outer(joint.mean, joint.mean)
-        kept = self.outputs.epoch.size
-        out_P, out_J = (
-            np.empty((kept, NAVIGATION + m, NAVIGATION + m)),
-            np.empty((kept, size, size)),
+        start = modified(np.diag(scenario.initial_sd.deviations**2), initial.velocity)
+        J = block_diag(start, joint.covariance + np.outer(joint.mean, joint.mean))
+        size = self.outputs.epoch.size
+        out_P, out_J = np.empty((size, *P.shape)), np.empty((size, *J.shape))
+        kept = KeptCovariances(self.outputs.epoch, self.outputs.before, out_P, out_J)
+        estimate, true = (
+            np.where(places >= 0, places + first, -1)
+            for places, first in (
+                (ready.noise_states, NAVIGATION),
+                (real.noise_states, NAVIGATION + table.m),
+            )
         )
-        run_both(
-            self.epoch, self.samples, dt, self.mid_matrix, self.mid_v, self.mid_lla,
-            self.end_matrix, self.end_v, self.end_rate,
-            P, table.axis, table.partner, table.phi, table.phi_off, table.gain, table.noise,
-            table.noise_off, table.cross, table.integral, ready.coloured,
-            J, joint.axis, joint.partner, joint.phi, joint.phi_off, joint.gain, joint.noise,
-            joint.noise_off, joint.cross, joint.integral,
-            np.where(real.coloured >= 0, real.coloured + m, -1),
-            events.epoch, events.kind, events.sd, ready.lever_arm, ready.second_order,
-            self.outputs.epoch, self.outputs.before, out_P, out_J,
-        )  # fmt: skip
-        index = self.outputs.epoch
+        noises = (estimate, true, ready.lever_arm, ready.second_order)
+        run_jointly(self.track, events, JointFilter(table.table, joint.table, *noises), P, J, kept)
+        index, nine = self.outputs.epoch, slice(0, NAVIGATION)
         velocity = scenario.trajectory.velocity[index]
-        nine = slice(0, NAVIGATION)
         # The filter's error in a sensor is the true sum less the estimated one, and either way
         # round it has the same second moments.
-        believed_sum, joint_sum = _sums(table), _sums(joint)
+        believed_sum, joint_sum = table.sums, joint.sums
         found = Analysis(
             time=self.outputs.time(dt),
             before=self.outputs.before == 1,
@@ -200,7 +209,7 @@ def covariance_analysis(
     ----------
     scenario : Scenario
     truth, believed : SensorModels
-        What the sensors do, and what the filter believes.
+        Of the sensors, and in the filter.
 
     Notes
     -----
@@ -219,24 +228,13 @@ def _too_large(found: Analysis, ends: Sequence[float]) -> Iterator[Notice]:
         tilt_north, tilt_east, heading = found.sd[found.index(end), 6:]
         tilt = float(max(tilt_north, tilt_east))
         if tilt > tuning.LINEAR_TILT or heading > tuning.LINEAR_HEADING:
-            yield Notice(
-                "outside-linearity", "warning", "",
-                f"at {end:g} s the attitude is off by {np.degrees(tilt):.2g} deg in tilt and "
-                f"{np.degrees(heading):.2g} deg in heading (1 sigma): products of errors count, "
-                "and NEES and errors predicted there are too small",
+            yield notice(
+                "outside-linearity",
+                "",
                 {"time": end, "tilt": tilt, "heading": float(heading)},
-                "check them by runs, as gmwm navigate does",
-            )  # fmt: skip
-
-
-def _steps(asked: IntArray, n: int, stride: int) -> IntArray:
-    """Epochs at which steps end: every one that is asked for, and none more than a stride apart."""
-    epochs: list[IntArray] = [np.zeros(1, dtype=np.int64)]
-    marks = np.union1d(np.append(asked, [0, n]), [])
-    for start, stop in pairwise(marks):
-        between = np.arange(start + stride, stop, stride)
-        epochs.append(np.append(between, stop))
-    return np.concatenate(epochs).astype(np.int64)
+                tilt_deg=float(np.degrees(tilt)),
+                heading_deg=float(np.degrees(heading)),
+            )
 
 
 def _joint(believed: SensorStates, truth: SensorStates) -> SensorStates:
@@ -245,26 +243,22 @@ def _joint(believed: SensorStates, truth: SensorStates) -> SensorStates:
     def both(first: FloatArray, second: FloatArray) -> FloatArray:
         return np.concatenate([first, second], axis=-1)
 
-    still = np.zeros_like(believed.noise)
-    covariance = np.zeros((believed.m + truth.m,) * 2)
-    covariance[believed.m :, believed.m :] = truth.covariance
-    return replace(
-        truth,
+    own, real = believed.table, truth.table
+    still = np.zeros_like(own.noise)
+    return SensorStates(
         names=(*believed.names, *truth.names),
-        axis=np.append(believed.axis, truth.axis),
-        output=np.append(-believed.output, truth.output),
-        partner=np.append(believed.partner, truth.partner + believed.m),
         mean=np.append(believed.mean, truth.mean),
-        covariance=covariance,
-        phi=both(believed.phi, truth.phi),
-        phi_off=both(believed.phi_off, truth.phi_off),
-        gain=both(-believed.gain, truth.gain),
-        noise=both(still, truth.noise),
-        noise_off=both(still, truth.noise_off),
-        cross=both(still, truth.cross),
+        covariance=block_diag(np.zeros((believed.m, believed.m)), truth.covariance),
+        table=real._replace(
+            paired=own.paired or real.paired,
+            axis=np.append(own.axis, real.axis),
+            output=np.append(-own.output, real.output),
+            partner=np.append(own.partner, real.partner + believed.m),
+            phi=both(own.phi, real.phi),
+            phi_off=both(own.phi_off, real.phi_off),
+            gain=both(-own.gain, real.gain),
+            noise=both(still, real.noise),
+            noise_off=both(still, real.noise_off),
+            cross=both(still, real.cross),
+        ),
     )
-
-
-def _sums(table: SensorStates) -> FloatArray:
-    """Matrix (6, m) that adds up the states of each sensor."""
-    return np.where(table.axis == np.arange(6)[:, None], table.output, 0.0)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -10,31 +11,47 @@ import numpy as np
 from scipy.optimize import minimize
 
 from gmwm._core import checks
-from gmwm._core.notices import Notice
 from gmwm._core.text import bullets
 from gmwm._core.typing import FloatArray
 from gmwm.calibration import Calibration
 from gmwm.errors import InputError
 from gmwm.ins import tuning
-from gmwm.ins.covariance.analysis import Analysis, Course
+from gmwm.ins.covariance.analysis import Course
 from gmwm.ins.filter import Outage, gnss
 from gmwm.ins.imu import AXES, SensorModels
-from gmwm.ins.montecarlo import Scenario
+from gmwm.ins.simulation import Scenario
 from gmwm.ins.trajectory import Trajectory, fixed_wing_loiter
+from gmwm.issues import Notice, notice
 from gmwm.process import GaussMarkov, Model, RandomWalk, WhiteNoise
 
 FORMS: dict[str, tuple[str, ...]] = {"N+K": ("N", "K"), "N+GM": ("N", "sigma", "tau")}
 """Forms of a reduced model, with their parameters."""
 
-_KINDS = ("gyro", "accel")
-_JUDGED = slice(0, 6)  # position and velocity
-_DIFFERENCE = 1e-4  # of the logarithms of the factors, for slopes
+_POSITION_AND_VELOCITY = slice(0, 6)
+
 _STEPS = 60
-_LOITER = Notice(
-    "judged-on-loiter", "note", "",
-    "judged on the loiter of a fixed-wing aircraft", {},
-    "give the motion that it is for, trajectory= or scenario=",
-)  # fmt: skip
+_SLOPE_STEP = 1e-4  # of the logarithms of factors, for slopes by differences
+_FARTHEST = 12.0  # logarithm of a factor, beyond which numbers have no meaning any more
+
+
+def smallest_score(
+    score: Callable[[FloatArray], float], starts: Sequence[FloatArray]
+) -> tuple[float, FloatArray]:
+    """The search of all reduced numbers: the least score, and the logarithms of factors there.
+
+    score: Of logarithms of factors on the numbers at the start of the search. To it comes a little
+        of their squares, so that a factor which does not matter stays at one.
+    starts: Where the search begins.
+    """
+
+    def cost(logs: FloatArray) -> float:
+        # Finite beyond the farthest, too, where a line search may try: it takes differences.
+        return score(np.clip(logs, -_FARTHEST, _FARTHEST)) + tuning.INERTIA * float(logs @ logs)
+
+    options = {"eps": _SLOPE_STEP, "gtol": tuning.SLOPE, "maxiter": _STEPS}
+    found = [minimize(cost, logs, method="BFGS", options=options) for logs in starts]
+    best = min(found, key=lambda each: float(each.fun))
+    return float(best.fun), np.clip(best.x, -_FARTHEST, _FARTHEST)
 
 
 @dataclass(frozen=True)
@@ -149,51 +166,58 @@ def reduce(
     if not scenario.outages:
         raise InputError("outages: give one length at least, s")
     course = Course.of(scenario)
+    ends = [outage.end for outage in scenario.outages]
     longest = max(outage.duration for outage in scenario.outages)
     start = read_off(truth, form, longest, scenario.trajectory.dt)
-    names = [f"{kind} {name}" for kind in _KINDS for name in FORMS[form]]
+    names = [f"{kind} {name}" for kind in ("gyro", "accel") for name in FORMS[form]]
 
     def scaled(logs: FloatArray) -> SensorModels:
-        return _scaled(start, dict(zip(names, np.exp(logs), strict=True)))
+        factors = dict(zip(names, map(float, np.exp(logs)), strict=True))
+        changed: dict[str, Model] = {}
+        for axis, model in start.models.items():
+            kind = axis.partition("_")[0]
+            values = {k: float(v or 0.0) * factors[f"{kind} {k}"] for k, v in model.params.items()}
+            changed[axis] = model.with_params(values)
+        return replace(start, models=changed)
 
-    def cost(logs: FloatArray) -> float:
+    def score(logs: FloatArray) -> float:
         analysis = course.analyse(truth, scaled(logs))
-        score = analysis.score(_JUDGED)
-        total = float(np.sum([score[analysis.index(o.end)] for o in scenario.outages]))
-        return total + tuning.INERTIA * float(logs @ logs)
+        by_epoch = analysis.score(_POSITION_AND_VELOCITY)
+        return float(np.sum([by_epoch[analysis.index(end)] for end in ends]))
 
-    found = minimize(
-        cost,
-        np.zeros(len(names)),
-        method="BFGS",
-        options={"eps": _DIFFERENCE, "gtol": tuning.SLOPE, "maxiter": _STEPS},
-    )
-    best = scaled(found.x)
-    analyses = [course.analyse(truth, each) for each in (truth, start, best)]
+    _, logs = smallest_score(score, [np.zeros(len(names))])
+    best = scaled(logs)
+    full, read, reduced = (course.analyse(truth, each) for each in (truth, start, best))
+    errors = []
+    for outage in scenario.outages:
+        at = full.index(outage.end)
+        sds = (full.sd, read.sd, read.predicted_sd, reduced.sd, reduced.predicted_sd)
+        horizontal = (float(np.hypot(*sd[at, :2])) for sd in sds)
+        errors.append(ReducedError(outage.duration, *horizontal, float(reduced.nees()[at])))
     return Reduction(
         form=form,
         models=best,
-        inflation=dict(zip(names, map(float, np.exp(found.x)), strict=True)),
-        errors=tuple(_errors(outage, *analyses) for outage in scenario.outages),
-        notices=(*analyses[2].notices, *((_LOITER,) if assumed else ())),
+        inflation=dict(zip(names, map(float, np.exp(logs)), strict=True)),
+        errors=tuple(errors),
+        notices=(*reduced.notices, *([notice("judged-on-loiter")] if assumed else ())),
     )
 
 
 def read_off(models: SensorModels, form: str, longest: float, dt: float) -> SensorModels:
-    """Reduced models as they are read off the Allan deviation of full ones; see `Reduction`.
+    """Reduced models as people read them off the Allan deviation of full ones; see `Reduction`.
 
     form: {"N+K", "N+GM"}.
     longest: Longest outage, s.
     dt: Sampling interval, s.
     """
-    reduced, bias_sd = {}, {}
+    reduced: dict[str, Model] = {}
+    bias_sd: dict[str, float] = {}
     tau = dt * 2.0 ** np.arange(np.ceil(np.log2(10.0 * longest / dt)) + 1)
     for axis in AXES:
         model = models.models[axis]
         deviation = np.sqrt(2.0 * model.haar_variance(tau, dt))
-        white = float(np.interp(np.log(tuning.WHITE_AT), np.log(tau), deviation)) * np.sqrt(
-            tuning.WHITE_AT
-        )
+        read = float(np.interp(np.log(tuning.WHITE_AT), np.log(tau), deviation))
+        white = read * math.sqrt(tuning.WHITE_AT)
         if form == "N+K":
             at_end = float(np.interp(np.log(longest), np.log(tau), deviation))
             reduced[axis] = WhiteNoise(white) + RandomWalk(at_end * np.sqrt(3.0 / longest))
@@ -205,15 +229,12 @@ def read_off(models: SensorModels, form: str, longest: float, dt: float) -> Sens
             height = float(rest[top]) or float(deviation[-1])
             at = max(float(tau[top]), tuning.SHORTEST_PEAK)
             reduced[axis] = WhiteNoise(white) + GaussMarkov.of_peak(height, at)
-        bias_sd[axis] = _initial_sd(models, axis, dt) if form == "N+K" else 0.0
+        bias_sd[axis] = 0.0
+        if form == "N+K":
+            states = model.state_space(dt)
+            slow = float(states.output @ states.initial_covariance @ states.output)
+            bias_sd[axis] = float(np.sqrt(slow + models.bias_sd[axis] ** 2))
     return SensorModels(reduced, bias_sd)
-
-
-def _initial_sd(models: SensorModels, axis: str, dt: float) -> float:
-    """Standard deviation of the slow error of a sensor at the start."""
-    form = models.models[axis].state_space(dt)
-    slow = float(form.output @ form.initial_covariance @ form.output)
-    return float(np.sqrt(slow + models.bias_sd[axis] ** 2))
 
 
 def loiter_with_outages(lengths: Sequence[float], dt: float = 0.01) -> Scenario:
@@ -247,32 +268,3 @@ def with_outages(
             f"minutes apart need {end:g} s: give a longer one, or fewer outages"
         )
     return Scenario(trajectory, gnss(trajectory), tuple(outages), interval=tuning.SETTLING)
-
-
-def _scaled(models: SensorModels, factors: Mapping[str, float]) -> SensorModels:
-    changed: dict[str, Model] = {}
-    for axis, model in models.models.items():
-        kind = axis.partition("_")[0]
-        values = {
-            key: float(value or 0.0) * factors[f"{kind} {key}"]
-            for key, value in model.params.items()
-        }
-        changed[axis] = model.with_params(values)
-    return replace(models, models=changed)
-
-
-def _errors(outage: Outage, full: Analysis, read: Analysis, reduced: Analysis) -> ReducedError:
-    index = full.index(outage.end)
-
-    def horizontal(sd: FloatArray) -> float:
-        return float(np.hypot(sd[index, 0], sd[index, 1]))
-
-    return ReducedError(
-        duration=outage.duration,
-        full=horizontal(full.sd),
-        read_off=horizontal(read.sd),
-        read_off_predicted=horizontal(read.predicted_sd),
-        reduced=horizontal(reduced.sd),
-        reduced_predicted=horizontal(reduced.predicted_sd),
-        nees=float(reduced.nees()[index]),
-    )

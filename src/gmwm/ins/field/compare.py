@@ -25,7 +25,7 @@ from gmwm.ins.field.smoother import Smoothed, smooth
 from gmwm.ins.filter import Outage
 from gmwm.ins.geometry import ned_difference
 from gmwm.ins.imu import SensorModels
-from gmwm.ins.montecarlo import mean_ratio
+from gmwm.ins.simulation import mean_ratio
 from gmwm.ins.spec import read_models
 
 if TYPE_CHECKING:

@@ -25,7 +25,7 @@ from gmwm.ins.field.replay import Replay, alignment_of, innovation_sizes
 from gmwm.ins.field.start import Alignment
 from gmwm.ins.filter import KINDS, Solution
 from gmwm.ins.geometry import ned_difference
-from gmwm.ins.montecarlo import InnovationTest
+from gmwm.ins.simulation import InnovationTest
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

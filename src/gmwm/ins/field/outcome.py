@@ -9,7 +9,7 @@ import numpy as np
 from gmwm._core.distributions import student
 from gmwm._core.typing import FloatArray
 from gmwm.ins import tuning
-from gmwm.ins.montecarlo import InnovationTest, Ratio
+from gmwm.ins.simulation import InnovationTest, Ratio
 
 PARTS = {"horizontal": (0, 1), "vertical": (2,)}
 

@@ -17,7 +17,7 @@ from gmwm.ins.field.start import Alignment, align, mean_sd, started
 from gmwm.ins.filter import KINDS, Aiding, FilterInnovations, Fixes, InitialSd, Solution, navigate
 from gmwm.ins.geometry import gravity_at, matrix_from_rpy, offset
 from gmwm.ins.imu import AXES, Imu, SensorModels
-from gmwm.ins.montecarlo import InnovationTest, chi_square_ratio, lag_one
+from gmwm.ins.simulation import InnovationTest, chi_square_ratio, lag_one
 from gmwm.ins.trajectory import NavState
 from gmwm.process import Model, Process
 

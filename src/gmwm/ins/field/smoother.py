@@ -18,12 +18,15 @@ from gmwm.ins.filter import (
     NAVIGATION,
     Events,
     Filter,
+    Kinematics,
     Outputs,
     SensorStates,
     Solution,
-    measurement_row,
+    Transition,
     measurement_update,
-    noise_state,
+    new_scratch,
+    new_transition,
+    observe,
     propagate,
     transition,
 )
@@ -143,7 +146,7 @@ class _Forward:
         i = int(np.clip(np.searchsorted(self._nodes, epoch, side="right") - 1, 0, None))
         return self._solution.velocity[i], self._solution.lla[i], self._solution.matrix[i], i
 
-    def transition(self, epoch: int, count: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def transition(self, epoch: int, count: int) -> tuple[FloatArray, Transition]:
         """Of all states over some samples, and that of navigation by itself and by sensors."""
         v, lla, C, i = self._nominal(epoch + 0.5 * count)
         if i + 1 < self._nodes.size:
@@ -153,26 +156,22 @@ class _Forward:
             )
             v = (1.0 - share) * v + share * self._solution.velocity[later]
             C = (1.0 - share) * C + share * self._solution.matrix[later]
-        F, A, B = np.zeros((9, 9)), np.zeros((9, 9)), np.zeros((9, 6))
-        transition(v, lla, np.ascontiguousarray(C), count * self._imu.dt, F, A, B)
-        return _whole(self._ready.states, A, B, count), A, B
+        change = new_transition()
+        transition(Kinematics(np.ascontiguousarray(C), v, lla), count * self._imu.dt, change)
+        return _whole(self._ready.states, change.A, change.B, count), change
 
     def _propagate(self, epoch: int, count: int) -> None:
         """Propagate the covariance by some samples."""
-        _, A, B = self.transition(epoch, count)
-        states, n = self._ready.states, self._P.shape[0]
-        propagate(
-            self._P, A, B, states.axis, states.partner, states.phi[count], states.phi_off[count],
-            states.gain[count], states.noise[count], states.noise_off[count], states.cross[count],
-            states.integral[count], np.zeros((6, n)), np.zeros((9, n)), np.zeros((9, 6)),
-            np.zeros(n),
-        )  # fmt: skip
+        _, change = self.transition(epoch, count)
+        table = self._ready.states.table
+        propagate(self._P, change, table, count, new_scratch(self._P.shape[0]))
 
     def _updates(self, event: int, epoch: int) -> list[_Update]:
         """Update the covariance by the components of a fix, with the filter's innovations."""
         innovations = self._solution.innovations
         kind = int(innovations.kind[event])
-        v, _, C, _ = self._nominal(epoch)
+        v, lla, C, _ = self._nominal(epoch)
+        at = Kinematics(np.ascontiguousarray(C), v, lla)
         last = min(max(epoch - 1, 0), self._imu.n - 1)
         rate = self._imu.rotation[last] / self._imu.dt
         found, n = [], self._P.shape[0]
@@ -182,9 +181,9 @@ class _Forward:
                 continue
             h, row, gain = np.zeros(NAVIGATION), np.zeros(n), np.zeros(n)
             lever = np.asarray(self._aiding.lever_arm)
-            measurement_row(kind, component, np.ascontiguousarray(C), v, rate, lever, h)
+            observe(kind, component, self._events.value[event], at, rate, lever, h)
             row[:NAVIGATION] = h
-            state = noise_state(kind, component, self._ready.coloured)
+            state = int(self._ready.noise_states[kind, component])
             if state >= 0:
                 state += NAVIGATION
                 row[state] = -1.0
@@ -198,17 +197,17 @@ class _Forward:
 
 def _whole(states: SensorStates, A: FloatArray, B: FloatArray, count: int) -> FloatArray:
     """Transition of all states over some samples, (9 + m, 9 + m)."""
-    n = NAVIGATION + states.m
+    table, n = states.table, NAVIGATION + states.m
     whole = np.zeros((n, n))
     whole[:NAVIGATION, :NAVIGATION] = A
     index = np.arange(states.m)
-    whole[NAVIGATION + index, NAVIGATION + index] = states.phi[count]
-    paired = states.partner != index
-    whole[NAVIGATION + index[paired], NAVIGATION + states.partner[paired]] = states.phi_off[count][
+    whole[NAVIGATION + index, NAVIGATION + index] = table.phi[count]
+    paired = table.partner != index
+    whole[NAVIGATION + index[paired], NAVIGATION + table.partner[paired]] = table.phi_off[count][
         paired
     ]
-    of_sensor = np.flatnonzero(states.axis >= 0)
+    of_sensor = np.flatnonzero(table.axis >= 0)
     whole[:NAVIGATION, NAVIGATION + of_sensor] = (
-        B[:, states.axis[of_sensor]] * states.gain[count][of_sensor]
+        B[:, table.axis[of_sensor]] * table.gain[count][of_sensor]
     )
     return whole

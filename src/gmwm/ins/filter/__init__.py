@@ -1,9 +1,7 @@
 """The INS/GNSS filter: mechanization, error states, measurement updates."""
 
 from gmwm.ins.filter.aiding import (
-    KINDS as KINDS,
     Aiding as Aiding,
-    Events as Events,
     Fixes as Fixes,
     Outage as Outage,
     gnss as gnss,
@@ -24,12 +22,15 @@ from gmwm.ins.filter.filter import (
     navigate as navigate,
     unmodified as unmodified,
 )
-from gmwm.ins.filter.measurement_kernels import (
-    IS_HEIGHT as IS_HEIGHT,
-    IS_POSITION as IS_POSITION,
-    IS_VELOCITY as IS_VELOCITY,
-    measurement_row as measurement_row,
-    noise_state as noise_state,
+from gmwm.ins.filter.measurements import IS_GNSS as IS_GNSS, KINDS as KINDS, observe as observe
+from gmwm.ins.filter.records import (
+    Events as Events,
+    Kinematics as Kinematics,
+    Scratch as Scratch,
+    SensorTable as SensorTable,
+    Transition as Transition,
+    new_scratch as new_scratch,
+    new_transition as new_transition,
 )
 from gmwm.ins.filter.solution import FilterInnovations as FilterInnovations, Solution as Solution
-from gmwm.ins.filter.states import IntArray as IntArray, SensorStates as SensorStates
+from gmwm.ins.filter.states import SensorStates as SensorStates

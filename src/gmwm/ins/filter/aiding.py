@@ -1,4 +1,4 @@
-"""What aids an inertial navigator: GNSS fixes, barometric height, standstill; and outages."""
+"""What aids an inertial navigator: GNSS fixes, barometric heights, standstills; and outages."""
 
 from __future__ import annotations
 
@@ -7,28 +7,17 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from gmwm._core import checks
 from gmwm._core.distributions import chi2
-from gmwm._core.typing import FloatArray
+from gmwm._core.typing import BoolArray, FloatArray, IntArray
 from gmwm.errors import InputError
 from gmwm.ins import tuning
-from gmwm.ins.filter.measurement_kernels import IS_HEIGHT, IS_POSITION, IS_STANDSTILL, IS_VELOCITY
-from gmwm.ins.filter.states import IntArray
-from gmwm.ins.geometry import matrix_from_rpy, offset
+from gmwm.ins.filter.measurements import IS_INFERRED, KINDS, MEASUREMENTS, Measurement
+from gmwm.ins.filter.records import Events
 from gmwm.ins.imu import Imu
 from gmwm.ins.trajectory import Trajectory
 
-KINDS = {
-    "position": IS_POSITION,
-    "velocity": IS_VELOCITY,
-    "height": IS_HEIGHT,
-    "standstill": IS_STANDSTILL,
-}
-"""Kinds of fixes, with their codes in the kernels."""
-
-_OF_GNSS = ("position", "velocity")
 _SAME_TIME = 1e-6  # s: sums of sampling intervals are not exact
 
 
@@ -81,64 +70,41 @@ class Fixes:
 
     def __post_init__(self) -> None:
         checks.choice("kind", self.kind, list(KINDS))
-        time = checks.real_numbers(self.time, "time of the fixes")
-        value, sd = (checks.real_numbers(each, f"{self.kind} fixes") for each in
-                     (self.value, self.sd))  # fmt: skip
+        name = f"{self.kind} fixes"
+        time = checks.real_numbers(self.time, f"time of the {name}")
+        value, sd = checks.real_numbers(self.value, name), checks.real_numbers(self.sd, name)
         if time.ndim != 1 or value.shape != (time.size, 3) or sd.shape != (time.size, 3):
             raise InputError(
-                f"{self.kind} fixes: give E times and E x 3 values and standard deviations, not "
+                f"{name}: give E times and E x 3 values and standard deviations, not "
                 f"{time.shape}, {value.shape}, {sd.shape}"
             )
         bad = ~np.isfinite(time) | ~np.all(np.isfinite(value) & np.isfinite(sd), axis=1)
         if np.any(bad):
-            raise InputError(
-                f"{self.kind} fixes: number {int(np.argmax(bad))} is not finite: leave it out"
-            )
+            raise InputError(f"{name}: number {int(np.argmax(bad))} is not finite: leave it out")
         if np.any(np.diff(time) < 0.0):
             late = int(np.argmax(np.diff(time) < 0.0)) + 1
             raise InputError(
-                f"{self.kind} fixes: number {late} at {time[late]:g} s comes before the one ahead "
-                "of it: sort them by time"
+                f"{name}: number {late} at {time[late]:g} s comes before the one ahead of it: sort "
+                "them by time"
             )
         if np.any(sd < 0.0):
-            raise InputError(f"{self.kind} fixes: a standard deviation is negative: give 0 or more")
-        for name, array in (("time", time), ("value", value), ("sd", sd)):
-            object.__setattr__(self, name, array)
+            raise InputError(f"{name}: a standard deviation is negative: give 0 or more")
+        sd = np.where(np.arange(3) < self.measurement.components, sd, 0.0)
+        for key, array in (("time", time), ("value", value), ("sd", sd)):
+            object.__setattr__(self, key, array)
 
-    def part(self, kept: npt.NDArray[np.bool_]) -> Fixes:
+    @property
+    def measurement(self) -> type[Measurement]:
+        """Class of the kind."""
+        return MEASUREMENTS[KINDS[self.kind]]
+
+    def part(self, kept: BoolArray) -> Fixes:
         """Some of the fixes."""
         return replace(self, time=self.time[kept], value=self.value[kept], sd=self.sd[kept])
 
-    def noisy(self, rng: np.random.Generator) -> Fixes:
-        """The fixes with white noise of their standard deviations added."""
-        noise = self.sd * rng.standard_normal(self.sd.shape)
-        return replace(self, value=self.moved(noise))
-
     def moved(self, by: FloatArray) -> FloatArray:
         """Values moved by metres or m/s to the north, east and down, (E, 3)."""
-        if self.kind == "position":
-            return offset(self.value, by)
-        if self.kind == "height":
-            return self.value + np.where(np.arange(3) == 0, by, 0.0)
-        return self.value + by
-
-
-@dataclass(frozen=True, eq=False)
-class Events:
-    """Fixes of all kinds in order of time, as the kernels take them.
-
-    epoch, kind: (E,) of int, of the nearest epoch of the IMU.
-    offset: (E,), time of the fix less that of its epoch, s; 0 where they are the same.
-    value, sd: (E, 3).
-    gate: (E,), normalised innovation squared beyond which a fix is rejected; infinite for none.
-    """
-
-    epoch: IntArray
-    kind: IntArray
-    offset: FloatArray
-    value: FloatArray
-    sd: FloatArray
-    gate: FloatArray
+        return self.measurement.moved(self.value, by)
 
 
 @dataclass(frozen=True, eq=False)
@@ -204,29 +170,23 @@ class Aiding:
 
     def without(self, outages: Iterable[Outage]) -> Aiding:
         """The same without the GNSS fixes of the outages."""
+        spans = [(outage.start + _SAME_TIME, outage.end - _SAME_TIME) for outage in outages]
         result = []
         for fixes in self.fixes:
-            if fixes.kind in _OF_GNSS:
-                out = np.zeros(fixes.time.size, dtype=bool)
-                for outage in outages:
-                    out |= (fixes.time > outage.start + _SAME_TIME) & (
-                        fixes.time < outage.end - _SAME_TIME
-                    )
-                fixes = fixes.part(~out)
-            result.append(fixes)
+            kept = np.ones(fixes.time.size, dtype=bool)
+            for start, end in spans if fixes.measurement.is_gnss else ():
+                kept &= (fixes.time <= start) | (fixes.time >= end)
+            result.append(fixes.part(kept))
         return replace(self, fixes=tuple(result))
 
     def noisy(self, rng: np.random.Generator) -> Aiding:
         """The same with noise added to error-free fixes, the coloured one included."""
         fixes = []
         for each in self.fixes:
-            drawn = each.noisy(rng)
-            if each.kind == "position" and np.any(self.coloured_sd):
-                slow = _markov(each.time, self.coloured_tau, rng) * self.coloured_sd
-                drawn = replace(drawn, value=drawn.moved(slow))
-            if each.kind == "height" and self.barometer_sd:
-                slow = _markov(each.time, self.barometer_tau, rng) * self.barometer_sd
-                drawn = replace(drawn, value=drawn.moved(slow))
+            drawn = replace(each, value=each.moved(each.sd * rng.standard_normal(each.sd.shape)))
+            sd, tau = each.measurement.slow_noise(self)
+            if np.any(sd):
+                drawn = replace(drawn, value=drawn.moved(_markov(each.time, tau, rng) * sd))
             fixes.append(drawn)
         return replace(self, fixes=tuple(fixes))
 
@@ -238,40 +198,31 @@ class Aiding:
         InputError
             If a fix lies outside the record.
         """
-        fixes = [each for each in self.fixes if each.time.size]
-        if not fixes:
-            none = np.zeros(0, dtype=np.int64)
-            empty = np.zeros((0, 3))
-            return Events(none, none, np.zeros(0), empty, empty, np.zeros(0))
-        for each in fixes:
+        for each in self.fixes:
             outside = (each.time < -0.5 * dt) | (each.time > (n + 0.5) * dt)
             if np.any(outside):
                 raise InputError(
                     f"{each.kind} fix at {each.time[np.argmax(outside)]:g} s: the IMU record goes "
                     f"from 0 to {n * dt:g} s; cut the fixes or shift their clock"
                 )
-        time = np.concatenate([each.time for each in fixes])
-        kind = np.concatenate([np.full(each.time.size, KINDS[each.kind]) for each in fixes])
+        none = np.zeros((0, 3))
+        time = np.concatenate([none[:, 0], *(each.time for each in self.fixes)])
+        codes = [np.full(each.time.size, KINDS[each.kind]) for each in self.fixes]
+        kind = np.concatenate([np.zeros(0, dtype=np.int64), *codes])
         epoch = np.clip(np.rint(time / dt), 0, n).astype(np.int64)
         offset = time - epoch * dt
         offset[np.abs(offset) <= _SAME_TIME] = 0.0
         order = np.lexsort((kind, offset, epoch))
-        value = np.concatenate([each.value for each in fixes])
-        sd = np.concatenate([each.sd for each in fixes])
-        return Events(
-            epoch[order],
-            kind.astype(np.int64)[order],
-            offset[order],
-            np.ascontiguousarray(value[order]),
-            np.ascontiguousarray(sd[order]),
-            self._gates(kind[order], sd[order]),
-        )
+        value = np.concatenate([none, *(each.value for each in self.fixes)])[order]
+        kind, sd = kind[order], np.concatenate([none, *(each.sd for each in self.fixes)])[order]
+        gates = self._gates(kind, sd)
+        return Events(epoch[order], kind, offset[order], value, sd, gates)
 
     def _gates(self, kind: IntArray, sd: FloatArray) -> FloatArray:
         """Largest normalised innovation squared of each fix that is used."""
         result = np.full(kind.size, np.inf)
-        gated = np.full(kind.size, self.gate is not None) | (kind == IS_STANDSTILL)
-        freedom = np.where(kind == IS_HEIGHT, 1, np.maximum(np.count_nonzero(sd, axis=1), 1))
+        gated = np.full(kind.size, self.gate is not None) | IS_INFERRED[kind]
+        freedom = np.maximum(np.count_nonzero(sd, axis=1), 1)
         result[gated] = chi2.isf(self.gate or tuning.GATE, freedom[gated])
         return result
 
@@ -308,44 +259,52 @@ def gnss(
     InputError
         If the interval is not a multiple of the trajectory's, or a standard deviation not positive.
     """
+    arm = _three("lever_arm", lever_arm)
+    given = {"position": position_sd, "velocity": velocity_sd}
+    fixes = [
+        _along(kind, trajectory, interval, sd, arm, imu)
+        for kind, sd in given.items()
+        if sd is not None
+    ]
+    return Aiding(tuple(fixes), arm, coloured_sd, coloured_tau)
+
+
+def barometer(trajectory: Trajectory, interval: float = 1.0, sd: float = 1.0) -> Aiding:
+    """Error-free heights along a trajectory; see `gnss`."""
+    return Aiding((_along("height", trajectory, interval, sd),))
+
+
+def standstills(trajectory: Trajectory, interval: float = 1.0, sd: float = 0.01) -> Aiding:
+    """Zero-velocity updates wherever a trajectory stands still; see `gnss`."""
+    fixes = _along("standstill", trajectory, interval, sd)
+    index = np.rint(fixes.time / trajectory.dt).astype(int)
+    speed = np.linalg.norm(trajectory.velocity[index], axis=1)
+    return Aiding((fixes.part(speed < tuning.STANDSTILL),))
+
+
+def _along(
+    kind: str,
+    trajectory: Trajectory,
+    interval: float,
+    sd: float | Sequence[float],
+    arm: FloatArray | None = None,
+    imu: Imu | None = None,
+) -> Fixes:
+    """Error-free fixes of a kind, every ``interval`` (s) after the first epoch."""
     # Beyond the end there are no fixes, however far.
     stride = min(checks.positive("interval", interval) / trajectory.dt, trajectory.n + 1.0)
     if abs(stride - round(stride)) > 1e-6 or round(stride) < 1:
         raise InputError(
             f"interval = {interval:g} s: give a multiple of the trajectory's {trajectory.dt:g} s"
         )
+    given = checks.real_numbers(sd, "standard deviation")
+    each = _three("standard deviation", np.full(3, given) if given.ndim == 0 else given)
+    if np.any(each <= 0.0):
+        raise InputError(f"standard deviation = {checks.shown(sd)}: give positive numbers")
     index = np.arange(round(stride), trajectory.n + 1, round(stride))
-    arm = _three("lever_arm", lever_arm)
-    matrix = matrix_from_rpy(trajectory.rpy[index])
-    time = trajectory.time[index]
-    fixes = []
-    if position_sd is not None:
-        antenna = offset(trajectory.lla[index], matrix @ arm)
-        fixes.append(Fixes("position", time, antenna, _deviations(position_sd, index.size)))
-    if velocity_sd is not None:
-        velocity = trajectory.velocity[index]
-        if np.any(arm):
-            if imu is None:
-                raise InputError("velocity fixes with a lever arm: give the error-free imu too")
-            rate = imu.rotation[index - 1] / imu.dt
-            velocity = velocity + np.einsum("kij,kj->ki", matrix, np.cross(rate, arm))
-        fixes.append(Fixes("velocity", time, velocity, _deviations(velocity_sd, index.size)))
-    return Aiding(tuple(fixes), arm, coloured_sd, coloured_tau)
-
-
-def barometer(trajectory: Trajectory, interval: float = 1.0, sd: float = 1.0) -> Aiding:
-    """Error-free heights along a trajectory; see `gnss`."""
-    whole = gnss(trajectory, interval, position_sd=sd).fixes[0]
-    value = np.where(np.arange(3) == 0, whole.value[:, 2:], 0.0)
-    return Aiding((Fixes("height", whole.time, value, whole.sd * [1.0, 0.0, 0.0]),))
-
-
-def standstills(trajectory: Trajectory, interval: float = 1.0, sd: float = 0.01) -> Aiding:
-    """Zero-velocity updates wherever a trajectory stands still; see `gnss`."""
-    whole = gnss(trajectory, interval, position_sd=None, velocity_sd=sd).fixes[0]
-    still = np.linalg.norm(whole.value, axis=1) < tuning.STANDSTILL
-    kept = whole.part(still)
-    return Aiding((Fixes("standstill", kept.time, np.zeros_like(kept.value), kept.sd),))
+    measurement = MEASUREMENTS[KINDS[kind]]
+    value = measurement.along(trajectory, index, np.zeros(3) if arm is None else arm, imu)
+    return Fixes(kind, trajectory.time[index], value, np.tile(each, (index.size, 1)))
 
 
 def _three(name: str, values: Any) -> FloatArray:
@@ -353,14 +312,6 @@ def _three(name: str, values: Any) -> FloatArray:
     if array.shape != (3,) or not np.all(np.isfinite(array)):
         raise InputError(f"{name} = {checks.shown(values)}: give three finite numbers")
     return array
-
-
-def _deviations(given: float | Sequence[float], count: int) -> FloatArray:
-    each = checks.real_numbers(given, "standard deviation")
-    each = _three("standard deviation", np.full(3, each) if each.ndim == 0 else each)
-    if np.any(each <= 0.0):
-        raise InputError(f"standard deviation = {checks.shown(given)}: give positive numbers")
-    return np.tile(each, (count, 1))
 
 
 def _markov(time: FloatArray, tau: float, rng: np.random.Generator) -> FloatArray:

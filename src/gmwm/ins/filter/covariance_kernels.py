@@ -15,7 +15,7 @@ import math
 
 from gmwm._core.compiled import compiled
 from gmwm._core.typing import FloatArray
-from gmwm.ins.filter.states import IntArray
+from gmwm.ins.filter.records import Kinematics, Scratch, SensorTable, Transition
 from gmwm.ins.geometry import RATE, gravity_at, radii_at
 
 POSITION, VELOCITY, ATTITUDE, NAVIGATION = 0, 3, 6, 9
@@ -74,19 +74,16 @@ def error_rates(v: FloatArray, lla: FloatArray, F: FloatArray) -> None:
 
 
 @compiled(fastmath=_FAST)
-def transition(
-    v: FloatArray, lla: FloatArray, C: FloatArray, step: float, F: FloatArray, A: FloatArray,
-    B: FloatArray,
-) -> None:  # fmt: skip
+def transition(at: Kinematics, step: float, into: Transition) -> None:
     """Fill the transition of the navigation errors over a step, and the effect of the sensors.
 
-    v, lla, C: Velocity, position and attitude in the middle of the step.
+    at: Solution in the middle of the step.
     step: s.
-    F: (9, 9), work space; the equation's matrix.
-    A: (9, 9), overwritten by ``I + F step + F^2 step^2 / 2``.
-    B: (9, 6), overwritten by the navigation error per unit of integrated sensor error (rad, m/s),
-        which is as good as made in the middle of the step.
+    into: Overwritten; A is ``I + F step + F^2 step^2 / 2``, and sensor errors act as if made in the
+        middle of the step.
     """
+    C, v, lla = at
+    F, A, B = into
     error_rates(v, lla, F)
     half = 0.5 * step
     for i in range(9):
@@ -120,25 +117,22 @@ def transition(
 
 @compiled(fastmath=_FAST)
 def propagate(
-    P: FloatArray, A: FloatArray, B: FloatArray, axis: IntArray, partner: IntArray,
-    phi: FloatArray, phi_off: FloatArray, gain: FloatArray, noise: FloatArray,
-    noise_off: FloatArray, cross: FloatArray, integral: FloatArray,
-    S: FloatArray, T: FloatArray, U: FloatArray, row: FloatArray,
-) -> None:  # fmt: skip
-    """Propagate a covariance over a step, in place.
+    P: FloatArray, change: Transition, table: SensorTable, samples: int, scratch: Scratch
+) -> None:
+    """Propagate a covariance (9 + m, 9 + m) over a step of some samples, in place.
 
-    P: (9 + m, 9 + m), symmetric.
-    A, B: From `transition`.
-    axis, partner: (m,) of int.
-    phi, phi_off, gain, noise, noise_off, cross: (m,).
-    integral: (6,), rows of `gmwm.ins.filter.states.SensorStates` for the samples of the step.
-    S: (6, 9 + m), T : (9, 9 + m), U : (9, 6), row : (9 + m,), work space.
+    change: From `transition`.
+    table: Of the m sensor states.
+    scratch: Work space for 9 + m states.
     """
+    A, B = change.A, change.B
+    S, T, U, row = scratch
+    axis, partner, paired = table.axis, table.partner, table.paired
+    phi, phi_off, gain = table.phi[samples], table.phi_off[samples], table.gain[samples]
+    noise, noise_off = table.noise[samples], table.noise_off[samples]
+    cross, integral = table.cross[samples], table.integral[samples]
     n = P.shape[0]
     m = n - 9
-    paired = False
-    for i in range(m):
-        paired = paired or partner[i] != i
     for a in range(6):
         for j in range(n):
             S[a, j] = 0.0
@@ -217,18 +211,16 @@ def propagate(
 
 @compiled()
 def tilt_squared(P: FloatArray, g: float, step: float, gathered: float) -> float:
-    """Allow for the square of the tilt error over a step, which a linear filter does not know.
+    """Add the square of the tilt error over a step, which a linear filter does not know.
 
-    Specific force that is resolved with a tilt error phi falls short of gravity by ``g phi^2 / 2``.
-    Where gyros are poor and accelerometers good, that is more than the vertical error that a linear
-    filter expects. The filter linearises about its estimate, which contains the tilt error: given
-    the horizontal errors, its linear terms predict ``g phi^2``, twice the shortfall and of its
-    sign. What is left is ``-g phi^2 / 2`` given them, and ``+g phi^2 / 2`` if nothing is given, so
-    that no mean is subtracted: the one would be made worse by what mends the other. Its mean square
-    is the same in both cases and follows from the covariance of the tilt, as in the Gaussian
-    second-order filter (Jazwinski 1970, *Stochastic Processes and Filtering Theory*, sec. 9.3). The
-    tilt hardly changes from step to step, so root mean squares add up, not squares, until a fix
-    corrects it; heights and standstills do not show it.
+    Specific force resolved with a tilt error phi falls short of gravity by ``g phi^2 / 2``. With
+    poor gyros and good accelerometers that exceeds the vertical error of a linear filter. The
+    filter linearises about its estimate: given the horizontal errors it predicts ``g phi^2``, twice
+    the shortfall. The rest is ``-g phi^2 / 2`` given them and ``+g phi^2 / 2`` without, so no mean
+    is subtracted; its mean square is the same in both cases and follows from the covariance of the
+    tilt (Jazwinski 1970, *Stochastic Processes and Filtering Theory*, sec. 9.3). The tilt hardly
+    changes from step to step, so root mean squares add up, not squares, until a GNSS fix corrects
+    it; heights and standstills do not show it.
 
     P: (n, n), changed in place: variance of the vertical velocity error.
     g: m/s^2.
@@ -245,13 +237,12 @@ def tilt_squared(P: FloatArray, g: float, step: float, gathered: float) -> float
 
 @compiled()
 def excess(P: FloatArray, h: FloatArray, attitude: float) -> float:
-    """Variance of a measurement for the products of errors that a linear filter does not know.
+    """Variance to add to a measurement for the products of errors a linear filter leaves out.
 
-    The errors that a linear filter predicts for position and velocity are wrong by half an attitude
-    error times themselves: what it leaves out is the second term of the rotation by phi,
-    ``phi x (phi x f)/2`` after ``phi x f``. Without fixes for long, that is far more than the noise
-    of a precise fix, which must not be believed to the last centimetre then; after a few fixes,
-    little is left of it.
+    A linear filter leaves out the second term of the rotation by phi, ``phi x (phi x f)/2`` after
+    ``phi x f``: its position and velocity errors are wrong by half an attitude error times
+    themselves. After a long outage that is far more than the noise of a precise fix; after a few
+    fixes, little is left of it.
 
     P: (n, n).
     h: (9,), as in `measurement_update`.
@@ -268,9 +259,14 @@ def excess(P: FloatArray, h: FloatArray, attitude: float) -> float:
 
 @compiled(fastmath=_FAST)
 def measurement_update(
-    P: FloatArray, h: FloatArray, state: int, variance: float, z: float, x: FloatArray,
+    P: FloatArray,
+    h: FloatArray,
+    state: int,
+    variance: float,
+    z: float,
+    x: FloatArray,
     K: FloatArray,
-) -> tuple[float, float]:  # fmt: skip
+) -> tuple[float, float]:
     """Update by one scalar measurement ``z = h x[:9] - x[state] + noise``, in place.
 
     P: (n, n).

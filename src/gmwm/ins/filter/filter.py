@@ -10,17 +10,26 @@ import numpy as np
 
 from gmwm._core import checks
 from gmwm._core.spool import release, windows
-from gmwm._core.typing import FloatArray
+from gmwm._core.typing import FloatArray, IntArray
 from gmwm.calibration import Calibration
 from gmwm.errors import InputError
 from gmwm.ins import tuning
-from gmwm.ins.filter.aiding import Aiding, Events
+from gmwm.ins.filter.aiding import Aiding
 from gmwm.ins.filter.covariance_kernels import ATTITUDE, NAVIGATION, VELOCITY
-from gmwm.ins.filter.filter_arrays import Kept, Measured, Sampled, Sensors, State
 from gmwm.ins.filter.filter_kernels import PAUSED, run
-from gmwm.ins.filter.measurement_kernels import IS_POSITION, KINDS
+from gmwm.ins.filter.measurements import KINDS, MEASUREMENTS
+from gmwm.ins.filter.records import (
+    Estimate,
+    Events,
+    Innovated,
+    Kept,
+    Kinematics,
+    Progress,
+    Samples,
+    Settings,
+)
 from gmwm.ins.filter.solution import FilterInnovations, Solution
-from gmwm.ins.filter.states import NO_AXIS, IntArray, SensorStates
+from gmwm.ins.filter.states import SensorStates
 from gmwm.ins.geometry import matrix_from_rpy, skew
 from gmwm.ins.imu import Imu, SensorModels
 from gmwm.ins.trajectory import NavState, check_latitudes
@@ -51,10 +60,8 @@ class InitialSd:
 
     @property
     def deviations(self) -> FloatArray:
-        """Of the nine navigation errors, (9,)."""
-        return np.array(
-            [self.position] * 3 + [self.velocity] * 3 + [self.tilt, self.tilt, self.heading]
-        )
+        """Standard deviations of the nine navigation errors, (9,)."""
+        return np.repeat([self.position, self.velocity, self.tilt, self.heading], [3, 3, 2, 1])
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,19 +75,19 @@ class Filter:
 
     dt: Sampling interval of the IMU, s.
     stride: Samples per step of the covariance.
-    coloured: (4,) of int, states of the coloured noise of GNSS positions to the north, east and
-        down, and of barometric heights; -1 for none.
+    noise_states: (kinds, 3) of int, sensor state of the slow noise of each component of each kind
+        of measurement; -1 for none.
     lever_arm: (3,), m.
-    second_order: Whether products of errors are allowed for; without it the filter is linear: too
+    second_order: Whether products of errors are allowed for. Without it the filter is linear: too
         sure of its vertical channel where gyros are poor and accelerometers good, and of what
-        precise fixes say after a long outage; see `gmwm.ins.filter.covariance_kernels.tilt_squared`
-        and ``excess``.
+        precise fixes say after a long outage; see `tilt_squared` and `excess` of
+        `gmwm.ins.filter.covariance_kernels`.
     """
 
     states: SensorStates
     dt: float
     stride: int
-    coloured: IntArray
+    noise_states: IntArray
     lever_arm: FloatArray
     second_order: bool = True
 
@@ -100,22 +107,31 @@ class Filter:
         """
         stride = max(round(checks.positive("step", step) / dt), 1)
         states = SensorStates.of(sensors, dt, stride, drift_known)
-        coloured = np.full(4, -1, dtype=np.int64)
-        sd = np.append(aiding.coloured_sd, aiding.barometer_sd)
-        if np.any(sd):
-            tau = np.append(np.full(3, aiding.coloured_tau), aiding.barometer_tau)
-            names = ("GNSS north", "GNSS east", "GNSS down", "barometer")
-            coloured[sd > 0.0] = states.m + np.arange(np.count_nonzero(sd))
-            states = states.with_markov(
-                [name for name, s in zip(names, sd, strict=True) if s > 0.0],
-                sd[sd > 0.0], tau[sd > 0.0], dt,
-            )  # fmt: skip
-        return cls(states, dt, stride, coloured, np.asarray(aiding.lever_arm), second_order)
+        noise_states = np.full((len(MEASUREMENTS), 3), -1, dtype=np.int64)
+        names: list[str] = []
+        sigmas: list[float] = []
+        taus: list[float] = []
+        for code, measurement in enumerate(MEASUREMENTS):
+            sd, tau = measurement.slow_noise(aiding)
+            for component in np.flatnonzero(sd > 0.0):
+                noise_states[code, component] = states.m + len(names)
+                names.append(measurement.slow_names[component])
+                sigmas.append(float(sd[component]))
+                taus.append(tau)
+        if names:
+            states = states.with_markov(names, np.array(sigmas), np.array(taus), dt)
+        return cls(states, dt, stride, noise_states, np.asarray(aiding.lever_arm), second_order)
 
     @property
     def size(self) -> int:
         """Number of states, those of navigation included."""
         return NAVIGATION + self.states.m
+
+    @property
+    def settings(self) -> Settings:
+        """Record for the kernels."""
+        table, lever = self.states.table, self.lever_arm
+        return Settings(table, self.noise_states, lever, self.second_order, self.stride)
 
     def covariance(self, initial: NavState, sd: InitialSd) -> FloatArray:
         """Covariance at the first epoch, (9 + m, 9 + m), with the modified velocity error."""
@@ -136,40 +152,28 @@ class Filter:
         Raises InputError if it starts closer than 1 deg to a pole.
         """
         check_latitudes(initial.lla[None, :], "initial")
-        table, m = self.states, self.states.m
-        P, x = self.covariance(initial, initial_sd), table.mean.copy()
-        state = State(
-            matrix_from_rpy(initial.rpy), initial.velocity.copy(), initial.lla.copy(), P, x
+        C, v, lla = matrix_from_rpy(initial.rpy), initial.velocity.copy(), initial.lla.copy()
+        P, x = self.covariance(initial, initial_sd), self.states.mean.copy()
+        estimate = Estimate(Kinematics(C, v, lla), P, x)
+        shape, count = events.value.shape, outputs.epoch.size
+        found = Innovated(
+            np.full(shape, np.nan), np.full(shape, np.nan), np.ones(shape[0], dtype=np.bool_)
         )
-        axis = table.axis[table.axis != NO_AXIS]
-        sensors = Sensors(
-            np.searchsorted(axis, np.arange(7)).astype(np.int64),
-            bool(np.any(table.partner != np.arange(m))),
-            table.axis, table.output, table.partner, table.phi, table.phi_off, table.gain,
-            table.noise, table.noise_off, table.cross, table.integral,
-        )  # fmt: skip
-        shape = events.value.shape
-        measured = Measured(
-            events.epoch, events.kind, events.offset, events.value, events.sd, events.gate,
-            self.coloured, self.lever_arm, self.second_order,
-            np.full(shape, np.nan), np.full(shape, np.nan), np.ones(shape[0], dtype=np.bool_),
-        )  # fmt: skip
-        count = outputs.epoch.size
-        kept = Kept(
-            outputs.epoch, outputs.before, np.zeros((count, 6)), np.zeros((count, 3, 3)),
-            np.zeros((count, 9, 9)), np.zeros((count, 6)), np.zeros((count, 6, 6)),
-        )  # fmt: skip
-        sampled = Sampled(imu.rotation, imu.velocity, imu.dt, self.stride)
-        place, carry = np.zeros(4 + len(KINDS), dtype=np.int64), np.zeros(7)
-        stopped = PAUSED
+        sizes = ((6,), (3, 3), (9, 9), (6,), (6, 6))
+        kept = Kept(outputs.epoch, outputs.before, *(np.zeros((count, *each)) for each in sizes))
+        samples = Samples(imu.rotation, imu.velocity, imu.dt)
+        place, rejected = np.zeros(4, dtype=np.int64), np.zeros(len(KINDS), dtype=np.int64)
+        progress = Progress(place, rejected, np.zeros(7))
+        stopped, settings = PAUSED, self.settings
         for part in (*windows(imu.n), slice(imu.n, imu.n)):
             if stopped == PAUSED:
-                stopped = run(sampled, state, sensors, measured, kept, part.stop, place, carry)
+                stopped = run(samples, settings, estimate, events, found, kept, progress, part.stop)
             release(imu.rotation)
             release(imu.velocity)
         done = count if stopped < 0 else int(np.searchsorted(outputs.epoch, stopped))
         for part in windows(done):
             kept.P[part] = unmodified(kept.P[part], kept.nav[part, 3:])
+        time = events.epoch * imu.dt + events.offset
         return Solution(
             time=outputs.time(imu.dt)[:done],
             before=outputs.before[:done] == 1,
@@ -179,16 +183,10 @@ class Filter:
             covariance=kept.P[:done],
             sensor_errors=kept.sensor[:done],
             sensor_covariance=kept.sensor_covariance[:done],
-            innovations=FilterInnovations(
-                time=events.epoch * imu.dt + events.offset,
-                kind=events.kind,
-                value=measured.innovation,
-                sd=measured.innovation_sd,
-                used=measured.used,
-            ),
-            state_names=table.names,
+            innovations=FilterInnovations(time, events.kind, found.value, found.sd, found.used),
+            state_names=self.states.names,
             states=x,
-            state_covariance=P[NAVIGATION : NAVIGATION + m, NAVIGATION : NAVIGATION + m],
+            state_covariance=P[NAVIGATION:, NAVIGATION:],
             diverged_at=None if stopped < 0 else float(stopped * imu.dt),
         )
 
@@ -230,23 +228,23 @@ class Outputs:
                 f"{n * dt:g} s; give times within it"
             )
         early = np.clip(np.rint(times / dt), 0, n).astype(np.int64)
-        epoch = np.concatenate([after, early])
-        flag = np.concatenate([np.zeros(after.size), np.ones(early.size)]).astype(np.int64)
+        epoch = np.concatenate([after, early]).astype(np.int64)
+        flag = np.repeat(np.array([0, 1]), [after.size, early.size])
         order = np.lexsort((-flag, epoch))
-        return cls(epoch[order].astype(np.int64), flag[order])
+        return cls(epoch[order], flag[order])
 
 
 def modified(covariance: FloatArray, velocity: FloatArray) -> FloatArray:
     """Covariance with the modified velocity error ``dv - v x phi``, from one with ``dv``."""
-    return _turned(covariance, velocity, -1.0)
+    return _with_turned_velocity(covariance, velocity, -1.0)
 
 
 def unmodified(covariance: FloatArray, velocity: FloatArray) -> FloatArray:
     """Covariance with the velocity error ``dv = u + v x phi``, from one with ``u``."""
-    return _turned(covariance, velocity, 1.0)
+    return _with_turned_velocity(covariance, velocity, 1.0)
 
 
-def _turned(covariance: FloatArray, velocity: FloatArray, sign: float) -> FloatArray:
+def _with_turned_velocity(covariance: FloatArray, velocity: FloatArray, sign: float) -> FloatArray:
     T = np.tile(np.eye(9), (*covariance.shape[:-2], 1, 1))
     T[..., VELOCITY:ATTITUDE, ATTITUDE:] = sign * skew(velocity)
     return T @ covariance @ np.swapaxes(T, -1, -2)
@@ -276,10 +274,8 @@ def navigate(
     aiding : Aiding
         Measurements, with their noise.
     initial_sd : InitialSd, optional
-    step : float, optional
-        Step of the covariance, s.
-    interval : float, optional
-        Of the solution, s.
+    step, interval : float, optional
+        Of the covariance and of the solution, s.
     before : sequence of float, optional
         Times (s) at which the solution before the measurements is wanted too, such as the end of an
         outage.
@@ -291,10 +287,11 @@ def navigate(
     InputError
         If sensor models or measurements cannot be used.
     """
-    models = SensorModels.of(sensors)
-    ready = Filter.of(models, aiding, imu.dt, step, second_order)
+    ready = Filter.of(SensorModels.of(sensors), aiding, imu.dt, step, second_order)
     events = aiding.events(imu.dt, imu.n)
-    if not np.any(events.kind == IS_POSITION) and aiding.fixes and np.any(ready.coloured[:3] >= 0):
+    position = KINDS["position"]
+    slow = np.any(ready.noise_states[position] >= 0)
+    if slow and aiding.fixes and not np.any(events.kind == position):
         raise InputError("coloured_sd without position fixes: set it to zero")
     outputs = Outputs.every(interval, imu.dt, imu.n, before)
     return ready.run(imu, initial, initial_sd or InitialSd(), events, outputs)

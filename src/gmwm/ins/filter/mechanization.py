@@ -8,7 +8,7 @@ import numpy as np
 
 from gmwm._core.compiled import compiled
 from gmwm._core.typing import FloatArray
-from gmwm.errors import InputError
+from gmwm.ins.filter.records import Increments, Kinematics, Samples
 from gmwm.ins.geometry import (
     RATE,
     SEMI_MAJOR_AXIS,
@@ -22,56 +22,17 @@ from gmwm.ins.geometry import (
     turn_navigation,
 )
 from gmwm.ins.imu import Imu
-from gmwm.ins.trajectory import HIGHEST_LATITUDE, NavState, Trajectory
+from gmwm.ins.trajectory import NavState, Trajectory, check_latitudes
 
 _CLEAN_EVERY = 1000  # samples: rounding errors of the attitude matrix stay below 1e-13
 
 
 @compiled()
-def step(
-    C: FloatArray,
-    v: FloatArray,
-    lla: FloatArray,
-    ax: float,
-    ay: float,
-    az: float,
-    fx: float,
-    fy: float,
-    fz: float,
-    ax_before: float,
-    ay_before: float,
-    az_before: float,
-    fx_before: float,
-    fy_before: float,
-    fz_before: float,
-    dt: float,
-) -> tuple[float, float, float]:
+def step(at: Kinematics, now: Increments, before: Increments, dt: float) -> None:
     """Propagate attitude, velocity and position over one sampling interval, in place.
 
     Coning and sculling are corrected with the increments of the interval before, as if rate and
     specific force changed linearly; on the first interval, give its own increments as those before.
-
-    Parameters
-    ----------
-    C : (3, 3) ndarray
-        Attitude C_bn.
-    v : (3,) ndarray
-        Velocity to the north, east and down, m/s.
-    lla : (3,) ndarray
-        Latitude, longitude, rad, and height, m.
-    ax, ay, az : float
-        Integral of the angular rate over the interval, body axes, rad.
-    fx, fy, fz : float
-        Integral of the specific force over the interval, body axes, m/s.
-    ax_before, ay_before, az_before, fx_before, fy_before, fz_before : float
-        The increments of the interval before.
-    dt : float
-        Sampling interval, s.
-
-    Returns
-    -------
-    north, east, down : float
-        Integral of the specific force over the interval in the navigation frame, m/s.
 
     Notes
     -----
@@ -80,6 +41,9 @@ def step(
     interval before instead of subintervals. Rotation of the frame, Coriolis and gravity are those
     at the middle of the interval (Groves 2013, ch. 5); the position follows the trapezoidal rule.
     """
+    C, v, lla = at
+    ax, ay, az, fx, fy, fz = now
+    ax_before, ay_before, az_before, fx_before, fy_before, fz_before = before
     # Rotation vector of the body.
     rx = ax + (ay_before * az - az_before * ay) / 12.0
     ry = ay + (az_before * ax - ax_before * az) / 12.0
@@ -130,47 +94,25 @@ def step(
     v[0], v[1], v[2] = end_n, end_e, end_d
     rotate(C, rx, ry, rz, sine, half)
     turn_navigation(C, zn, ze, zd)
-    return fn, fe, fd
 
 
 @compiled()
 def _run(
-    C: FloatArray,
-    rotation: FloatArray,
-    increment: FloatArray,
-    dt: float,
-    lla: FloatArray,
-    velocity: FloatArray,
-    rpy: FloatArray,
+    samples: Samples, at: Kinematics, lla: FloatArray, velocity: FloatArray, rpy: FloatArray
 ) -> None:
-    """Fill the epochs after the first one; ``C`` is the attitude at the first."""
-    v, position = velocity[0].copy(), lla[0].copy()
-    for i in range(rotation.shape[0]):
-        before = max(i - 1, 0)
-        step(
-            C,
-            v,
-            position,
-            rotation[i, 0],
-            rotation[i, 1],
-            rotation[i, 2],
-            increment[i, 0],
-            increment[i, 1],
-            increment[i, 2],
-            rotation[before, 0],
-            rotation[before, 1],
-            rotation[before, 2],
-            increment[before, 0],
-            increment[before, 1],
-            increment[before, 2],
-            dt,
-        )
+    """Fill the epochs after the first one, where the solution is ``at``."""
+    a, f = samples.rotation, samples.velocity
+    now = Increments(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    for i in range(a.shape[0]):
+        before = now
+        now = Increments(a[i, 0], a[i, 1], a[i, 2], f[i, 0], f[i, 1], f[i, 2])
+        step(at, now, now if i == 0 else before, samples.dt)
         if (i + 1) % _CLEAN_EVERY == 0:
-            orthonormalise(C)
+            orthonormalise(at.C)
         for j in range(3):
-            lla[i + 1, j] = position[j]
-            velocity[i + 1, j] = v[j]
-        rpy[i + 1, 0], rpy[i + 1, 1], rpy[i + 1, 2] = angles(C)
+            lla[i + 1, j] = at.lla[j]
+            velocity[i + 1, j] = at.v[j]
+        rpy[i + 1, 0], rpy[i + 1, 1], rpy[i + 1, 2] = angles(at.C)
 
 
 def integrate(imu: Imu, initial: NavState) -> Trajectory:
@@ -195,12 +137,9 @@ def integrate(imu: Imu, initial: NavState) -> Trajectory:
     InputError
         If it starts closer than 1 deg to a pole, where north cannot be steered by.
     """
-    if abs(initial.lla[0]) > HIGHEST_LATITUDE:
-        raise InputError(
-            f"initial: latitude {math.degrees(initial.lla[0]):.6g} deg is too near the pole for "
-            "north-east-down axes: start within 89 deg of the equator"
-        )
+    check_latitudes(initial.lla[None, :], "initial")
     lla, velocity, rpy = (np.empty((imu.n + 1, 3)) for _ in range(3))
     lla[0], velocity[0], rpy[0] = initial.lla, initial.velocity, initial.rpy
-    _run(matrix_from_rpy(initial.rpy), imu.rotation, imu.velocity, imu.dt, lla, velocity, rpy)
+    at = Kinematics(matrix_from_rpy(initial.rpy), initial.velocity.copy(), initial.lla.copy())
+    _run(Samples(imu.rotation, imu.velocity, imu.dt), at, lla, velocity, rpy)
     return Trajectory(imu.dt, lla, velocity, rpy)

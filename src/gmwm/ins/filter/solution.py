@@ -6,9 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gmwm._core.typing import FloatArray
+from gmwm._core.typing import BoolArray, FloatArray, IntArray
 from gmwm.errors import InputError
-from gmwm.ins.filter.states import IntArray
 from gmwm.ins.geometry import matrix_from_rpy, ned_difference, rpy_from_matrix
 from gmwm.ins.trajectory import Trajectory
 
@@ -22,7 +21,7 @@ class FilterInnovations:
     time : (E,) ndarray
         s.
     kind : (E,) ndarray of int
-        Codes of `gmwm.ins.filter.aiding.KINDS`.
+        Codes of `gmwm.ins.filter.KINDS`.
     value, sd : (E, 3) ndarray
         Each component given those before it, with the standard deviation that the filter expected;
         so ``value / sd`` is white with unit variance if the filter is right. NaN where a component
@@ -35,7 +34,7 @@ class FilterInnovations:
     kind: IntArray
     value: FloatArray
     sd: FloatArray
-    used: np.typing.NDArray[np.bool_]
+    used: BoolArray
 
     @property
     def standard(self) -> FloatArray:
@@ -46,7 +45,7 @@ class FilterInnovations:
     def nis(self) -> FloatArray:
         """Normalised innovation squared of each measurement, (E,); NaN where it was not reached.
 
-        Of as many degrees of freedom as the measurement has components in use.
+        Its degrees of freedom are the components in use.
         """
         squares = self.standard**2
         reached = np.any(np.isfinite(squares), axis=1)
@@ -78,15 +77,14 @@ class Solution:
     innovations : FilterInnovations
     state_names : tuple of str
         Of the sensor states.
-    states : (m,) ndarray
-        At the last epoch.
-    state_covariance : (m, m) ndarray
+    states, state_covariance : (m,) ndarray, (m, m) ndarray
+        Sensor states at the last epoch.
     diverged_at : float or None
         Time at which the filter was stopped because it had diverged, s.
     """
 
     time: FloatArray
-    before: np.typing.NDArray[np.bool_]
+    before: BoolArray
     lla: FloatArray
     velocity: FloatArray
     matrix: FloatArray
@@ -128,16 +126,9 @@ class Solution:
                 f"the trajectory ends at {truth.duration:g} s, before the solution at "
                 f"{self.time[-1]:g} s: give all of it"
             )
-        position = ned_difference(self.lla, truth.lla[index])
-        velocity = self.velocity - truth.velocity[index]
-        product = self.matrix @ np.swapaxes(matrix_from_rpy(truth.rpy[index]), 1, 2)
         # The estimate is (I - phi x) times the truth.
-        attitude = -0.5 * np.stack(
-            [
-                product[:, 2, 1] - product[:, 1, 2],
-                product[:, 0, 2] - product[:, 2, 0],
-                product[:, 1, 0] - product[:, 0, 1],
-            ],
-            axis=1,
-        )
-        return np.hstack([position, velocity, attitude])
+        product = self.matrix @ np.swapaxes(matrix_from_rpy(truth.rpy[index]), 1, 2)
+        twice = np.swapaxes(product, 1, 2) - product
+        attitude = 0.5 * np.stack([twice[:, 2, 1], twice[:, 0, 2], twice[:, 1, 0]], axis=1)
+        position = ned_difference(self.lla, truth.lla[index])
+        return np.hstack([position, self.velocity - truth.velocity[index], attitude])

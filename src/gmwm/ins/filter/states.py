@@ -13,59 +13,42 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
-import numpy.typing as npt
 from scipy.linalg import block_diag
 
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
+from gmwm.ins.filter.records import SensorTable
 from gmwm.ins.imu import AXES, SensorModels
 from gmwm.process import Model, StateSpace
 
-IntArray = npt.NDArray[np.int64]
-
 _LARGEST_BLOCK = 2
-NO_AXIS = -1
-"""Axis of a state that adds to no inertial sensor."""
+_NO_AXIS = -1  # of a state that adds to no inertial sensor
 
 
 @dataclass(frozen=True, eq=False)
 class SensorStates:
-    """m states of the six sensors, and what k samples do to them, for k = 0..k_max.
+    """The m states of six sensors before the first sample, and what samples do to them.
 
     names: E.g. ``"gyro_x: Gauss-Markov"``.
-    axis: (m,) of int, sensor of `AXES` that each state adds to; `NO_AXIS` for none.
-    output: (m,), fraction of the state in the error of its sensor.
-    partner: (m,) of int, the other state of its block; itself if there is none.
-    mean: (m,), before the first sample; zero but for drifts that are known.
+    mean: (m,), zero except for drifts that are known.
     covariance: (m, m).
-    phi, phi_off: (k_max + 1, m), ``x_i <- phi_i x_i + phi_off_i x_partner`` over k samples.
-    gain: (k_max + 1, m), integral of the sensor's error over k samples per unit of the state, s.
-    noise, noise_off: (k_max + 1, m), variance of the noise gathered over k samples, and its
-        covariance with the partner.
-    cross: (k_max + 1, m), covariance of that noise with the noise in the integral of the sensor's
-        error.
-    integral: (k_max + 1, 6), variance of the noise in the integral of each sensor's error, white
-        noise included.
+    table: See `SensorTable`.
     """
 
     names: tuple[str, ...]
-    axis: IntArray
-    output: FloatArray
-    partner: IntArray
     mean: FloatArray
     covariance: FloatArray
-    phi: FloatArray
-    phi_off: FloatArray
-    gain: FloatArray
-    noise: FloatArray
-    noise_off: FloatArray
-    cross: FloatArray
-    integral: FloatArray
+    table: SensorTable
 
     @property
     def m(self) -> int:
         """Number of states."""
         return len(self.names)
+
+    @property
+    def sums(self) -> FloatArray:
+        """Matrix (6, m) that adds up the states of each sensor."""
+        return np.where(self.table.axis == np.arange(6)[:, None], self.table.output, 0.0)
 
     @classmethod
     def of(
@@ -81,66 +64,88 @@ class SensorStates:
         Raises InputError if a term has no state-space form, or one of more than two states.
         """
         given = tuple((sensors.models[axis], sensors.bias_sd[axis]) for axis in AXES)
-        return _of(given, dt, k_max, drift_known)
+        return _states(given, dt, k_max, drift_known)
 
     def with_markov(
-        self, names: Sequence[str], sigma: FloatArray, tau: FloatArray | float, dt: float
+        self, names: Sequence[str], sigma: FloatArray, tau: FloatArray, dt: float
     ) -> SensorStates:
-        """These states, and some first-order Gauss-Markov ones that add to no inertial sensor.
+        """These states and first-order Gauss-Markov states that add to no inertial sensor.
 
-        sigma: Standard deviation of each.
-        tau: Correlation times, s.
+        sigma, tau: Standard deviation and correlation time (s) of each.
         dt: Sampling interval, s.
         """
-        k = np.arange(len(self.phi))[:, None]
-        extra, zeros = len(names), np.zeros((len(self.phi), len(names)))
-        decay = np.exp(-k * dt / tau) + zeros
+        table, k = self.table, np.arange(len(self.table.phi))[:, None]
+        zero = np.zeros(len(names))
+        zeros, decay = np.zeros((k.size, len(names))), np.exp(-k * dt / tau)
         return SensorStates(
             names=(*self.names, *names),
-            axis=np.append(self.axis, np.full(extra, NO_AXIS)),
-            output=np.append(self.output, np.zeros(extra)),
-            partner=np.append(self.partner, self.m + np.arange(extra)),
-            mean=np.append(self.mean, np.zeros(extra)),
-            covariance=block_diag(self.covariance, np.diag(np.asarray(sigma, dtype=float) ** 2)),
-            phi=np.hstack([self.phi, decay]),
-            phi_off=np.hstack([self.phi_off, zeros]),
-            gain=np.hstack([self.gain, zeros]),
-            noise=np.hstack([self.noise, np.asarray(sigma) ** 2 * (1.0 - decay**2)]),
-            noise_off=np.hstack([self.noise_off, zeros]),
-            cross=np.hstack([self.cross, zeros]),
-            integral=self.integral,
+            mean=np.append(self.mean, zero),
+            covariance=block_diag(self.covariance, np.diag(sigma**2)),
+            table=table._replace(
+                axis=np.append(table.axis, np.full(len(names), _NO_AXIS)),
+                output=np.append(table.output, zero),
+                partner=np.append(table.partner, self.m + np.arange(len(names))),
+                phi=np.hstack([table.phi, decay]),
+                phi_off=np.hstack([table.phi_off, zeros]),
+                gain=np.hstack([table.gain, zeros]),
+                noise=np.hstack([table.noise, sigma**2 * (1.0 - decay**2)]),
+                noise_off=np.hstack([table.noise_off, zeros]),
+                cross=np.hstack([table.cross, zeros]),
+            ),
         )
 
 
-@dataclass(frozen=True, eq=False)
-class _Block:
-    """A term of a model: one or two states of one sensor."""
-
-    axis: int
-    names: tuple[str, ...]
-    form: StateSpace
-
-
 @lru_cache(maxsize=8)
-def _of(
+def _states(
     given: tuple[tuple[Model, float], ...], dt: float, k_max: int, drift_known: bool
 ) -> SensorStates:
-    """Of models and standard deviations of biases: faults of a log are looked for with the same."""
-    blocks: list[_Block] = []
+    """States of models and standard deviations of biases; kept, since logs are filtered often."""
+    blocks: list[tuple[int, StateSpace]] = []
     white = np.zeros(6)
     for i, (model, bias_sd) in enumerate(given):
-        blocks += _of_axis(i, model, bias_sd**2, dt, white, drift_known)
-    return _assembled(blocks, white, dt, k_max)
+        forms, white[i] = _blocks(AXES[i], model, bias_sd**2, dt, drift_known)
+        blocks += [(i, form) for form in forms]
+    m = sum(form.n_states for _, form in blocks)
+    phi, phi_off, gain, noise, noise_off, cross = (np.zeros((k_max + 1, m)) for _ in range(6))
+    axis, partner = np.zeros(m, dtype=np.int64), np.arange(m)
+    output, mean, covariance = np.zeros(m), np.zeros(m), np.zeros((m, m))
+    integral = np.arange(k_max + 1)[:, None] * (white * dt**2)
+    first = 0
+    for sensor, form in blocks:
+        size = form.n_states
+        part = slice(first, first + size)
+        axis[part] = sensor
+        partner[part] = first + np.arange(size)[::-1]
+        output[part], mean[part] = form.output, form.initial_mean
+        covariance[part, part] = form.initial_covariance
+        transition, added = _after_samples(form, dt, k_max)
+        phi[:, part] = np.diagonal(transition, axis1=1, axis2=2)[:, :size]
+        gain[:, part] = transition[:, size, :size]
+        noise[:, part] = np.diagonal(added, axis1=1, axis2=2)[:, :size]
+        cross[:, part] = added[:, size, :size]
+        integral[:, sensor] += added[:, size, size]
+        if size == _LARGEST_BLOCK:
+            phi_off[:, part] = np.stack([transition[:, 0, 1], transition[:, 1, 0]], axis=1)
+            noise_off[:, part] = added[:, :1, 1]
+        first += size
+    starts, paired = np.searchsorted(axis, np.arange(7)), bool(np.any(partner != np.arange(m)))
+    steps = (phi, phi_off, gain, noise, noise_off, cross, integral)
+    table = SensorTable(starts.astype(np.int64), paired, axis, output, partner, *steps)
+    names = tuple(f"{AXES[sensor]}: {name}" for sensor, form in blocks for name in form.names)
+    return SensorStates(names, mean, covariance, table)
 
 
-def _of_axis(
-    index: int, model: Model, bias: float, dt: float, white: FloatArray, drift_known: bool
-) -> list[_Block]:
-    """Blocks of one sensor; adds its white noise (variance of a sample) to ``white``."""
-    axis, blocks = AXES[index], []
+def _blocks(
+    axis: str, model: Model, bias: float, dt: float, drift_known: bool
+) -> tuple[list[StateSpace], float]:
+    """Terms of a sensor that have states, and the variance of its white noise in a sample.
+
+    bias: Variance of a constant.
+    """
+    blocks, white = [], 0.0
     for term in model.terms:
         form = term.state_space(dt)
-        white[index] += form.measurement_noise
+        white += form.measurement_noise
         if form.n_states > _LARGEST_BLOCK:
             raise InputError(
                 f"{axis}: {term!r} needs {form.n_states} states in a filter, more than two: "
@@ -157,55 +162,13 @@ def _of_axis(
             spread = np.diag([bias, term.drift_rate() ** 2])
             form = replace(form, initial_mean=np.zeros(2), initial_covariance=spread)
             bias = 0.0
-        blocks.append(_Block(index, tuple(f"{axis}: {name}" for name in form.names), form))
+        blocks.append(form)
     if bias > 0.0:
-        blocks.append(_Block(index, (f"{axis}: bias",), StateSpace.scalar("bias", 1.0, 0.0, bias)))
-    return blocks
+        blocks.append(StateSpace.scalar("bias", 1.0, 0.0, bias))
+    return blocks, white
 
 
-def _assembled(blocks: Sequence[_Block], white: FloatArray, dt: float, k_max: int) -> SensorStates:
-    m = sum(block.form.n_states for block in blocks)
-    shape = (k_max + 1, m)
-    phi, phi_off, gain, noise, noise_off, cross = (np.zeros(shape) for _ in range(6))
-    axis, partner = np.zeros(m, dtype=np.int64), np.arange(m)
-    output, mean, covariance = np.zeros(m), np.zeros(m), np.zeros((m, m))
-    integral = np.arange(k_max + 1)[:, None] * (white * dt**2)
-    first = 0
-    for block in blocks:
-        size = block.form.n_states
-        part = slice(first, first + size)
-        axis[part] = block.axis
-        partner[part] = first + np.arange(size)[::-1]
-        output[part], mean[part] = block.form.output, block.form.initial_mean
-        covariance[part, part] = block.form.initial_covariance
-        transition, added = _carried(block.form, dt, k_max)
-        phi[:, part] = np.diagonal(transition, axis1=1, axis2=2)[:, :size]
-        gain[:, part] = transition[:, size, :size]
-        noise[:, part] = np.diagonal(added, axis1=1, axis2=2)[:, :size]
-        cross[:, part] = added[:, size, :size]
-        integral[:, block.axis] += added[:, size, size]
-        if size == _LARGEST_BLOCK:
-            phi_off[:, part] = np.stack([transition[:, 0, 1], transition[:, 1, 0]], axis=1)
-            noise_off[:, part] = added[:, :1, 1]
-        first += size
-    return SensorStates(
-        names=tuple(name for block in blocks for name in block.names),
-        axis=axis,
-        output=output,
-        partner=partner,
-        mean=mean,
-        covariance=covariance,
-        phi=phi,
-        phi_off=phi_off,
-        gain=gain,
-        noise=noise,
-        noise_off=noise_off,
-        cross=cross,
-        integral=integral,
-    )
-
-
-def _carried(form: StateSpace, dt: float, k_max: int) -> tuple[FloatArray, FloatArray]:
+def _after_samples(form: StateSpace, dt: float, k_max: int) -> tuple[FloatArray, FloatArray]:
     """Transition and noise of the states and of the integral of their output, after k samples."""
     size = form.n_states
     one = np.eye(size + 1)

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from gmwm._core import checks
-from gmwm._core.notices import Notice
 from gmwm._core.typing import FloatArray
 from gmwm.calibration import Calibration
 from gmwm.errors import InputError
+from gmwm.issues import Notice, notice
 from gmwm.process import Model, Process, as_model
 
 AXES = ("gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z")
@@ -89,12 +89,11 @@ class SensorModels:
         """That models come from fits that are not valid."""
         if not self.not_valid:
             return ()
-        fit, are, them = ("fits", "are", "them") if self.not_valid[1:] else ("fit", "is", "it")
-        text = f"the {fit} {are} not valid, nor is a filter that believes {them}"
+        fit, are = ("fits", "are") if self.not_valid[1:] else ("fit", "is")
+        text = f"the {fit} {are} not valid: do not use these numbers in a filter"
         hint = "read the notices of the calibration first"
-        return (
-            Notice("fit-not-valid", "warning", ", ".join(self.not_valid), text, {}, hint),
-        )  # fmt: skip
+        axes = ", ".join(self.not_valid)
+        return (notice("fit-not-valid", axes, severity="warning", hint=hint, text=text),)
 
     def simulate(self, n: int, dt: float, rng: np.random.Generator) -> SensorErrors:
         """Draw the errors of all axes over ``n`` samples; constant biases are drawn too.

@@ -17,7 +17,7 @@ from gmwm.ins import tuning
 from gmwm.ins.covariance import reduce
 from gmwm.ins.filter import Aiding, InitialSd, Outage, SensorStates, gnss
 from gmwm.ins.imu import Recorded, SensorModels, emulate
-from gmwm.ins.montecarlo import ErrorSource, Experiment, Scenario, Simulated
+from gmwm.ins.simulation import ErrorSource, Experiment, Scenario, Simulated
 from gmwm.ins.spec.fields import (
     RECORDINGS,
     REDUCED,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import lru_cache
+from itertools import product
 from numbers import Integral, Real
 from typing import Any, ClassVar, Self
 
@@ -92,45 +93,35 @@ class ARIMA(Process):
         return tuple(self.values[f"ma_{i + 1}"] for i in range(self.orders[1]))
 
     def _arguments(self, values: dict[str, float | None]) -> dict[str, Any]:
+        """What the constructor of this very class takes."""
         p, q = self.orders
-        return {
+        known = {
             "ar": [values[f"ar_{i + 1}"] for i in range(p)],
             "d": self.d,
             "ma": [values[f"ma_{i + 1}"] for i in range(q)],
             "sigma2": values["sigma2"],
         }
+        return {name: known[name] for name in self._accepted}
 
     def with_values(self, **values: float | None) -> Self:
         unknown = set(values) - set(self.values)
         if unknown:
             raise InputError(f"{type(self).__name__} has no parameter {sorted(unknown)[0]!r}")
-        return self._build(self._arguments({**self.values, **values}))
+        return type(self)(**self._arguments({**self.values, **values}))
 
     def to_dict(self) -> dict[str, Any]:
-        arguments = self._arguments(self.values)
-        if type(self) is not ARIMA:
-            kept = {"AR": ("ar",), "MA": ("ma",)}.get(type(self).__name__, ("ar", "ma"))
-            arguments = {name: arguments[name] for name in (*kept, "sigma2")}
-        return {"process": type(self).__name__, **arguments}
-
-    def _build(self, arguments: dict[str, Any]) -> Self:
-        return type(self)(**arguments)
+        return {"process": type(self).__name__, **self._arguments(self.values)}
 
     def __repr__(self) -> str:
-        arguments = self._arguments(self.values)
         parts = []
-        for name in ("ar", "ma"):
-            coefficients = arguments[name]
-            if coefficients:
-                if all(c is None for c in coefficients):
-                    parts.append(f"{name}={len(coefficients)}")
-                else:
-                    inner = ", ".join("None" if c is None else f"{c:.12g}" for c in coefficients)
-                    parts.append(f"{name}=[{inner}]")
-        if type(self) is ARIMA:
-            parts.insert(1, f"d={self.d}")
-        if self.values["sigma2"] is not None:
-            parts.append(f"sigma2={self.sigma2:.12g}")
+        for name, value in self._arguments(self.values).items():
+            if isinstance(value, list) and any(c is not None for c in value):
+                listed = ", ".join("None" if c is None else f"{c:.12g}" for c in value)
+                parts.append(f"{name}=[{listed}]")
+            elif isinstance(value, list) and value:
+                parts.append(f"{name}={len(value)}")
+            elif not isinstance(value, list) and value is not None:
+                parts.append(f"{name}={value:.12g}")
         return f"{type(self).__name__}({', '.join(parts)})"
 
     def __eq__(self, other: object) -> bool:
@@ -217,12 +208,12 @@ class ARIMA(Process):
 
     def shape_grid(self, dt: float, n: int) -> list[Shape]:
         size = sum(self.orders)
-        levels = np.array([-1.5, -0.3, 0.5, 1.5, 3.0])
-        if len(levels) ** size <= 700:
-            mesh = np.meshgrid(*[levels] * size, indexing="ij")
-            points = np.stack(mesh, -1).reshape(-1, size)
-        else:
-            points = np.random.default_rng(0).normal(0.3, 1.2, (700, size))
+        levels = (-1.5, -0.3, 0.5, 1.5, 3.0)
+        points = np.array(
+            list(product(levels, repeat=size))
+            if len(levels) ** size <= 700
+            else np.random.default_rng(0).normal(0.3, 1.2, (700, size))
+        )
         return [self.shape_from_free(point) for point in points]
 
     @classmethod
@@ -240,9 +231,6 @@ class ARMA(ARIMA):
     ) -> None:
         super().__init__(ar, 0, ma, sigma2)
 
-    def _build(self, arguments: dict[str, Any]) -> Self:
-        return type(self)(arguments["ar"], arguments["ma"], arguments["sigma2"])
-
     @classmethod
     def examples(cls) -> tuple[Process, ...]:
         near_unit_root = cls([1.98, -0.9801], [0.2], 1.0)
@@ -257,9 +245,6 @@ class AR(ARIMA):
     def __init__(self, ar: Coefficients = 1, sigma2: float | None = None) -> None:
         super().__init__(ar, 0, 0, sigma2)
 
-    def _build(self, arguments: dict[str, Any]) -> Self:
-        return type(self)(arguments["ar"], arguments["sigma2"])
-
     @classmethod
     def examples(cls) -> tuple[Process, ...]:
         return (cls([-0.7], 1.0), cls([0.9], 0.1), cls([1.2, -0.6], 2.0), cls([0.9999], 1e-4))
@@ -272,9 +257,6 @@ class MA(ARIMA):
 
     def __init__(self, ma: Coefficients = 1, sigma2: float | None = None) -> None:
         super().__init__(0, 0, ma, sigma2)
-
-    def _build(self, arguments: dict[str, Any]) -> Self:
-        return type(self)(arguments["ma"], arguments["sigma2"])
 
     @classmethod
     def examples(cls) -> tuple[Process, ...]:

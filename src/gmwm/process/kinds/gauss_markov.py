@@ -16,7 +16,6 @@ from __future__ import annotations
 
 import cmath
 import math
-from collections.abc import Callable
 from math import factorial
 from typing import Any, ClassVar
 
@@ -53,9 +52,10 @@ class GaussMarkov(Process):
     sigma: float = parameter("u", "scale", meaning="Gauss-Markov standard deviation")
     tau: float = parameter("s", meaning="Gauss-Markov correlation time")
     label: ClassVar[str] = "Gauss-Markov"
+    short_name: ClassVar[str] = "GM"
+    is_candidate: ClassVar[bool] = True
     compiled_kind: ClassVar[int] = 1
     ordered_by: ClassVar[str] = "tau"
-    is_textbook: ClassVar[bool] = True
     is_exponential: ClassVar[bool] = True
 
     def __init__(self, sigma: float | None = None, tau: float | None = None) -> None:
@@ -69,17 +69,8 @@ class GaussMarkov(Process):
     def psd(self, f: FloatArray, dt: float) -> FloatArray:
         return self.sigma**2 * _exponential_psd(dt / self.tau, f, dt)
 
-    def haar_variance(self, tau: FloatArray, dt: float) -> FloatArray:
-        tau = np.asarray(tau, dtype=float)
-        return self.sigma**2 * self.unit_haar_variance((self.tau,), tau, dt)
-
     def unit_haar_variance(self, shape: Shape, tau: FloatArray, dt: float) -> FloatArray:
-        flat = real_haar(dt / shape[0], np.ascontiguousarray(tau).ravel() / dt)
-        return flat.reshape(tau.shape)
-
-    def unit_haar_curves(self, tau: FloatArray, dt: float) -> Callable[[Shape], FloatArray]:
-        m = np.asarray(tau, dtype=float) / dt
-        return lambda shape: real_haar(dt / shape[0], m)
+        return real_haar(dt / shape[0], np.ravel(tau) / dt).reshape(np.shape(tau))
 
     def unit_haar_slopes(self, shape: Shape, tau: FloatArray, dt: float) -> FloatArray:
         return real_slope(dt / shape[0], np.asarray(tau, dtype=float) / dt)
@@ -98,12 +89,6 @@ class GaussMarkov(Process):
         driving = self.sigma * np.sqrt(-np.expm1(-2.0 * dt / self.tau))
         synthesis.first_order(series, float(np.exp(-dt / self.tau)), float(driving), self.sigma)
         return series
-
-    def shape_to_free(self, shape: Shape) -> FloatArray:
-        return np.array([np.log(shape[0])])
-
-    def shape_from_free(self, free: FloatArray) -> Shape:
-        return (float(np.exp(free[0])),)
 
     def shape_grid(self, dt: float, n: int) -> list[Shape]:
         # Below a third of dt it is white noise; beyond a third of the record a random walk.
@@ -152,28 +137,15 @@ class Resonance(Process):
     ) -> None:
         super().__init__(sigma, frequency, damping)
 
-    @property
-    def _shape(self) -> Shape:
-        return self.frequency, self.damping
-
     def psd(self, f: FloatArray, dt: float) -> FloatArray:
-        rate, weight = _exponential(*self._shape, dt)
+        rate, weight = _exponential(self.frequency, self.damping, dt)
         return self.sigma**2 * np.real(weight * _exponential_psd(rate, f, dt))
 
-    def haar_variance(self, tau: FloatArray, dt: float) -> FloatArray:
-        return self.sigma**2 * self.unit_haar_variance(self._shape, tau, dt)
-
     def unit_haar_variance(self, shape: Shape, tau: FloatArray, dt: float) -> FloatArray:
-        tau = np.asarray(tau, dtype=float)
-        m = np.ascontiguousarray(tau).ravel() / dt
-        return resonance_haar(*shape, dt, m).reshape(tau.shape)
-
-    def unit_haar_curves(self, tau: FloatArray, dt: float) -> Callable[[Shape], FloatArray]:
-        m = np.asarray(tau, dtype=float) / dt
-        return lambda shape: resonance_haar(*shape, dt, m)
+        return resonance_haar(*shape, dt, np.ravel(tau) / dt).reshape(np.shape(tau))
 
     def autocovariance(self, lag: FloatArray, dt: float) -> FloatArray:
-        rate, weight = _exponential(*self._shape, dt)
+        rate, weight = _exponential(self.frequency, self.damping, dt)
         return self.sigma**2 * np.real(weight * np.exp(-rate * np.asarray(lag)))
 
     def state_space(self, dt: float) -> StateSpace:

@@ -8,7 +8,6 @@ state-space form is that white noise, without a state.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from functools import lru_cache
 from typing import Any, ClassVar
 
@@ -43,7 +42,7 @@ BUTTERWORTH = float(np.sqrt(0.5))
 
 
 class _Filtered(Process):
-    """What white noise behind any low-pass of density 1 at zero frequency has in common."""
+    """White noise behind any low-pass of gain 1 at zero frequency."""
 
     is_band_limited: ClassVar[bool] = True
     has_finite_state_space: ClassVar[bool] = False
@@ -103,19 +102,9 @@ class LowPassNoise(_Filtered):
         found = _gain(self.bandwidth, self.order, self.damping, x.ravel(), dt)
         return self.N**2 * found.reshape(x.shape)
 
-    def haar_variance(self, tau: FloatArray, dt: float) -> FloatArray:
-        tau = np.asarray(tau, dtype=float)
-        shape = (self.bandwidth, self.order, self.damping)
-        return self.N**2 * self.unit_haar_variance(shape, tau, dt)
-
     def unit_haar_variance(self, shape: Shape, tau: FloatArray, dt: float) -> FloatArray:
-        tau = np.asarray(tau, dtype=float)
-        averaging = tuple((tau.ravel() / dt).tolist())
-        return _unit_curve(tuple(map(float, shape)), averaging, dt).reshape(tau.shape).copy()
-
-    def unit_haar_curves(self, tau: FloatArray, dt: float) -> Callable[[Shape], FloatArray]:
-        averaging = tuple((np.asarray(tau, dtype=float) / dt).tolist())
-        return lambda shape: _unit_curve(shape, averaging, dt)
+        averaging = tuple((np.ravel(tau) / dt).tolist())
+        return _unit_curve(tuple(map(float, shape)), averaging, dt).reshape(np.shape(tau))
 
     def autocovariance(self, lag: FloatArray, dt: float) -> FloatArray:
         lag = np.asarray(lag, dtype=int)
@@ -179,16 +168,12 @@ class AveragedNoise(_Filtered):
         inside = lag < covariance.size
         return self.N**2 / dt * np.where(inside, covariance[np.where(inside, lag, 0)], 0.0)
 
-    def haar_variance(self, tau: FloatArray, dt: float) -> FloatArray:
-        return self.N**2 * self.unit_haar_variance((self.window,), tau, dt)
-
     def unit_haar_variance(self, shape: Shape, tau: FloatArray, dt: float) -> FloatArray:
-        tau = np.asarray(tau, dtype=float)
-        averaging = tuple((tau.ravel() / dt).tolist())
-        return _window_curve(shape[0] / dt, averaging).reshape(tau.shape) / dt
+        averaging = tuple((np.ravel(tau) / dt).tolist())
+        return _window_curve(shape[0] / dt, averaging).reshape(np.shape(tau)) / dt
 
     def draw(self, n: int, dt: float, rng: np.random.Generator) -> FloatArray:
-        weights = _weights(self.window / dt)
+        weights = _window(self.window / dt)
         noise = self.N / np.sqrt(dt) * rng.standard_normal(n + weights.size - 1)
         return np.convolve(noise, weights, "valid")
 
@@ -237,7 +222,7 @@ def low_pass_haar(
 
 @lru_cache(maxsize=1024)
 def _unit_curve(shape: Shape, averaging: tuple[float, ...], dt: float) -> FloatArray:
-    """Wavelet variance at unit N; a fit asks for that of its grid and of given shapes often."""
+    """Wavelet variance at unit N; kept, as a fit asks for its grid and given shapes often."""
     found = low_pass_haar(*shape, dt, *on_panels(averaging))
     if not found.size:
         parts = (averaging[i : i + TOGETHER] for i in range(0, len(averaging), TOGETHER))
@@ -252,18 +237,18 @@ Weights = tuple[FloatArray, FloatArray]
 
 @lru_cache(maxsize=16)
 def _nodes(averaging: tuple[float, ...]) -> Weights:
-    """Log tan(pi f) at the nodes of the quadrature, and the weights of each averaging time."""
+    """Log tan(pi f) at all nodes of the quadrature, and the weights of each averaging time."""
     frequency, weight = node_weights(rounded(averaging))
     return np.log(np.tan(np.pi * frequency)), weight
 
 
 def on_panels(averaging: tuple[float, ...]) -> tuple[Weights, Weights]:
-    """The same at Chebyshev points of panels, wide and narrow, which are so many fewer."""
+    """Points and weights of wide and of narrow panels: far fewer than all nodes."""
     whole = rounded(averaging)
     return panel_weights(whole, WIDER), panel_weights(whole)
 
 
-def _weights(length: float) -> FloatArray:
+def _window(length: float) -> FloatArray:
     """Weights of a window of ``length`` samples."""
     length = max(length, 1.0)
     whole = int(length + 1e-9)
@@ -272,14 +257,14 @@ def _weights(length: float) -> FloatArray:
     return weights / np.sum(weights)
 
 
+def _window_covariance(length: float) -> FloatArray:
+    """Autocovariance of white noise of unit variance behind a window."""
+    weights = _window(length)
+    return np.asarray(np.correlate(weights, weights, "full")[weights.size - 1 :])
+
+
 @lru_cache(maxsize=1024)
 def _window_curve(length: float, averaging: tuple[float, ...]) -> FloatArray:
     """Wavelet variance of white noise of unit variance behind a window."""
     covariance = _window_covariance(length)
     return np.array([haar_sum(covariance, m) for m in averaging])
-
-
-def _window_covariance(length: float) -> FloatArray:
-    """Autocovariance of white noise of unit variance behind such a window."""
-    weights = _weights(length)
-    return np.asarray(np.correlate(weights, weights, "full")[weights.size - 1 :])

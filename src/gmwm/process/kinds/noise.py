@@ -1,4 +1,4 @@
-"""The noises with one parameter: white, quantization, random walk, rate ramp, bias instability.
+"""The terms of IEEE Std 952: white, quantization, walk, ramp, bias instability, sinusoid.
 
 Letters and definitions follow IEEE Std 952-2020, annex C. The spectra are those of the sampled
 processes, so that closed forms and simulations agree at every averaging time, not only in the
@@ -14,11 +14,13 @@ from scipy.special import digamma
 
 from gmwm._core.typing import FloatArray
 from gmwm.process import synthesis
-from gmwm.process.base import Process
+from gmwm.process.base import Process, Shape
 from gmwm.process.parameter import parameter
 from gmwm.process.spectral import squared_sine
 from gmwm.process.state_space import StateSpace
 from gmwm.process.wavelets import wavelet as filters
+
+_LINES_PER_DECADE = 100
 
 
 class WhiteNoise(Process):
@@ -32,8 +34,9 @@ class WhiteNoise(Process):
 
     N: float = parameter("u/sqrt(Hz)", "scale", meaning="white noise")
     label: ClassVar[str] = "white noise"
+    short_name: ClassVar[str] = "N"
+    is_candidate: ClassVar[bool] = True
     is_white: ClassVar[bool] = True
-    is_textbook: ClassVar[bool] = True
 
     def __init__(self, N: float | None = None) -> None:
         super().__init__(N)
@@ -73,7 +76,8 @@ class QuantizationNoise(Process):
 
     Q: float = parameter("u s", "scale", meaning="quantization noise")
     label: ClassVar[str] = "quantization noise"
-    is_textbook: ClassVar[bool] = True
+    short_name: ClassVar[str] = "Q"
+    is_candidate: ClassVar[bool] = True
 
     def __init__(self, Q: float | None = None) -> None:
         super().__init__(Q)
@@ -119,8 +123,9 @@ class RandomWalk(Process):
 
     K: float = parameter("u/s/sqrt(Hz)", "scale", meaning="random walk")
     label: ClassVar[str] = "random walk"
+    short_name: ClassVar[str] = "K"
+    is_candidate: ClassVar[bool] = True
     is_walk: ClassVar[bool] = True
-    is_textbook: ClassVar[bool] = True
 
     def __init__(self, K: float | None = None) -> None:
         super().__init__(K)
@@ -157,6 +162,7 @@ class RateRamp(Process):
 
     R: float = parameter("u/s", "slope", lower=-np.inf, meaning="rate ramp")
     label: ClassVar[str] = "rate ramp"
+    short_name: ClassVar[str] = "R"
     is_drift: ClassVar[bool] = True
 
     def __init__(self, R: float | None = None) -> None:
@@ -215,6 +221,8 @@ class BiasInstability(Process):
 
     B: float = parameter("u", "scale", meaning="bias instability")
     label: ClassVar[str] = "bias instability"
+    short_name: ClassVar[str] = "B"
+    is_flicker: ClassVar[bool] = True
     has_finite_state_space: ClassVar[bool] = False
 
     states_per_decade: ClassVar[int] = 2
@@ -270,6 +278,80 @@ class BiasInstability(Process):
         return (cls(0.3), cls(2e-5))
 
 
+class Sinusoid(Process):
+    """A periodic line of constant amplitude and random phase (IEEE Std 952, sinusoidal noise).
+
+    Parameters
+    ----------
+    amplitude : float, optional
+        u.
+    frequency : float, optional
+        Hz; what lies above 1/(2 dt) is aliased.
+    """
+
+    amplitude: float = parameter("u", "scale", meaning="line amplitude")
+    frequency: float = parameter("Hz", meaning="line frequency")
+    label: ClassVar[str] = "sinusoid"
+    prefix: ClassVar[str] = "sinusoid_"
+    is_line: ClassVar[bool] = True
+
+    def __init__(self, amplitude: float | None = None, frequency: float | None = None) -> None:
+        super().__init__(amplitude, frequency)
+
+    def psd(self, f: FloatArray, dt: float) -> FloatArray:
+        """Zero: all of the variance is in the line, see `lines`."""
+        return np.zeros_like(f)
+
+    def lines(self) -> tuple[tuple[float, float], ...]:
+        return ((float(self.frequency), float(self.amplitude)),)
+
+    def haar_variance(self, tau: FloatArray, dt: float) -> FloatArray:
+        m = np.asarray(tau, dtype=float) / dt
+        return 0.5 * self.amplitude**2 * _line_gain(m, self.frequency * dt)
+
+    def autocovariance(self, lag: FloatArray, dt: float) -> FloatArray:
+        phase = 2.0 * np.pi * self.frequency * dt * np.asarray(lag)
+        return 0.5 * self.amplitude**2 * np.cos(phase)
+
+    def state_space(self, dt: float) -> StateSpace:
+        self._require_given()
+        angle = 2.0 * np.pi * self.frequency * dt
+        rotation = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+        return StateSpace(
+            transition=rotation,
+            process_noise=np.zeros((2, 2)),
+            output=np.array([1.0, 0.0]),
+            measurement_noise=0.0,
+            initial_mean=np.zeros(2),
+            initial_covariance=0.5 * self.amplitude**2 * np.eye(2),
+            names=("line, in phase", "line, in quadrature"),
+        )
+
+    def draw(self, n: int, dt: float, rng: np.random.Generator) -> FloatArray:
+        cycles = self.frequency * dt * np.arange(n) + rng.random()
+        return self.amplitude * np.cos(2.0 * np.pi * cycles)
+
+    def shape_grid(self, dt: float, n: int) -> list[Shape]:
+        # The gain's lobes at coarse levels make many local minima: the grid is finer than they are
+        # where the line is seen at all.
+        low, high = np.log10(2.0 / (n * dt)), np.log10(0.5 / dt)
+        points = max(int(np.ceil((high - low) * _LINES_PER_DECADE)), 2)
+        return [(float(frequency),) for frequency in np.logspace(low, high, points)]
+
+    @classmethod
+    def examples(cls) -> tuple[Process, ...]:
+        return (cls(1.0, 0.00565), cls(0.1, 0.203))
+
+
 def _odd_harmonic(k: FloatArray) -> FloatArray:
     """1 + 1/3 + ... + 1/(2k - 1), continued to real k."""
     return np.asarray(0.5 * (digamma(k + 0.5) - digamma(0.5)))
+
+
+def _line_gain(m: FloatArray, frequency: float) -> FloatArray:
+    """Squared Haar gain at one frequency (cycles per sample), also at multiples of 1 and near 0."""
+    alias = abs(frequency - np.rint(frequency))
+    x = np.pi * m * alias
+    # sin(x)^2 / (m sin(pi f)) with the ratio written through sinc so that f -> 0 stays exact.
+    ratio = x * np.sinc(x / np.pi) ** 2 / np.sinc(alias)
+    return np.asarray(ratio**2)

@@ -1,15 +1,15 @@
 """Covariance of the wavelet variance estimates of a Gaussian process, for any wavelet.
 
-The theory is that of `gmwm.variance.covariance.haar`: with M_j coefficients W_j free of end
-effects, and c_jk(h) pairs of them at lag h,
+As in `gmwm.variance.covariance.haar`: with M_j coefficients W_j free of end effects, and c_jk(h)
+pairs of them at lag h,
 
     cov(nu2_j, nu2_k) = 2 / (M_j M_k) sum_h c_jk(h) g_jk(h)^2,
 
 g_jk being their cross-covariance (Serroukh, Walden & Percival 2000, *JASA* 95, 184-196). Sums over
 all lags with min(M_j, M_k) pairs each are spectral integrals, whose weights are those of
 `gmwm.process.wavelet_gain`. For the coarse levels they are multiplied by the ratio of the two sums,
-over the lags that are multiples of a block of samples: g_jk^2 is smooth on that scale. Nothing
-supposes that filters are symmetric: their transfer functions enter with their phases.
+over the lags that are multiples of a block of samples: g_jk^2 is smooth on that scale. Filters need
+not be symmetric: their transfer functions enter with their phases.
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-import numpy.typing as npt
 
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
-from gmwm.process import PSD, ComplexArray, Wavelet, evaluated, pair_weights, unit_legendre, wavelet
+from gmwm.process import PSD, ComplexArray, evaluated, pair_weights, unit_legendre, wavelet
 from gmwm.variance import tuning
+from gmwm.variance.covariance.haar import centred_pairs
 from gmwm.variance.covariance.lags import LagGrid, block_of
 
 
@@ -56,38 +56,21 @@ def _lag_sums(name: str, n: int, levels: int) -> _LagSums:
     signed = (grid.frequency + folds[:, None]) / block
     transfer = np.empty((len(coarse), *signed.shape), dtype=complex)
     for row, level in enumerate(coarse):
-        transfer[row] = _transfer(filters, level, signed)
-    lag = block * grid.lag
-    counts = np.array([[_counts(filters, n, j, k, lag, block) for k in coarse] for j in coarse])
+        # With all digits of its size where it is minute.
+        phase = np.angle(filters.transfer(level, signed))
+        transfer[row] = np.sqrt(filters.gain(level, signed)) * np.exp(1j * phase)
+    number = {level: n - filters.width(level) + 1 for level in coarse}
+
+    def pairs(j: int, k: int) -> FloatArray:
+        """Number of coefficients of levels j and k at each lag, relative to min(M_j, M_k)."""
+        first, second = number[j], number[k]
+        centre = filters.width(j) - 1 - n + 0.5 * (first + second)
+        apart = (block * grid.lag - centre).astype(float)
+        found = centred_pairs(first, second, apart, block)
+        return found / (block * min(first, second))
+
+    counts = np.array([[pairs(j, k) for k in coarse] for j in coarse])
     return _LagSums(first, np.abs(signed), transfer, counts, grid)
-
-
-def _transfer(filters: Wavelet, level: int, f: FloatArray) -> ComplexArray:
-    """Transfer function, with all digits of its size where it is minute."""
-    response = filters.transfer(level, f)
-    return np.asarray(np.sqrt(filters.gain(level, f)) * np.exp(1j * np.angle(response)))
-
-
-def _counts(
-    filters: Wavelet, n: int, j: int, k: int, lag: npt.NDArray[np.intp], block: int
-) -> FloatArray:
-    """Number of coefficients s of level j and t of level k with s - t about ``lag``.
-
-    It is a trapezium in the lag, which may be narrower than a block: its mean under a triangle
-    of one block to either side is given, relative to min(M_j, M_k). As the sum of four ramps
-    max(x, 0) it is a second difference of |x| (x^2 - 1) / 12.
-    """
-    first, second = (n - filters.width(level) + 1 for level in (j, k))
-    begin = filters.width(j) - 1 - n
-    total = np.zeros(lag.size)
-    for corner, sign in ((0, 1.0), (first, -1.0), (second, -1.0), (first + second, 1.0)):
-        for shift, factor in ((-block, 1.0), (0, -2.0), (block, 1.0)):
-            x = np.abs(lag - begin - corner + shift).astype(float)
-            total += sign * factor * x * (x * x - 1.0)
-    total /= 12.0 * block**2
-    outside = (lag <= begin - block) | (lag >= begin + first + second + block)
-    total[outside] = 0.0
-    return np.asarray(total / min(first, second))
 
 
 def _end_effects(psd: PSD, dt: float, sums: _LagSums, moments: int) -> FloatArray:
@@ -111,10 +94,10 @@ def _end_effects(psd: PSD, dt: float, sums: _LagSums, moments: int) -> FloatArra
 def _at_zero(
     psd: PSD, dt: float, sums: _LagSums, moments: int, neighbour: FloatArray
 ) -> FloatArray:
-    """What stands for the spectrum in the bin at zero frequency.
+    """Value of the spectrum that stands for the bin at zero frequency.
 
-    The product of two gains and the spectrum is f^2r S(f) there. It is given its mean over the bin
-    less what a smooth function would have curved there.
+    The product of two gains and the spectrum is f^2r S(f) there: its mean over the bin, less the
+    curvature of a smooth function.
     """
     x, w = unit_legendre(8)
     bin_width = 1.0 / (sums.grid.size * sums.grid.block)

@@ -45,7 +45,7 @@ def dyadic_levels(n: int) -> FloatArray:
 
 
 def _tent_sum(distance: FloatArray, block: int) -> FloatArray:
-    """What a kink of unit slope in the counts adds to their sum under a tent of +- block lags.
+    """Contribution of a kink of unit slope in the counts to their sum under a tent of +-block lags.
 
     sum_h (1 - |h - x|/b)_+ (h)_+ - b (x)_+ with integer h, x: even in x, (y^3 - y)/(6 b) with
     y = b - |x|.
@@ -57,8 +57,8 @@ def _tent_sum(distance: FloatArray, block: int) -> FloatArray:
 def centred_pairs(first: float, second: float, x: FloatArray, block: int) -> FloatArray:
     """Number of pairs of coefficients whose centres are about ``x`` samples apart.
 
-    Of ``first`` and ``second`` coefficients the number is a trapezoid in the lag. The pairs at the
-    lags between multiples of ``block`` are divided between the neighbours as a straight line would.
+    The number for ``first`` and ``second`` coefficients is a trapezoid in the lag. The pairs at
+    lags between multiples of ``block`` are divided linearly between the neighbours.
     """
     outer, inner = 0.5 * (first + second), 0.5 * abs(first - second)
     pairs = block * np.clip(outer - np.abs(x), 0.0, min(first, second))
@@ -69,14 +69,14 @@ def centred_pairs(first: float, second: float, x: FloatArray, block: int) -> Flo
 
 @dataclass(frozen=True, eq=False)
 class _LagSums:
-    """Everything about the coarse levels that does not depend on the spectrum.
+    """What the sums over lags of the coarse levels need, without the spectrum.
 
     first: The finest of the coarse levels.
     averaging: (L,) of int, averaging times, blocks.
     slopes: (L, F), gains over their phases and the sine of the frequency; 0 at frequency zero.
     at_zero: (L,), gains over their phases at frequency zero.
-    weights: (H,), how often each lag from zero on stands for itself and its negative.
-    counts: (L, L, H), pairs of coefficients at each lag, of those that there are, times
+    weights: (H,), 2 for lags that stand for their negative too, else 1.
+    counts: (L, L, H), share of the pairs of coefficients that exist at each lag, times
         ``weights``.
     """
 
@@ -117,15 +117,8 @@ def _lag_sums(n: int) -> _LagSums:
     amplitude = grid.haar_amplitude(averaging)
     slopes = amplitude / np.sin(np.pi * grid.frequency)
     slopes[:, 0] = 0.0
-    return _LagSums(
-        first,
-        grid,
-        averaging.astype(np.intp),
-        slopes,
-        amplitude[:, 0].copy(),
-        weights,
-        weights * counts,
-    )
+    steps, at_zero = averaging.astype(np.intp), amplitude[:, 0].copy()
+    return _LagSums(first, grid, steps, slopes, at_zero, weights, weights * counts)
 
 
 def _end_effects(psd: PSD, dt: float, sums: _LagSums) -> FloatArray:
@@ -142,10 +135,10 @@ def _end_effects(psd: PSD, dt: float, sums: _LagSums) -> FloatArray:
 def _excess(
     averaging: tuple[float, ...], frequency: FloatArray
 ) -> tuple[IntArray, IntArray, FloatArray]:
-    """Rows, columns and weights at nodes of what replaced lobes take from products of gains.
+    """Quadrature corrections for replaced lobes: rows, columns, and weights at the nodes.
 
-    Where lobes were replaced by their mean, the mean of a product of two gains is not the
-    product of the means if the averaging times are equal or differ by a factor of two.
+    Where lobes were replaced by their mean, the mean of a product of two gains is not the product
+    of the means if the averaging times are equal or differ by a factor of two.
     """
     m = np.array(averaging)
     rows, columns, weights = [], [], []
@@ -198,10 +191,10 @@ def _pairs(averaging: tuple[float, ...]) -> _Pairs:
 
 
 def integrals(psd: PSD, dt: float, m: FloatArray) -> FloatArray:
-    """2 int |H_j|^2 |H_k|^2 S^2 df over all frequencies, shape (J, J), in u^4.
+    """2 int |H_j|^2 |H_k|^2 S^2 df over all frequencies, (J, J), in u^4.
 
-    Where S^2 is a polynomial on a panel of nodes, the lobes of the gains are in weights of a few
-    points; the other panels, about a narrow resonance or a kink, are summed node by node.
+    Where S^2 is a polynomial on a panel of nodes, the weights of a few points hold the lobes of the
+    gains; other panels, about a narrow resonance or a kink, are summed node by node.
     """
     averaging = tuple(m.tolist())
     pairs = _pairs(averaging)
@@ -218,7 +211,7 @@ def integrals(psd: PSD, dt: float, m: FloatArray) -> FloatArray:
 
 
 @lru_cache(maxsize=2)  # the spectra of a search are rough in the same places; 2 MB each
-def _chosen(averaging: tuple[float, ...], panels: bytes) -> tuple[Any, ...]:
+def _nodes_of(averaging: tuple[float, ...], panels: bytes) -> tuple[Any, ...]:
     """Frequencies, weights and gains of the nodes of some panels, and their `_excess`."""
     grid, starts = quadrature(averaging), _pairs(averaging).starts
     width = np.diff(starts, append=grid.frequency.size)
@@ -232,7 +225,7 @@ def _node_by_node(
     psd: PSD, dt: float, averaging: tuple[float, ...], chosen: npt.NDArray[np.bool_]
 ) -> FloatArray:
     """A quarter of the integrals over some panels, from all of their nodes."""
-    frequency, weight, gain, rows, columns, excess = _chosen(averaging, chosen.tobytes())
+    frequency, weight, gain, rows, columns, excess = _nodes_of(averaging, chosen.tobytes())
     density = evaluated(psd, in_hertz(frequency, dt), dt) / dt
     scaled = gain * (np.sqrt(weight) * density)
     integral = scaled @ scaled.T
@@ -246,8 +239,8 @@ def _node_by_node(
 def mean_covariance(psd: PSD, n: int, dt: float) -> FloatArray:
     """Covariance of the means over time of the Haar coefficients of the levels, (J, J), in u^2.
 
-    It scales what a drift adds to the covariance of the wavelet variances. At fine levels, where
-    a drift that the record can show is far below the noise, it is left at zero.
+    A drift adds a multiple of it to the covariance of the wavelet variances. It is zero at fine
+    levels, where a drift that the record can show is far below the noise.
     """
     sums = _lag_sums(n)
     mean = sums.of(block_spectrum(psd, dt, sums.grid))[0]
@@ -291,7 +284,7 @@ def line_covariance(
     m: FloatArray,
     counts: FloatArray,
 ) -> FloatArray:
-    """What spectral lines add to the covariance: their product with the noise around them.
+    """Contribution of spectral lines to the covariance: their product with the noise around them.
 
     A line of amplitude a at frequency f adds 2 a^2 |H_j|^2 |H_k|^2 S(f) / max(M_j, M_k).
     """

@@ -46,7 +46,7 @@ class LagGrid:
         x, w = legendre(8)
         near = 0.25 / self.size * (x + 1.0)
         folds = _Folds.of(np.concatenate([self.frequency, near]), self.block)
-        folds.frequency.flags.writeable = False  # what spectra make of them is kept
+        folds.frequency.flags.writeable = False  # spectra of it are cached
         return near, w, folds
 
     @cached_property
@@ -91,7 +91,7 @@ def block_density(psd: PSD, dt: float, frequency: FloatArray, block: int) -> Flo
 
 @dataclass(frozen=True, eq=False)
 class _Folds:
-    """What of `block_density` does not depend on the spectrum.
+    """Frequencies and weights of `block_density`.
 
     frequency: (A,), of all folds, then of the rest of the band, cycles per sample.
     smoothing: (folds, F), weights of the folds.
@@ -137,9 +137,9 @@ class _Folds:
 def block_spectrum(psd: PSD, dt: float, grid: LagGrid) -> FloatArray:
     """`block_density` at the Fourier frequencies of a grid.
 
-    The product of two gains and the spectrum is f^2 S(f) near zero frequency. What stands for
-    its bin at zero is its mean over the bin less what a smooth function would have curved there:
-    exact for short memory, where it vanishes, and for a random walk, where it is constant.
+    The product of two gains and the spectrum is f^2 S(f) near zero frequency. The bin at zero gets
+    its mean over the bin, less the curvature of a smooth function: exact for short memory, where it
+    vanishes, and for a random walk, where it is constant.
     """
     x, w, folds = grid.folds
     found = folds.density(psd, dt)

@@ -13,17 +13,17 @@ rho, E[H_p H_q] = q! rho^q if p = q, else 0 (Mehler), so that for two levels
 
 with c_jk(h) the number of pairs at lag h. For independent coefficients the sum of all terms is
 the classical variance over the efficiency. Each power of a correlation function is one itself
-(Schur), so what is added is positive semi-definite.
+(Schur), so the excess is positive semi-definite.
 
 The powers from the fourth on are local: two levels whose averaging times differ by 2^d have
 correlations of order 2^(-d/2), over a few times the longer averaging time, and share about
-2^(-3d/2) of the added variance (random walk) or less (2^(-5d/2) for white noise). Levels up to
-``_REACH`` apart are summed, on a common grid of lags. It is made of means over blocks of samples,
-which give the coefficients at every ``block``-th lag exactly; between these lags the sum of powers
-is taken as a straight line. Correlations are by cosine transform from frequencies in the middle
-of their bins: the transform then gives correlations less their first alias, and a spectrum that
-grows without bound towards zero frequency needs no care. Farther levels, which hardly matter
-unless one narrow resonance makes them all, get a value of the right size.
+2^(-3d/2) of the added variance (random walk) or less (2^(-5d/2) for white noise). Levels up to four
+apart are summed, on a common grid of lags. It is made of means over blocks of samples, which give
+the coefficients at every ``block``-th lag exactly; between these lags the sum of powers is taken as
+a straight line. Correlations are by cosine transform from frequencies in the middle of their bins:
+the transform then gives correlations less their first alias, and a spectrum that grows without
+bound towards zero frequency needs no care. Farther levels hardly matter unless one narrow resonance
+makes them all; they get a value of the right size.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ _MAX_TERMS = 40
 
 @lru_cache(maxsize=64)
 def excess_series(efficiency: float) -> FloatArray:
-    """b_q^2 q! for q = 4, 6, ...: what powers of the correlation add to the covariance.
+    """b_q^2 q! for q = 4, 6, ...: factors of the powers of the correlation.
 
     Their sum is 2/efficiency - 2; the last one holds what the series leaves out.
     """
@@ -104,29 +104,25 @@ def pair_shares(n: int, m_j: float, m_k: float, block: int, lags: int) -> FloatA
     return np.asarray(pairs / (first * second))
 
 
-def _grid(n: int, m: FloatArray, first: int, own: int, block: int) -> _Grid:
-    """The grid whose ``own`` levels start at number ``first``."""
-    size = min(own + tuning.ROBUST_REACH, m.size - first)
-    frequency = (np.arange(tuning.ROBUST_LAGS) + 0.5) / (2 * tuning.ROBUST_LAGS)
-    coarse = m[first : first + size, None] / block
-    amplitude = np.sin(np.pi * coarse * frequency) ** 2 / (coarse * np.sin(np.pi * frequency))
-    weight = np.zeros((own, tuning.ROBUST_REACH + 1, tuning.ROBUST_LAGS))
-    for j in range(own):
-        for k in range(j, min(j + tuning.ROBUST_REACH + 1, size)):
-            weight[j, k - j] = pair_shares(n, m[first + j], m[first + k], block, tuning.ROBUST_LAGS)
-    return _Grid(block, first, own, size, frequency, amplitude, weight)
-
-
 @lru_cache(maxsize=4)
 def _grids(n: int, levels: int) -> tuple[_Grid, ...]:
-    """Everything about the sums over lags that does not depend on the spectrum."""
-    m = dyadic_levels(n)[:levels]
-    grids = [_grid(n, m, 0, min(tuning.ROBUST_FIRST_LEVELS, m.size), 1)]
-    first = tuning.ROBUST_FIRST_LEVELS
-    while first < m.size:
-        own = min(tuning.ROBUST_LEVELS_PER_GRID, m.size - first)
-        grids.append(_grid(n, m, first, own, int(m[first]) // tuning.ROBUST_BLOCKS_PER_AVERAGE))
+    """Grids of all levels, on samples for the finest ones, on means of blocks for the others."""
+    m, reach, lags = dyadic_levels(n)[:levels], tuning.ROBUST_REACH, tuning.ROBUST_LAGS
+    frequency = (np.arange(lags) + 0.5) / (2 * lags)
+    grids = []
+    first, own, block = 0, min(tuning.ROBUST_FIRST_LEVELS, m.size), 1
+    while own:
+        size = min(own + reach, m.size - first)
+        coarse = m[first : first + size, None] / block
+        amplitude = np.sin(np.pi * coarse * frequency) ** 2 / (coarse * np.sin(np.pi * frequency))
+        weight = np.zeros((own, reach + 1, lags))
+        for j in range(own):
+            for k in range(j, min(j + reach + 1, size)):
+                weight[j, k - j] = pair_shares(n, m[first + j], m[first + k], block, lags)
+        grids.append(_Grid(block, first, own, size, frequency, amplitude, weight))
         first += own
+        own = min(tuning.ROBUST_LEVELS_PER_GRID, m.size - first)
+        block = int(m[first]) // tuning.ROBUST_BLOCKS_PER_AVERAGE if own else 0
     return tuple(grids)
 
 
@@ -154,7 +150,7 @@ def excess_correlation(
 
 
 def _excess(psd: PSD, n: int, dt: float, series: FloatArray, levels: int) -> FloatArray:
-    """What is added to the covariance, over nu_j^2 nu_k^2, for levels within reach, (J, J)."""
+    """Excess of the covariance over nu_j^2 nu_k^2, for levels within reach, (J, J)."""
     result = np.zeros((levels, levels))
     for grid in _grids(n, levels):
         density = block_density(psd, dt, grid.frequency, grid.block)
@@ -167,7 +163,7 @@ def _excess(psd: PSD, n: int, dt: float, series: FloatArray, levels: int) -> Flo
 
 
 def _normalised(matrix: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Square roots of the diagonal, and the matrix of correlations."""
+    """Square roots of the diagonal, and the correlations."""
     deviation = np.sqrt(np.maximum(np.diag(matrix), np.finfo(float).tiny))
     return deviation, matrix / np.outer(deviation, deviation)
 
@@ -189,40 +185,20 @@ def robust_covariance(
     classical: FloatArray,
     counts: FloatArray | None = None,
 ) -> FloatArray:
-    """Asymptotic covariance of the robust Haar wavelet variances of a Gaussian series.
+    """Asymptotic covariance of the robust Haar wavelet variances of a Gaussian series, u^4, (J, J).
 
-    Parameters
-    ----------
-    psd : callable
-        ``psd(f, dt)``, two-sided, in u^2/Hz.
-    n : int
-        Number of samples.
-    dt : float
-        Sampling interval, s.
-    efficiency : float
-        Of the estimates at independent coefficients, between 0 and 1.
-    classical : (J, J) ndarray
-        Covariance of the classical wavelet variances, u^4, of the first J levels of
-        `dyadic_levels`; `haar_covariance`.
-    counts : (J,) ndarray, optional
-        Numbers of coefficients, where samples are missing.
+    Asymptotic normality after Mondal & Percival (2012), *Ann. Inst. Stat. Math.* 64, 27-53; the
+    series is their influence function in Hermite polynomials. It holds where a level has many
+    independent coefficients: with fewer than about ten equivalent degrees of freedom robust
+    estimates vary more than this.
 
-    Returns
-    -------
-    (J, J) ndarray
-        In u^4; at least ``classical``, and positive definite if that is.
-
-    Raises
-    ------
-    InputError
-        For an efficiency outside (0, 1), or a spectrum that is not finite and non-negative.
-
-    Notes
-    -----
-    The asymptotic normality is that of Mondal & Percival (2012), *Ann. Inst. Stat. Math.* 64,
-    27-53; the series is their influence function in Hermite polynomials. It holds where a level
-    has many independent coefficients: with fewer than about ten equivalent degrees of freedom
-    robust estimates vary more than this says.
+    psd: ``psd(f, dt)``, two-sided, in u^2/Hz.
+    efficiency: Of the estimates at independent coefficients, between 0 and 1.
+    classical: (J, J), covariance of the classical wavelet variances, u^4, of the first J levels of
+        `dyadic_levels`. The result is at least that, and positive definite if that is.
+    counts: (J,), numbers of coefficients, where samples are missing.
+    Raises InputError for an efficiency outside (0, 1), or a spectrum that is not finite and
+        non-negative.
     """
     levels = classical.shape[0]
     m = dyadic_levels(n)[:levels]

@@ -21,9 +21,8 @@ from gmwm import (
     WhiteNoise,
 )
 from gmwm.errors import InputError
-from gmwm.estimate.likelihood.expectation import expect
-from gmwm.estimate.likelihood.likelihood import Columns, KalmanLikelihood, stacked
-from gmwm.estimate.likelihood.maximization import StateMoments, updated, white
+from gmwm.estimate.likelihood import Columns, KalmanLikelihood, stacked
+from gmwm.estimate.likelihood.em import StateMoments, _gauss_markov, expect
 from gmwm.process import as_model
 
 
@@ -122,32 +121,6 @@ def test_it_finds_the_estimates_of_maximum_likelihood(truth, missing):
         assert fit.stderr[key] == pytest.approx(error, rel=0.03)
 
 
-@pytest.mark.parametrize(
-    "truth", [AR([1.2, -0.6], 2.0), WhiteNoise(1.0) + AR([1.2, -0.6], 2.0)], ids=repr
-)
-def test_an_autoregression_is_close_to_maximum_likelihood(truth):
-    # It leaves the density of the first two samples out, which is worth O(1) of n = 3000.
-    truth = as_model(truth)
-    x = truth.simulate(3000, 1.0, seed=5)
-    exact = gmwm.fit(truth.opened(), x, dt=1.0, method="mle")
-    fit = em(truth.opened(), x)
-    for key, error in exact.stderr.items():
-        assert fit.params[key] == pytest.approx(exact.params[key], abs=0.2 * error)
-        assert fit.stderr[key] == pytest.approx(error, rel=0.1)
-
-
-def test_extrapolated_steps_do_not_fall_either():
-    truth = WhiteNoise(0.5) + GaussMarkov(1.0, 20.0)
-    x = truth.simulate(1000, 1.0, seed=6)
-    for start in (
-        WhiteNoise(0.03) + GaussMarkov(0.1, 3.0),
-        WhiteNoise(3.0) + GaussMarkov(0.1, 100.0),
-        WhiteNoise(1.2) + GaussMarkov(0.2, 1.0),
-    ):
-        fit = em(truth.opened(), x, start=start)
-        assert falls(fit.trace) < 1e-8 * abs(fit.trace[-1])
-
-
 def test_an_amplitude_that_has_hardly_risen_is_no_crash():
     model = RandomWalk() + GaussMarkov()
     x = (RandomWalk(1.0) + GaussMarkov(1.0, 1.0)).simulate(30, 1.0, seed=0)
@@ -177,30 +150,6 @@ def test_iterations_that_run_out_are_no_valid_fit(accelerate):
         assert "EM did not converge" in fit.message
         assert not fit.reasons["converged"]
         assert len(fit.trace) == most
-
-
-@pytest.mark.parametrize("accelerate", [True, False])
-@pytest.mark.parametrize("drift", ["ramp", "state"])
-@pytest.mark.parametrize("length", [300, 1500])
-def test_it_never_falls_where_the_step_leaves_the_first_state_out(accelerate, drift, length):
-    truth = WhiteNoise(0.2) + RandomWalk(0.02) + RateRamp(0.003)
-    x = truth.simulate(6000, 1.0, seed=1)[:length]
-    model, start = AR(2), AR([0.4, 0.4], 0.1)
-    if drift == "state":
-        model, start = model + RateRamp(), start + RateRamp(0.0)
-    fit = em(model, x, start=start, accelerate=accelerate, drift=drift)
-    assert falls(fit.trace) == 0.0
-    assert fit.log_likelihood == max(fit.trace)
-    again = em(model, x, start=start, accelerate=accelerate, drift=drift, max_iterations=3)
-    assert len(again.trace) <= 3
-
-
-def test_what_it_returns_has_the_likelihood_it_says():
-    truth = WhiteNoise(0.2) + RandomWalk(0.02) + RateRamp(0.003)
-    x = truth.simulate(6000, 1.0, seed=1)[:1500]
-    fit = em(AR(2), x, start=AR([0.4, 0.4], 0.1))
-    likelihood = KalmanLikelihood(Columns(x, 1.0, None, False))
-    assert likelihood(fit.model.terms) == pytest.approx(fit.log_likelihood, abs=1e-6)
 
 
 # -- a drift of the state -------------------------------------------------------------------------
@@ -249,13 +198,12 @@ def moments(draw_phi, n, seed, spread):
     """Second moments of a state whose mean is a series and whose variance is ``spread``."""
     rng = np.random.default_rng(seed)
     x = as_model(AR([draw_phi], 1.0)).simulate(n, 1.0, rng)
-    one = np.ones((1, 1))
     lagged = 0.9 * draw_phi * spread
     return StateMoments(
-        later=one * (np.sum(x[1:] ** 2) + (n - 1) * spread),
-        cross=one * (np.sum(x[1:] * x[:-1]) + (n - 1) * lagged),
-        earlier=one * (np.sum(x[:-1] ** 2) + (n - 1) * spread),
-        first=one * (x[0] ** 2 + spread),
+        later=np.sum(x[1:] ** 2) + (n - 1) * spread,
+        cross=np.sum(x[1:] * x[:-1]) + (n - 1) * lagged,
+        earlier=np.sum(x[:-1] ** 2) + (n - 1) * spread,
+        first=x[0] ** 2 + spread,
         steps=n - 1,
     )
 
@@ -263,7 +211,7 @@ def moments(draw_phi, n, seed, spread):
 def expected_log_likelihood(process, m, dt):
     """Of a Gauss-Markov process whose states are seen, up to a constant."""
     variance, phi = process.sigma**2, np.exp(-dt / process.tau)
-    later, cross, earlier, first = (a[0, 0] for a in (m.later, m.cross, m.earlier, m.first))
+    later, cross, earlier, first = m.later, m.cross, m.earlier, m.first
     noise = -variance * np.expm1(-2.0 * dt / process.tau)
     squares = later - 2.0 * phi * cross + phi**2 * earlier
     return -0.5 * (np.log(variance) + first / variance + m.steps * np.log(noise) + squares / noise)
@@ -276,7 +224,7 @@ def test_the_gauss_markov_step_is_the_maximum(like, phi, n, spread):
     dt = 0.1
     m = moments(phi, n, seed=n, spread=spread)
     start = GaussMarkov(*(value or 1.0 for value in like.values.values()))
-    found = updated(start, like, m, dt)
+    found = _gauss_markov(start, like, m, dt)
     best = expected_log_likelihood(found, m, dt)
     free = [name for name, value in like.values.items() if value is None]
     assert all(found.values[k] == v for k, v in like.values.items() if v is not None)
@@ -290,30 +238,6 @@ def test_the_gauss_markov_step_is_the_maximum(like, phi, n, spread):
         assert best >= -search.fun - 1e-9 * abs(best) - 1e-7
 
 
-@pytest.mark.parametrize("like", [AR(2), AR(2, 0.7), AR([0.5, 0.2])], ids=repr)
-def test_the_autoregressive_step_is_least_squares(like):
-    x = as_model(AR([1.2, -0.6], 2.0)).simulate(500, 1.0, seed=1)
-    states = np.column_stack([x[1:], x[:-1]])
-    later, earlier = states[1:], states[:-1]
-    m = StateMoments(later.T @ later, later.T @ earlier, earlier.T @ earlier, np.eye(2), 498)
-    start = AR([0.1, 0.1] if like.ar[0] is None else like.ar, like.values["sigma2"] or 1.0)
-    found = updated(start, like, m, 1.0)
-    beta = np.linalg.lstsq(earlier, later[:, 0], rcond=None)[0]
-    expected = beta if like.ar[0] is None else np.array(like.ar)
-    np.testing.assert_allclose(found.ar, expected, rtol=1e-9)
-    rest = later[:, 0] - earlier @ expected
-    assert found.sigma2 == pytest.approx(like.values["sigma2"] or np.mean(rest**2), rel=1e-9)
-
-
-def test_walk_and_white_steps_are_mean_squares():
-    one = np.ones((1, 1))
-    m = StateMoments(5.0 * one, 2.0 * one, 4.0 * one, one, 10)
-    assert pytest.approx(np.sqrt(5.0)) == updated(RandomWalk(1.0), RandomWalk(), m, 0.1).K
-    assert updated(RandomWalk(1.0), RandomWalk(1.0), m, 0.1).K == 1.0
-    assert pytest.approx(np.sqrt(0.4)) == white(WhiteNoise(1.0), WhiteNoise(), 8.0, 2, 0.1).N
-    assert white(WhiteNoise(1.0), WhiteNoise(1.0), 8.0, 2, 0.1).N == 1.0
-
-
 @pytest.mark.parametrize("drift", [False, True])
 def test_expected_moments_are_those_of_draws_from_the_posterior(drift):
     """By dense algebra, with flat priors of the regressors' coefficients."""
@@ -322,7 +246,7 @@ def test_expected_moments_are_those_of_draws_from_the_posterior(drift):
     x = np.random.default_rng(3).normal(size=n)
     x[[0, 7, 8]] = np.nan
     columns = Columns(x, 1.0, None, drift)
-    e = expect(columns, stacked(processes, 1.0))
+    e = expect(columns, stacked(processes, 1.0), np.zeros(2), np.zeros(2))
     k = np.arange(n)
     prior = np.zeros((2 * n, 2 * n))
     prior[:n, :n] = processes[0].autocovariance(np.abs(k[:, None] - k), 1.0)
@@ -357,6 +281,7 @@ def test_expected_moments_are_those_of_draws_from_the_posterior(drift):
         Resonance(),
         Sinusoid(),
         MA(1),
+        AR(1),
         ARMA(1, 1),
         ARIMA(1, 1, 0),
         ARIMA(0, 1, 0),

@@ -16,7 +16,7 @@ from gmwm import (
     Sinusoid,
     WhiteNoise,
 )
-from gmwm.estimate.likelihood.kalman import smooth, whiten
+from gmwm.estimate.likelihood.kalman import Space, smooth, whiten
 from gmwm.process import as_model
 
 MODELS = [
@@ -48,7 +48,7 @@ gaps = pytest.mark.parametrize("gap", GAPS.values(), ids=GAPS.keys())
 
 
 def arguments(space):
-    return (
+    return Space(
         space.transition,
         space.process_noise,
         space.output,
@@ -91,7 +91,7 @@ def test_whitening_is_the_inverse_of_the_cholesky_factor(model, gap):
     y = columns(N, gap)
     present = ~np.isnan(y[:, 0])
     root = np.linalg.cholesky(sample_covariance(space, N)[np.ix_(present, present)])
-    innovations, log_variance, count = whiten(*arguments(space), y)
+    innovations, log_variance, count = whiten(arguments(space), y)
     assert count == np.sum(present)
     assert np.all(innovations[~present] == 0.0)
     np.testing.assert_allclose(
@@ -118,9 +118,7 @@ def test_smoothing_is_conditioning_on_all_samples(model, gap):
     of_samples = sample_covariance(space, N)[np.ix_(present, present)]
     gain = np.linalg.solve(of_samples, read @ prior).T
     posterior = (prior - gain @ read @ prior).reshape(N, p, N, p)
-    states, covariance, lagged, innovations, variances = smooth(
-        *arguments(space), y, starts, inputs
-    )
+    states, covariance, lagged, innovations, variances = smooth(arguments(space), y, starts, inputs)
     np.testing.assert_array_equal(np.isfinite(variances), present)
     scale = max(float(np.max(np.abs(prior), initial=0.0)), 1.0)
     for c in range(3):
@@ -159,13 +157,13 @@ def test_filter_and_smoother_agree_with_statsmodels(model, gap):
     peer.tolerance = 0.0  # no settled gain
     theirs = peer.smooth()
     zero = np.zeros((1, p))
-    states, covariance, lagged, _, _ = smooth(*arguments(space), y, zero, zero)
+    states, covariance, lagged, _, _ = smooth(arguments(space), y, zero, zero)
     np.testing.assert_allclose(states[:, 0], theirs.smoothed_state.T, rtol=1e-7, atol=1e-8)
     np.testing.assert_allclose(covariance, theirs.smoothed_state_cov.transpose(2, 0, 1), atol=1e-8)
     np.testing.assert_allclose(
         lagged, theirs.smoothed_state_autocov.transpose(2, 0, 1)[: N - 1], atol=1e-8
     )
-    whitened, log_variance, count = whiten(*arguments(space), y)
+    whitened, log_variance, count = whiten(arguments(space), y)
     value = -0.5 * (count * np.log(2.0 * np.pi) + log_variance + np.sum(whitened**2))
     assert value == pytest.approx(theirs.llf, rel=1e-9, abs=1e-8)
 
@@ -176,7 +174,7 @@ LONG = 5000
 def full_recursion(space, y):
     """Innovations and log-determinant with the gain renewed at every sample."""
     zero = np.zeros((y.shape[1], space.n_states))
-    _, _, _, innovations, variances = smooth(*arguments(space), y, zero, zero)
+    _, _, _, innovations, variances = smooth(arguments(space), y, zero, zero)
     present = np.isfinite(variances)
     whitened = np.zeros_like(innovations)
     whitened[present] = innovations[present] / np.sqrt(variances[present])[:, None]
@@ -202,7 +200,7 @@ def full_recursion(space, y):
 def test_a_settled_gain_is_as_good_as_a_new_one(model, gap):
     space = model.state_space(1.0)
     y = columns(LONG, gap, seed=4)
-    innovations, log_variance, count = whiten(*arguments(space), y)
+    innovations, log_variance, count = whiten(arguments(space), y)
     expected, expected_log_variance, expected_count = full_recursion(space, y)
     assert count == expected_count
     # A prediction that settles slowly is held while it still moves by up to 1e-13 a sample.
@@ -215,7 +213,7 @@ def test_a_gap_that_begins_at_a_settled_gain_is_seen():
     space = (WhiteNoise(1.0) + RandomWalk(0.3)).state_space(1.0)
     y = columns(LONG, slice(3000, 3700), seed=5)[:, :1].copy()
     y[3700] = 10.0
-    innovations = whiten(*arguments(space), y)[0][:, 0]
+    innovations = whiten(arguments(space), y)[0][:, 0]
     # After 701 steps the prediction is off by 0.3 sqrt(701) = 7.9 beside the noise of 1.
     assert abs(innovations[3700]) == pytest.approx(10.0 / np.hypot(7.9, 1.0), rel=0.15)
     # The next prediction starts from the sample that ended the gap.

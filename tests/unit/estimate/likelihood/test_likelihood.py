@@ -15,7 +15,7 @@ from gmwm import (
     Sinusoid,
     WhiteNoise,
 )
-from gmwm.estimate.likelihood.likelihood import Columns, KalmanLikelihood
+from gmwm.estimate.likelihood import Columns, KalmanLikelihood
 
 MODELS = [
     (WhiteNoise(0.3),),

@@ -7,9 +7,9 @@ from scipy.optimize import minimize_scalar
 
 import gmwm
 from gmwm import GaussMarkov, RandomWalk, RateRamp, WhiteNoise
+from gmwm.estimate.likelihood import Columns, KalmanLikelihood
 from gmwm.estimate.likelihood.conclusion import redundant_term
-from gmwm.estimate.likelihood.likelihood import Columns, KalmanLikelihood
-from gmwm.estimate.problem.parameters import Coordinates
+from gmwm.estimate.problem import Coordinates
 
 
 @pytest.fixture(scope="module")

@@ -17,8 +17,8 @@ from gmwm import (
     Resonance,
     WhiteNoise,
 )
-from gmwm.estimate.likelihood.likelihood import Columns, KalmanLikelihood
-from gmwm.estimate.likelihood.whittle import WhittleLikelihood
+from gmwm.estimate.likelihood import Columns, KalmanLikelihood
+from gmwm.estimate.likelihood.likelihood import WhittleLikelihood
 from gmwm.process import as_model
 
 MODELS = [

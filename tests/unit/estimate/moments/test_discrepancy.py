@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from gmwm.estimate.moments import discrepancy as room
-from gmwm.estimate.moments.discrepancy import Discrepancy, _moment_estimate
+from gmwm.estimate import tuning
+from gmwm.estimate.moments.weights import Discrepancy, moment_estimate
 
 LEVELS = 12
 TARGET = 2.0 ** -np.arange(LEVELS)
@@ -17,15 +17,15 @@ def test_it_is_what_makes_the_sum_of_squares_its_degrees_of_freedom(delta):
     dof = 9
     size = np.sqrt(dof / LEVELS) * np.hypot(0.01, delta)
     residual = size * TARGET * np.where(np.arange(LEVELS) % 2, 1.0, -1.0)
-    found = _moment_estimate(residual, COVARIANCE, TARGET, dof)
+    found = moment_estimate(residual, COVARIANCE, TARGET, dof)
     assert found == pytest.approx(delta, rel=1e-4)
 
 
 def test_none_where_chance_explains_the_residuals():
     residual = 0.01 * TARGET * np.sqrt(9 / LEVELS)
-    assert _moment_estimate(0.999 * residual, COVARIANCE, TARGET, 9) == 0.0
-    assert 0.0 < _moment_estimate(1.01 * residual, COVARIANCE, TARGET, 9) < 0.01
-    assert _moment_estimate(1e3 * TARGET, COVARIANCE, TARGET, 9) == pytest.approx(10.0)
+    assert moment_estimate(0.999 * residual, COVARIANCE, TARGET, 9) == 0.0
+    assert 0.0 < moment_estimate(1.01 * residual, COVARIANCE, TARGET, 9) < 0.01
+    assert moment_estimate(1e3 * TARGET, COVARIANCE, TARGET, 9) == pytest.approx(10.0)
 
 
 def update(each, size):
@@ -58,7 +58,7 @@ def test_one_that_is_given_or_not_known_stays(given, dof):
 
 
 def test_it_starts_at_what_was_found_elsewhere_if_that_is_notable():
-    least = room.tuning.DISCREPANCY_NOTABLE
+    least = tuning.DISCREPANCY_NOTABLE
     for value, taken in ((0.99 * least, 0.0), (1.01 * least, 1.01 * least)):
         each = Discrepancy(None, 1)
         each.start_at(value)

@@ -8,10 +8,10 @@ import pytest
 
 import gmwm
 from gmwm.estimate.moments import (
+    GMWM,
     Design,
     Profile,
     dictionary_fit,
-    gmwm as method,
     profile,
     search,
 )
@@ -123,7 +123,7 @@ def test_the_compiled_search_goes_where_minpack_goes_step_by_step(model, shapes,
     start = search_of.at(shapes)
     z = design.pack(shapes)
     for evaluations in range(2, 32):
-        monkeypatch.setattr(profile, "_MAX_EVALUATIONS", evaluations)
+        monkeypatch.setattr(profile, "_MOST", evaluations)
         compiled = search_of._compiled(z, start, design.bounds)
         stepwise = search_of._stepwise(z, start, design.bounds)
         np.testing.assert_allclose(
@@ -173,10 +173,8 @@ def test_an_estimation_is_searched_once_and_does_not_keep_the_series(monkeypatch
     x = (gmwm.WhiteNoise(0.2) + gmwm.GaussMarkov(0.05, 4.0)).simulate(20_000, 0.01, seed=5)
     data = gmwm.wavelet_variance(x, 0.01)
     searched = []
-    real = method.GMWM._searched
-    monkeypatch.setattr(
-        method.GMWM, "_searched", lambda *args: searched.append(args[1]) or real(*args)
-    )
+    real = GMWM._solve
+    monkeypatch.setattr(GMWM, "_solve", lambda *args: searched.append(args[1]) or real(*args))
     model = gmwm.WhiteNoise() + gmwm.GaussMarkov()
     first, second = gmwm.fit(model, data), gmwm.fit(model, data)
     assert searched.count(model) == 1

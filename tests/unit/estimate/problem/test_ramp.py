@@ -6,8 +6,13 @@ from scipy.linalg import toeplitz
 
 import gmwm
 from gmwm import GaussMarkov, RandomWalk, RateRamp, WhiteNoise
-from gmwm.estimate.problem import gls_slope, slope_dof, slope_p_value
-from gmwm.estimate.problem.ramp import Slope, detrended_covariance
+from gmwm.estimate.problem import (
+    Slope,
+    detrended_covariance,
+    gls_slope,
+    slope_dof,
+    slope_p_value,
+)
 from gmwm.process import as_model
 from marks import slow
 

@@ -10,18 +10,19 @@ from scipy.linalg import toeplitz
 import gmwm
 from gmwm import GaussMarkov, RandomWalk, RateRamp, WhiteNoise
 from gmwm.estimate import tuning
-from gmwm.estimate.problem.information import density, frequency_nodes
-from gmwm.estimate.problem.ramp import (
+from gmwm.estimate.problem import (
     Slope,
-    _restricted,
     bias_of_detrending,
+    chi_square,
+    density,
     difference_covariance,
+    frequency_nodes,
     gls_slope,
     ols_slope,
     slope_p_value,
+    weight_root,
 )
-from gmwm.estimate.problem.whitening import chi_square, weight_root
-from gmwm.estimate.result.bound import quantile_above_zero
+from gmwm.estimate.result import quantile_above_zero
 
 DT = 0.5
 WV = gmwm.wavelet_variance((WhiteNoise(1.0) + RandomWalk(0.01)).simulate(600, DT, 1), dt=DT)
@@ -87,24 +88,6 @@ def test_a_slope_needs_some_blocks(count):
     for slope in (ols_slope, lambda each: gls_slope(each, WhiteNoise(1.0).psd)):
         with pytest.raises(gmwm.InputError, match="missing all over"):
             slope(wv)
-
-
-def test_a_restricted_likelihood_is_that_of_what_the_slope_leaves():
-    rng = np.random.default_rng(2)
-    root = rng.normal(size=(7, 7))
-    covariance, apart, difference = root @ root.T, rng.random(7) + 0.5, rng.normal(size=7)
-    slope, variance, likelihood = _restricted(covariance, apart, difference)
-    inverse = np.linalg.inv(covariance)
-    assert variance == pytest.approx(1.0 / (apart @ inverse @ apart))
-    assert slope == pytest.approx(variance * (apart @ inverse @ difference))
-    contrasts = np.linalg.svd(apart[None, :])[2][1:]
-    left = stats.multivariate_normal(np.zeros(6), contrasts @ covariance @ contrasts.T)
-    constant = left.logpdf(contrasts @ difference) - likelihood
-    other = _restricted(3.0 * covariance + np.eye(7), apart, difference)[2]
-    left = stats.multivariate_normal(
-        np.zeros(6), contrasts @ (3.0 * covariance + np.eye(7)) @ contrasts.T
-    )
-    assert left.logpdf(contrasts @ difference) - other == pytest.approx(constant)
 
 
 def test_what_detrending_takes_is_given_back():

@@ -7,7 +7,7 @@ from scipy.stats import binom
 import gmwm
 from gmwm import GaussMarkov, RandomWalk, WhiteNoise
 from gmwm.estimate.problem import Coordinates
-from gmwm.estimate.result.bound import quantile_above_zero, upper_amplitude
+from gmwm.estimate.result import quantile_above_zero, upper_amplitude
 from marks import slow
 
 MODEL = WhiteNoise() + RandomWalk()
@@ -27,7 +27,7 @@ def test_bounds_of_a_walk_near_the_threshold_lie_above_it(walk):
 
 def bound(centre, deviation, at):
     processes = (WhiteNoise(1.0), RandomWalk(1e-3))
-    return upper_amplitude(Coordinates(MODEL), processes, 1, centre, deviation, at, WV)
+    return upper_amplitude(Coordinates(MODEL), processes, 1, (centre, deviation, at), WV)
 
 
 def test_it_is_no_lower_than_under_the_noise_alone():
@@ -43,7 +43,7 @@ def test_it_rises_with_the_estimate_and_its_error():
     processes = (GaussMarkov(1.0, 20.0), WhiteNoise(1e-3))
 
     def of(centre, deviation):
-        return upper_amplitude(coordinates, processes, 1, centre, deviation, 0.0, wv)
+        return upper_amplitude(coordinates, processes, 1, (centre, deviation, 0.0), wv)
 
     bounds = [of(centre, 1e-4) for centre in (-1e-4, 0.0, 1e-4, 3e-4)]
     assert bounds == sorted(set(bounds))

@@ -11,7 +11,7 @@ from scipy.stats import chi2, kstest
 import gmwm
 from gmwm import GaussMarkov, RandomWalk, RateRamp, WhiteNoise
 from gmwm.estimate.result import between, fit_joint
-from gmwm.variance.pooled import PooledVariance
+from gmwm.variance import PooledVariance
 
 TRUTH = WhiteNoise(1.0) + GaussMarkov(0.7, 30.0)
 
@@ -123,7 +123,7 @@ def test_what_does_not_belong_together_is_refused():
         gmwm.fit(TRUTH.opened(), [one, other])
     with pytest.raises(gmwm.InputError, match="one recording at a time"):
         gmwm.fit(TRUTH.opened(), [one, one], method="allan")
-    with pytest.raises(gmwm.InputError, match="accident of one recording"):
+    with pytest.raises(gmwm.InputError, match="belongs to one recording"):
         gmwm.fit(WhiteNoise() + RateRamp(), [one, one])
     with pytest.raises(gmwm.InputError, match="no recording"):
         PooledVariance.of([])

@@ -7,8 +7,8 @@ import gmwm
 from gmwm import GaussMarkov, LowPassNoise, Resonance, WhiteNoise
 from gmwm.filter_numbers import tuning
 from gmwm.filter_numbers.spectra import region as module
-from gmwm.filter_numbers.spectra.region import ParameterRegion, region_targets
-from gmwm.filter_numbers.spectra.target import Target
+from gmwm.filter_numbers.spectra.region import ParameterRegion, region_spectra
+from gmwm.filter_numbers.spectra.required import RequiredSpectrum
 
 DT, HORIZON = 0.01, 0.1
 """So short a horizon that the peak of a resonance counts."""
@@ -21,7 +21,7 @@ def resonant():
 
 
 def test_no_model_of_the_region_is_far_above_those_found(resonant):
-    found = region_targets(Target.of(resonant.model, DT, HORIZON), resonant, 0.95)
+    found = region_spectra(RequiredSpectrum.of(resonant.model, DT, HORIZON), resonant, 0.95)
     region = ParameterRegion.of(resonant, 0.95)
     f = np.append(np.geomspace(1e-4, 50.0, 200), np.linspace(7.0, 9.0, 200))
     largest = np.max([each.psd(f) for each in found], axis=0)
@@ -29,7 +29,7 @@ def test_no_model_of_the_region_is_far_above_those_found(resonant):
         region.model_at(point).psd(f, DT) for point in region.draws(1000, np.random.default_rng(7))
     ]
     assert np.max(np.max(drawn, axis=0) / largest) < tuning.ENVELOPE
-    estimate = Target.of(resonant.model, DT, HORIZON).psd(f)
+    estimate = RequiredSpectrum.of(resonant.model, DT, HORIZON).psd(f)
     assert np.max(largest / estimate) > 1.1
 
 
@@ -64,7 +64,7 @@ def test_what_has_no_peak_costs_no_search_of_one(monkeypatch):
     searched = []
     plain = module.minimize
     monkeypatch.setattr(module, "minimize", lambda *a, **k: searched.append(1) or plain(*a, **k))
-    target = Target.of(fit.model, DT, HORIZON)
-    region_targets(target, fit, 0.95)
+    target = RequiredSpectrum.of(fit.model, DT, HORIZON)
+    region_spectra(target, fit, 0.95)
     decades = np.log10(50.0 / target.lowest)
     assert len(searched) < tuning.REGION_POINTS * decades + 20

@@ -6,24 +6,16 @@ import numpy as np
 import pytest
 from scipy.stats import chi2, t
 
-from gmwm import (
-    AR,
-    GaussMarkov,
-    QuantizationNoise,
-    RandomWalk,
-    RateRamp,
-    Resonance,
-    WhiteNoise,
-)
+from gmwm import AR, GaussMarkov, QuantizationNoise, RandomWalk, RateRamp, Resonance, WhiteNoise
 from gmwm.errors import InputError
 from gmwm.ins.covariance.analysis import Course, covariance_analysis
 from gmwm.ins.filter.aiding import Aiding, Outage, barometer, gnss, standstills
 from gmwm.ins.filter.filter import Filter, InitialSd
 from gmwm.ins.imu.emulation import emulate
 from gmwm.ins.imu.sensors import SensorModels
-from gmwm.ins.montecarlo.filter_errors import GROUPS
-from gmwm.ins.montecarlo.scenario import Scenario, Simulated
-from gmwm.ins.montecarlo.trials import monte_carlo
+from gmwm.ins.simulation.filter_errors import GROUPS
+from gmwm.ins.simulation.scenario import Scenario, Simulated
+from gmwm.ins.simulation.trials import monte_carlo
 from gmwm.ins.trajectory.missions import car_drive, fixed_wing_loiter, helicopter_mapping
 
 DT = 0.05
@@ -140,7 +132,7 @@ def test_a_filter_without_sensor_states():
 
 
 def test_rates_are_those_of_the_increment_that_ends_at_the_epoch_and_at_first_of_the_first():
-    course = Course.of(RICH, IMU)
+    course = Course.of(RICH, IMU).track
     assert course.epoch[0] == 0
     np.testing.assert_array_equal(course.end_rate[0], IMU.rotation[0] / DT)
     np.testing.assert_array_equal(course.end_rate[1:], IMU.rotation[course.epoch[1:] - 1] / DT)

@@ -18,8 +18,8 @@ from gmwm.ins.covariance.reduction import (
 )
 from gmwm.ins.filter.aiding import Outage, gnss
 from gmwm.ins.imu.sensors import AXES, SensorModels
-from gmwm.ins.montecarlo.scenario import Scenario, Simulated
-from gmwm.ins.montecarlo.trials import monte_carlo
+from gmwm.ins.simulation.scenario import Scenario, Simulated
+from gmwm.ins.simulation.trials import monte_carlo
 from gmwm.ins.trajectory.missions import car_drive, fixed_wing_loiter
 
 DT = 0.1
@@ -34,10 +34,7 @@ FULL = SensorModels.of(
     }
 )
 WALK = SensorModels.of(
-    {
-        "gyro": WhiteNoise(1e-5) + RandomWalk(2e-5),
-        "accel": WhiteNoise(3e-4) + RandomWalk(3e-4),
-    }
+    {"gyro": WhiteNoise(1e-5) + RandomWalk(2e-5), "accel": WhiteNoise(3e-4) + RandomWalk(3e-4)}
 )
 
 

@@ -14,7 +14,7 @@ from gmwm.ins.field.replay import Replay
 from gmwm.ins.field.smoother import smooth
 from gmwm.ins.field.start import align
 from gmwm.ins.geometry import ned_difference
-from gmwm.ins.montecarlo import Ratio
+from gmwm.ins.simulation import Ratio
 from gmwm.study.emulated_logs import emulated_log, sensors
 
 

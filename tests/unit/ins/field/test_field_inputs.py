@@ -15,7 +15,7 @@ from gmwm.ins import Outage, car_drive, emulate, fixed_wing_loiter, gnss
 from gmwm.ins.field.measured import Measured
 from gmwm.ins.field.navigated import Navigated
 from gmwm.ins.field.outage_pictures import outage_pictures
-from gmwm.ins.geometry.earth import ned_difference
+from gmwm.ins.geometry import ned_difference
 from gmwm.ins.spec.sensor_terms import sensor_models
 
 RATE = 25.0

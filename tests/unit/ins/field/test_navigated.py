@@ -17,7 +17,7 @@ from gmwm.ins.field.measured import Measured
 from gmwm.ins.field.navigated import Navigated
 from gmwm.ins.field.replay import innovation_sizes
 from gmwm.ins.filter.aiding import KINDS
-from gmwm.ins.geometry.earth import ned_difference
+from gmwm.ins.geometry import ned_difference
 from gmwm.ins.imu import AXES
 from gmwm.ins.spec.sensor_terms import sensor_models
 

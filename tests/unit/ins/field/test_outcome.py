@@ -8,7 +8,7 @@ from scipy import stats
 
 from gmwm.ins import Comparison, Outage, tuning
 from gmwm.ins.field.outcome import Paired, _p_value, by_part, paired, true_squares
-from gmwm.ins.montecarlo import Ratio
+from gmwm.ins.simulation import Ratio
 
 
 def outcome(error, score, reference=(0.0, 0.0, 0.0)):

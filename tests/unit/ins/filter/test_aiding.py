@@ -7,8 +7,7 @@ from gmwm._core.distributions import chi2
 from gmwm.errors import InputError
 from gmwm.ins import tuning
 from gmwm.ins.filter.aiding import KINDS, Aiding, Fixes, Outage, barometer, gnss, standstills
-from gmwm.ins.geometry.earth import ned_difference
-from gmwm.ins.geometry.rotation import matrix_from_rpy
+from gmwm.ins.geometry import matrix_from_rpy, ned_difference
 from gmwm.ins.imu.emulation import emulate
 from gmwm.ins.trajectory.missions import car_drive
 

@@ -24,8 +24,13 @@ from gmwm.ins.filter.covariance_kernels import (
 )
 from gmwm.ins.filter.mechanization import integrate
 from gmwm.ins.filter.states import SensorStates
-from gmwm.ins.geometry.earth import ned_difference, offset
-from gmwm.ins.geometry.rotation import matrix_from_rotation_vector, matrix_from_rpy, rpy_from_matrix
+from gmwm.ins.geometry import (
+    matrix_from_rotation_vector,
+    matrix_from_rpy,
+    ned_difference,
+    offset,
+    rpy_from_matrix,
+)
 from gmwm.ins.imu.emulation import Imu, emulate
 from gmwm.ins.imu.sensors import AXES, SensorModels
 from gmwm.ins.trajectory.manoeuvres import Stop, perform

@@ -2,9 +2,6 @@
 
 import numpy as np
 import pytest
-
-from gmwm import AR, GaussMarkov, RandomWalk, RateRamp, Resonance, WhiteNoise
-from gmwm.ins.filter.filter_kernels import axis_sums, correct, sample_error
 from gmwm.ins.filter.measurement_kernels import (
     IS_HEIGHT,
     IS_POSITION,
@@ -13,9 +10,11 @@ from gmwm.ins.filter.measurement_kernels import (
     measurement_row,
     residual,
 )
+
+from gmwm import AR, GaussMarkov, RandomWalk, RateRamp, Resonance, WhiteNoise
+from gmwm.ins.filter.filter_kernels import axis_sums, correct, sample_error
 from gmwm.ins.filter.states import SensorStates
-from gmwm.ins.geometry.earth import ned_difference, offset
-from gmwm.ins.geometry.rotation import matrix_from_rotation_vector, matrix_from_rpy
+from gmwm.ins.geometry import matrix_from_rotation_vector, matrix_from_rpy, ned_difference, offset
 from gmwm.ins.imu.sensors import SensorModels
 
 DT = 0.01

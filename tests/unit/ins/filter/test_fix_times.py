@@ -9,7 +9,7 @@ from scipy import stats
 from gmwm import GaussMarkov, WhiteNoise
 from gmwm.ins.filter.aiding import gnss
 from gmwm.ins.filter.filter import navigate
-from gmwm.ins.geometry.earth import ned_difference
+from gmwm.ins.geometry import ned_difference
 from gmwm.ins.imu.emulation import Imu, emulate
 from gmwm.ins.imu.sensors import SensorModels
 from gmwm.ins.trajectory.missions import car_drive

@@ -5,8 +5,13 @@ import pytest
 
 from gmwm.errors import InputError
 from gmwm.ins.filter.mechanization import integrate, step
-from gmwm.ins.geometry.earth import RATE, ned_difference, offset
-from gmwm.ins.geometry.rotation import matrix_from_rotation_vector, matrix_from_rpy
+from gmwm.ins.geometry import (
+    RATE,
+    matrix_from_rotation_vector,
+    matrix_from_rpy,
+    ned_difference,
+    offset,
+)
 from gmwm.ins.imu.emulation import Imu, emulate
 from gmwm.ins.trajectory.manoeuvres import (
     Accelerate,

@@ -6,7 +6,7 @@ import pytest
 from gmwm.errors import InputError
 from gmwm.ins.filter.filter import modified, skew, unmodified
 from gmwm.ins.filter.solution import FilterInnovations, Solution
-from gmwm.ins.geometry.rotation import matrix_from_rotation_vector, matrix_from_rpy
+from gmwm.ins.geometry import matrix_from_rotation_vector, matrix_from_rpy
 from gmwm.ins.trajectory.trajectory import Trajectory
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from gmwm.ins.geometry.earth import (
+from gmwm.ins.geometry import (
     gravity,
     ned_difference,
     offset,

@@ -7,7 +7,7 @@ from hypothesis import given, strategies as st
 from scipy.linalg import expm
 from scipy.spatial.transform import Rotation
 
-from gmwm.ins.geometry.rotation import (
+from gmwm.ins.geometry import (
     matrix_from_rotation_vector,
     matrix_from_rpy,
     orthonormalise,

@@ -5,8 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from gmwm.errors import InputError
-from gmwm.ins.geometry.earth import RATE, gravity, offset
-from gmwm.ins.geometry.rotation import matrix_from_rpy
+from gmwm.ins.geometry import RATE, gravity, matrix_from_rpy, offset
 from gmwm.ins.imu.emulation import Imu, emulate
 from gmwm.ins.trajectory.trajectory import Trajectory
 

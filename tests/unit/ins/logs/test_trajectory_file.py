@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from gmwm.errors import InputError
-from gmwm.ins.geometry.earth import gravity, ned_difference
+from gmwm.ins.geometry import gravity, ned_difference
 from gmwm.ins.imu.emulation import emulate
 from gmwm.ins.trajectory.trajectory import Trajectory
 from places import SHARED

@@ -9,7 +9,7 @@ from gmwm.errors import InputError
 from gmwm.ins.field import measured
 from gmwm.ins.field.measured import MeasuredSpec
 from gmwm.ins.imu.sensors import AXES, SensorModels
-from gmwm.ins.montecarlo.scenario import Scenario
+from gmwm.ins.simulation.scenario import Scenario
 from gmwm.ins.spec import experiment
 from gmwm.ins.spec.document import read_document
 from gmwm.ins.spec.experiment import MISSIONS, ExperimentSpec, experiment_from

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from gmwm.errors import InputError
-from gmwm.ins.geometry.earth import ned_difference
+from gmwm.ins.geometry import ned_difference
 from gmwm.ins.imu.emulation import emulate
 from gmwm.ins.trajectory.manoeuvres import (
     Accelerate,

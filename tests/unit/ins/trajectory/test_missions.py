@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from gmwm.errors import InputError
-from gmwm.ins.geometry.earth import ned_difference
+from gmwm.ins.geometry import ned_difference
 from gmwm.ins.imu.emulation import emulate
 from gmwm.ins.trajectory.missions import car_drive, fixed_wing_loiter, helicopter_mapping
 

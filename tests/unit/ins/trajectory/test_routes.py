@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from gmwm.errors import InputError
-from gmwm.ins.geometry.earth import ned_difference, offset
+from gmwm.ins.geometry import ned_difference, offset
 from gmwm.ins.trajectory.routes import through
 from gmwm.ins.trajectory.trajectory import Trajectory
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from gmwm.errors import InputError
-from gmwm.ins.geometry.earth import offset
+from gmwm.ins.geometry import offset
 from gmwm.ins.trajectory.trajectory import NavState, Trajectory
 
 PLACE = np.array([-0.6, math.pi - 1e-6, 40.0])

@@ -1,0 +1,253 @@
+"""Periodic lines: peaks of the periodogram too high for noise and too narrow for a resonance."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from gmwm._core.compiled import compiled
+from gmwm._core.distributions import fisher
+from gmwm._core.text import brief, readable
+from gmwm._core.typing import FloatArray, IntArray
+from gmwm.diagnosis import tuning
+from gmwm.diagnosis.spectrum import POWER_INFLATION, Spectrum
+from gmwm.issues import Notice, notice
+
+_CLIP = np.log(np.log(100.0))  # one bin of noise in a hundred is higher
+_EIGENVALUE = 8.0 / 3.0  # largest of the correlation of Hann bins, 1 + 2 (2/3 + 1/6)
+
+
+@dataclass(frozen=True)
+class Line:
+    """A periodic line.
+
+    frequency: Hz.
+    amplitude: Of a sinusoid of the same power, u.
+    ratio: Density over that of the surroundings, over the width.
+    width: Over which it is smeared, Hz.
+    start, stop: Bins that it takes.
+    """
+
+    frequency: float
+    amplitude: float
+    ratio: float
+    width: float
+    start: int
+    stop: int
+
+
+def find_lines(spectrum: Spectrum, smooth: FloatArray) -> tuple[Line, ...]:
+    """Lines by their power, strongest first.
+
+    The mean of m = 1, 2, 4, ... neighbouring bins, over the local background, is compared with
+    the quantile of an F distribution that noise passes with `tuning.FALSE_ALARM` in all bins and
+    widths together (Bonferroni); its degrees of freedom are those of the largest eigenvalue of the
+    correlation between Hann bins, which rules the tail. Wider means find lines that wander.
+
+    smooth: (n // 2 + 1,), background, u^2/Hz.
+    """
+    last = spectrum.density.size - 1
+    if last <= tuning.FIRST_BIN + 2 * tuning.UNRESOLVED:
+        return ()
+    local, freedom = _local_background(spectrum.density, smooth)
+    # A filter leaves so little beyond its band that rounding of the computer has peaks there.
+    local = np.maximum(local, tuning.LEAST_LINE**2 * float(np.sum(spectrum.density)))
+    ratio = spectrum.density / local
+    grid, limits = _limits(last, freedom)
+    score, best = _scores(ratio, freedom, grid, limits, 0, last)
+    lines: list[Line] = []
+    for _ in range(tuning.MOST_LINES):
+        k = int(np.argmax(score))
+        if score[k] <= 1.0:
+            break
+        line = _measured(spectrum, local, k, int(best[k]))
+        wide = line.width > max(
+            tuning.NARROW * line.frequency, tuning.UNRESOLVED * spectrum.resolution
+        )
+        if not wide:
+            lines.append(line)
+        # What it takes, and half of that on both sides, is noise from here on.
+        margin = (line.stop - line.start) // 2
+        ratio[max(line.start - margin, 0) : line.stop + margin] = 1.0
+        reach = margin + max(limits)
+        low, high = max(line.start - reach, 0), min(line.stop + reach, last)
+        score[low:high], best[low:high] = _scores(ratio, freedom, grid, limits, low, high)
+    return tuple(sorted(lines, key=lambda line: -line.amplitude))
+
+
+def line_notices(name: str, unit: str, lines: tuple[Line, ...]) -> list[Notice]:
+    """One notice for each of the strongest lines and its harmonics, one for the rest."""
+    families = _families(lines)
+    notices = []
+    for main, harmonics in families[: tuning.NAMED_LINES]:
+        values = {
+            "frequency": main.frequency,
+            "amplitude": main.amplitude,
+            "ratio": main.ratio,
+            "width": main.width,
+            "harmonics": float(len(harmonics)),
+        }
+        at = ", ".join(f"{line.frequency:.4g}" for line in harmonics)
+        also = f", with harmonics at {at} Hz" if harmonics else ""
+        amplitude, times = readable(main.amplitude, unit), brief(main.ratio, 3)
+        notices.append(
+            notice(
+                "line", name, values, severity="warning", shown=amplitude, times=times, also=also
+            )
+        )
+    rest = families[tuning.NAMED_LINES :]
+    if rest:
+        strongest = rest[0][0]
+        values = {
+            "count": float(len(rest)),
+            "frequency": strongest.frequency,
+            "amplitude": strongest.amplitude,
+        }
+        amplitude = readable(strongest.amplitude, unit)
+        notices.append(notice("line", name, values, variant="weak", hint="", shown=amplitude))
+    return notices
+
+
+def _local_background(density: FloatArray, smooth: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Background that follows bumps, and its degrees of freedom.
+
+    Mean logarithm over the neighbours, those cut that are too high for noise.
+    """
+    k = np.arange(density.size)
+    reach = np.maximum(tuning.BESIDE_LINE, (tuning.BESIDE_LINE_FRACTION * k).astype(int))
+    low, high = (
+        np.maximum(k - reach, tuning.FIRST_BIN // 2),
+        np.minimum(k + reach + 1, density.size - 1),
+    )
+    low = np.minimum(low, high - 1)
+    count = high - low
+    logs = np.log(np.maximum(density / smooth, np.finfo(float).tiny)) + np.euler_gamma
+    level = np.zeros(density.size)
+    for cut in (np.inf, _CLIP + np.euler_gamma, _CLIP + np.euler_gamma):
+        total = np.concatenate([[0.0], np.cumsum(np.minimum(logs, level + cut))])
+        level = (total[high] - total[low]) / count
+    # A mean of logarithms of exponential variates has 6/pi^2 of the efficiency.
+    freedom = 2.0 * count * (6.0 / np.pi**2) / POWER_INFLATION
+    return smooth * np.exp(level), freedom
+
+
+def _limits(bins: int, freedom: FloatArray) -> tuple[FloatArray, dict[int, FloatArray]]:
+    """Grid of degrees of freedom of the background, and largest ratios of noise on it by width."""
+    widest = max(int(tuning.NARROW * bins), 1)
+    widths = [2**i for i in range(int(np.log2(widest)) + 1)]
+    grid = np.geomspace(np.min(freedom), np.max(freedom) * 1.001, 12)
+    chance = tuning.FALSE_ALARM / (bins * len(widths))
+    limits = {}
+    for width in widths:
+        eigenvalue = _EIGENVALUE if width > 2 else 1.0 + 2.0 / 3.0 * (width - 1)
+        limits[width] = fisher.isf(chance, 2.0 * width / eigenvalue, grid)
+    return grid, limits
+
+
+def _scores(
+    ratio: FloatArray,
+    freedom: FloatArray,
+    grid: FloatArray,
+    limits: dict[int, FloatArray],
+    start: int,
+    stop: int,
+) -> tuple[FloatArray, IntArray]:
+    """Largest ratio to the limit over all widths, and the width that has it, of some bins.
+
+    ratio: (n // 2 + 1,), density over background.
+    freedom: (n // 2 + 1,), degrees of freedom of the background.
+    grid, limits: (K,) and dict, see `_limits`.
+    start, stop: Bins.
+    """
+    last = ratio.size - 1
+    widths = np.array(list(limits))
+    low, high = max(start - int(widths[-1]), 0), min(stop + int(widths[-1]), last)
+    total = np.concatenate([[0.0], np.cumsum(ratio[low:high])])
+    slowest = np.where(widths > tuning.UNRESOLVED, widths / tuning.NARROW, 0).astype(np.int64)
+    slowest = np.maximum(slowest, np.maximum(tuning.FIRST_BIN, low + widths // 2))
+    table = np.stack([limits[width] for width in limits])
+    place = np.interp(freedom[start:stop], grid, np.arange(grid.size))
+    found: tuple[FloatArray, IntArray] = _largest(total, low, start, place, widths, slowest, table)
+    return found
+
+
+@compiled()
+def _largest(
+    total: FloatArray, low: int, start: int, place: FloatArray,
+    widths: IntArray, slowest: IntArray, table: FloatArray,
+) -> tuple[FloatArray, IntArray]:  # fmt: skip
+    """Hot loop of `_scores`.
+
+    total: Sums of ratios from bin ``low`` on.
+    place: Of bins from ``start`` on, where they are between the columns of ``table``.
+    widths, slowest, table: By width, the first bin and the limits.
+    """
+    score, best = np.zeros(place.size), np.ones(place.size, dtype=np.int64)
+    for i in range(place.size):
+        k = start + i
+        cell = min(int(place[i]), table.shape[1] - 2)
+        part = place[i] - cell
+        for w in range(widths.size):
+            begin = k - widths[w] // 2 - low
+            if k < slowest[w] or begin + widths[w] >= total.size:
+                continue
+            limit = table[w, cell] + part * (table[w, cell + 1] - table[w, cell])
+            value = (total[begin + widths[w]] - total[begin]) / widths[w] / limit
+            if value > score[i]:
+                score[i], best[i] = value, widths[w]
+    return score, best
+
+
+def _measured(spectrum: Spectrum, local: FloatArray, k: int, width: int) -> Line:
+    """Frequency, amplitude and foot of the line at bin k."""
+    density, df = spectrum.density, spectrum.resolution
+    surroundings = float(local[k])
+    # The feet of a strong line that wanders raise the background beneath it: look beyond them.
+    for _ in range(2):
+        start, stop = _foot(density / surroundings, k, width)
+        reach = max(tuning.BESIDE_LINE, int(tuning.BESIDE_LINE_FRACTION * k))
+        sides = local[np.clip([start - reach, stop + reach], tuning.FIRST_BIN, local.size - 2)]
+        surroundings = float(min(np.exp(np.mean(np.log(sides))), local[k]))
+    bins = np.arange(start, stop)
+    excess = density[start:stop] - surroundings
+    area = float(np.sum(excess))
+    positive = np.maximum(excess, 0.0)
+    strong = positive * (positive > 0.05 * np.max(positive))
+    frequency = float(np.sum(strong * bins) / np.sum(strong)) * df
+    # Bins of equal height that would have the same power and the same sum of squares.
+    extent = float(np.sum(positive) ** 2 / np.sum(positive**2))
+    ratio = 1.0 + area / (extent * surroundings)
+    amplitude = float(np.sqrt(2.0 * max(area, 0.0) * df))
+    return Line(frequency, amplitude, ratio, extent * df, start, stop)
+
+
+def _foot(ratio: FloatArray, k: int, width: int) -> tuple[int, int]:
+    """Bins around k over which means stay above the surroundings."""
+    step = max(width, 8)
+    ends = []
+    for sign in (-1, 1):
+        at = k
+        for _ in range(4 + int(2.0 * tuning.FOOT * k / step)):
+            block = ratio[max(at - step // 2, 1) : at + step // 2 + 1]
+            if block.size == 0 or np.mean(block) < tuning.FOOT_RATIO:
+                break
+            at += sign * (step // 2)
+        ends.append(int(np.clip(at, 1, ratio.size - 1)))
+    return min(ends[0], k - 3), min(max(ends[1], k + 3) + 1, ratio.size - 1)
+
+
+def _families(lines: tuple[Line, ...]) -> list[tuple[Line, list[Line]]]:
+    """Lines with their harmonics, families by the power of their strongest line."""
+    families: list[tuple[Line, list[Line]]] = []
+    for line in sorted(lines, key=lambda line: line.frequency):
+        for main, harmonics in families:
+            order = round(line.frequency / main.frequency)
+            tolerance = order * max(main.width, 1e-3 * main.frequency) + line.width
+            off = abs(line.frequency - order * main.frequency)
+            if order > 1 and off <= min(tolerance, 0.01 * line.frequency):
+                harmonics.append(line)
+                break
+        else:
+            families.append((line, []))
+    return sorted(families, key=lambda family: -family[0].amplitude)

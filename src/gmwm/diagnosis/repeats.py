@@ -1,0 +1,133 @@
+"""Samples that were not measured: sample and hold, lost packets, and linear interpolation."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from gmwm._core.typing import known_of
+from gmwm.diagnosis import tuning
+from gmwm.diagnosis.channel import Examined, Held
+from gmwm.diagnosis.health import Repetition
+from gmwm.diagnosis.resolution import step_size
+from gmwm.diagnosis.samples import is_dithered, stuck
+from gmwm.issues import Notice, Severity, notice
+from gmwm.readers import Channel
+
+
+def repetition(channel: Channel) -> Repetition | None:
+    """Find out whether a channel changes at every k-th sample only.
+
+    Of samples that are not repeated, every change is in the same place modulo k with a probability
+    of 1/k, so that some dozen changes leave no room for chance, however coarse the rounding is.
+    """
+    steps = np.diff(channel.values)
+    changes = np.flatnonzero((steps != 0.0) & ~np.isnan(steps)) + 1
+    if changes.size < tuning.FEWEST_KNOWN:
+        return None
+    times = int(np.gcd.reduce(np.diff(changes)))
+    # Where the others are missing, as in rows of which every third is empty, nothing was repeated.
+    repeats = np.count_nonzero(steps == 0.0)
+    if times == 1 or 2 * repeats < (times - 1) * changes.size:
+        return None
+    return Repetition(times, int(changes[0]) % times)
+
+
+def thinned(channel: Channel, found: Repetition) -> Channel:
+    """One of each group of equal samples, at the channel's own rate."""
+    values = channel.values[found.first :: found.times]
+    return replace(channel, values=values, dt=channel.dt * found.times)
+
+
+def repetition_notice(channel: Channel, found: Repetition) -> Notice:
+    """Say how often each sample comes, and the rate of the channel."""
+    values = {"times": float(found.times), "rate": 1.0 / (channel.dt * found.times)}
+    return notice("repeated-samples", channel.name, values)
+
+
+def interpolation_notice(channel: Channel) -> Notice | None:
+    """Say that samples lie on straight lines between others, all over or now and then.
+
+    Second differences vanish but where two lines meet, which two of them see: of an interpolation
+    from f to F Hz a share of 1 - 2 f / F vanishes; of noise nearly none, if its step is small.
+    """
+    values = np.asarray(channel.values, dtype=float)
+    steps = np.diff(values)
+    bends = np.abs(np.diff(steps))
+    # A value that is held, of a sensor that is stuck, is on no line between others.
+    is_held = (steps[1:] == 0.0) & (steps[:-1] == 0.0)
+    bends = bends[~np.isnan(bends) & ~is_held]
+    if bends.size < tuning.FEWEST_KNOWN:
+        return None
+    size = float(np.quantile(bends, tuning.BENT))
+    rounding = 4.0 * max(
+        step_size(values[~np.isnan(values)]), float(np.spacing(np.nanmax(np.abs(values))))
+    )
+    limit = max(tuning.STRAIGHT * size, rounding)
+    if not limit < tuning.STRAIGHT_AT_MOST * size:
+        return None  # steps as large as the noise
+    share = float(np.mean(bends <= limit))
+    near = float(np.mean(bends <= tuning.NEARLY_STRAIGHT * size)) - share
+    if share < max(tuning.FEWEST_STRAIGHT, tuning.BESIDE_STRAIGHT * near, 10.0 * limit / size):
+        return None
+    if share < tuning.LEAST_STRAIGHT:
+        severity: Severity = "bad" if share > tuning.HELD_AT_MOST else "warning"
+        return notice("filled", channel.name, {"share": share}, severity=severity)
+    rate = 0.5 * (1.0 - share) / channel.dt
+    return notice("interpolated", channel.name, {"share": share, "rate": rate})
+
+
+def held_samples(channel: Examined) -> Held:
+    """Find samples that repeat the one before without being measured.
+
+    Where a packet is lost, recorders write the last sample again. Of measured samples, differences
+    of no step are by a power of the ratio more frequent than those of one step by which these are
+    than those of two: 1/3 of a Gaussian law. Nothing is held if chance, with three standard errors,
+    explains those that repeat.
+    """
+    values, step, scatter = channel.values, channel.step, channel.scatter
+    # Where steps are wide in a part of the values, neighbours are equal by chance in that part.
+    if step != channel.smallest and 2.0 * step >= scatter:
+        return Held()
+    sizes = np.diff(values)
+    sizes = known_of(np.abs(sizes, out=sizes))
+    same = int(np.count_nonzero(sizes == 0.0))
+    fewest = max(tuning.FALSE_ALARM * sizes.size, tuning.LONG_RUN)
+    if same < fewest:
+        return Held()
+    width = step or tuning.NEAR * scatter
+    near, one, two = np.histogram(sizes[sizes > 0.0], np.array([0.0, 0.5, 1.5, 2.5]) * width)[0]
+    if not is_dithered(channel.present, step) or not min(one, two):
+        return Held()
+    if step == 0.0:
+        # Steps that slowly change their size, by a correction, are a lattice all the same: of noise
+        # without steps half as many are so near.
+        chance, error = float(not one < 4 * near < 4 * one), 0.0
+    else:
+        power = tuning.LAST_RISE
+        chance = 0.5 * one / sizes.size * max(one / two, 1.0) ** power
+        error = float(np.hypot((1.0 + power) / np.sqrt(one), power / np.sqrt(two)))
+    if same - chance * np.exp(3.0 * error) * sizes.size < fewest:
+        return Held()
+    share = same / sizes.size - chance
+    runs = next(stuck(channel), None)
+    if runs is not None and 2.0 * runs.values["samples"] > share * channel.present.size:
+        return Held(0.0, chance)  # most of what is held is held in a few places
+    # A slower sensor in the rows of a faster clock leaves no runs of samples between them.
+    ends = np.flatnonzero(np.isnan(values[1:]) | (np.diff(values) == 0.0)) + 1
+    longest = np.max(np.diff(ends, prepend=0, append=values.size))
+    return Held(share, chance, bool(longest <= tuning.FEWEST_BETWEEN_HELD))
+
+
+def held_or_stuck(channel: Examined) -> Iterator[Notice]:
+    """Say how many samples repeat the one before, or where values stick."""
+    share, chance, is_even = channel.held
+    if share == 0.0:
+        yield from stuck(channel)
+        return
+    severity: Severity = "bad" if share > tuning.HELD_AT_MOST else "warning"
+    hint = "record at the sensor's own rate" if is_even else None
+    values = {"share": share, "chance": chance}
+    yield notice("held", channel.name, values, severity=severity, hint=hint)

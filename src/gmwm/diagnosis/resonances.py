@@ -1,0 +1,241 @@
+"""Resonances: bumps of the spectrum above its smooth background."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from gmwm._core.distributions import norm
+from gmwm._core.text import brief, readable
+from gmwm._core.typing import BoolArray, FloatArray
+from gmwm.diagnosis import tuning
+from gmwm.diagnosis.lines import Line, find_lines, line_notices
+from gmwm.diagnosis.spectrum import Bands, Spectrum, background, bands, spectrum
+from gmwm.issues import Notice, notice
+from gmwm.process import Resonance
+
+# Logarithms of frequency over that of the band, of damping and of height; background.
+_LOW = np.array([-0.2, np.log(1e-3), -5.0, -8.0, -8.0, -8.0])
+_HIGH = np.array([0.2, np.log(0.9), 12.0, 8.0, 8.0, 8.0])
+_STEP = 1e-4
+_ROUNDS = 60
+_MOST_DAMPED = 1e8
+_GAIN = 1e-9  # of the deviance
+
+
+@dataclass(frozen=True)
+class Bump:
+    """A resonance of second order on a smooth background.
+
+    frequency: Undamped natural frequency, Hz.
+    damping: Damping ratio: half of the half-power width over the frequency, where that is small.
+    sigma: Standard deviation, u.
+    ratio: Of the density at the peak, background included, to the background.
+    """
+
+    frequency: float
+    damping: float
+    sigma: float
+    ratio: float
+
+
+def find_resonances(
+    spectrum: Spectrum, found: Bands, smooth: FloatArray, left_out: BoolArray
+) -> tuple[Bump, ...]:
+    """Resonances by their height, highest first.
+
+    A band that stands out of the running median by more than Gaussian noise would in any of them,
+    and by half, is a candidate; a second-order Gauss-Markov spectrum on the background is fitted
+    around it by Whittle's likelihood, which gives frequency and damping.
+
+    found: Without the lines.
+    smooth: (n // 2 + 1,), background, u^2/Hz.
+    left_out: (n // 2 + 1,) of bool, bins of lines.
+    """
+    height = found.level - found.smooth
+    count = height.size
+    if count < tuning.FEWEST_BANDS:
+        return ()
+    median_error = 0.5 * np.pi * np.mean(found.variance) / min(25, count)
+    limit = norm.isf(tuning.FALSE_ALARM / count) * np.sqrt(found.variance + median_error)
+    excess = np.where(
+        (height > np.maximum(limit, np.log(tuning.LEAST_PEAK)))
+        & (found.edges[:-1] >= tuning.SLOWEST_BIN),
+        height,
+        0.0,
+    )
+    bumps: list[Bump] = []
+    for _ in range(2 * tuning.MOST_RESONANCES):
+        j = int(np.argmax(excess))
+        if excess[j] <= 0.0 or len(bumps) == tuning.MOST_RESONANCES:
+            break
+        start, stop = _sides(height, j)
+        excess[start:stop] = 0.0
+        if start == 0 or stop == count:
+            continue  # no peak: the spectrum only rises towards its end
+        bump = _fitted(spectrum, smooth, left_out, float(found.frequency[j]), float(height[j]))
+        if bump is not None and not any(_same(bump, other) for other in bumps):
+            bumps.append(bump)
+    return tuple(sorted(bumps, key=lambda bump: -bump.ratio))
+
+
+def resonance_notice(name: str, unit: str, bump: Bump) -> Notice:
+    """Say where it is, how damped and how high."""
+    values = {
+        "frequency": bump.frequency,
+        "damping": bump.damping,
+        "ratio": bump.ratio,
+        "sigma": bump.sigma,
+    }
+    return notice(
+        "resonance", name, values, times=brief(bump.ratio), shown=readable(bump.sigma, unit)
+    )
+
+
+def _sides(height: FloatArray, j: int) -> tuple[int, int]:
+    """Bands around j that are higher than a third of it."""
+    low = np.flatnonzero(height[:j] < height[j] / 3.0)
+    high = np.flatnonzero(height[j + 1 :] < height[j] / 3.0)
+    start = int(low[-1]) + 1 if low.size else 0
+    return start, j + 1 + int(high[0]) if high.size else height.size
+
+
+def _same(bump: Bump, other: Bump) -> bool:
+    wide = max(bump.damping * bump.frequency, other.damping * other.frequency)
+    return abs(bump.frequency - other.frequency) < 2.0 * wide
+
+
+def _fitted(
+    spectrum: Spectrum, smooth: FloatArray, left_out: BoolArray, centre: float, height: float
+) -> Bump | None:
+    """Whittle fit of a resonance on a background whose logarithm is a parabola in log f."""
+    start = max(int(centre / tuning.FITTED_OCTAVES / spectrum.resolution), 1)
+    stop = min(int(centre * tuning.FITTED_OCTAVES / spectrum.resolution), spectrum.density.size - 1)
+    f, power, weight = _points(spectrum, left_out, start, stop)
+    level = float(np.interp(centre, spectrum.frequency, smooth))
+    power = power / level
+    place = np.log(f / centre)
+
+    starts = (
+        np.array([0.0, np.log(damping), np.log(np.expm1(height)), 0.0, 0.0, 0.0])
+        for damping in tuning.DAMPING_STARTS
+    )
+    free, _ = min(
+        (_scored(start, f, power, weight, centre, spectrum.dt) for start in starts),
+        key=lambda result: result[1],
+    )
+    unit = _unit(free, centre, spectrum.dt)
+    bottom = float(np.interp(unit.frequency, f, _floor(free, place)))
+    peak = float(np.exp(free[2]))
+    ratio = (bottom + peak) / bottom
+    if ratio < tuning.LEAST_PEAK or not tuning.NARROWEST <= unit.damping <= tuning.WIDEST:
+        return None
+    height_of_unit = 2.0 * float(unit.psd(np.array([unit.frequency]), spectrum.dt)[0])
+    sigma = float(np.sqrt(peak * level / height_of_unit))
+    return Bump(float(unit.frequency), float(unit.damping), sigma, ratio)
+
+
+def _unit(free: FloatArray, centre: float, dt: float) -> Resonance:
+    frequency = min(centre * float(np.exp(free[0])), 0.499 / dt)
+    return Resonance(1.0, frequency, float(np.exp(free[1])))
+
+
+def _floor(free: FloatArray, place: FloatArray) -> FloatArray:
+    return np.asarray(np.exp(free[3] + free[4] * place + free[5] * place**2))
+
+
+def _bump(free: FloatArray, f: FloatArray, centre: float, dt: float) -> FloatArray:
+    unit = _unit(free, centre, dt)
+    peak = float(unit.psd(np.array([unit.frequency]), dt)[0])
+    return np.asarray(np.exp(free[2]) * unit.psd(f, dt) / peak)
+
+
+def _scored(
+    free: FloatArray, f: FloatArray, power: FloatArray, weight: FloatArray, centre: float, dt: float
+) -> tuple[FloatArray, float]:
+    """Minimize Whittle's deviance by Fisher scoring with Levenberg's damping.
+
+    The parameters are the logarithms of frequency (over ``centre``), damping and height, and the
+    three coefficients of the logarithm of the background.
+    """
+    place = np.log(f / centre)
+
+    def deviance(expected: FloatArray) -> float:
+        return float(np.average(np.log(expected) + power / expected, weights=weight))
+
+    bump, floor = _bump(free, f, centre, dt), _floor(free, place)
+    value, damping = deviance(bump + floor), 1e-3
+    for _ in range(_ROUNDS):
+        expected = bump + floor
+        slopes = [
+            (_bump(free + step, f, centre, dt) - _bump(free - step, f, centre, dt)) / (2.0 * _STEP)
+            for step in _STEP * np.eye(free.size)[:2]
+        ]
+        columns = [*slopes, bump, floor, floor * place, floor * place**2]
+        jacobian = np.column_stack(columns) / expected[:, None]
+        weighted = jacobian * weight[:, None]
+        information = weighted.T @ jacobian
+        score = weighted.T @ (power / expected - 1.0)
+        ridge = damping * np.diag(information) + 1e-12 * np.trace(information)
+        new = np.clip(free + np.linalg.solve(information + np.diag(ridge), score), _LOW, _HIGH)
+        new_bump, new_floor = _bump(new, f, centre, dt), _floor(new, place)
+        new_value = deviance(new_bump + new_floor)
+        if new_value > value:
+            damping *= 10.0
+            if damping > _MOST_DAMPED:
+                break
+            continue
+        gain = value - new_value
+        free, bump, floor, value, damping = new, new_bump, new_floor, new_value, 0.3 * damping
+        if gain < _GAIN:
+            break
+    return free, value
+
+
+def _points(
+    spectrum: Spectrum, left_out: BoolArray, start: int, stop: int
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Frequency, mean density and number of bins of groups of bins without lines."""
+    groups = min(tuning.FITTED_POINTS, stop - start)
+    edges = np.linspace(start, stop, groups + 1).astype(int)[:-1]
+    used = np.where(left_out[:stop], 0.0, 1.0)
+    count = np.add.reduceat(used, edges)
+    power = np.add.reduceat(used * spectrum.density[:stop], edges)
+    place = np.add.reduceat(used * np.arange(stop), edges)
+    kept = count > 0.0
+    count = count[kept]
+    return place[kept] / count * spectrum.resolution, power[kept] / count, count
+
+
+def peaks(values: FloatArray, dt: float) -> tuple[tuple[Line, ...], tuple[Bump, ...]]:
+    """Lines, and resonances of what they leave.
+
+    values: (n,), samples, NaN where missing.
+    dt: s.
+    Returns: None of a series that is too short, or of which more than half is missing.
+    """
+    if (
+        values.size < tuning.FEWEST_OF_SPECTRUM
+        or np.count_nonzero(~np.isnan(values)) < values.size / 2
+    ):
+        return (), ()
+    power = spectrum(values, dt)
+    if not np.any(power.density > 0.0):
+        return (), ()
+    lines = find_lines(power, background(power, bands(power)))
+    occupied = np.zeros(power.density.size, dtype=bool)
+    for line in lines:
+        margin = (line.stop - line.start) // 2
+        occupied[max(line.start - margin, 0) : line.stop + margin] = True
+    if 2 * np.count_nonzero(occupied) > occupied.size:
+        return lines, ()  # a square wave: hardly anything is left to be a background
+    rest = bands(power, occupied)
+    return lines, find_resonances(power, rest, background(power, rest), occupied)
+
+
+def spectral_notices(
+    name: str, unit: str, lines: tuple[Line, ...], bumps: tuple[Bump, ...]
+) -> list[Notice]:
+    """Say which lines and resonances a channel has."""
+    return [*line_notices(name, unit, lines), *(resonance_notice(name, unit, b) for b in bumps)]

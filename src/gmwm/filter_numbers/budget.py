@@ -1,0 +1,478 @@
+"""The error budget: how fast attitude, velocity and position are lost without aiding."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+
+from gmwm._core.text import brief, bullets
+from gmwm._core.typing import BoolArray, FloatArray
+from gmwm._core.units import factor
+from gmwm.errors import InputError
+from gmwm.estimate import Fit
+from gmwm.filter_numbers.integrals import integral_rms
+from gmwm.process import Model, Process, as_model
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+QUANTITIES = {"attitude": "rad", "velocity": "m/s", "position": "m"}
+"""Errors of the budget, with their SI units."""
+
+FIELD_UNITS = {"attitude": "deg", "velocity": "m/s", "position": "m"}
+"""Units in which they are shown."""
+
+HORIZONTAL = "horizontal"
+"""Name of the total over the x and y axes of both sensors."""
+
+STARTS = {
+    True: "initial values of the slow errors known",
+    False: "initial values of the errors unknown",
+}
+"""Knowledge of the sensors' errors at the start, by `ErrorBudget.calibrated`; attitude, velocity
+and position are exact there."""
+
+TIMES = (1.0, 10.0, 60.0, 600.0)
+"""Usual coasting times, s."""
+
+LONGEST = 600.0
+"""Coasting time up to which the formulas hold to within 10 %, s."""
+
+_GRAVITY = factor("g", "m/s^2")
+_SMALL_ANGLE = np.radians(10.0)
+_RECORD_SHARE = 0.1  # of a record: errors over longer times are seen fewer than ten times
+_CURVE_POINTS = 33
+_HORIZONTAL_CHANNELS = ("gyro_x", "gyro_y", "accel_x", "accel_y")
+
+
+class _Fits(Protocol):
+    @property
+    def fits(self) -> Mapping[str, Fit]: ...
+
+
+Source = Fit | _Fits | Mapping[str, Process | Model | Fit]
+"""A calibration, a fit, or channel name -> model."""
+
+
+@dataclass(frozen=True)
+class ErrorRow:
+    """Error of one quantity by one term of one channel's model.
+
+    Attributes
+    ----------
+    channel : str
+    component : str
+        Label of the term in its model.
+    quantity : {"attitude", "velocity", "position"}
+    unit : str
+        "rad", "m/s" or "m".
+    values : tuple of float
+        Standard deviation at each of the budget's ``times``; the absolute value for a rate ramp.
+    curve : tuple of float
+        The same at each time of its ``grid``.
+    """
+
+    channel: str
+    component: str
+    quantity: str
+    unit: str
+    values: tuple[float, ...]
+    curve: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class ErrorBudget:
+    """Predicted growth of attitude, velocity and position errors in free inertial coasting.
+
+    Attributes
+    ----------
+    times : tuple of float
+        Coasting times, s, rising.
+    rows : tuple of ErrorRow
+        Channel by channel, quantity by quantity, term by term.
+    calibrated : bool
+        Whether the initial values of the slow errors are known.
+    grid : tuple of float
+        Times of the curves of `plot`, s.
+    notes : tuple of str
+        Read these before using the numbers.
+    """
+
+    times: tuple[float, ...]
+    rows: tuple[ErrorRow, ...]
+    calibrated: bool
+    grid: tuple[float, ...]
+    notes: tuple[str, ...] = ()
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """Names of the channels, in their order."""
+        return tuple(dict.fromkeys(row.channel for row in self.rows))
+
+    @property
+    def groups(self) -> tuple[str, ...]:
+        """Names that `total` takes: the channels, and "horizontal" if there is an x or y axis."""
+        flat = any(axis(channel) in ("x", "y") for channel in self.channels)
+        return (*self.channels, HORIZONTAL) if flat else self.channels
+
+    def total(self, of: str = HORIZONTAL) -> dict[str, FloatArray]:
+        """Root sum of squares over the terms of a channel, or of both horizontal axes.
+
+        Parameters
+        ----------
+        of : str, optional
+            A channel, or "horizontal": tilt, and radial velocity and position errors (root of the
+            sum of the variances of x and y), from the x and y axes of both sensors.
+
+        Returns
+        -------
+        dict
+            Quantity -> (T,) ndarray at ``times``, in rad, m/s and m.
+
+        Raises
+        ------
+        InputError
+            If there is no such channel, or no horizontal one.
+        """
+        return {
+            quantity: root_sum([row.values for row in self._rows(of, quantity)])
+            for quantity in self.quantities(of)
+        }
+
+    def quantities(self, of: str = HORIZONTAL) -> tuple[str, ...]:
+        """Quantities that a channel, or the horizontal pair, contributes to."""
+        present = {row.quantity for row in self._rows(of)}
+        return tuple(quantity for quantity in QUANTITIES if quantity in present)
+
+    def largest(self, quantity: str, of: str = HORIZONTAL) -> tuple[ErrorRow, float]:
+        """The row that contributes most at the longest time, and its share of the variance."""
+        rows = self._rows(of, quantity)
+        squares = [row.values[-1] ** 2 for row in rows]
+        total = sum(squares)
+        place = int(np.argmax(squares))
+        return rows[place], squares[place] / total if total > 0.0 else 0.0
+
+    def _rows(self, of: str, quantity: str | None = None) -> list[ErrorRow]:
+        if of not in self.groups:
+            raise InputError(
+                f"the error budget has no total {of!r}: it has {', '.join(self.groups)}"
+            )
+        return [
+            row
+            for row in self.rows
+            if (row.channel == of or (of == HORIZONTAL and axis(row.channel) in ("x", "y")))
+            and quantity in (None, row.quantity)
+        ]
+
+    # -- looks ------------------------------------------------------------------------------------
+
+    def __str__(self) -> str:
+        lines = [
+            "Error (1 sigma) after free inertial coasting, level and not manoeuvring, from",
+            f"exact attitude, velocity and position; {STARTS[self.calibrated]}.",
+        ]
+        names = max(len(row.channel) for row in self.rows)
+        labels = max(len(row.component) for row in self.rows)
+        head = 2 + names + 2 + labels
+        for quantity in QUANTITIES:
+            channels = [c for c in self.channels if quantity in self.quantities(c)]
+            if not channels:
+                continue
+
+            def cells(values: Sequence[float] | FloatArray, scale: float = per_si(quantity)) -> str:
+                return "".join(f"{brief(scale * value, 3):>10}" for value in values)
+
+            times = "".join(f"{f'{t:g} s':>10}" for t in self.times)
+            lines += ["", f"{f'{quantity} [{FIELD_UNITS[quantity]}]':<{head}}{times}"]
+            for channel in channels:
+                rows = self._rows(channel, quantity)
+                texts = [f"{row.component:<{labels}}{cells(row.values)}" for row in rows]
+                if len(rows) > 1:
+                    texts.append(f"{'total':<{labels}}{cells(self.total(channel)[quantity])}")
+                own = [channel, *[""] * len(texts)]
+                lines += [f"  {name:<{names}}  {text}" for name, text in zip(own, texts)]  # noqa: B905
+            if HORIZONTAL in self.groups and quantity in self.quantities():
+                label = "tilt" if quantity == "attitude" else "horizontal, radial"
+                lines.append(f"  {label:<{head - 2}}{cells(self.total()[quantity])}")
+        notes = bullets(self.notes)
+        return "\n".join([*lines, *([""] if notes else []), *notes])
+
+    def plot(
+        self, ax: Axes | None = None, *, of: str | None = None, quantity: str | None = None
+    ) -> Axes:
+        """Growth of an error with time, log-log: its parts as lines and a bold total.
+
+        Parameters
+        ----------
+        ax : matplotlib.axes.Axes, optional
+        of : str, optional
+            A channel, whose parts are its terms, or "horizontal", whose parts are the channels; by
+            default "horizontal" where there is one.
+        quantity : {"attitude", "velocity", "position"}, optional
+            By default the last that there is.
+
+        Raises
+        ------
+        InputError
+            If there is no such channel, or it does not contribute to that quantity.
+        """
+        import matplotlib.pyplot as plt
+
+        from gmwm.plotting import COMPONENT_COLOURS, SUM_COLOUR
+
+        of = self.groups[-1] if of is None else of
+        quantity = self.quantities(of)[-1] if quantity is None else quantity
+        curves = self.curves(of, quantity)
+        if ax is None:
+            _, ax = plt.subplots(figsize=(7.0, 4.6), layout="constrained")
+        for i, (label, curve) in enumerate(curves.items()):
+            colour = COMPONENT_COLOURS[i % len(COMPONENT_COLOURS)]
+            ax.plot(self.grid, curve, color=colour, linewidth=1.3, linestyle="--", label=label)
+        total = per_si(quantity) * root_sum([row.curve for row in self._rows(of, quantity)])
+        ax.plot(self.grid, total, color=SUM_COLOUR, linewidth=2.6, label="total")
+        ax.set_xscale("log")
+        ax.set_yscale("log" if np.any(total > 0.0) else "linear")
+        ax.set_xlabel("coasting time [s]")
+        ax.set_ylabel(f"{quantity} error, 1 sigma [{FIELD_UNITS[quantity]}]")
+        ax.set_title(f"{of}, {STARTS[self.calibrated]}")
+        ax.grid(True, which="major", color="#cccccc", linewidth=0.6)
+        ax.legend(fontsize="small", framealpha=0.9)
+        return ax
+
+    def curves(self, of: str, quantity: str) -> dict[str, FloatArray]:
+        """Curves of `plot` beside the total: label -> curve on ``grid``, in field units."""
+        known = self.quantities(of)
+        if quantity not in known:
+            raise InputError(
+                f"{of} has no part in the {quantity!r} error: choose among {', '.join(known)}"
+            )
+        parts: dict[str, list[tuple[float, ...]]] = {}
+        for row in self._rows(of, quantity):
+            label = row.channel if of == HORIZONTAL else row.component
+            parts.setdefault(label, []).append(row.curve)
+        return {
+            label: per_si(quantity) * root_sum(part)
+            for label, part in parts.items()
+            if np.any(part)
+        }
+
+    def to_dict(self) -> dict[str, Any]:
+        """Everything in JSON types and SI units, with the totals."""
+        rows = [asdict(row) for row in self.rows]
+        return {
+            "times_s": list(self.times),
+            "calibrated": self.calibrated,
+            "rows": [r | {"values": list(r["values"]), "curve": list(r["curve"])} for r in rows],
+            "totals": {
+                of: {quantity: values.tolist() for quantity, values in self.total(of).items()}
+                for of in self.groups
+            },
+            "grid_s": list(self.grid),
+            "notes": list(self.notes),
+        }
+
+
+def axis(channel: str) -> str:
+    """The axis that a channel's name ends with; empty if it names none."""
+    last = channel.rpartition("_")[2].lower()
+    return last if last in ("x", "y", "z") else ""
+
+
+def root_sum(parts: Sequence[Sequence[float] | FloatArray]) -> FloatArray:
+    """Root of the sum of squares over the parts, time by time."""
+    return np.asarray(np.sqrt(np.sum(np.square(np.array(parts, dtype=float)), axis=0)))
+
+
+def per_si(quantity: str) -> float:
+    """Factor from a quantity's SI unit to its field unit."""
+    return 1.0 / factor(FIELD_UNITS[quantity], QUANTITIES[quantity])
+
+
+def error_budget(
+    source: Source,
+    times: Sequence[float] = TIMES,
+    *,
+    dt: float | None = None,
+    calibrated: bool = True,
+) -> ErrorBudget:
+    """Predicted growth of attitude, velocity and position errors without aiding.
+
+    A platform stays level and does not manoeuvre; its initial attitude, velocity and position are
+    right. A gyro's error is integrated to an attitude error; the tilt times gravity is an
+    acceleration, integrated to velocity and position. An accelerometer's error is integrated to
+    velocity and position. A gyro named ``..._z`` is the heading's and tilts nothing.
+
+    Short-term only: no Schuler oscillation (84 min) and no Earth rate. Up to 600 s constant errors
+    come out at most 10 % too large; beyond, the numbers are no longer what a navigator shows.
+
+    Parameters
+    ----------
+    source : Calibration, Fit or mapping
+        A mapping takes channel names that begin with "gyro" or "accel" to a `Process`, `Model` or
+        `Fit`.
+    times : sequence of float, optional
+        Coasting times, s.
+    dt : float, optional
+        Sampling interval of models that are not fitted, s.
+    calibrated : bool, optional
+        True: the initial value of every state of the models is known, as from a filter before an
+        outage; its covariance is zero. False: nothing is known, stationary processes start in their
+        stationary state. In both cases a random walk starts at zero, a line has a random phase, and
+        flicker noise, of which True knows the past, is counted from its first sample by False. A
+        constant bias is not part of a model: False counts what varies about the mean of the
+        recording.
+
+    Returns
+    -------
+    ErrorBudget
+        Terms are independent: their squares add up. A rate ramp counts by its absolute value.
+
+    Raises
+    ------
+    InputError
+        If a model has free parameters or is known by simulation only, no channel is a gyro or an
+        accelerometer, or a time is shorter than the sampling interval.
+
+    Notes
+    -----
+    Titterton & Weston, *Strapdown Inertial Navigation Technology*, 2nd ed. 2004, ch. 12; Groves,
+    *Principles of GNSS, Inertial, and Multisensor Integrated Navigation Systems*, 2nd ed. 2013,
+    sec. 5.7. White noise N gives an angle N t^(1/2), as an accelerometer's a position
+    N t^(3/2)/3^(1/2), as a gyro's g N t^(5/2)/20^(1/2).
+    """
+    if isinstance(source, Fit):
+        source = {source.wv.name or "channel": source}
+    channels = getattr(source, "fits", source)
+    if not isinstance(channels, Mapping):
+        raise InputError(
+            f"{type(source).__name__} has no channels: give a Calibration, a Fit, or models by "
+            "channel name"
+        )
+    known = {name: item for name, item in channels.items() if _quantity(name, item) is not None}
+    if not known:
+        raise InputError(
+            "the error budget needs a gyro or an accelerometer: give channels of that quantity, or "
+            "models by names such as gyro_x and accel_z"
+        )
+    steps = {name: _interval(name, item, dt) for name, item in known.items()}
+    longest = max(steps.values())
+    chosen = _checked(times, longest)
+    first = chosen[0] if len(chosen) > 1 else max(0.01 * chosen[0], min(longest, chosen[0]))
+    grid = tuple(np.geomspace(first, chosen[-1], _CURVE_POINTS).tolist())
+    rows: list[ErrorRow] = []
+    for name, item in known.items():
+        rows += _channel_rows(name, item, steps[name], chosen, grid, calibrated)
+    budget = ErrorBudget(chosen, tuple(rows), calibrated, grid)
+    return replace(budget, notes=tuple(_notes(channels, budget)))
+
+
+def is_steep(budget: ErrorBudget) -> BoolArray:
+    """At which of its times the tilt is beyond a small angle: orders of magnitude from there on."""
+    tilts = [
+        budget.total(of)["attitude"]
+        for of in budget.groups
+        if axis(of) != "z" and "attitude" in budget.quantities(of)
+    ]
+    largest = np.max(tilts, axis=0, initial=0.0) * np.ones(len(budget.times))
+    return np.maximum.accumulate(largest) > _SMALL_ANGLE
+
+
+def _quantity(name: str, item: Process | Model | Fit) -> str | None:
+    if isinstance(item, Fit) and item.wv.quantity is not None:
+        return item.wv.quantity
+    return next((sensor for sensor in ("gyro", "accel") if name.startswith(sensor)), None)
+
+
+def _interval(name: str, item: Process | Model | Fit, dt: float | None) -> float:
+    if isinstance(item, Fit):
+        return item.wv.dt
+    if dt is None:
+        raise InputError(f"{name} is a model without data: give its sampling interval, dt=0.01")
+    if not (np.isfinite(dt) and dt > 0.0):
+        raise InputError(f"dt = {dt!r}: give a positive sampling interval in seconds")
+    return float(dt)
+
+
+def _checked(times: Sequence[float], dt: float) -> tuple[float, ...]:
+    """Rising coasting times; raises InputError if there are none, or one is shorter than dt."""
+    try:
+        values = np.unique(np.asarray(times, dtype=float))
+    except (TypeError, ValueError):
+        values = np.zeros(0)
+    if values.size == 0 or not np.all(np.isfinite(values)):
+        raise InputError(f"times = {times!r}: give numbers of seconds, e.g. (1, 60)")
+    if values[0] < dt * (1.0 - 1e-6):
+        raise InputError(
+            f"a coasting time of {values[0]:g} s is shorter than the sampling interval of {dt:g} "
+            "s: give longer times"
+        )
+    return tuple(values.tolist())
+
+
+def _channel_rows(
+    name: str,
+    item: Process | Model | Fit,
+    dt: float,
+    times: tuple[float, ...],
+    grid: tuple[float, ...],
+    calibrated: bool,
+) -> list[ErrorRow]:
+    model = item.model if isinstance(item, Fit) else as_model(item)
+    if model.is_open:
+        raise InputError(f"{name}: {model!r} has free parameters, give them a value or fit it")
+    if _quantity(name, item) == "accel":
+        scales = {"velocity": 1.0, "position": 1.0}
+    elif axis(name) == "z":
+        scales = {"attitude": 1.0}
+    else:
+        scales = {"attitude": 1.0, "velocity": _GRAVITY, "position": _GRAVITY}
+    labels = [
+        f"{label}, |R|" if term.is_drift else label
+        for label, term in zip(model.term_labels(), model.terms, strict=True)
+    ]
+    growths = [
+        integral_rms(term, (*times, *grid), dt, known_start=calibrated) for term in model.terms
+    ]
+    rows = []
+    for order, (quantity, scale) in enumerate(scales.items()):
+        for label, growth in zip(labels, growths, strict=True):
+            values = tuple((scale * growth[order]).tolist())
+            unit, cut = QUANTITIES[quantity], len(times)
+            rows.append(ErrorRow(name, label, quantity, unit, values[:cut], values[cut:]))
+    return rows
+
+
+def _notes(channels: Mapping[str, Process | Model | Fit], budget: ErrorBudget) -> list[str]:
+    notes = []
+    skipped = [name for name in channels if name not in budget.channels]
+    if skipped:
+        notes.append(f"neither gyro nor accelerometer, left out: {', '.join(skipped)}")
+    fits = {name: item for name, item in channels.items() if isinstance(item, Fit)}
+    doubtful = [name for name in budget.channels if name in fits and not fits[name].valid]
+    if doubtful:
+        model, are = ("models", "are") if doubtful[1:] else ("model", "is")
+        of = ", ".join(doubtful)
+        notes.append(f"the {model} of {of} {are} not valid: read the notices first")
+    shortest = min((fit.wv.n * fit.wv.dt for fit in fits.values()), default=np.inf)
+    if budget.times[-1] > _RECORD_SHARE * shortest:
+        notes.append(
+            f"a record of {shortest:.4g} s shows little of what happens over more than "
+            f"{_RECORD_SHARE * shortest:.3g} s"
+        )
+    present = {f"{_quantity(name, channels[name])}_{axis(name)}" for name in budget.channels}
+    missing = [name for name in _HORIZONTAL_CHANNELS if name not in present]
+    if HORIZONTAL in budget.groups and missing:
+        notes.append(f"the horizontal total lacks {', '.join(missing)}")
+    steep = is_steep(budget)
+    if np.any(steep):
+        notes.append(
+            f"at {budget.times[int(np.argmax(steep))]:g} s the tilt exceeds "
+            f"{np.degrees(_SMALL_ANGLE):.0f} deg: from there on velocity and position are orders "
+            "of magnitude only"
+        )
+    if budget.times[-1] > LONGEST:
+        notes.append(f"beyond {LONGEST:g} s the Schuler oscillation (84 min) bounds this growth")
+    return notes

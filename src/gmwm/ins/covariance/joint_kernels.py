@@ -1,0 +1,227 @@
+"""The true covariance of a filter whose model is not the truth, in compiled code.
+
+The joint vector holds the errors of n integrals (of navigation: nine), the filter's estimates of
+its sensor states and the true sensor states. It obeys linear equations: the estimates enter the
+integrals with the sign turned round, and the gains come from the filter's own covariance. After
+Maybeck (1979), *Stochastic Models, Estimation, and Control* 1, sec. 6.8.
+
+`aid_jointly` is for a system that does not change with time, `run_jointly` for one along a
+trajectory. P is the filter's covariance, (n + q, n + q); J has the joint second moments.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from gmwm._core.compiled import compiled
+from gmwm._core.typing import FloatArray, IntArray
+from gmwm.ins.filter import (
+    IS_GNSS,
+    Events,
+    Kinematics,
+    SensorTable,
+    excess,
+    measurement_update,
+    new_scratch,
+    new_transition,
+    observe,
+    propagate,
+    tilt_squared,
+    transition,
+)
+from gmwm.ins.geometry import gravity
+
+
+class LinearStep(NamedTuple):
+    """Transition and noise of a step: A, Q of the filter, B, R of the joint vector."""
+
+    A: FloatArray
+    Q: FloatArray
+    B: FloatArray
+    R: FloatArray
+
+
+class Track(NamedTuple):
+    """A trajectory cut into S steps.
+
+    epoch, samples: (S + 1,), epoch at the end of each step, and samples of the step that leads
+        there (none to the first).
+    dt: Sampling interval, s.
+    middle, end: Arrays of the true motion in the middle of each step, and at its end.
+    rate: (S + 1, 3), angular rate at the end, body axes, rad/s.
+    """
+
+    epoch: IntArray
+    samples: IntArray
+    dt: float
+    middle: Kinematics
+    end: Kinematics
+    rate: FloatArray
+
+
+class JointFilter(NamedTuple):
+    """A navigation filter beside the truth.
+
+    table, joint: Sensor states of the filter, and of the joint vector.
+    estimate, truth: (kinds, 3), places in the joint vector of the estimated and the true slow noise
+        of each measurement; -1 for none.
+    lever: (3,), m.
+    second_order: Whether products of errors are allowed for.
+    """
+
+    table: SensorTable
+    joint: SensorTable
+    estimate: IntArray
+    truth: IntArray
+    lever: FloatArray
+    second_order: bool
+
+
+class KeptCovariances(NamedTuple):
+    """Epochs that are kept; P and J there are overwritten.
+
+    before: (K,), 1 for those before the measurements of the epoch, which come first, 0 after them.
+    """
+
+    epoch: IntArray
+    before: IntArray
+    P: FloatArray
+    J: FloatArray
+
+
+@compiled()
+def update_jointly(
+    J: FloatArray, h: FloatArray, estimate: int, truth: int, variance: float, gain: FloatArray,
+) -> None:  # fmt: skip
+    """Update the joint second moments by a scalar measurement with a given gain, in place.
+
+    h: (n,), row of the integrals.
+    estimate, truth: Places of the estimated and the true slow noise of the measurement, or -1.
+    variance: Of the measurement's white noise.
+    gain: (n + q,), the filter's.
+    """
+    size, n = J.shape[0], h.size
+    a, k = np.zeros(size), np.zeros(size)
+    for i in range(n):
+        if h[i] != 0.0:
+            for j in range(size):
+                a[j] += h[i] * J[i, j]
+    if estimate >= 0:
+        for j in range(size):
+            a[j] += J[estimate, j] - J[truth, j]
+    # Feedback: the integrals are corrected, and the estimates take what their errors lose.
+    for i in range(gain.size):
+        k[i] = gain[i] if i < n else -gain[i]
+    s = variance
+    for i in range(n):
+        s += h[i] * a[i]
+    if estimate >= 0:
+        s += a[estimate] - a[truth]
+    for i in range(size):
+        for j in range(i, size):
+            J[i, j] += s * k[i] * k[j] - k[i] * a[j] - a[i] * k[j]
+            J[j, i] = J[i, j]
+
+
+@compiled()
+def _propagated(P: FloatArray, A: FloatArray, Q: FloatArray) -> FloatArray:
+    """A P A' + Q, symmetric: nothing damps what rounding leaves of an asymmetry.
+
+    Loops, for a product of matrices takes numba seconds to compile.
+    """
+    size = P.shape[0]
+    left, result = np.zeros((size, size)), Q.copy()
+    for i in range(size):
+        for k in range(size):
+            if A[i, k] != 0.0:
+                for j in range(size):
+                    left[i, j] += A[i, k] * P[k, j]
+    for i in range(size):
+        for j in range(i + 1):
+            for k in range(size):
+                result[i, j] += left[i, k] * A[j, k]
+            result[j, i] = result[i, j]
+    return result
+
+
+@compiled()
+def aid_jointly(
+    P: FloatArray, J: FloatArray, step: LinearStep, n: int, variance: float, is_relative: bool,
+    fixes: int, out_P: FloatArray, out_J: FloatArray,
+) -> tuple[FloatArray, FloatArray]:  # fmt: skip
+    """Propagate over equal steps, each of which ends with a fix of the last integral.
+
+    variance: Of a fix.
+    is_relative: Whether the last integral starts anew at each fix.
+    out_P, out_J: (K, n, n), covariances of the integrals after the first K fixes, overwritten.
+    Returns: P and J after the last fix.
+    """
+    last = n - 1
+    h, gain = np.zeros(n), np.zeros(P.shape[0])
+    h[last] = 1.0
+    for fix in range(fixes):
+        P = _propagated(P, step.A, step.Q)
+        J = _propagated(J, step.B, step.R)
+        total = P[last, last] + variance
+        for i in range(gain.size):
+            gain[i] = P[i, last] / total
+        for i in range(gain.size):
+            for j in range(i, gain.size):
+                P[i, j] -= gain[i] * gain[j] * total
+                P[j, i] = P[i, j]
+        update_jointly(J, h, -1, -1, variance, gain)
+        if is_relative:
+            P[last] = P[:, last] = 0.0
+            J[last] = J[:, last] = 0.0
+        if fix < out_P.shape[0]:
+            out_P[fix], out_J[fix] = P[:n, :n], J[:n, :n]
+    return P, J
+
+
+@compiled()
+def run_jointly(
+    track: Track, events: Events, about: JointFilter, P: FloatArray, J: FloatArray,
+    kept: KeptCovariances,
+) -> None:  # fmt: skip
+    """Propagate P and J of a navigation filter along a trajectory."""
+    change, scratch, j_scratch = new_transition(), new_scratch(P.shape[0]), new_scratch(J.shape[0])
+    h, gain, x = np.zeros(9), np.zeros(P.shape[0]), np.zeros(P.shape[0])
+    event = out = 0
+    gathered = j_gathered = 0.0
+    for s in range(track.epoch.size):
+        epoch, count = track.epoch[s], track.samples[s]
+        if count > 0:
+            middle = Kinematics(track.middle.C[s], track.middle.v[s], track.middle.lla[s])
+            step = count * track.dt
+            transition(middle, step, change)
+            propagate(P, change, about.table, count, scratch)
+            propagate(J, change, about.joint, count, j_scratch)
+            if about.second_order:
+                g = gravity(middle.lla[0], middle.lla[2])
+                gathered = tilt_squared(P, g, step, gathered)
+                j_gathered = tilt_squared(J, g, step, j_gathered)
+        while out < kept.epoch.size and kept.epoch[out] == epoch and kept.before[out] == 1:
+            kept.P[out], kept.J[out] = P, J
+            out += 1
+        attitude = P[6, 6] + P[7, 7] + P[8, 8] if about.second_order else 0.0
+        j_attitude = J[6, 6] + J[7, 7] + J[8, 8] if about.second_order else 0.0
+        end = Kinematics(track.end.C[s], track.end.v[s], track.end.lla[s])
+        while event < events.epoch.size and events.epoch[event] == epoch:
+            kind, value = events.kind[event], events.value[event]
+            for component in range(3):
+                sd = events.sd[event, component]
+                if not sd > 0.0:
+                    continue
+                observe(kind, component, value, end, track.rate[s], about.lever, h)
+                estimate, truth = about.estimate[kind, component], about.truth[kind, component]
+                expected = sd * sd + excess(P, h, attitude)
+                measurement_update(P, h, estimate, expected, 0.0, x, gain)
+                update_jointly(J, h, estimate, truth, sd * sd + excess(J, h, j_attitude), gain)
+            if IS_GNSS[kind]:
+                gathered = j_gathered = 0.0
+            event += 1
+        while out < kept.epoch.size and kept.epoch[out] == epoch:
+            kept.P[out], kept.J[out] = P, J
+            out += 1

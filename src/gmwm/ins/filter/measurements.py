@@ -1,0 +1,256 @@
+"""Kinds of measurements: each a class beside its kernel, registered in one table at the end.
+
+A new kind takes a kernel and a class here, its line in `MEASUREMENTS` and `observe`, and its
+paragraph in docs/navigation.md.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+
+from gmwm._core.compiled import compiled
+from gmwm._core.typing import FloatArray
+from gmwm.errors import InputError
+from gmwm.ins.filter.records import Kinematics
+from gmwm.ins.geometry import matrix_from_rpy, offset, radii_at
+from gmwm.ins.imu import Imu
+from gmwm.ins.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from gmwm.ins.filter.aiding import Aiding
+
+
+class Measurement:
+    """A kind of measurement of up to three components.
+
+    Its kernel fills the row h (9,) of the navigation errors and returns estimate less measurement.
+
+    name: Of the kind, in `Fixes` and in files.
+    is_gnss: Whether an outage removes it.
+    is_inferred: Whether it is inferred rather than measured: it is always gated, and never used
+        against the filter.
+    components: How many of the three columns of values it has.
+    slow_names: States of its slow noise, one a component, if it can have any.
+    """
+
+    name: ClassVar[str]
+    is_gnss: ClassVar[bool] = False
+    is_inferred: ClassVar[bool] = False
+    components: ClassVar[int] = 3
+    slow_names: ClassVar[tuple[str, ...]] = ()
+
+    @staticmethod
+    def slow_noise(aiding: Aiding) -> tuple[FloatArray, float]:
+        """Standard deviation (3,) and correlation time (s) of its Gauss-Markov noise."""
+        return np.zeros(3), 1.0
+
+    @staticmethod
+    def moved(value: FloatArray, by: FloatArray) -> FloatArray:
+        """Values moved by errors ``by``, (E, 3), in m or m/s to the north, east and down."""
+        return value + by
+
+    @staticmethod
+    def along(
+        trajectory: Trajectory, index: FloatArray, arm: FloatArray, imu: Imu | None
+    ) -> FloatArray:
+        """Error-free values (E, 3) at some epochs of a trajectory, with an antenna on an arm."""
+        raise NotImplementedError
+
+
+@compiled()
+def observe_position(
+    component: int, value: FloatArray, at: Kinematics, lever: FloatArray, h: FloatArray
+) -> float:
+    """Latitude, longitude and height of the antenna, as metres to the north, east and down."""
+    C, lla = at.C, at.lla
+    h[component] = 1.0
+    a = C[0, 0] * lever[0] + C[0, 1] * lever[1] + C[0, 2] * lever[2]
+    b = C[1, 0] * lever[0] + C[1, 1] * lever[1] + C[1, 2] * lever[2]
+    c = C[2, 0] * lever[0] + C[2, 1] * lever[1] + C[2, 2] * lever[2]
+    _add_turned(component, a, b, c, h)
+    if component == 2:
+        return c - (lla[2] - value[2])
+    meridian, transverse = radii_at(math.sin(lla[0]))
+    if component == 0:
+        return (meridian + lla[2]) * (lla[0] - value[0]) + a
+    east = lla[1] - value[1]
+    east -= 2.0 * math.pi * math.floor(east / (2.0 * math.pi) + 0.5)
+    return (transverse + lla[2]) * math.cos(lla[0]) * east + b
+
+
+class Position(Measurement):
+    """GNSS position: latitude, longitude (rad) and height (m) of the antenna."""
+
+    name = "position"
+    is_gnss = True
+    slow_names = ("GNSS north", "GNSS east", "GNSS down")
+
+    @staticmethod
+    def slow_noise(aiding: Aiding) -> tuple[FloatArray, float]:
+        """That of multipath and of the atmosphere."""
+        return np.asarray(aiding.coloured_sd), aiding.coloured_tau
+
+    @staticmethod
+    def moved(value: FloatArray, by: FloatArray) -> FloatArray:
+        """Positions moved by metres."""
+        return offset(value, by)
+
+    @staticmethod
+    def along(
+        trajectory: Trajectory, index: FloatArray, arm: FloatArray, imu: Imu | None
+    ) -> FloatArray:
+        """Positions of the antenna."""
+        return offset(trajectory.lla[index], matrix_from_rpy(trajectory.rpy[index]) @ arm)
+
+
+@compiled()
+def observe_velocity(
+    component: int,
+    value: FloatArray,
+    at: Kinematics,
+    rate: FloatArray,
+    lever: FloatArray,
+    h: FloatArray,
+) -> float:
+    """Velocity of the antenna, which turns about the IMU."""
+    C, v = at.C, at.v
+    x = rate[1] * lever[2] - rate[2] * lever[1]
+    y = rate[2] * lever[0] - rate[0] * lever[2]
+    z = rate[0] * lever[1] - rate[1] * lever[0]
+    a = C[0, 0] * x + C[0, 1] * y + C[0, 2] * z
+    b = C[1, 0] * x + C[1, 1] * y + C[1, 2] * z
+    c = C[2, 0] * x + C[2, 1] * y + C[2, 2] * z
+    h[3 + component] = 1.0
+    _add_turned(component, v[0] + a, v[1] + b, v[2] + c, h)
+    moved = a if component == 0 else b if component == 1 else c
+    return v[component] + moved - value[component]
+
+
+class Velocity(Measurement):
+    """GNSS velocity of the antenna to the north, east and down, m/s."""
+
+    name = "velocity"
+    is_gnss = True
+
+    @staticmethod
+    def along(
+        trajectory: Trajectory, index: FloatArray, arm: FloatArray, imu: Imu | None
+    ) -> FloatArray:
+        """Velocities of the antenna; with a lever arm, the error-free IMU is needed."""
+        velocity = trajectory.velocity[index]
+        if not np.any(arm):
+            return velocity
+        if imu is None:
+            raise InputError("velocity fixes with a lever arm: give the error-free imu too")
+        matrix, rate = matrix_from_rpy(trajectory.rpy[index]), imu.rotation[index - 1] / imu.dt
+        return np.asarray(velocity + np.einsum("kij,kj->ki", matrix, np.cross(rate, arm)))
+
+
+@compiled()
+def observe_height(value: FloatArray, at: Kinematics, h: FloatArray) -> float:
+    """Height of the IMU; errors are counted downwards."""
+    h[2] = -1.0
+    return at.lla[2] - value[0]
+
+
+class Height(Measurement):
+    """Height of a barometer, m, in the first column; its slow noise is that of the weather."""
+
+    name = "height"
+    components = 1
+    slow_names = ("barometer",)
+
+    @staticmethod
+    def slow_noise(aiding: Aiding) -> tuple[FloatArray, float]:
+        """How far the height of a pressure is off."""
+        return np.array([aiding.barometer_sd, 0.0, 0.0]), aiding.barometer_tau
+
+    @staticmethod
+    def moved(value: FloatArray, by: FloatArray) -> FloatArray:
+        """Heights moved by the first column of ``by``."""
+        return value + np.where(np.arange(3) == 0, by, 0.0)
+
+    @staticmethod
+    def along(
+        trajectory: Trajectory, index: FloatArray, arm: FloatArray, imu: Imu | None
+    ) -> FloatArray:
+        """Heights of the IMU."""
+        return np.where(np.arange(3) == 0, trajectory.lla[index, 2:], 0.0)
+
+
+@compiled()
+def observe_standstill(component: int, value: FloatArray, at: Kinematics, h: FloatArray) -> float:
+    """Velocity of the IMU."""
+    h[3 + component] = 1.0
+    _add_turned(component, at.v[0], at.v[1], at.v[2], h)
+    return at.v[component] - value[component]
+
+
+class Standstill(Measurement):
+    """Zero velocity of a vehicle at rest; values are zero, or how much a simulated one shakes."""
+
+    name = "standstill"
+    is_inferred = True
+
+    @staticmethod
+    def along(
+        trajectory: Trajectory, index: FloatArray, arm: FloatArray, imu: Imu | None
+    ) -> FloatArray:
+        """Zeros."""
+        return np.zeros((index.size, 3))
+
+
+@compiled()
+def _add_turned(component: int, a: float, b: float, c: float, h: FloatArray) -> None:
+    """Add the effect of an attitude error phi on a vector, which it moves by (a, b, c) x phi."""
+    if component == 0:
+        h[7], h[8] = -c, b
+    elif component == 1:
+        h[6], h[8] = c, -a
+    else:
+        h[6], h[7] = -b, a
+
+
+# -- table of all kinds ----------------------------------------------------------------------------
+
+MEASUREMENTS: tuple[type[Measurement], ...] = (Position, Velocity, Height, Standstill)
+"""All kinds; a kind's place is its code in the kernels."""
+
+KINDS = {each.name: code for code, each in enumerate(MEASUREMENTS)}
+"""Name of a kind -> its code."""
+
+IS_GNSS = np.array([each.is_gnss for each in MEASUREMENTS])
+IS_INFERRED = np.array([each.is_inferred for each in MEASUREMENTS])
+"""By code."""
+
+
+@compiled()
+def observe(
+    kind: int,
+    component: int,
+    value: FloatArray,
+    at: Kinematics,
+    rate: FloatArray,
+    lever: FloatArray,
+    h: FloatArray,
+) -> float:
+    """Fill the row h (9,) of one component of a measurement; returns estimate less measurement.
+
+    kind: Code of `KINDS`, in the order of `MEASUREMENTS`.
+    value: (3,), what was measured.
+    rate: (3,), angular rate, body axes, rad/s.
+    lever: (3,), from the IMU to the antenna, body axes, m.
+    Returns: m or m/s.
+    """
+    for i in range(9):
+        h[i] = 0.0
+    if kind == 0:
+        return observe_position(component, value, at, lever, h)
+    if kind == 1:
+        return observe_velocity(component, value, at, rate, lever, h)
+    if kind == 2:
+        return observe_height(value, at, h)
+    return observe_standstill(component, value, at, h)

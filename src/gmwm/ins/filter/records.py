@@ -1,0 +1,240 @@
+"""Records of arrays that the kernels of the filter take."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from gmwm._core.compiled import compiled
+from gmwm._core.typing import BoolArray, FloatArray, IntArray
+
+
+class Kinematics(NamedTuple):
+    """Attitude C_bn (3, 3), velocity (3,) and position (3,): latitude, longitude, height."""
+
+    C: FloatArray
+    v: FloatArray
+    lla: FloatArray
+
+
+class Increments(NamedTuple):
+    """Integrals of angular rate (rad) and specific force (m/s) over an interval, body axes."""
+
+    ax: float
+    ay: float
+    az: float
+    fx: float
+    fy: float
+    fz: float
+
+
+class Samples(NamedTuple):
+    """Increments of an IMU, (N, 3), rad and m/s, and its sampling interval, s."""
+
+    rotation: FloatArray
+    velocity: FloatArray
+    dt: float
+
+
+class SensorTable(NamedTuple):
+    """m sensor states, and what k samples do to them, for k = 0..k_max.
+
+    first: (7,), first state of each sensor, and how many states add to a sensor.
+    paired: Whether there are blocks of two states.
+    axis: (m,), sensor that each state adds to; -1 for none.
+    output: (m,), fraction of the state in the error of its sensor.
+    partner: (m,), the other state of its block; itself if there is none.
+    phi, phi_off: (k_max + 1, m), ``x_i <- phi_i x_i + phi_off_i x_partner`` over k samples.
+    gain: (k_max + 1, m), integral of the sensor's error over k samples per unit of the state, s.
+    noise, noise_off: (k_max + 1, m), variance of the noise added over k samples, and its
+        covariance with the partner.
+    cross: (k_max + 1, m), covariance of that noise with the noise in the integral.
+    integral: (k_max + 1, 6), variance of the noise in the integral of each sensor's error, white
+        noise included.
+    """
+
+    first: IntArray
+    paired: bool
+    axis: IntArray
+    output: FloatArray
+    partner: IntArray
+    phi: FloatArray
+    phi_off: FloatArray
+    gain: FloatArray
+    noise: FloatArray
+    noise_off: FloatArray
+    cross: FloatArray
+    integral: FloatArray
+
+
+class Transition(NamedTuple):
+    """Equation of the navigation errors and its solution over a step.
+
+    F: (9, 9), the equation's matrix.
+    A: (9, 9), transition of the navigation errors.
+    B: (9, 6), navigation error per unit of integrated sensor error (rad, m/s).
+    """
+
+    F: FloatArray
+    A: FloatArray
+    B: FloatArray
+
+
+class Scratch(NamedTuple):
+    """Work space of `propagate` for n states: (6, n), (9, n), (9, 6), (n,)."""
+
+    S: FloatArray
+    T: FloatArray
+    U: FloatArray
+    row: FloatArray
+
+
+class Estimate(NamedTuple):
+    """Solution, covariance (9 + m, 9 + m) and sensor states (m,) of a filter at one epoch."""
+
+    at: Kinematics
+    P: FloatArray
+    x: FloatArray
+
+
+class Settings(NamedTuple):
+    """How a filter is set up.
+
+    table: Of its sensor states.
+    noise_states: (kinds, 3), sensor state of the slow noise of each component; -1 for none.
+    lever: (3,), from the IMU to the antenna, body axes, m.
+    second_order: Whether products of errors are allowed for; see `tilt_squared` and `excess`.
+    stride: Samples per step of the covariance.
+    """
+
+    table: SensorTable
+    noise_states: IntArray
+    lever: FloatArray
+    second_order: bool
+    stride: int
+
+
+class Events(NamedTuple):
+    """Measurements of all kinds in order of time.
+
+    epoch: (E,), nearest epoch of the IMU.
+    kind: (E,), codes of `KINDS`.
+    offset: (E,), time of the measurement less that of its epoch, s.
+    value, sd: (E, 3).
+    gate: (E,), normalised innovation squared beyond which it is rejected; infinite for none.
+    """
+
+    epoch: IntArray
+    kind: IntArray
+    offset: FloatArray
+    value: FloatArray
+    sd: FloatArray
+    gate: FloatArray
+
+
+class Innovated(NamedTuple):
+    """What comes of each measurement, overwritten.
+
+    value, sd: (E, 3), innovation of each component given those before it.
+    used: (E,), False where it was rejected.
+    """
+
+    value: FloatArray
+    sd: FloatArray
+    used: BoolArray
+
+
+class Kept(NamedTuple):
+    """Epochs that are kept, in order of time, and the estimates there, overwritten.
+
+    before: (K,), 1 for the estimate before the measurements of the epoch, 0 for that after them; at
+        one epoch those before come first.
+    nav: (K, 6), position and velocity.
+    C, P: (K, 3, 3), (K, 9, 9).
+    sensor, sensor_covariance: (K, 6), (K, 6, 6), sums of sensor states and their covariance.
+    """
+
+    epoch: IntArray
+    before: IntArray
+    nav: FloatArray
+    C: FloatArray
+    P: FloatArray
+    sensor: FloatArray
+    sensor_covariance: FloatArray
+
+
+class Progress(NamedTuple):
+    """Where a run is, so that it can pause and go on; zeros at first.
+
+    place: (4,), epoch, event, kept epoch, steps of the covariance.
+    rejected: (kinds,), measurements of each kind that were rejected in a row.
+    carry: (7,), increments of the sample before, and root mean square of `tilt_squared`.
+    """
+
+    place: IntArray
+    rejected: IntArray
+    carry: FloatArray
+
+
+class Workspace(NamedTuple):
+    """Work space of the filter's loop.
+
+    middle: Solution in the middle of a step.
+    there, rate_there, force_there: Solution at a measurement between two epochs, and angular rate
+        and specific force about it, rad/s and m/s^2.
+    rate: (3,), angular rate at the epoch, rad/s.
+    h, h_there: (9,), rows of a measurement.
+    gain, estimated: (9 + m,), gain of a measurement, errors estimated at the epoch so far.
+    P_held, estimated_held: What a rejected measurement must not change.
+    error, x_held: (6,), (m,).
+    """
+
+    change: Transition
+    scratch: Scratch
+    middle: Kinematics
+    there: Kinematics
+    rate_there: FloatArray
+    force_there: FloatArray
+    rate: FloatArray
+    h: FloatArray
+    h_there: FloatArray
+    gain: FloatArray
+    estimated: FloatArray
+    P_held: FloatArray
+    estimated_held: FloatArray
+    error: FloatArray
+    x_held: FloatArray
+
+
+@compiled()
+def new_transition() -> Transition:
+    """Room for a transition."""
+    return Transition(np.zeros((9, 9)), np.zeros((9, 9)), np.zeros((9, 6)))
+
+
+@compiled()
+def new_scratch(n: int) -> Scratch:
+    """Work space of `propagate` for n states, the nine of navigation included."""
+    return Scratch(np.zeros((6, n)), np.zeros((9, n)), np.zeros((9, 6)), np.zeros(n))
+
+
+@compiled()
+def new_kinematics() -> Kinematics:
+    """Room for a solution."""
+    return Kinematics(np.zeros((3, 3)), np.zeros(3), np.zeros(3))
+
+
+@compiled()
+def new_workspace(n: int) -> Workspace:
+    """Work space for n states, the nine of navigation included."""
+    change, scratch, middle, there = (
+        new_transition(),
+        new_scratch(n),
+        new_kinematics(),
+        new_kinematics(),
+    )
+    three = (np.zeros(3), np.zeros(3), np.zeros(3))
+    rows = (np.zeros(9), np.zeros(9), np.zeros(n), np.zeros(n))
+    held = (np.zeros((n, n)), np.zeros(n), np.zeros(6), np.zeros(n - 9))
+    return Workspace(change, scratch, middle, there, *three, *rows, *held)

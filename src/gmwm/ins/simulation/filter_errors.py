@@ -1,0 +1,164 @@
+"""Errors of a filter over many runs: what is kept of each run."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from gmwm._core.typing import BoolArray, FloatArray
+from gmwm.errors import InputError
+from gmwm.ins.filter import Outputs, Solution
+from gmwm.ins.imu import SensorErrors
+from gmwm.ins.trajectory import Trajectory
+
+GROUPS = {
+    "position": slice(0, 3),
+    "velocity": slice(3, 6),
+    "attitude": slice(6, 9),
+    "navigation": slice(0, 9),
+    "horizontal": slice(0, 2),
+    "vertical": slice(2, 3),
+}
+"""Navigation errors that are judged together, and the two parts of the position: both can be right
+where their correlation is wrong."""
+
+_SAME_TIME = 1e-6  # s
+
+
+@dataclass(frozen=True, eq=False)
+class FilterErrors:
+    """Errors of one filter over R runs at K epochs.
+
+    Attributes
+    ----------
+    time : (K,) ndarray
+        s.
+    before : (K,) ndarray of bool
+        Whether the measurements of the epoch were not in yet.
+    error, sd : (R, K, 9) ndarray
+        Estimate less truth of position (m), velocity (m/s) and attitude (rad), and the standard
+        deviation that the filter predicted; NaN from where a filter diverged.
+    nees : (R, K, 6) ndarray
+        Normalised error squared of the `GROUPS`.
+    log_det : (R, K, 6) ndarray
+        Logarithm of the determinant of the predicted covariance of the `GROUPS`.
+    sensor_error, sensor_sd : (R, K, 6) ndarray
+        Estimate less truth of the sensors' errors, without their white noise; NaN where the truth
+        is not known, as at the very last epoch, which no sample follows.
+    sensor_nees : (R, K) ndarray
+        Of all sensors that have states; NaN as long as one of them is known without error.
+    nis : (R, 2) ndarray
+        Sum of the normalised innovations squared of a run, and how many components it sums.
+    whiteness : (R,) ndarray
+        Autocorrelation of the standardised innovations from one fix to the next in its standard
+        error: standard normal if they are white, whatever their size.
+    """
+
+    time: FloatArray
+    before: BoolArray
+    error: FloatArray
+    sd: FloatArray
+    nees: FloatArray
+    log_det: FloatArray
+    sensor_error: FloatArray
+    sensor_sd: FloatArray
+    sensor_nees: FloatArray
+    nis: FloatArray
+    whiteness: FloatArray
+
+    @property
+    def runs(self) -> int:
+        """Number of runs R."""
+        return len(self.error)
+
+    @property
+    def diverged(self) -> int:
+        """Runs in which the filter diverged."""
+        return int(np.count_nonzero(np.isnan(self.error[:, -1, 0])))
+
+    def index(self, time: float, *, before: bool = True) -> int:
+        """Place of an epoch.
+
+        Raises
+        ------
+        InputError
+            If it was not kept.
+        """
+        found = np.flatnonzero((np.abs(self.time - time) < _SAME_TIME) & (self.before == before))
+        if found.size == 0:
+            raise InputError(f"no errors were kept at {time:g} s: give the end of an outage")
+        return int(found[0])
+
+
+PER_RUN = tuple(name for name in FilterErrors.__annotations__ if name not in ("time", "before"))
+"""Arrays of `FilterErrors` whose first axis is the run."""
+
+
+def errors_of_run(
+    solution: Solution, truth: Trajectory, errors: SensorErrors, outputs: Outputs
+) -> dict[str, FloatArray]:
+    """What is kept of a run, by the names of `PER_RUN`; NaN where the solution does not reach.
+
+    outputs: The K epochs that were asked for.
+    """
+    done = solution.time.size
+    error = solution.errors(truth)
+    nees, log_det = np.empty((2, done, len(GROUPS)))
+    for i, part in enumerate(GROUPS.values()):
+        nees[:, i], log_det[:, i] = _normalised(error[:, part], solution.covariance[:, part, part])
+    sensor_error, sensor_nees = np.full((done, 6), np.nan), np.full(done, np.nan)
+    if errors.slow is not None:
+        # The states of an epoch are those of the sample that follows it; the last one has none.
+        at = outputs.epoch[:done]
+        known = at < len(errors.slow)
+        sensor_error[known] = solution.sensor_errors[known] - errors.slow[at[known]]
+        sensor_nees = _normalised(sensor_error, solution.sensor_covariance)[0]
+    result = {
+        "error": error,
+        "sd": solution.sd,
+        "nees": nees,
+        "log_det": log_det,
+        "sensor_error": sensor_error,
+        "sensor_sd": np.sqrt(np.diagonal(solution.sensor_covariance, axis1=1, axis2=2)),
+        "sensor_nees": sensor_nees,
+    }
+    for key, values in result.items():
+        result[key] = np.full((outputs.epoch.size, *values.shape[1:]), np.nan)
+        result[key][:done] = values
+    standard, kinds = solution.innovations.standard, solution.innovations.kind
+    seen = standard[np.isfinite(standard)]
+    result["nis"] = np.array([np.sum(seen**2), float(seen.size)])
+    result["whiteness"] = np.array(lag_one([standard[kinds == each] for each in np.unique(kinds)]))
+    return result
+
+
+def _normalised(error: FloatArray, covariance: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Squares of errors (K, d) in units of their covariance (K, d, d), and its log determinant.
+
+    Only what has a variance at some epoch counts: a sensor without states has no error that is
+    estimated. NaN where one that counts has none yet, as a random walk that starts at zero.
+    """
+    variance = np.diagonal(covariance, axis1=1, axis2=2)
+    alive = np.any(variance > 0.0, axis=0)
+    squares, log_det = np.full((2, len(error)), np.nan)
+    settled = np.all(variance[:, alive] > 0.0, axis=1)
+    if np.any(alive) and np.any(settled):
+        error, covariance = error[settled][:, alive], covariance[settled][:, alive][:, :, alive]
+        solved = np.linalg.solve(covariance, error[..., None])[..., 0]
+        squares[settled] = np.sum(error * solved, axis=1)
+        log_det[settled] = np.linalg.slogdet(covariance)[1]
+    return squares, log_det
+
+
+def lag_one(parts: Sequence[FloatArray]) -> float:
+    """Autocorrelation of innovations from fix to fix, in its standard error if they are white.
+
+    parts: (E, 3), standardised innovations of each kind in order of time.
+    """
+    products = [np.zeros(0), *((part[1:] * part[:-1]).ravel() for part in parts)]
+    together = np.concatenate(products)
+    together = together[np.isfinite(together)]
+    scale = np.sqrt(np.sum(together**2))
+    return float(np.sum(together) / scale) if scale > 0.0 else float("nan")

@@ -1,0 +1,206 @@
+"""Monte Carlo: the same errors for every filter, run after run, in parallel."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TypedDict, Unpack
+
+import numpy as np
+
+from gmwm._core import checks
+from gmwm._core.runs import Earlier, do_runs
+from gmwm._core.typing import FloatArray, Progress
+from gmwm.errors import InputError
+from gmwm.ins.filter import Filter, InitialSd, Outage, Outputs, Solution
+from gmwm.ins.geometry import matrix_from_rotation_vector, matrix_from_rpy, offset, rpy_from_matrix
+from gmwm.ins.imu import Imu, SensorErrors, SensorModels, emulate
+from gmwm.ins.simulation.filter_errors import PER_RUN, FilterErrors, errors_of_run
+from gmwm.ins.simulation.scenario import ErrorSource, Scenario, Simulated
+from gmwm.ins.trajectory import NavState, Trajectory
+from gmwm.issues import Notice, notice
+
+
+@dataclass(frozen=True, eq=False)
+class MonteCarlo:
+    """Errors of some filters over the same runs.
+
+    Attributes
+    ----------
+    filters : dict
+        Name -> `FilterErrors`.
+    outages : tuple of Outage
+    example : dict
+        Name -> `Solution` of the first run, once a second.
+    truth : Trajectory
+    notices : tuple of Notice
+    """
+
+    filters: dict[str, FilterErrors]
+    outages: tuple[Outage, ...]
+    example: dict[str, Solution]
+    truth: Trajectory
+    notices: tuple[Notice, ...] = ()
+
+    def __getitem__(self, name: str) -> FilterErrors:
+        if name not in self.filters:
+            raise InputError(f"no filter {name!r}: there are {', '.join(self.filters)}")
+        return self.filters[name]
+
+
+class Work(TypedDict, total=False):
+    """How runs are done, and where they are kept.
+
+    jobs : int
+        Processes; -1 for one a core.
+    cluster : str
+        Address of a Dask scheduler that does the work instead.
+    folder : Path
+        Where finished runs are kept every few seconds, also when the work is interrupted.
+    earlier : {"resume", "replace", "refuse"}
+        What to do with runs that the folder holds already.
+    progress : callable
+        Called as ``progress(done, runs, "")``.
+    """
+
+    jobs: int
+    cluster: str | None
+    folder: Path | None
+    earlier: Earlier
+    progress: Progress | None
+
+
+def monte_carlo(
+    scenario: Scenario,
+    source: ErrorSource,
+    filters: Mapping[str, SensorModels],
+    runs: int = 100,
+    seed: int = 0,
+    **work: Unpack[Work],
+) -> MonteCarlo:
+    """Run filters with different sensor models on the same simulated flights.
+
+    Every run draws sensor errors, noise of the fixes and an initial error; all filters get the
+    same, so that their differences are those of the models.
+
+    Parameters
+    ----------
+    scenario : Scenario
+    source : ErrorSource
+        `Simulated`, or `gmwm.ins.Recorded`, whose independent stretches are limited.
+    filters : mapping of str to SensorModels
+        Name -> models of a filter.
+    runs, seed : int, optional
+    **work
+        jobs, cluster, folder, earlier, progress: see `gmwm.ins.simulation.trials.Work`.
+
+    Raises
+    ------
+    InputError
+        If there is no filter, no run, the seed is negative, or the folder holds another study.
+    """
+    if not filters:
+        raise InputError("there is no filter: give one at least")
+    runs, seed = checks.whole("runs", runs, 1), checks.whole("seed", seed, 0)
+    notices: tuple[Notice, ...] = ()
+    if source.available is not None and source.available < runs:
+        notices = (notice("fewer-runs", "", {"runs": source.available, "asked": runs}),)
+        runs = source.available
+    task = _Task(scenario, source, dict(filters), emulate(scenario.trajectory), seed)
+    found = do_runs(task, runs, task.study(), **work)
+    outputs = scenario.outputs()
+    time, before = outputs.time(scenario.trajectory.dt), outputs.before == 1
+    errors = {
+        name: FilterErrors(time, before, **{key: found[f"{name}/{key}"] for key in PER_RUN})
+        for name in filters
+    }
+    return MonteCarlo(errors, scenario.outages, task.example(), scenario.trajectory, notices)
+
+
+@dataclass(frozen=True, eq=False)
+class _Task:
+    """All that a worker needs; called with the number of a run, it does that."""
+
+    scenario: Scenario
+    source: ErrorSource
+    filters: dict[str, SensorModels]
+    imu: Imu
+    seed: int
+
+    def __call__(self, run: int) -> dict[str, FloatArray]:
+        """What is kept of a run, by filter and name."""
+        outputs, truth = self.scenario.outputs(), self.scenario.trajectory
+        found, errors = self.solutions(run, outputs)
+        return {
+            f"{name}/{key}": values
+            for name, solution in found.items()
+            for key, values in errors_of_run(solution, truth, errors, outputs).items()
+        }
+
+    def solutions(self, run: int, outputs: Outputs) -> tuple[dict[str, Solution], SensorErrors]:
+        """All filters on the errors of one run, and the sensor errors."""
+        scenario, imu = self.scenario, self.imu
+        rng = np.random.default_rng([self.seed, run])
+        errors = self.source.draw(run, imu.n, imu.dt, rng)
+        noisy = imu.with_errors(errors.total[:, :3], errors.total[:, 3:])
+        aiding = scenario.aiding.without(scenario.outages).noisy(rng)
+        initial = disturbed(scenario.trajectory.state(0), scenario.initial_sd, rng)
+        events = aiding.events(imu.dt, imu.n)
+        found = {}
+        for name, models in self.filters.items():
+            ready = Filter.of(models, aiding, imu.dt, scenario.step, scenario.second_order)
+            found[name] = ready.run(noisy, initial, scenario.initial_sd, events, outputs)
+        return found, errors
+
+    def example(self) -> dict[str, Solution]:
+        """The first run, once a second and before the first fix after an outage."""
+        ends = [outage.end for outage in self.scenario.outages]
+        dt = self.imu.dt
+        return self.solutions(0, Outputs.every(max(1.0, dt), dt, self.imu.n, ends))[0]
+
+    def study(self) -> dict[str, Any]:
+        """Everything that the runs depend on."""
+        scenario, source, aiding = self.scenario, self.source, self.scenario.aiding
+        truth = scenario.trajectory
+        fixes = [part for f in aiding.fixes for part in (f.kind, f.time, f.value, f.sd)]
+        slow = (aiding.coloured_sd, aiding.coloured_tau, aiding.barometer_sd, aiding.barometer_tau)
+        drawn = _exactly(source.models) if isinstance(source, Simulated) else source
+        start = (scenario.initial_sd, scenario.step, scenario.second_order, scenario.interval)
+        return {
+            "seed": self.seed,
+            "filters": {name: _digest(_exactly(each)) for name, each in self.filters.items()},
+            "sensor errors": _digest(drawn),
+            "trajectory": _digest(truth.dt, truth.lla, truth.velocity, truth.rpy),
+            "fixes": _digest(aiding.lever_arm, *slow, aiding.gate, *fixes),
+            "outages": _digest(scenario.outages),
+            "settings": _digest(*start),
+        }
+
+
+def disturbed(state: NavState, sd: InitialSd, rng: np.random.Generator) -> NavState:
+    """An estimate of a state: the truth with errors drawn from their standard deviations."""
+    error = sd.deviations * rng.standard_normal(9)
+    turn = matrix_from_rotation_vector(-error[6:])
+    return NavState(
+        offset(state.lla, error[:3]),
+        state.velocity + error[3:6],
+        rpy_from_matrix(turn @ matrix_from_rpy(state.rpy)),
+    )
+
+
+def _digest(*parts: Any) -> str:
+    """Digest of arrays and of objects whose text has all digits."""
+    digest = hashlib.sha256()
+    for part in parts:
+        array = isinstance(part, np.ndarray)
+        digest.update(repr(part.shape if array else part).encode())
+        digest.update(np.ascontiguousarray(part).tobytes() if array else b"")
+    return digest.hexdigest()
+
+
+def _exactly(models: SensorModels) -> str:
+    """Models with all digits, which their own text has not."""
+    values = [list(model.params.values()) for model in models.models.values()]
+    return repr((models, values))

@@ -1,0 +1,211 @@
+"""The page of a comparison: verdicts, curves, parameters, and the numbers for a filter."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gmwm._core.files import writable_file
+from gmwm._core.pages import page_of
+from gmwm._core.text import brief
+from gmwm.estimate import Estimate, Fit
+from gmwm.issues import worst_first
+from gmwm.population import STATES, AxisComparison, ParameterSpread, SensorComparison
+from gmwm.report.datasheet import Datasheet, read_datasheet
+from gmwm.report.multiples import COLOURS, multiple
+from gmwm.report.page import origin, write_page
+from gmwm.report.text import duration_text
+
+_SIDE_BY_SIDE = 6
+"""Recordings whose values stand in columns of their own; of more the range is shown."""
+
+_NARROW, _WIDE = 1.02, 1.5
+"""Ratios of the ends of an interval: four digits below the one, two above the other."""
+
+_ASIDE = ("not-noise", "channel-missing", "channel-skipped")
+"""Codes of notices that the verdicts have in a word."""
+
+_MARKS = {"agree": "good", "close": "good", "differ": "care", "untested": "bad"}
+_LETTERS = {"N": "u/sqrt(Hz)", "K": "u/s/sqrt(Hz)"}
+
+
+@page_of(SensorComparison)
+def write_sensor_comparison_report(
+    comparison: SensorComparison,
+    path: str | os.PathLike[str],
+    *,
+    datasheet: str | os.PathLike[str] | None = None,
+    provenance: Mapping[str, str] | None = None,
+) -> Path:
+    """Write the comparison of recordings or units as one HTML file that needs no network.
+
+    Parameters
+    ----------
+    comparison : SensorComparison
+    path : path-like
+    datasheet : path-like, optional
+        YAML of N, B and K by sensor or channel, drawn over the curves; see `write_report`.
+    provenance : mapping of str to str, optional
+        What else is known of where the numbers come from.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be written, or the data sheet not be read.
+    """
+    path, sheet = writable_file(path), None
+    if datasheet is not None:
+        sheet = read_datasheet(datasheet, {name: a.quantity for name, a in comparison.items()})
+    sources = {label: each.source for label, each in comparison.calibrations.items()}
+    return write_page(
+        path,
+        "compared.html",
+        comparison=comparison,
+        recordings=[
+            {
+                "label": label,
+                "colour": place % COLOURS,
+                "size": f"{duration_text(each.duration)} at {each.rate:.6g} Hz",
+            }
+            for place, (label, each) in enumerate(comparison.calibrations.items())
+        ],
+        state=_overall(comparison),
+        axes=[_axis(axis, comparison, sheet) for axis in comparison.values()],
+        notices=_notices(comparison),
+        columns=comparison.labels if len(comparison.labels) <= _SIDE_BY_SIDE else ("range",),
+        sheet=sheet,
+        stated={
+            letter: sheet is not None
+            and any(letter in sheet.of(name, a.quantity) for name, a in comparison.items())
+            for letter in _LETTERS
+        },
+        provenance=origin(sources | dict(provenance or {}), "comparison of", sheet),
+    )
+
+
+def _overall(comparison: SensorComparison) -> str:
+    states = {axis.state for axis in comparison.values()}
+    return "care" if states & {"differ", "untested"} else "good"
+
+
+def _notices(comparison: SensorComparison) -> list[dict[str, Any]]:
+    """Without those that the verdicts repeat."""
+    return [
+        {
+            "is_aside": notice.code in _ASIDE,
+            "is_remark": notice.severity in ("warning", "bad"),
+            "text": notice.sentence,
+        }
+        for notice in worst_first(list(comparison.notices))
+        if notice.code not in ("curves-differ", "curves-close")
+    ]
+
+
+def _axis(
+    axis: AxisComparison, comparison: SensorComparison, sheet: Datasheet | None
+) -> dict[str, Any]:
+    labels = comparison.labels
+    others = [
+        comparison.calibrations[label][axis.name]
+        for label in axis.left_out
+        if axis.name in comparison.calibrations[label]
+    ]
+    return {
+        "name": axis.name,
+        "state": _MARKS[axis.state],
+        "word": STATES[axis.state],
+        "sentence": axis.sentence,
+        "figure": multiple(axis, labels, others, sheet) if axis.fits or others else "",
+        "model": axis.joint.model.title() if axis.joint else "none",
+        "joint_valid": axis.joint is not None and axis.joint.valid,
+        "joint_codes": _codes(axis.joint),
+        "equality": _p(axis.joint.equality_p, "= ") if axis.joint else "",
+        "rows": [
+            _row(each, axis, labels) for each in axis.parameters if each.joint.kind != "fixed"
+        ],
+        "numbers": [_numbers(axis, letter, sheet) for letter in _LETTERS],
+        "nees": _nees(axis),
+        "inflation": f"{axis.curve_inflation:.2f}" if np.isfinite(axis.curve_inflation) else "",
+        "own": len(axis.numbers.each),
+    }
+
+
+def _codes(fit: Fit | None) -> str:
+    bad = [n.code.replace("-", " ") for n in fit.notices if n.severity == "bad"] if fit else []
+    return ", ".join(dict.fromkeys(bad))
+
+
+def _row(spread: ParameterSpread, axis: AxisComparison, labels: tuple[str, ...]) -> dict[str, Any]:
+    by_label = dict(zip(axis.fits, spread.each, strict=True))
+    cells = [_cell(by_label.get(label)) for label in labels]
+    if len(labels) > _SIDE_BY_SIDE:
+        known = [e.usual.value for e in spread.each if e is not None and e.kind == "estimated"]
+        text = f"{brief(min(known), 4)} to {brief(max(known), 4)}" if known else "none"
+        cells = [{"value": text, "interval": f"{len(known)} of {len(spread.each)}"}]
+    return {
+        "key": spread.key,
+        "unit": spread.joint.usual.unit,
+        "joint": _cell(spread.joint),
+        "cells": cells,
+        "spread": "–" if np.isnan(spread.spread) else _share(spread.spread),
+        "p": _p(spread.p_value) or "–",
+        "differs": spread.p_value < 0.01,
+    }
+
+
+def _cell(estimate: Estimate | None) -> dict[str, str]:
+    """A value and its interval, with the digits that this leaves."""
+    if estimate is None:
+        return {"value": "–", "interval": ""}
+    usual = estimate.usual
+    if estimate.kind == "bound":
+        return {"value": f"< {brief(usual.upper, 3)}", "interval": ""}
+    if estimate.kind != "estimated":
+        return {"value": brief(usual.value, 3), "interval": estimate.kind}
+    if not (np.isfinite(usual.upper) and usual.lower > 0.0):
+        return {"value": brief(usual.value, 3), "interval": "not determined"}
+    ratio = usual.upper / usual.lower
+    digits = 4 if ratio < _NARROW else 3
+    ends = [brief(end, digits if ratio < _WIDE else 2) for end in (usual.lower, usual.upper)]
+    return {"value": brief(usual.value, digits), "interval": "–".join(ends)}
+
+
+def _share(value: float) -> str:
+    return f"{100.0 * value:.1f} %" if value < 1.0 else f"{100.0 * value:.0f} %"
+
+
+def _p(value: float, sign: str = "") -> str:
+    return "" if np.isnan(value) else f"{sign}{value:.2g}" if value >= 1e-4 else "< 0.0001"
+
+
+def _numbers(axis: AxisComparison, letter: str, sheet: Datasheet | None) -> dict[str, str]:
+    values = [getattr(each, letter) for each in axis.numbers.each.values()]
+    found = [value for value in values if value > 0.0]
+    covering, ratio = axis.numbers.value(letter), axis.numbers.inflation(letter)
+    sign = "≤ " if letter in axis.numbers.upper else ""
+    stated = sheet.of(axis.name, axis.quantity).get(letter) if sheet is not None else None
+    times = f"{brief(covering / stated, 3)} times" if stated and np.isfinite(covering) else ""
+    ends = [axis.number_text(letter, end)[0] for end in found and (min(found), max(found))]
+    text, unit = axis.number_text(letter, covering)
+    details = [f"{covering:.3e} SI"] if np.isfinite(covering) else []
+    details += [f"{ratio:.2f} x joint"] if np.isfinite(ratio) else []
+    return {
+        "range": " to ".join(dict.fromkeys(ends)) or "none found",
+        "covering": sign + text if np.isfinite(covering) else "none",
+        "unit": unit if np.isfinite(covering) else "",
+        "details": ", ".join(details),
+        "stated": times,
+    }
+
+
+def _nees(axis: AxisComparison) -> str:
+    """Of the covering numbers, in the recordings."""
+    known = [value for value in axis.numbers.nees.values() if np.isfinite(value)]
+    if not known:
+        return ""
+    low, high = f"{min(known):.2g}", f"{max(known):.2g}"
+    return low if low == high else f"{low} to {high}"

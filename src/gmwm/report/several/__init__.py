@@ -1,1 +1,0 @@
-"""Pages of several recordings or units."""

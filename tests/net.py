@@ -1,0 +1,998 @@
+# ruff: noqa: E501 - calls in a line
+"""Public behaviour as JSON files, and how that of two trees differs.
+
+``python tests/net.py record FOLDER [--only PART,...] [--inputs FOLDER/inputs]`` runs the commands
+and public functions of the package of the current directory. ``python tests/net.py compare BEFORE
+AFTER [--tolerance 1e-9]`` lists what differs and ends with status 1 if anything does.
+
+Files of ``FOLDER/inputs`` are made where they are absent: give ``--inputs`` of an earlier record, so
+that both trees have the same ones, stored calibrations and damaged files included. Texts are left out:
+codes, severities and values are compared.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import gzip
+import importlib
+import io
+import json
+import math
+import os
+import random
+import re
+import runpy
+import shutil
+import sys
+import tempfile
+import time
+import warnings
+from collections import defaultdict
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import fields, is_dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import gmwm
+from gmwm import (
+    AR,
+    ARIMA,
+    ARMA,
+    MA,
+    AveragedNoise,
+    BiasInstability,
+    GaussMarkov,
+    LowPassNoise,
+    QuantizationNoise,
+    RandomWalk,
+    RateRamp,
+    Resonance,
+    Sinusoid,
+    WhiteNoise,
+    ins,
+)
+
+SI = {"gyro": "rad/s", "accel": "m/s^2"}
+TEXTS = {"text", "hint", "action", "sentence", "message", "prose"}
+"""Keys that are not recorded."""
+ROUND_OFF = {"jitter": 1e-9}
+"""Absolute tolerance of keys whose value may be what rounding leaves of zero."""
+LONGEST = 100  # numbers of a list that are recorded one by one
+SENTENCE = 4  # words that make a text
+ADIS_ROWS = {1: (0, 100_000), 2: (400_000, 100_000), 3: (900_000, 100_000), 4: (0, 100_000)}
+PER_KIND = {"document": 40, "text": 40, "study": 5, "field": 5, "odd": 8, "fleet": 4}
+"""Damaged files of a kind; of the others 15."""
+
+PARTS: dict[str, Callable[[], Iterator[tuple[str, Callable[[], Any]]]]] = {}
+
+
+def part(make: Callable[[], Iterator[tuple[str, Callable[[], Any]]]]) -> Any:
+    PARTS[make.__name__.rstrip("_")] = make
+    return make
+
+
+# -- what is recorded -----------------------------------------------------------------------------
+
+
+def plain(value: Any) -> Any:
+    """A result in JSON types, without texts, with sums in place of long arrays."""
+    if hasattr(value, "to_dict") and not isinstance(value, type):
+        return plain(value.to_dict())
+    if is_dataclass(value) and not isinstance(value, type):
+        value = {each.name: getattr(value, each.name) for each in fields(value)}
+    if isinstance(value, Mapping):
+        return {str(key): plain(each) for key, each in value.items() if str(key) not in TEXTS}
+    if isinstance(value, str):
+        return "<text>" if len(value.split()) >= SENTENCE else value
+    if callable(value):
+        return "<callable>"
+    if value is None or isinstance(value, bool | np.bool_):
+        return value if value is None else bool(value)
+    if isinstance(value, int | np.integer):
+        return int(value)
+    if isinstance(value, float | np.floating):
+        return float(value) if np.isfinite(value) else str(float(value))
+    if isinstance(value, np.ndarray) and value.dtype.kind in "biuf":
+        return array(value)
+    if isinstance(value, set | frozenset):
+        value = sorted(value)
+    if isinstance(value, list | tuple | np.ndarray):
+        if len(value) > LONGEST and all(isinstance(each, int | float) for each in value):
+            return array(np.asarray(value, dtype=float))
+        return [plain(each) for each in value]
+    return f"<{type(value).__name__}>"
+
+
+def array(values: np.ndarray) -> Any:
+    if values.size <= LONGEST:
+        return plain(values.tolist())
+    flat = values.astype(float).ravel()
+    there = np.where(np.isfinite(flat), flat, 0.0)
+    wave = np.cos(math.sqrt(2.0) * np.arange(flat.size))
+    size, scale = float(np.sum(np.abs(there))), float(np.sum(np.abs(there)) or 1.0)
+    return {
+        "shape": list(values.shape),
+        "missing": int(np.sum(~np.isfinite(flat))),
+        "sum": size,
+        "wave": round(float(there @ wave) / scale, 12),
+    }
+
+
+def recording(given: Any) -> Any:
+    return {
+        "rate": given.rate,
+        "jitter": given.jitter,
+        "notices": given.notices,
+        "channels": {
+            each.name: [
+                each.n,
+                each.dt,
+                each.quantity,
+                each.unit,
+                each.missing,
+                array(np.asarray(each.values, float)),
+            ]
+            for each in given.channels
+        },
+    }
+
+
+def outcome(act: Callable[[], Any]) -> Any:
+    """What comes of an act, or the code with which it is rejected."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        try:
+            return plain(act())
+        except gmwm.InputError as error:
+            return {"rejected": error.code, "values": plain(error.values)}
+        except Exception as error:
+            return {"failed": type(error).__name__, "what": plain(str(error)[:80].split())}
+
+
+def command(*args: Any) -> Any:
+    """What ``gmwm ARGS`` prints and its exit status; JSON as such, of anything else the numbers."""
+    printed, errors, code, argv = io.StringIO(), io.StringIO(), 0, sys.argv
+    sys.argv = ["gmwm", *map(str, args)]
+    try:
+        with contextlib.redirect_stdout(printed), contextlib.redirect_stderr(errors):
+            runpy.run_module("gmwm", run_name="__main__")
+    except SystemExit as ended:
+        code = ended.code if isinstance(ended.code, int) else int(ended.code is not None)
+    finally:
+        sys.argv = argv
+    text = printed.getvalue()
+    with contextlib.suppress(ValueError):
+        return {"status": code, "printed": json.loads(text) if text else None}
+    return {"status": code, "printed": tokens(text)}
+
+
+NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
+
+
+def tokens(text: str) -> list[Any]:
+    """Words and numbers of each line, without comments."""
+    text = re.sub(r'"""[\s\S]*?"""|<!--[\s\S]*?-->|/\*[\s\S]*?\*/', "", text)
+    lines = []
+    for line in text.splitlines():
+        line = re.sub(r"(^|\s)(#|//|%).*", "", line).strip()
+        if line:
+            words = re.split(rf"({NUMBER.pattern})", line)
+            lines.append(
+                [
+                    float(each) if NUMBER.fullmatch(each) else each.strip()
+                    for each in words
+                    if each.strip()
+                ]
+            )
+    return lines
+
+
+# -- inputs ---------------------------------------------------------------------------------------
+
+
+def shared() -> Path | None:
+    """Folder of the real recordings: beside the repository, or above."""
+    for folder in Path(os.environ["NET_HOME"]).parents:
+        if (folder / "shared" / "data" / "adis16405").exists():
+            return folder / "shared" / "data"
+    return None
+
+
+def made(name: str, make: Callable[[Path], Any]) -> Path:
+    """A file or folder of the inputs, made where it is absent."""
+    path = Path(name)
+    if not path.exists():
+        path.parent.mkdir(parents=True, exist_ok=True)
+        draft = path.with_name(f"draft-{path.name}")
+        make(draft)
+        draft.rename(path)
+    return path
+
+
+def csv(path: Path, columns: Mapping[str, np.ndarray], rate: float = 100.0) -> None:
+    n = len(next(iter(columns.values())))
+    rows = np.column_stack([np.arange(n) / rate, *columns.values()])
+    header = ",".join(["time_s", *(f"{name} [{SI[name.split('_')[0]]}]" for name in columns)])
+    np.savetxt(path, rows, fmt="%.9g", delimiter=",", header=header, comments="")
+
+
+def drive() -> Path:
+    return made("drive", lambda path: command("demo", "--files", "-o", path))
+
+
+def mems_series(seed: int, n: int = 40_000) -> dict[str, np.ndarray]:
+    gyro, accel = WhiteNoise(6e-5) + GaussMarkov(1e-4, 20.0), WhiteNoise(8e-4) + RandomWalk(3e-5)
+    return {
+        f"{sensor}_{axis}": gmwm.simulate(model, n, 0.01, seed=10 * seed + 3 * k + i)
+        for k, (sensor, model) in enumerate({"gyro": gyro, "accel": accel}.items())
+        for i, axis in enumerate("xyz")
+    }
+
+
+def mems(seed: int = 1) -> Path:
+    return made(f"mems_{seed}.csv", lambda path: csv(path, mems_series(seed)))
+
+
+def faulty() -> Path:
+    """A recording in which much is wrong."""
+
+    def make(path: Path) -> None:
+        x = mems_series(7)
+        t = 0.01 * np.arange(40_000)
+        x["gyro_x"] += 3e-4 * np.sin(2 * np.pi * 7.3 * t)
+        x["gyro_y"][[500, 9000, 21_000]] += 0.05
+        x["gyro_z"][20_000:] += 5e-4
+        x["accel_x"][10_000:10_400] = np.nan
+        x["accel_y"] = 0.004 * np.round(x["accel_y"] / 0.004)
+        x["accel_z"] = np.clip(9.8 + x["accel_z"] + 0.05 * np.exp(-t / 40.0), None, 9.83)
+        csv(path, x)
+
+    return made("faulty.csv", make)
+
+
+def adis(number: int) -> Path | None:
+    """Some rows of a real recording."""
+    folder = shared()
+    name = f"adis_{number}.csv"
+    if not Path(name).exists() and folder is None:
+        return None
+
+    def make(path: Path) -> None:
+        first, n = ADIS_ROWS[number]
+        with gzip.open(folder / "adis16405" / f"adis16405_{number}.csv.gz", "rt") as stream:
+            lines = [next(stream)]
+            for i, line in enumerate(stream):
+                if first <= i < first + n:
+                    lines.append(line)
+        path.write_text("".join(lines))
+
+    return made(name, make)
+
+
+ADIS_OPTIONS = ("--rate", 100, "--gyro-unit", "deg/s", "--accel-unit", "g")
+
+
+def calibration(name: str) -> Path:
+    """A stored calibration: of mems_K or of adis_K."""
+
+    def make(path: Path) -> None:
+        kind, number = name.split("_")
+        source = mems(int(number)) if kind == "mems" else adis(int(number))
+        options = ADIS_OPTIONS if kind == "adis" else ()
+        with tempfile.TemporaryDirectory() as folder:
+            command("calibrate", source, *options, "--jobs", 1, "-q", "-o", folder)
+            shutil.copy(Path(folder) / "calibration.json", path)
+
+    return made(f"cal_{name}.json", make)
+
+
+def calibrations() -> list[str]:
+    return ["mems_1", *(["adis_1"] if Path("adis_1.csv").exists() or shared() else [])]
+
+
+# -- parts ----------------------------------------------------------------------------------------
+
+
+@part
+def readers() -> Iterator[tuple[str, Callable[[], Any]]]:
+    for name, path in {"drive": drive() / "imu.csv", "mems": mems(), "faulty": faulty()}.items():
+        yield name, lambda path=path: recording(gmwm.read(path))
+    for number in ADIS_ROWS:
+        if path := adis(number):
+            given = {"rate": 100.0, "units": {"gyro": "deg/s", "accel": "g"}}
+            yield (
+                f"adis_{number}",
+                lambda path=path, given=given: recording(gmwm.read(path, **given)),
+            )
+    yield "imu", lambda: ins.read_imu(drive() / "imu.csv")
+    yield "fixes", lambda: ins.read_fixes(drive() / "fixes.csv")
+    yield (
+        "columns",
+        lambda: recording(
+            gmwm.read(mems(), channels={"gyro_x": 1, "accel_z": 6}, units=SI, time=0)
+        ),
+    )
+    yield "part", lambda: recording(gmwm.read(faulty()).part(50.0, 150.0))
+    for path in made("formats", _make_formats).iterdir():
+        files = [each for each in sorted(path.iterdir()) if each.name != "layout"]
+        layout = path / "layout"
+        given = {"layout": layout.read_text()} if layout.exists() else {}
+        yield path.name, lambda path=files[0], given=given: recording(gmwm.read(path, **given))
+
+
+def _make_formats(folder: Path) -> None:
+    """Whole files of all formats."""
+    formats = importlib.import_module("fuzz_formats")
+    for variant in range(8):
+        originals = {
+            "ulog": formats.ulog(variant),
+            "ardupilot": formats.ardupilot(variant),
+            "mat": formats.mat(variant),
+            "hdf5": formats.hdf5(variant),
+            "mat73": formats.hdf5(variant, is_mat=True),
+            **{kind: formats.arrow(kind, variant) for kind in ("parquet", "feather")},
+            **{f"bag{kind}": formats.bag(kind, variant) for kind in ("1", "SQLITE3", "MCAP")},
+        }
+        for name, files in originals.items():
+            for file, data in files.items():
+                path = folder / f"{name}_{variant}" / file
+                path.parent.mkdir(parents=True, exist_ok=True)
+                path.write_bytes(data)
+
+
+@part
+def variance() -> Iterator[tuple[str, Callable[[], Any]]]:
+    x = np.load(made("walk.npy", _make_walk))
+    holes = x.copy()
+    holes[3000:3200] = holes[7000] = np.nan
+    for wavelet in ("haar", "db2", "sym4", "coif1"):
+        yield wavelet, lambda wavelet=wavelet: gmwm.wavelet_variance(x, 0.01, wavelet=wavelet)
+    yield "gaps", lambda: gmwm.wavelet_variance(holes, 0.01)
+    yield "robust", lambda: gmwm.wavelet_variance(x, 0.01, robust=True)
+    yield "robust_gaps", lambda: gmwm.wavelet_variance(holes, 0.01, robust=True, efficiency=0.8)
+    yield "octave", lambda: gmwm.wavelet_variance(x, 0.01, data_covariance="octave")
+    model = WhiteNoise(1.0) + RandomWalk(0.1)
+    yield "covariance", lambda: gmwm.wavelet_variance(x, 0.01).covariance
+    yield "covariance_under", lambda: gmwm.wavelet_variance(x, 0.01).covariance_under(model.psd)
+    yield "covariance_gaps", lambda: gmwm.wavelet_variance(holes, 0.01).covariance_under(model.psd)
+    yield "haar_covariance", lambda: gmwm.haar_covariance(GaussMarkov(1.0, 3.0).psd, 5000, 0.1)
+    for tau in ("octave", "decade", [0.01, 0.05, 1.0]):
+        yield f"deviations_{tau}", lambda tau=tau: gmwm.deviations(x[:8000], 0.01, tau=tau)
+    yield "modwt", lambda: [*gmwm.modwt(x[:500], "db2").detail, gmwm.modwt(x[:500], "db2").smooth]
+    yield (
+        "stream",
+        lambda: [plain(each.to_dict()) for each in gmwm.stream(mems()).variances.values()],
+    )
+    yield "live", _live
+
+
+def _make_walk(path: Path) -> None:
+    values = gmwm.simulate(WhiteNoise(1.0) + RandomWalk(0.1), 20_000, 0.01, seed=3)
+    with path.open("wb") as stream:
+        np.save(stream, values)
+
+
+def _live() -> Any:
+    x = np.load("walk.npy")
+    stream = gmwm.StreamingVariance(0.01)
+    for piece in np.array_split(x, 7):
+        stream.update(piece)
+    return stream.results()
+
+
+@part
+def diagnosis() -> Iterator[tuple[str, Callable[[], Any]]]:
+    yield "mems", lambda: command("health", mems(), "--json")
+    yield "faulty", lambda: command("health", faulty(), "--json")
+    yield "drive", lambda: command("health", drive() / "imu.csv", "--json")
+    yield "still", lambda: gmwm.find_still(gmwm.read(drive() / "imu.csv"))
+    for number in ADIS_ROWS:
+        if path := adis(number):
+            yield (
+                f"adis_{number}",
+                lambda path=path: command("health", path, *ADIS_OPTIONS, "--json"),
+            )
+
+
+MODELS = {
+    "N": WhiteNoise(1.0),
+    "Q+N": QuantizationNoise(0.05) + WhiteNoise(1.0),
+    "N+B": WhiteNoise(1.0) + BiasInstability(0.5),
+    "N+K": WhiteNoise(1.0) + RandomWalk(0.1),
+    "N+R": WhiteNoise(1.0) + RateRamp(0.02),
+    "N+GM": WhiteNoise(1.0) + GaussMarkov(1.0, 5.0),
+    "N+2GM": WhiteNoise(1.0) + GaussMarkov(1.0, 2.0) + GaussMarkov(1.0, 50.0),
+    "N+line": WhiteNoise(1.0) + Sinusoid(1.0, 0.5),
+    "N+resonance": WhiteNoise(1.0) + Resonance(2.0, 1.0, 0.05),
+    "lowpass": LowPassNoise(1.0, 2.0, 1.0, 0.7) + RandomWalk(0.1),
+    "averaged": AveragedNoise(1.0, 0.5) + RandomWalk(0.1),
+    "AR": AR([0.9], 1.0),
+    "MA": MA([0.4], 1.0),
+    "ARMA": ARMA([0.8], [0.3], 1.0),
+    "ARIMA": ARIMA([0.5], 1, [0.3], 1.0) + WhiteNoise(3.0),
+}
+METHODS = ("gmwm", "mle", "whittle", "em", "allan", "simulated")
+WEIGHTS = ("model", "data", "diagonal", "identity")
+
+
+def _make_series(path: Path) -> None:
+    values = {name: gmwm.simulate(model, 6000, 0.1, seed=5) for name, model in MODELS.items()}
+    with path.open("wb") as stream:
+        np.savez(stream, **values)
+
+
+@part
+def process() -> Iterator[tuple[str, Callable[[], Any]]]:
+    tau, f = 0.1 * 2.0 ** np.arange(12), np.geomspace(1e-3, 5.0, 30)
+    for name, model in MODELS.items():
+        model = model if isinstance(model, gmwm.Model) else gmwm.Model((model,))
+        yield (
+            name,
+            lambda model=model: {
+                "params": model.params,
+                "keys": [each.key for each in model.parameters],
+                "terms": [each.to_dict() for each in model.terms],
+                "labels": model.term_labels(),
+                "haar": outcome(lambda: model.haar_variance(tau, 0.1)),
+                "db2": outcome(lambda: model.wavelet_variance(tau, 0.1, "db2")),
+                "psd": outcome(lambda: model.psd(f, 0.1)),
+                "autocovariance": outcome(lambda: model.autocovariance(np.arange(5), 0.1)),
+                "states": outcome(lambda: model.state_space(0.1)),
+                "drawn": outcome(lambda: model.simulate(500, 0.1, seed=2)),
+                "white": model.white_density(),
+                "drift": model.drift_rate(),
+                "lines": model.lines(),
+            },
+        )
+    for each in ("WhiteNoise", "GaussMarkov", "Resonance", "LowPassNoise", "ARMA", "Sinusoid"):
+        for values in ((-1.0,), (0.0,), (float("nan"),), (1.0, -1.0), (1.0, 1.0, 1.0, 1.0)):
+            yield (
+                f"{each}{values}",
+                lambda each=each, values=values: str(getattr(gmwm, each)(*values)),
+            )
+
+
+@part
+def estimate() -> Iterator[tuple[str, Callable[[], Any]]]:
+    series = np.load(made("series.npz", _make_series))
+    for name, model in MODELS.items():
+        free = (model if isinstance(model, gmwm.Model) else gmwm.Model((model,))).opened()
+        wv = gmwm.wavelet_variance(series[name], 0.1)
+        octave = gmwm.wavelet_variance(series[name], 0.1, data_covariance="octave")
+        for weights in WEIGHTS:
+            yield (
+                f"{name}_{weights}",
+                lambda free=free, wv=wv, octave=octave, weights=weights: gmwm.fit(
+                    free, octave if weights == "data" else wv, weights=weights
+                ),
+            )
+        for method in METHODS[1:]:
+            if method == "em" and name not in ("N+K", "N+GM", "N+R"):
+                continue
+            n = 1500 if method in ("mle", "em") else 6000
+            yield (
+                f"{name}_{method}",
+                lambda free=free, x=series[name][:n], method=method: gmwm.fit(
+                    free, x, 0.1, method=method
+                ),
+            )
+    model = MODELS["N+K"]
+    x = series["N+K"]
+    halves = [gmwm.wavelet_variance(each, 0.1) for each in np.split(x, 2)]
+    yield "joint", lambda: gmwm.fit(model.opened(), halves)
+    yield "robust", lambda: gmwm.fit(model.opened(), gmwm.wavelet_variance(x, 0.1, robust=True))
+    yield "fixed", lambda: gmwm.fit(WhiteNoise() + GaussMarkov(tau=5.0), series["N+GM"], 0.1)
+    yield "bootstrap", lambda: gmwm.bootstrap(gmwm.fit(model.opened(), x, 0.1), 8, seed=1)
+    yield (
+        "test",
+        lambda: gmwm.bootstrap_test(
+            gmwm.fit(WhiteNoise(), x[:1000], 0.1), WhiteNoise() + RandomWalk(), 8
+        ),
+    )
+    yield "parts", lambda: _parts_of(gmwm.fit(model.opened(), x, 0.1))
+    for name in ("N+K", "N+GM", "N+2GM", "Q+N", "N+R", "lowpass", "N+B"):
+        yield f"cramer_rao_{name}", lambda name=name: gmwm.cramer_rao(MODELS[name], 2000, 0.1)
+
+
+def _parts_of(fit: Any) -> Any:
+    return [
+        fit.interval(0.9),
+        fit.error_growth,
+        fit.needed_length(),
+        fit.deviation_interval(fit.wv.tau),
+        [each.to_dict() for each in fit.estimates],
+        fit.reasons,
+        fit.implied,
+    ]
+
+
+@part
+def selection() -> Iterator[tuple[str, Callable[[], Any]]]:
+    series = np.load(made("series.npz", _make_series))
+    for name in ("N", "N+K", "N+2GM", "N+B", "Q+N", "N+R", "lowpass", "AR"):
+        yield name, lambda name=name: gmwm.select(series[name], 0.1)
+    yield "validity", lambda: gmwm.select(series["N+GM"], 0.1, max_gauss_markov=2, rule="validity")
+    yield (
+        "extra",
+        lambda: gmwm.select(series["N+line"], 0.1, max_gauss_markov=1, extra=[Sinusoid()]),
+    )
+
+
+@part
+def calibration_() -> Iterator[tuple[str, Callable[[], Any]]]:
+    out = ("--jobs", 1, "--json", "-o", tempfile.mkdtemp())
+    yield "mems", lambda: command("calibrate", mems(), *out)
+    yield "faulty", lambda: command("calibrate", faulty(), *out)
+    yield (
+        "departures",
+        lambda: command(
+            "calibrate", faulty(), "--remove-departures", "--channels", "gyro_z,accel_z", *out
+        ),
+    )
+    yield "given", lambda: command("calibrate", mems(), "--model", "N + GM", *out)
+    yield (
+        "left",
+        lambda: command("calibrate", faulty(), "--leave", "all", "--channels", "gyro", *out),
+    )
+    yield (
+        "several",
+        lambda: command(
+            "calibrate", mems(), mems(2), "--model", "N + K", "--channels", "gyro_x,accel_x", *out
+        ),
+    )
+    yield "drive", lambda: command("calibrate", drive() / "imu.csv", "--channels", "gyro_x", *out)
+    for number, channels in {1: "gyro,accel", 3: "gyro_z,accel_y", 4: "gyro_x,accel_z"}.items():
+        if path := adis(number):
+            more = (*ADIS_OPTIONS, "--channels", channels)
+            yield (
+                f"adis_{number}",
+                lambda path=path, more=more: command("calibrate", path, *more, *out),
+            )
+    for name in calibrations():
+        yield f"loaded_{name}", lambda name=name: _loaded(gmwm.load(calibration(name)))
+
+
+def _loaded(found: Any) -> Any:
+    frame = found.to_frame()
+    return {"whole": found, "columns": list(frame.columns), "rows": frame.to_dict(orient="list")}
+
+
+@part
+def filter_numbers() -> Iterator[tuple[str, Callable[[], Any]]]:
+    for name in calibrations():
+        path = calibration(name)
+        for form in ("N+K", "N+GM", "N+K+GM", "N+2GM"):
+            for kind in ("bound", "reduce"):
+                more = () if kind == "reduce" or "GM" not in form else ("--tau", 100)
+                given = (kind, path, "--form", form, *more, "--json")
+                yield f"{kind}_{form}_{name}", lambda given=given: command(*given)
+        yield (
+            f"keyframe_{name}",
+            lambda path=path: command("reduce", path, "--keyframe", 1, "--json"),
+        )
+        for kind, tau in {"bound": 50, "reduce": "shared"}.items():
+            yield (
+                f"{kind}_shared_{name}",
+                lambda kind=kind, path=path, tau=tau: command(
+                    kind,
+                    path,
+                    "--form",
+                    "N+GM",
+                    "--shared",
+                    "--tau",
+                    tau,
+                    "--gyro-bias",
+                    1e-3,
+                    "--accel-bias",
+                    1e-2,
+                    "--json",
+                ),
+            )
+        yield (
+            f"level_{name}",
+            lambda path=path: command("bound", path, "--level", 0.9, "--horizon", 10, "--json"),
+        )
+        certify = ("certify", path, "-N", "1e-4,2e-3", "-K", "1e-6,3e-5", "--json")
+        yield f"certify_{name}", lambda certify=certify: command(*certify)
+        yield (
+            f"imperfections_{name}",
+            lambda certify=certify: command(
+                *certify,
+                "--motion",
+                "car",
+                "--scale-error",
+                1,
+                "--misalignment",
+                0.2,
+                "--g-sensitivity",
+                0.01,
+                "--time-offset",
+                5,
+                "--keyframe",
+                0.5,
+            ),
+        )
+        yield f"budget_{name}", lambda path=path: gmwm.error_budget(gmwm.load(path), dt=0.01)
+        yield f"unknown_{name}", lambda path=path: command("budget", path, "--unknown-start")
+        yield (
+            f"own_{name}",
+            lambda path=path: gmwm.certify(gmwm.load(path), gmwm.bound(gmwm.load(path))),
+        )
+    truth = WhiteNoise(1e-4) + GaussMarkov(2e-4, 5.0) + RandomWalk(2e-6)
+    for form in ("N+K", "N+GM", "N+K+GM"):
+        yield (
+            f"model_bound_{form}",
+            lambda form=form: gmwm.bound(
+                truth, form, tau=None if form == "N+K" else 100.0, dt=0.01
+            ),
+        )
+        yield f"model_reduce_{form}", lambda form=form: gmwm.reduce(truth, form, dt=0.01)
+    for name, model in MODELS.items():
+        yield f"model_{name}", lambda model=model: gmwm.bound(model, dt=0.1)
+
+
+STUDY = """\
+trajectory: car
+duration: 60 s
+rate: 20 Hz
+truth: {gyro: {N: 140 deg/h/sqrt(Hz), GM: [[113 deg/h, 2000 s]]}, accel: {N: 200 ug/sqrt(Hz), K: 1e-6}}
+filters: {right: truth, small: {reduce: N+K, of: truth}}
+outages: [[20, 10], [40 s, 10 s]]
+gnss: {interval: 1, position_sd: [2, 2, 4], velocity_sd: 0.1, lever_arm: [1, 0, 0]}
+initial_sd: {tilt: 0.1 deg, heading: 1 deg}
+runs: 4
+seed: 1
+"""
+
+
+def _study(**changes: Any) -> Any:
+    import yaml
+
+    return ins.experiment_from(yaml.safe_load(STUDY) | changes)
+
+
+def _validation() -> Any:
+    own = _study()
+    found = ins.monte_carlo(own.scenario, own.source, own.filters, own.runs, own.seed)
+    return {
+        "filters": {name: _errors(each) for name, each in found.filters.items()},
+        "notices": found.notices,
+    }
+
+
+def _errors(each: Any) -> Any:
+    return [each.time, each.error, each.sd, each.nees, each.nis, each.sensor_error, each.diverged]
+
+
+def _analysis() -> Any:
+    own = _study()
+    found = ins.covariance_analysis(own.scenario, own.truth, own.filters["small"])
+    return [found.time, found.predicted, found.actual, found.nees, found.notices]
+
+
+@part
+def ins_() -> Iterator[tuple[str, Callable[[], Any]]]:
+    log = (f"--imu={drive() / 'imu.csv'}", f"--gnss={drive() / 'fixes.csv'}")
+    out = ("--json", "-o", tempfile.mkdtemp())
+    cal, other = (f"{calibration(f'mems_{k}')}" for k in (1, 2))
+    yield "own", lambda: command("navigate", *log, f"--sensors={cal}", *out)
+    yield (
+        "arm",
+        lambda: command(
+            "navigate",
+            *log,
+            f"--sensors={cal}",
+            "--lever-arm",
+            "1,0.3,-1",
+            "--gate",
+            1e-5,
+            "--zero-velocity",
+            "0.02 m/s",
+            "--heading",
+            30,
+            *out,
+        ),
+    )
+    yield (
+        "compared",
+        lambda: command(
+            "navigate", *log, f"--sensors=A={cal}", f"--sensors=B={other}", "--outages", 30, *out
+        ),
+    )
+    yield "study", _validation
+    yield "covariance", _analysis
+    yield "reduce", lambda: _reduction(ins.reduce(_study().truth, "N+K", (10.0,)))
+    for form in ("car", "helicopter", "loiter"):
+        yield f"trajectory_{form}", lambda form=form: _study(trajectory=form).scenario.trajectory
+    path = ins.car_drive(duration=20.0)
+    yield "emulate", lambda: ins.emulate(path)
+    yield "integrate", lambda: ins.integrate(ins.emulate(path), path.state(0))
+    yield "preintegrate", lambda: ins.preintegrate(ins.emulate(path), _study().truth)
+    yield (
+        "gnss",
+        lambda: ins.gnss(path, velocity_sd=0.1, lever_arm=(1.0, 0.0, 0.0), imu=ins.emulate(path)),
+    )
+
+
+def _reduction(found: Any) -> Any:
+    models = {
+        name: [each.to_dict() for each in model.terms]
+        for name, model in found.models.models.items()
+    }
+    return [found.form, models, found.inflation, found.errors, found.notices]
+
+
+@part
+def population() -> Iterator[tuple[str, Callable[[], Any]]]:
+    paths = [calibration(name) for name in ("mems_1", "mems_2")]
+    yield "compare", lambda: command("compare", *paths, "--json", "-o", _new("compare.html"))
+    if Path("adis_1.csv").exists():
+        more = (calibration("mems_1"), calibration("adis_1"))
+        yield "unequal", lambda: command("compare", *more, "--json", "-o", _new("compare.html"))
+    lot = made("lot", _make_lot)
+    yield (
+        "fleet",
+        lambda: command(
+            "fleet",
+            str(lot / "*.csv"),
+            "--jobs",
+            1,
+            "--model",
+            "N + K",
+            "--json",
+            "-o",
+            _new("fleet"),
+        ),
+    )
+    yield (
+        "selected",
+        lambda: command(
+            "fleet", str(lot / "unit_[12].csv"), "--jobs", 1, "--json", "-o", _new("fleet")
+        ),
+    )
+
+
+def _new(name: str) -> str:
+    return f"{tempfile.mkdtemp()}/{name}"
+
+
+def _make_lot(folder: Path) -> None:
+    folder.mkdir()
+    for unit in range(6):
+        model = WhiteNoise(1e-4 * (1 + 0.1 * unit)) + RandomWalk(1e-5 * (1 + (unit == 4)))
+        values = {"gyro_x": gmwm.simulate(model, 5000, 0.01, seed=unit)}
+        csv(folder / f"unit_{unit}.csv", values)
+    (folder / "unit_9.csv").write_text("no,numbers\nat,all\n")
+
+
+TARGETS = [
+    "kalibr",
+    "openvins",
+    "vins",
+    "orbslam3",
+    "fastlio",
+    "liosam",
+    "kimera",
+    "okvis2",
+    "maplab",
+    "px4",
+    "gtsam",
+    "gtsam-cpp",
+    "ros-covariance",
+    "matlab",
+    "state-space",
+    "gazebo",
+    "pyins",
+    "gnss-ins-sim",
+    "kfgins",
+    "basalt",
+    "glim",
+]
+
+
+@part
+def export() -> Iterator[tuple[str, Callable[[], Any]]]:
+    for name in calibrations():
+        found = gmwm.load(calibration(name))
+        for target in TARGETS:
+            yield f"{target}_{name}", lambda found=found, target=target: _exported(found, target)
+    found = gmwm.load(calibration("mems_1"))
+    for target, more in {
+        "kalibr": {"horizon": 10.0},
+        "kfgins": {"horizon": 30.0},
+        "state-space": {"form": "N+GM"},
+        "gazebo": {"form": "N+K"},
+        "px4": {"form": "N+GM"},
+        "nothing": {},
+    }.items():
+        yield f"{target}_{more}", lambda target=target, more=more: _exported(found, target, **more)
+    yield "list", lambda: command("export", "--list")
+
+
+def _exported(found: Any, target: str, **more: Any) -> Any:
+    text = gmwm.export(found, target, **more)
+    with contextlib.suppress(ValueError):
+        return json.loads(text)
+    return tokens(text)
+
+
+# -- damaged files --------------------------------------------------------------------------------
+
+READ = [
+    "text",
+    "gzip",
+    "npy",
+    "npz",
+    "ulog",
+    "ardupilot",
+    "mat",
+    "mat73",
+    "hdf5",
+    "parquet",
+    "feather",
+    "bag1",
+    "sqlite3",
+    "mcap",
+    "records",
+]
+USES: dict[str, Callable[[Path, int], Any]] = {
+    "document": lambda path, case: gmwm.load(path),
+    "imu": lambda path, case: ins.read_imu(path, 100.0 if case % 2 else None, SI),
+    "fixes": lambda path, case: ins.read_fixes(path),
+    "trajectory": lambda path, case: ins.Trajectory.read(path),
+    "study": lambda path, case: command("navigate", path, "--jobs", 1, "-o", _new("nav"))["status"],
+    "field": lambda path, case: command("navigate", path, "--json", "-o", _new("nav")),
+    "odd": lambda path, case: [
+        gmwm.health(gmwm.read(path, units=SI)),
+        gmwm.calibrate(gmwm.read(path, units=SI), WhiteNoise() + RandomWalk(), jobs=1),
+    ],
+    "numbers": lambda path, case: gmwm.filter_numbers.read_numbers(
+        path, 100.0 if case % 2 else None
+    ),
+    "datasheet": lambda path, case: gmwm.report.read_datasheet(
+        path, {"gyro_x": "gyro", "accel_x": "accel"}
+    ),
+    "checkpoint": lambda path, case: gmwm.StreamingVariance.load(path).results(),
+    "fleet": lambda path, case: gmwm.Fleet.load(path),
+}
+
+
+def _read(path: Path, case: int) -> Any:
+    options: dict[str, Any] = {"units": SI, "damaged": case % 3 == 0}
+    if case % 2:
+        options["rate"] = 100.0
+    if path.suffix == ".dat":
+        options["layout"] = path.with_name("layout").read_text()
+    return recording(gmwm.read(path, **options))
+
+
+def _make_corpus(folder: Path) -> None:
+    kinds = importlib.import_module("fuzz").KINDS
+    for kind in (*READ, *USES):
+        for case in range(PER_KIND.get(kind, 15)):
+            own = folder / kind / str(case)
+            own.mkdir(parents=True)
+            path = kinds[kind].make(random.Random(f"net/{kind}/{case}"), own)
+            (own / "path.txt").write_text(str(path.relative_to(own)))
+
+
+@part
+def fuzz() -> Iterator[tuple[str, Callable[[], Any]]]:
+    corpus = made("fuzz", _make_corpus)
+    importlib.import_module("gmwm.filter_numbers"), importlib.import_module("gmwm.report")
+    for kind in (*READ, *USES):
+        for own in sorted((corpus / kind).iterdir(), key=lambda path: int(path.name)):
+            use, case = USES.get(kind, _read), int(own.name)
+            path = own / (own / "path.txt").read_text()
+            yield f"{kind}/{case}", lambda use=use, path=path, case=case: use(path, case)
+
+
+# -- recording and comparing ----------------------------------------------------------------------
+
+
+def record(folder: Path, only: list[str], inputs: Path | None) -> None:
+    """Write a file of JSON for each part."""
+    folder.mkdir(parents=True, exist_ok=True)
+    home, folder = Path.cwd(), folder.resolve()
+    os.environ["NET_HOME"] = str(home / "x")
+    inputs = (inputs or folder / "inputs").resolve()
+    inputs.mkdir(parents=True, exist_ok=True)
+    sys.path.insert(0, str(home / "tests"))
+    print(f"gmwm of {Path(gmwm.__file__).parent}")
+    try:
+        os.chdir(inputs)
+        for name in only or PARTS:
+            start, found = time.process_time(), {}
+            for case, act in PARTS[name]():
+                begin = time.process_time()
+                found[case] = outcome(act)
+                if (seconds := time.process_time() - begin) > 4.0:
+                    print(f"  {name}/{case}: {seconds:.1f} s", flush=True)
+            failed = [
+                case for case, each in found.items() if isinstance(each, dict) and "failed" in each
+            ]
+            print(
+                f"{name}: {len(found)} cases, {time.process_time() - start:.0f} s"
+                + (f"; failed: {', '.join(failed[:20])}" if failed else ""),
+                flush=True,
+            )
+            text = json.dumps(found, indent=0, sort_keys=True)
+            (folder / f"{name}.json").write_text(text, encoding="utf-8")
+    finally:
+        os.chdir(home)
+
+
+def differences(a: Any, b: Any, tolerance: float, path: str = "") -> Iterator[tuple[str, Any, Any]]:
+    """Place and both values wherever they are not the same."""
+    if isinstance(a, dict) and isinstance(b, dict):
+        for key in sorted({*a, *b}):
+            if key not in a or key not in b:
+                yield f"{path}/{key}", a.get(key, "(none)"), b.get(key, "(none)")
+            else:
+                yield from differences(a[key], b[key], tolerance, f"{path}/{key}")
+    elif _is_number(a) and _is_number(b):
+        floor = ROUND_OFF.get(path.rsplit("/", 1)[-1], 0.0)
+        if abs(a - b) > max(tolerance * max(abs(a), abs(b)), floor):
+            yield path, a, b
+    elif isinstance(a, list) and isinstance(b, list) and len(a) == len(b):
+        scale = max((abs(each) for each in (*a, *b) if _is_number(each)), default=0.0)
+        for i, (one, other) in enumerate(zip(a, b, strict=True)):
+            if _is_number(one) and _is_number(other):
+                if abs(one - other) > tolerance * max(abs(one), abs(other), 1e-3 * scale):
+                    yield f"{path}/{i}", one, other
+            else:
+                yield from differences(one, other, tolerance, f"{path}/{i}")
+    elif a != b:
+        yield path, a, b
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def compare(before: Path, after: Path, tolerance: float, most: int) -> int:
+    """Print the differences of two records, grouped by part and key; how many there are."""
+    count = 0
+    for file in sorted(after.glob("*.json")):
+        if not (before / file.name).exists():
+            print(f"{file.name}: not in {before}")
+            continue
+        old, new = (json.loads((each / file.name).read_text()) for each in (before, after))
+        groups: dict[str, list[tuple[str, Any, Any]]] = defaultdict(list)
+        for place, one, other in differences(old, new, tolerance):
+            case, _, rest = place[1:].partition("/")
+            groups[re.sub(r"/\d+(?=/|$)", "/*", rest) or "(whole)"].append((case, one, other))
+        found = sum(map(len, groups.values()))
+        count += found
+        print(f"{file.stem}: {len(old)} cases, {found} differences")
+        for key, each in sorted(groups.items(), key=lambda item: -len(item[1])):
+            print(f"  {len(each)} x {key}")
+            for case, one, other in each[:most]:
+                print(f"    {case}: {str(one)[:160]}  ->  {str(other)[:160]}")
+    return count
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    commands = parser.add_subparsers(dest="command", required=True)
+    recorder = commands.add_parser("record")
+    recorder.add_argument("folder", type=Path)
+    recorder.add_argument("--only", type=lambda text: text.split(","), default=[])
+    recorder.add_argument("--inputs", type=Path)
+    comparer = commands.add_parser("compare")
+    comparer.add_argument("before", type=Path)
+    comparer.add_argument("after", type=Path)
+    comparer.add_argument("--tolerance", type=float, default=1e-9)
+    comparer.add_argument("--most", type=int, default=4, help="examples of each group")
+    given = parser.parse_args()
+    if given.command == "record":
+        record(given.folder, given.only, given.inputs)
+    else:
+        sys.exit(compare(given.before, given.after, given.tolerance, given.most) > 0)
+
+
+if __name__ == "__main__":
+    main()

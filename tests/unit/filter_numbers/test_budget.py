@@ -1,0 +1,376 @@
+"""The error budget: field numbers, sums, tables, curves, refusals and the command."""
+
+import json
+import re
+from functools import partial
+
+import matplotlib
+
+matplotlib.use("Agg")
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+from hypothesis import given, settings, strategies as st
+
+import gmwm
+from gmwm import (
+    BiasInstability,
+    GaussMarkov,
+    InputError,
+    QuantizationNoise,
+    RandomWalk,
+    RateRamp,
+    WhiteNoise,
+    error_budget,
+)
+from gmwm._core.text import brief
+from gmwm.process import CATALOGUE
+
+G = 9.80665
+DEG = np.pi / 180.0
+DT = 0.01
+GYRO = WhiteNoise(2e-5) + GaussMarkov(1e-5, 100.0) + RandomWalk(1e-7)
+ACCEL = WhiteNoise(1e-3) + BiasInstability(1e-4) + GaussMarkov(2e-4, 5.0) + GaussMarkov(1e-4, 300.0)
+IMU = {f"{kind}_{axis}": m for kind, m in (("gyro", GYRO), ("accel", ACCEL)) for axis in "xyz"}
+
+
+@pytest.fixture(autouse=True)
+def closed():
+    yield
+    plt.close("all")
+
+
+@pytest.fixture(scope="module")
+def budget():
+    return error_budget(IMU, dt=DT)
+
+
+@pytest.fixture(scope="module")
+def calibration():
+    rng = np.random.default_rng(3)
+    n = 4000
+    channels = [
+        gmwm.Channel("gyro_x", WhiteNoise(1e-3).simulate(n, DT, rng), DT, "gyro", "rad/s"),
+        gmwm.Channel("accel_y", WhiteNoise(2e-3).simulate(n, DT, rng), DT, "accel", "m/s^2"),
+        gmwm.Channel("voltage", WhiteNoise(1.0).simulate(n, DT, rng), DT, None, "V"),
+    ]
+    return gmwm.calibrate(gmwm.Recording(tuple(channels), source="bench.csv"), WhiteNoise())
+
+
+# -- numbers --------------------------------------------------------------------------------------
+
+
+def test_the_units_on_data_sheets():
+    # 0.3 deg/sqrt(h) over an hour; 60 ug/sqrt(Hz) is 0.0353 m/s/sqrt(h).
+    models = {"gyro_z": WhiteNoise(0.3 * DEG / 60.0), "accel_z": WhiteNoise(60e-6 * G)}
+    found = error_budget(models, [3600.0], dt=DT)
+    assert np.degrees(found.total("gyro_z")["attitude"]) == pytest.approx([0.3], rel=1e-6)
+    assert found.total("accel_z")["velocity"] == pytest.approx([60e-6 * G * 60.0], rel=1e-6)
+
+
+def test_ten_degrees_an_hour_of_drift_by_hand():
+    # A bias of 10 deg/h that nobody knows, held by a very long correlation time.
+    bias = 10.0 * DEG / 3600.0
+    found = error_budget({"gyro_x": GaussMarkov(bias, 1e9)}, [60.0], dt=DT, calibrated=False)
+    total = found.total("gyro_x")
+    assert np.degrees(total["attitude"]) == pytest.approx([10.0 / 60.0], rel=1e-4)
+    assert total["velocity"] == pytest.approx([G * bias * 60.0**2 / 2.0], rel=1e-4)
+    assert total["position"] == pytest.approx([G * bias * 60.0**3 / 6.0], rel=1e-4)
+
+
+def test_one_milli_g_unknown_by_hand():
+    found = error_budget({"accel_y": GaussMarkov(1e-3 * G, 1e9)}, [60.0], dt=DT, calibrated=False)
+    assert found.total("accel_y")["position"] == pytest.approx([1e-3 * G * 1800.0], rel=1e-4)
+
+
+def test_each_channel_acts_on_what_it_can(budget):
+    found = {name: budget.quantities(name) for name in budget.channels}
+    tilting, pushing = ("attitude", "velocity", "position"), ("velocity", "position")
+    assert found == {
+        "gyro_x": tilting, "gyro_y": tilting, "gyro_z": ("attitude",),
+        "accel_x": pushing, "accel_y": pushing, "accel_z": pushing,
+    }  # fmt: skip
+    # Without an axis in its name a gyro is taken for one that tilts.
+    assert error_budget({"gyro": GYRO}, dt=DT).quantities("gyro") == tilting
+
+
+def test_a_gyro_counts_by_tilt_times_gravity(budget):
+    small = error_budget({"accel_x": GYRO}, dt=DT)
+    gyro = {q: v / G for q, v in budget.total("gyro_x").items()}
+    assert gyro["velocity"] == pytest.approx(small.total("accel_x")["position"])
+
+
+@pytest.mark.parametrize("calibrated", [True, False])
+def test_terms_add_up_by_their_squares(calibrated):
+    whole = error_budget(IMU, dt=DT, calibrated=calibrated)
+    for name, model in IMU.items():
+        parts = [
+            error_budget({name: term}, dt=DT, calibrated=calibrated).total(name)
+            for term in model.terms
+        ]
+        for quantity, total in whole.total(name).items():
+            squares = np.sum([part[quantity] ** 2 for part in parts], axis=0)
+            assert total**2 == pytest.approx(squares)
+    flat = [name for name in IMU if name.endswith(("x", "y"))]
+    for quantity, total in whole.total().items():
+        squares = [whole.total(name).get(quantity, np.zeros(4)) ** 2 for name in flat]
+        assert total**2 == pytest.approx(np.sum(squares, axis=0))
+
+
+@settings(deadline=None, max_examples=15)
+@given(
+    st.sampled_from([p for kind in CATALOGUE for p in kind.examples()]),
+    st.sampled_from(["gyro_x", "gyro_z", "accel_z"]),
+    st.booleans(),
+)
+def test_errors_are_positive_and_end_on_the_curve(process, name, calibrated):
+    found = error_budget({name: process}, [0.5, 3.0, 20.0], dt=0.05, calibrated=calibrated)
+    for row in found.rows:
+        assert np.all(np.isfinite(row.values))
+        assert np.all(np.array(row.values) > 0.0)
+        assert row.curve[0] == pytest.approx(row.values[0], rel=1e-5)
+        assert row.curve[-1] == pytest.approx(row.values[-1], rel=1e-5)
+
+
+def test_a_ramp_counts_by_its_absolute_value():
+    down, up = (error_budget({"gyro_z": RateRamp(r)}, [100.0], dt=1e-4) for r in (-1e-6, 1e-6))
+    assert down.rows[0].component == "rate ramp, |R|"
+    assert down.rows == up.rows
+    assert down.rows[0].values == pytest.approx([1e-6 * 100.0**2 / 2.0], rel=1e-5)
+
+
+def test_a_budget_of_a_calibration_a_fit_and_a_mapping(calibration):
+    whole = error_budget(calibration, (1.0, 5.0))
+    assert whole.channels == ("gyro_x", "accel_y")
+    models = {name: calibration[name].model for name in whole.channels}
+    assert error_budget(models, (1.0, 5.0), dt=DT).rows == whole.rows
+    assert error_budget(dict(calibration.fits), (1.0, 5.0)).rows == whole.rows
+    single = error_budget(calibration["gyro_x"], (1.0, 5.0))
+    assert single.rows == tuple(row for row in whole.rows if row.channel == "gyro_x")
+    n = calibration["gyro_x"].params["N"]
+    assert single.total("gyro_x")["attitude"] == pytest.approx([n, n * 5.0**0.5])
+
+
+def test_a_fit_without_a_channel_goes_by_the_name_that_it_is_given():
+    fit = gmwm.fit(WhiteNoise(), WhiteNoise(1e-3).simulate(1000, DT, 1), dt=DT)
+    assert error_budget({"accel_z": fit}, [1.0]).quantities("accel_z") == ("velocity", "position")
+
+
+def test_the_unit_of_the_file_does_not_matter(tmp_path):
+    values = WhiteNoise(1e-3).simulate(2000, DT, 5)
+    budgets = []
+    for unit, scale in (("rad/s", 1.0), ("deg/s", 1.0 / DEG), ("deg/h", 3600.0 / DEG)):
+        path = tmp_path / "f.csv"
+        path.write_text("\n".join(["gyro_x", *(f"{scale * v:.12g}" for v in values), ""]))
+        recording = gmwm.read(path, rate=100, units={"gyro": unit})
+        budgets.append(error_budget(gmwm.calibrate(recording, WhiteNoise())))
+    for other in budgets[1:]:
+        for quantity, total in other.total().items():
+            assert total == pytest.approx(budgets[0].total()[quantity], rel=1e-6)
+
+
+def test_times_come_in_order_and_once():
+    assert error_budget({"gyro_x": GYRO}, [60, 1, 60], dt=DT).times == (1.0, 60.0)
+
+
+def test_the_largest_contribution(budget):
+    row, share = budget.largest("attitude", "gyro_z")
+    values = {r.component: r.values[-1] for r in budget.rows if r.channel == "gyro_z"}
+    assert row.component == max(values, key=values.get)
+    assert share == pytest.approx(values[row.component] ** 2 / sum(v**2 for v in values.values()))
+    silent = error_budget({"gyro_z": WhiteNoise(0.0)}, dt=DT)
+    assert silent.largest("attitude", "gyro_z")[1] == 0.0
+
+
+# -- notes ----------------------------------------------------------------------------------------
+
+
+def test_what_to_know(calibration):
+    notes = " ".join(error_budget(calibration, (1.0, 3600.0)).notes)
+    assert "neither gyro nor accelerometer, left out: voltage" in notes
+    assert "a record of 40 s shows little of what happens over more than 4 s" in notes
+    assert "the horizontal total lacks gyro_y, accel_x" in notes
+    assert "beyond 600 s the Schuler oscillation" in notes
+    assert error_budget(IMU, dt=DT).notes == ()
+
+
+def test_a_tilt_that_is_no_small_angle():
+    large = {"gyro_x": GaussMarkov(0.1 * DEG, 1e6)}
+    (_, note) = error_budget(large, dt=DT, calibrated=False).notes
+    assert note.startswith("at 600 s the tilt exceeds 10 deg")
+    # A heading is none.
+    heading = {"gyro_z": GaussMarkov(0.1 * DEG, 1e6)}
+    assert error_budget(heading, dt=DT, calibrated=False).notes == ()
+
+
+def test_models_that_are_not_valid_are_named():
+    series = gmwm.Channel("gyro_x", WhiteNoise(1e-3).simulate(4000, DT, 1), DT, "gyro", "rad/s")
+    fit = gmwm.fit(WhiteNoise() + RandomWalk(), series)
+    assert not fit.valid
+    notes = error_budget(fit, (1.0,)).notes
+    assert "the model of gyro_x is not valid: read the notices first" in notes
+
+
+# -- looks ----------------------------------------------------------------------------------------
+
+
+def test_the_table_is_as_wide_as_a_terminal(budget):
+    for found in (budget, error_budget({"gyro_z": QuantizationNoise(1e-5) + RateRamp(1e-9)}, dt=1)):
+        lines = str(found).splitlines()
+        assert max(map(len, lines)) <= 80
+        assert not any(line != line.rstrip() for line in lines)
+
+
+def test_the_table_says_what_the_numbers_say(budget):
+    text = str(budget)
+    for quantity, scale in (("attitude", 1.0 / DEG), ("velocity", 1.0), ("position", 1.0)):
+        block = next(part for part in text.split("\n\n") if part.startswith(quantity))
+        head, *lines = block.splitlines()
+        assert head.split("]")[1].split() == ["1", "s", "10", "s", "60", "s", "600", "s"]
+        last = [float(word.replace(",", "")) for word in lines[-1].split()[-4:]]
+        assert last == pytest.approx(scale * budget.total()[quantity], rel=6e-3)
+        rows = [row for row in budget.rows if row.quantity == quantity]
+        totals = len({row.channel for row in rows})
+        assert len(lines) == len(rows) + totals + 1
+    assert "attitude [deg]" in text
+    assert "values of the slow errors known" in text
+    assert "from\nexact attitude, velocity and position" in text
+
+
+def test_one_term_needs_no_total():
+    text = str(error_budget({"gyro_z": WhiteNoise(1e-5)}, dt=DT))
+    assert "total" not in text
+    assert "horizontal" not in text
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [(0.0, "0"), (0.012345, "0.0123"), (999.4, "999"), (999.6, "1,000"), (1234.5, "1,230"),
+     (45678.9, "45,700"), (999_900.0, "1,000,000"), (3.2e7, "3.2e+07"), (1.2e-7, "1.2e-07")],
+)  # fmt: skip
+def test_short_numbers(value, text):
+    assert brief(value, 3) == text
+    assert len(brief(value, 3)) <= 9
+
+
+@pytest.mark.parametrize(
+    ("value", "text"), [(434.0, "430"), (99.4, "99"), (99.6, "100"), (1e9, "1e+09")]
+)
+def test_two_digits_have_no_exponent_where_a_person_writes_none(value, text):
+    assert brief(value) == text
+
+
+def test_to_dict_is_json_and_complete(budget):
+    content = json.loads(json.dumps(budget.to_dict(), allow_nan=False))
+    assert content["times_s"] == [1.0, 10.0, 60.0, 600.0]
+    assert content["calibrated"] is True
+    assert len(content["rows"]) == len(budget.rows)
+    assert content["totals"]["horizontal"]["position"] == budget.total()["position"].tolist()
+    for row in content["rows"]:
+        assert (
+            row["unit"] == {"attitude": "rad", "velocity": "m/s", "position": "m"}[row["quantity"]]
+        )
+        assert len(row["values"]) == 4
+        assert len(row["curve"]) == len(content["grid_s"])
+
+
+def test_the_curves_of_a_channel(budget):
+    axes = budget.plot(of="gyro_x", quantity="attitude")
+    assert (axes.get_xscale(), axes.get_yscale()) == ("log", "log")
+    assert axes.get_ylabel() == "attitude error, 1 sigma [deg]"
+    lines = {line.get_label(): line for line in axes.get_lines()}
+    assert list(lines) == [*GYRO.term_labels(), "total"]
+    x, y = lines["total"].get_data()
+    assert (x[0], x[-1]) == pytest.approx((1.0, 600.0))
+    assert [y[0], y[-1]] == pytest.approx(np.degrees(budget.total("gyro_x")["attitude"][[0, -1]]))
+    assert np.sqrt(sum(lines[k].get_ydata() ** 2 for k in GYRO.term_labels())) == pytest.approx(y)
+    thin = max(lines[label].get_linewidth() for label in GYRO.term_labels())
+    assert lines["total"].get_linewidth() > 1.5 * thin
+    axes.figure.canvas.draw()
+
+
+def test_the_curves_of_the_horizontal_pair(budget):
+    _, given_axes = plt.subplots()
+    axes = budget.plot(given_axes)
+    assert axes is given_axes
+    labels = [line.get_label() for line in axes.get_lines()]
+    assert labels == ["gyro_x", "gyro_y", "accel_x", "accel_y", "total"]
+    assert axes.get_ylabel() == "position error, 1 sigma [m]"
+    assert axes.get_lines()[-1].get_ydata()[-1] == pytest.approx(budget.total()["position"][-1])
+
+
+def test_a_term_of_zero_is_in_the_table_but_not_drawn():
+    found = error_budget({"gyro_z": WhiteNoise(1e-5) + RandomWalk(0.0)}, [10.0], dt=DT)
+    assert re.search(r"random walk +0$", str(found), re.MULTILINE)
+    assert [line.get_label() for line in found.plot().get_lines()] == ["white noise", "total"]
+    assert len(error_budget({"gyro_z": WhiteNoise(0.0)}, dt=DT).plot().get_lines()) == 1
+
+
+# -- bad input ------------------------------------------------------------------------------------
+
+REFUSED = {
+    "free parameters": (lambda: error_budget({"gyro_x": WhiteNoise()}, dt=DT), "free parameters"),
+    "no quantity": (lambda: error_budget({"temp": GYRO}, dt=DT), "a gyro or an accelerometer"),
+    "no channels": (lambda: error_budget({}, dt=DT), "a gyro or an accelerometer"),
+    "a model alone": (lambda: error_budget(GYRO, dt=DT), "models by channel name"),
+    "no model": (lambda: error_budget({"gyro_x": 3}, dt=DT), "is not an error model"),
+    "no interval": (lambda: error_budget({"gyro_x": GYRO}), "give its sampling interval"),
+    "interval of zero": (lambda: error_budget({"gyro_x": GYRO}, dt=0.0), "positive sampling"),
+    "interval of NaN": (lambda: error_budget({"gyro_x": GYRO}, dt=np.nan), "positive sampling"),
+    "no times": (lambda: error_budget(IMU, [], dt=DT), "give numbers of seconds"),
+    "no numbers": (lambda: error_budget(IMU, ["soon"], dt=DT), "give numbers of seconds"),
+    "infinite time": (lambda: error_budget(IMU, [1, np.inf], dt=DT), "give numbers of seconds"),
+    "negative time": (lambda: error_budget(IMU, [-1.0], dt=DT), "shorter than the sampling"),
+    "time below dt": (lambda: error_budget(IMU, [0.001, 1], dt=DT), "shorter than the sampling"),
+    "total of nothing": (lambda: error_budget(IMU, dt=DT).total("gyro_w"), "has no total 'gyro_w'"),
+    "no horizontal": (lambda: error_budget({"gyro_z": GYRO}, dt=DT).total(), "no total"),
+    "heading in metres": (
+        lambda: error_budget(IMU, dt=DT).plot(of="gyro_z", quantity="position"),
+        "gyro_z has no part in the 'position' error",
+    ),
+}
+
+
+@pytest.mark.parametrize("what", REFUSED)
+def test_bad_input(what):
+    call, words = REFUSED[what]
+    with pytest.raises(InputError, match=re.escape(words)) as refused:
+        call()
+    assert "\n" not in str(refused.value)
+
+
+# -- the command ----------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def run(run):
+    return partial(run, "budget")
+
+
+def test_the_command_prints_the_table(run, calibration, tmp_path):
+    path = calibration.save(tmp_path / "calibration.json")
+    assert run(path) == (0, f"{error_budget(calibration)}\n", "")
+    code, printed, _ = run(path, "--times", "1, 2.5", "--unknown-start")
+    assert code == 0
+    assert printed == f"{error_budget(calibration, (1.0, 2.5), calibrated=False)}\n"
+
+
+def test_the_command_refuses(run, calibration, tmp_path):
+    path = calibration.save(tmp_path / "calibration.json")
+    for arguments, words in (
+        ((path, "--times", "1,x"), "--times 1,x: write seconds, e.g. 1,10,60"),
+        ((path, "--times", "0"), "shorter than the sampling interval"),
+        ((tmp_path / "none.json",), "cannot be read"),
+    ):
+        code, printed, told = run(*arguments)
+        assert (code, printed) == (2, "")
+        assert words in told
+        assert told.count("\n") == 1
+
+
+def test_the_rows_of_both_axes_together_are_named_by_what_they_are(budget):
+    blocks = {part.split()[0]: part.splitlines()[-1] for part in str(budget).split("\n\n")[1:4]}
+    assert blocks["attitude"].split()[0] == "tilt"
+    for quantity in ("velocity", "position"):
+        assert blocks[quantity].strip().startswith("horizontal, radial")

@@ -1,0 +1,442 @@
+"""Monte Carlo: what it promises about seeds, filters, workers, interruptions and initial errors."""
+
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings, strategies as st
+from scipy.stats import chi2, kstest
+
+from gmwm import GaussMarkov, QuantizationNoise, RandomWalk, WhiteNoise
+from gmwm.errors import InputError
+from gmwm.ins.filter.aiding import Aiding, Outage, barometer, gnss
+from gmwm.ins.filter.filter import InitialSd
+from gmwm.ins.filter.solution import Solution
+from gmwm.ins.imu.recorded import Recorded
+from gmwm.ins.imu.sensors import AXES, SensorErrors, SensorModels
+from gmwm.ins.simulation.filter_errors import GROUPS, PER_RUN, FilterErrors
+from gmwm.ins.simulation.scenario import Scenario, Simulated
+from gmwm.ins.simulation.trials import disturbed, monte_carlo
+from gmwm.ins.trajectory.missions import helicopter_mapping
+from gmwm.ins.trajectory.trajectory import NavState
+from gmwm.readers.recording import Recording
+
+DT = 0.05
+TRUTH = helicopter_mapping(duration=130.0, dt=DT).segment(70.0, 130.0)
+GOOD = SensorModels.of(
+    {
+        "gyro": WhiteNoise(1e-4) + GaussMarkov(2e-4, 20.0),
+        "accel": WhiteNoise(1e-3) + GaussMarkov(3e-3, 50.0),
+    }
+)
+POOR = SensorModels.of({"gyro": WhiteNoise(1e-4), "accel": WhiteNoise(1e-3)})
+SCENARIO = Scenario(TRUTH, gnss(TRUTH), (Outage(30.0, 20.0),), interval=5.0)
+
+
+def assert_same(first: FilterErrors, second: FilterErrors):
+    for each in fields(FilterErrors):
+        np.testing.assert_array_equal(getattr(first, each.name), getattr(second, each.name))
+
+
+def study(runs=3, seed=1, filters=None, scenario=SCENARIO, source=None, **options):
+    filters = {"good": GOOD} if filters is None else filters
+    return monte_carlo(scenario, source or Simulated(GOOD), filters, runs, seed, **options)
+
+
+@pytest.fixture(scope="module")
+def reference():
+    return study(12)["good"]
+
+
+# ---- Seeds, filters, workers ----
+
+
+def test_a_seed_gives_one_result(reference):
+    assert reference.runs == 12
+    assert_same(study(12)["good"], reference)
+    assert not np.any(study(2, seed=2)["good"].error == reference.error[:2])
+
+
+def test_a_longer_study_begins_with_the_shorter_one(reference):
+    short = study(7)["good"]
+    for key in PER_RUN:
+        np.testing.assert_array_equal(getattr(short, key), getattr(reference, key)[:7])
+
+
+def test_the_result_does_not_depend_on_workers(reference):
+    """But for the last digit: vector instructions follow the alignment of arrays."""
+    found = study(12, jobs=2)["good"]
+    for each in fields(FilterErrors):
+        expected = getattr(reference, each.name)
+        scale = np.nanmax(np.abs(expected)) if expected.dtype == float else 0.0
+        np.testing.assert_allclose(
+            getattr(found, each.name), expected, rtol=1e-7, atol=1e-9 * scale
+        )
+
+
+def test_a_filter_does_not_change_the_others(reference):
+    both = study(3, filters={"poor": POOR, "good": GOOD, "again": GOOD})
+    assert list(both.filters) == ["poor", "good", "again"]
+    assert_same(both["good"], both["again"])
+    np.testing.assert_array_equal(both["good"].error, reference.error[:3])
+    # The same errors: at the first epoch nothing but the initial error is there.
+    np.testing.assert_array_equal(both["poor"].error[:, 0], both["good"].error[:, 0])
+    assert np.all(both["poor"].error[:, -1] != both["good"].error[:, -1])
+
+
+def test_runs_differ():
+    error = study(6)["good"].error[:, -1, 0]
+    assert np.unique(error).size == 6
+
+
+def test_the_example_is_the_first_run(reference):
+    found = study(1)
+    solution = found.example["good"]
+    at = solution.before & (solution.time == 50.0)
+    np.testing.assert_array_equal(
+        solution.errors(TRUTH)[at][0], reference.error[0, reference.index(50.0)]
+    )
+    assert found.truth is TRUTH
+    assert found.outages == SCENARIO.outages
+    assert found.notices == ()
+
+
+# ---- Interruptions ----
+
+
+def test_a_study_can_be_made_longer(tmp_path, reference):
+    study(5, folder=tmp_path)
+    seen = []
+    assert_same(
+        study(12, folder=tmp_path, progress=lambda done, *_: seen.append(done))["good"], reference
+    )
+    assert seen == list(range(5, 13))
+
+
+def other_scenarios():
+    # The same rows, slower: only the sampling interval differs.
+    late = replace(TRUTH, dt=2.0 * DT)
+    moved = replace(TRUTH, velocity=TRUTH.velocity + 1e-9)
+    plain = gnss(TRUTH)
+    fixes = plain.fixes[0]
+    return {
+        "dt": Scenario(late, gnss(TRUTH), SCENARIO.outages, interval=5.0),
+        "velocity": replace(SCENARIO, trajectory=moved),
+        "outages": replace(SCENARIO, outages=(Outage(30.0, 20.05),)),
+        "initial": replace(SCENARIO, initial_sd=InitialSd(heading=0.01)),
+        "step": replace(SCENARIO, step=0.2),
+        "interval": replace(SCENARIO, interval=6.0),
+        "lever arm": replace(SCENARIO, aiding=replace(plain, lever_arm=[0.0, 0.0, 1.0])),
+        "noise": replace(SCENARIO, aiding=gnss(TRUTH, position_sd=(1.0, 1.0, 1.5 + 1e-12))),
+        "colour": replace(SCENARIO, aiding=gnss(TRUTH, coloured_sd=(0.1, 0.0, 0.0))),
+        "kind": replace(SCENARIO, aiding=replace(plain, fixes=(replace(fixes, kind="velocity"),))),
+        "barometer": replace(SCENARIO, aiding=plain + barometer(TRUTH)),
+    }
+
+
+@pytest.mark.parametrize("change", [*other_scenarios()])
+def test_the_folder_of_another_scenario_is_refused(tmp_path, change):
+    study(1, folder=tmp_path)
+    study(1, folder=tmp_path, scenario=replace(SCENARIO))
+    with pytest.raises(InputError, match="belongs to another study"):
+        study(1, folder=tmp_path, scenario=other_scenarios()[change])
+
+
+def test_the_folder_of_other_models_is_refused(tmp_path):
+    study(1, folder=tmp_path)
+    tiny = SensorModels.of(
+        {
+            "gyro": WhiteNoise(1e-4 * (1.0 + 1e-15)) + GaussMarkov(2e-4, 20.0),
+            "accel": WhiteNoise(1e-3) + GaussMarkov(3e-3, 50.0),
+        }
+    )
+    bias = SensorModels.of(GOOD, {"gyro_x": 1e-9})
+    for each in (tiny, bias, POOR):
+        with pytest.raises(InputError, match="belongs to another study"):
+            study(1, folder=tmp_path, filters={"good": each})
+        with pytest.raises(InputError, match="belongs to another study"):
+            study(1, folder=tmp_path, source=Simulated(each))
+    for filters in ({"Good": GOOD}, {"good": GOOD, "poor": POOR}):
+        with pytest.raises(InputError, match="belongs to another study"):
+            study(1, folder=tmp_path, filters=filters)
+    with pytest.raises(InputError, match="belongs to another study"):
+        study(1, seed=2, folder=tmp_path)
+    with pytest.raises(InputError, match="belongs to another study"):
+        study(1, folder=tmp_path, source=recorded(1))
+
+
+def test_names_of_filters_survive_the_folder(tmp_path):
+    names = ["a/b", "", "N+K x 1.5", "файл"]
+    filters = dict.fromkeys(names, GOOD)
+    first = study(1, filters=filters, folder=tmp_path)
+    again = study(1, filters=filters, folder=tmp_path)
+    assert list(again.filters) == names
+    for name in names:
+        assert_same(first[name], again[name])
+
+
+# ---- Recorded errors ----
+
+
+def recorded(stretches, extra=0):
+    values = np.random.default_rng(5).standard_normal((stretches * TRUTH.n + extra, 6)) * 1e-3
+    arrays = dict(zip(AXES, values.T, strict=True))
+    given_in = Recording.from_arrays(arrays, 1.0 / DT, {"gyro": "rad/s", "accel": "m/s^2"}, "a.csv")
+    return Recorded.of(given_in, TRUTH.duration)
+
+
+def test_fewer_stretches_than_runs_are_noted():
+    found = study(9, source=recorded(3, extra=TRUTH.n // 2))
+    assert found["good"].runs == 3
+    (notice,) = found.notices
+    assert notice.code == "fewer-runs"
+    assert notice.text.startswith("3 runs in place of 9")
+    assert study(2, source=recorded(3)).notices == ()
+    # True sensor errors are not known.
+    assert np.all(np.isnan(found["good"].sensor_nees))
+    assert np.all(np.isnan(found["good"].sensor_error))
+    assert np.all(np.isfinite(found["good"].nees))
+
+
+# ---- Initial errors ----
+
+
+def test_initial_errors_have_the_covariance_claimed():
+    sd = InitialSd(position=3.0, velocity=0.2, tilt=0.02, heading=0.05)
+    state = NavState(np.array([0.8, 3.1, 500.0]), np.array([40.0, -25.0, 3.0]),
+                     np.array([0.4, -0.3, 2.5]))  # fmt: skip
+    rng = np.random.default_rng(6)
+    count = 1500
+    turned = np.array([error_of(disturbed(state, sd, rng), state) for _ in range(count)])
+    # Drawn in their own order and sign, to first order in the angles.
+    rng = np.random.default_rng(6)
+    given_out = np.array([rng.standard_normal(9) for _ in range(count)])
+    standard = turned / sd.deviations
+    np.testing.assert_allclose(standard, given_out, atol=0.05)
+    np.testing.assert_allclose(standard.mean(axis=0), 0.0, atol=4.0 / np.sqrt(count))
+    np.testing.assert_allclose(np.cov(standard.T), np.eye(9), atol=5.0 / np.sqrt(count))
+
+
+def error_of(estimate, truth):
+    """Errors as a solution reports them."""
+    one = np.zeros((1, 9, 9))
+    still = replace(
+        TRUTH,
+        lla=np.tile(truth.lla, (2, 1)),
+        velocity=np.tile(truth.velocity, (2, 1)),
+        rpy=np.tile(truth.rpy, (2, 1)),
+    )
+    from gmwm.ins.geometry import matrix_from_rpy
+
+    solution = Solution(
+        time=np.zeros(1), before=np.zeros(1, dtype=bool), lla=estimate.lla[None],
+        velocity=estimate.velocity[None], matrix=matrix_from_rpy(estimate.rpy)[None],
+        covariance=one, sensor_errors=np.zeros((1, 6)), sensor_covariance=np.zeros((1, 6, 6)),
+        innovations=None, state_names=(), states=np.zeros(0), state_covariance=np.zeros((0, 0)),
+    )  # fmt: skip
+    return solution.errors(still)[0]
+
+
+def test_the_first_nees_is_right_and_stays_so_without_aiding():
+    """A flight at 30 m/s: a wrong sign of the attitude error would show within seconds."""
+    free = Scenario(
+        TRUTH.segment(0.0, 20.0), Aiding(), initial_sd=InitialSd(1.0, 0.1, 0.01, 0.03), interval=4.0
+    )
+    found = study(200, scenario=free)["good"]
+    total = found.nees.sum(axis=0)
+    for i, part in enumerate(GROUPS.values()):
+        dof = 200 * (part.stop - part.start)
+        low, high = chi2.ppf([1e-5, 1.0 - 1e-5], dof)
+        assert np.all((low < total[:, i]) & (total[:, i] < high))
+    first = found.nees[:, 0, 3]
+    assert kstest(first, chi2(9).cdf).pvalue > 1e-4
+    np.testing.assert_allclose(
+        found.sd[:, 0], np.tile([1.0] * 3 + [0.1] * 3 + [0.01, 0.01, 0.03], (200, 1)), rtol=1e-3
+    )
+
+
+# ---- What is kept ----
+
+
+def test_kept_figures_are_those_of_the_solution():
+    found = study(1)
+    runs, solution = found["good"], found.example["good"]
+    k = runs.index(50.0)
+    j = int(np.flatnonzero(solution.before & (solution.time == 50.0))[0])
+    error, P = solution.errors(TRUTH)[j], solution.covariance[j]
+    for i, part in enumerate(GROUPS.values()):
+        expected = error[part] @ np.linalg.inv(P[part, part]) @ error[part]
+        assert runs.nees[0, k, i] == pytest.approx(expected)
+        assert runs.log_det[0, k, i] == pytest.approx(np.log(np.linalg.det(P[part, part])))
+    np.testing.assert_allclose(runs.sd[0, k], np.sqrt(np.diag(P)))
+    standard = solution.innovations.standard
+    assert runs.nis[0] == pytest.approx([np.sum(standard**2), standard.size])
+    products = standard[1:] * standard[:-1]
+    assert runs.whiteness[0] == pytest.approx(np.sum(products) / np.sqrt(np.sum(products**2)))
+
+
+@dataclass(frozen=True)
+class Steady:
+    """Constant errors of the sensors."""
+
+    values: tuple[float, ...]
+
+    @property
+    def available(self):
+        return None
+
+    def draw(self, run, n, dt, rng):
+        slow = np.tile(self.values, (n, 1)) + 1e-9 * np.arange(n)[:, None]
+        return SensorErrors(slow, slow)
+
+
+def test_sensor_errors_are_those_of_the_sample_after_an_epoch():
+    source = Steady((1e-4,) * 3 + (1e-3,) * 3)
+    found = study(1, source=source)
+    runs, solution = found["good"], found.example["good"]
+    k = runs.index(50.0)
+    j = int(np.flatnonzero(solution.before & (solution.time == 50.0))[0])
+    slow = source.draw(0, TRUTH.n, DT, None).slow
+    np.testing.assert_allclose(
+        runs.sensor_error[0, k], solution.sensor_errors[j] - slow[1000], atol=1e-14
+    )
+    # No sample follows the last epoch.
+    assert np.all(np.isnan(runs.sensor_error[0, -1]))
+    assert np.isnan(runs.sensor_nees[0, -1])
+    assert np.all(np.isfinite(runs.sensor_nees[0, :-1]))
+
+
+def test_fast_processes_are_judged_at_their_own_sample():
+    """Errors that hardly outlive a sample: those of the sample before would be quite others."""
+    fast = SensorModels.of(
+        {
+            "gyro": WhiteNoise(1e-5) + GaussMarkov(1e-3, 0.02),
+            "accel": WhiteNoise(1e-4) + QuantizationNoise(1e-4),
+        }
+    )
+    runs = study(60, filters={"fast": fast}, source=Simulated(fast))["fast"]
+    squares = runs.sensor_nees[:, 1:-1]
+    dof = 6 * squares.size
+    assert np.mean(squares) / 6.0 == pytest.approx(1.0, abs=5.0 * np.sqrt(2.0 / dof))
+
+
+def test_a_random_walk_that_starts_at_zero_counts_from_its_first_step():
+    walk = SensorModels.of(
+        {
+            "gyro": WhiteNoise(1e-4) + GaussMarkov(2e-4, 20.0),
+            "accel": WhiteNoise(1e-3) + RandomWalk(1e-4),
+        }
+    )
+    runs = study(60, filters={"walk": walk}, source=Simulated(walk))["walk"]
+    assert np.all(np.isnan(runs.sensor_nees[:, 0]))
+    assert np.all(np.isfinite(runs.sensor_nees[:, 1:-1]))
+    at = runs.index(50.0)
+    low, high = chi2.ppf([1e-5, 1.0 - 1e-5], 60 * 6)
+    assert low < np.sum(runs.sensor_nees[:, at]) < high
+
+
+def test_whiteness_does_not_depend_on_the_size_of_the_innovations():
+    """Twice as much noise as believed: the innovations are too large, and hardly coloured."""
+    loud = Scenario(TRUTH, gnss(TRUTH), interval=30.0)
+    runs = study(2, scenario=loud)["good"]
+    assert np.all(np.abs(runs.whiteness) < 4.0)
+
+
+# ---- Divergence ----
+
+
+@dataclass(frozen=True)
+class Wild:
+    """Errors that no filter survives, in some runs."""
+
+    runs: tuple[int, ...]
+
+    @property
+    def available(self):
+        return None
+
+    def draw(self, run, n, dt, rng):
+        total = np.zeros((n, 6))
+        if run in self.runs:
+            total[n // 2 :, 3:] = 1e9
+        return SensorErrors(total)
+
+
+def test_a_filter_that_diverges_is_counted():
+    found = study(5, source=Wild((1, 3)), filters={"good": GOOD})["good"]
+    assert found.diverged == 2
+    lost = np.isnan(found.error[:, :, 0])
+    assert not np.any(lost[[0, 2, 4]])
+    for run in (1, 3):
+        first = int(np.argmax(lost[run]))
+        assert first > 0
+        assert found.time[first] == pytest.approx(30.0, abs=6.0)
+        assert np.all(np.isnan(found.error[run, first:]))
+        assert np.all(np.isnan(found.nees[run, first:]))
+        assert np.all(np.isfinite(found.error[run, :first]))
+        assert np.isfinite(found.nis[run]).all()
+
+
+# ---- Scenarios and input ----
+
+
+def test_epochs_kept():
+    scenario = replace(SCENARIO, outages=(Outage(10.0, 10.0), Outage(30.0, 20.35)))
+    outputs = scenario.outputs()
+    time = outputs.time(DT)
+    np.testing.assert_allclose(time[outputs.before == 1], [20.0, 50.35])
+    # Every second of an outage.
+    seconds = np.concatenate([np.arange(0.0, 60.1, 5.0), np.arange(10.0, 20.0), np.arange(30, 51)])
+    np.testing.assert_allclose(time[outputs.before == 0], np.unique(seconds), atol=1e-9)
+    assert np.all(np.diff(time) >= 0.0)
+    found = study(1, scenario=scenario)["good"]
+    assert found.time[found.index(50.35)] == pytest.approx(50.35)
+
+
+@given(st.integers(40, 4000), st.sampled_from([0.5, 0.05, 1.0 / 64.0]))
+@settings(max_examples=40, deadline=None)
+def test_some_300_epochs_are_kept(n, dt):
+    rows = np.zeros((n + 1, 3))
+    scenario = Scenario(replace(TRUTH, dt=dt, lla=rows, velocity=rows, rpy=rows), Aiding())
+    kept = scenario.outputs().epoch.size
+    assert kept <= 302
+    assert kept >= min(150, int(n * dt)) or kept >= n // 2
+
+
+def test_an_outage_beyond_the_end_is_refused():
+    Scenario(TRUTH, gnss(TRUTH), (Outage(40.0, 20.0),))
+    with pytest.raises(InputError, match=r"from 40 s to 60\.05 s goes beyond the end"):
+        Scenario(TRUTH, gnss(TRUTH), (Outage(40.0, 20.05),))
+
+
+def test_an_outage_that_ends_between_epochs_is_refused():
+    with pytest.raises(InputError, match=r"ends at 50\.02 s, between two epochs .* 0\.05 s"):
+        Scenario(TRUTH, gnss(TRUTH), (Outage(30.0, 20.02),))
+    # Sums of decimal fractions are not exact.
+    Scenario(TRUTH, gnss(TRUTH), (Outage(0.1, 0.2), Outage(59.9, 0.1)))
+
+
+def test_an_epoch_that_was_not_kept(reference):
+    with pytest.raises(InputError, match=r"no errors were kept at 51\.3 s"):
+        reference.index(51.3)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"filters": {}}, "no filter"),
+        ({"runs": 0}, "runs = 0"),
+        ({"runs": 2.5}, r"runs = 2\.5"),
+        ({"seed": -1}, "seed = -1"),
+        ({"scenario": replace(SCENARIO, step=-0.1)}, "step"),
+        ({"scenario": replace(SCENARIO, interval=-1.0)}, "interval"),
+    ],
+)
+def test_what_cannot_be_used(options, message):
+    with pytest.raises(InputError, match=message):
+        study(**options)
+
+
+def test_a_filter_that_is_not_there():
+    with pytest.raises(InputError, match="no filter 'poor': there are good"):
+        study(1)["poor"]
