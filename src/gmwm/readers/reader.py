@@ -135,23 +135,19 @@ def read(
     else:
         topics = (topic,) if isinstance(topic, str) else tuple(topic)
         tables = open_tables(path, Wanted(topics, clock, channels is not None, damaged), format)
-    return _read(tables, Given(rate, units or {}, channels, time))
-
-
-read.__doc__ = str(read.__doc__).replace("FORMATS", ", ".join(f'``"{name}"``' for name in NAMES))
-
-
-def _read(tables: Sequence[Table], given: Given) -> Recording:
-    """The recording of one table or of several."""
+    given = Given(rate, units or {}, channels, time)
     if len(tables) == 1:
         return recording_of(tables[0], given).recording
     own = [table for table in tables if has_sensors(table)]
-    chosen = [(own[0], given.channels)] if len(own) == 1 else shares(own, given.channels)
+    chosen = [(own[0], channels)] if len(own) == 1 else shares(own, channels)
     parts = [recording_of(table, replace(given, channels=only)) for table, only in chosen]
     for table in tables:
         if table not in own:
             parts[0] = with_temperature(parts[0], table)
     return joined(parts)
+
+
+read.__doc__ = str(read.__doc__).replace("FORMATS", ", ".join(f'``"{name}"``' for name in NAMES))
 
 
 def recording_of(table: Table, given: Given) -> Part:

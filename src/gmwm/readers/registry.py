@@ -44,6 +44,7 @@ class Wanted:
 class Format:
     """A kind of file.
 
+    title: What messages call such files.
     opener: Function of a path and `Wanted` that gives tables, as "module:name" in this room; it
         asks for the libraries of an extra that it needs by `gmwm.readers.table.library`.
     suffixes: Endings of its files.
@@ -53,6 +54,7 @@ class Format:
     """
 
     name: str
+    title: str
     opener: str
     suffixes: tuple[str, ...] = ()
     magic: tuple[bytes, ...] = ()
@@ -65,29 +67,34 @@ class Format:
         return tables
 
 
-_TEXT = Format("text", "text.csv_table:open_text")
-_FRAME = Format("a table in memory", "formats.frame:open_frame")
+_TEXT = Format("text", "CSV and other delimited text (plain or .gz)", "text.csv_table:open_text")
+_FRAME = Format("a table in memory", "tables in memory", "formats.frame:open_frame")
 
 FORMATS = (
     _TEXT,
-    Format("numpy", "formats.numpy_file:open_numpy", (".npy", ".npz")),
+    Format("numpy", "NPY and NPZ", "formats.numpy_file:open_numpy", (".npy", ".npz")),
     # By content before by name: a MAT file of version 7.3 is one of HDF5 behind 512 bytes.
-    Format("hdf5", "formats.hdf5:open_hdf5", (".h5", ".hdf5", ".hdf"),
+    Format("hdf5", "HDF5", "formats.hdf5:open_hdf5", (".h5", ".hdf5", ".hdf"),
            (b"\x89HDF\r\n\x1a\n", b"MATLAB 7.3")),
-    Format("mat", "formats.hdf5:open_mat", (".mat",), (b"MATLAB 5.0",)),
-    Format("parquet", "formats.frame:open_parquet", (".parquet",), (b"PAR1",)),
-    Format("feather", "formats.frame:open_feather", (".feather", ".arrow"), (b"ARROW1", b"FEA1")),
-    Format("rosbag", "logs.rosbag:open_bag", (".bag",), (b"#ROSBAG",), True, True),
-    Format("rosbag2", "logs.rosbag:open_bag", (".mcap", ".db3"),
+    Format("mat", "MAT", "formats.hdf5:open_mat", (".mat",), (b"MATLAB 5.0",)),
+    Format("parquet", "Parquet", "formats.frame:open_parquet", (".parquet",), (b"PAR1",)),
+    Format("feather", "Feather", "formats.frame:open_feather", (".feather", ".arrow"),
+           (b"ARROW1", b"FEA1")),
+    Format("rosbag", "bags of ROS 1", "logs.rosbag:open_bag", (".bag",), (b"#ROSBAG",), True, True),
+    Format("rosbag2", "bags of ROS 2", "logs.rosbag:open_bag", (".mcap", ".db3"),
            (b"\x89MCAP", b"SQLite format 3"), True, True),
-    Format("ulog", "logs.ulog:open_ulog", (".ulg",), (b"ULog\x01\x12\x35",), True),
+    Format("ulog", "PX4 logs", "logs.ulog:open_ulog", (".ulg",), (b"ULog\x01\x12\x35",), True),
     # Other binary files have the suffix .bin too.
-    Format("ardupilot", "logs.ardupilot:open_ardupilot", (), (b"\xa3\x95",), True),
+    Format("ardupilot", "ArduPilot logs", "logs.ardupilot:open_ardupilot", (), (b"\xa3\x95",),
+           True),
 )  # fmt: skip
 """All formats of files; a file of no other format is text."""
 
 NAMES = tuple(each.name for each in FORMATS)
 """Names of the formats, as ``format`` of `gmwm.read` has them."""
+
+READABLE = f"gmwm reads {', '.join(each.title for each in FORMATS)}"
+"""For messages about files of another kind."""
 
 
 def open_tables(data: Any, wanted: Wanted, name: str | None = None) -> Sequence[Table]:

@@ -19,12 +19,6 @@ from gmwm.errors import InputError
 from gmwm.issues import Notice, notice
 from gmwm.readers import tuning
 
-READABLE = (
-    "gmwm reads CSV and other delimited text (plain or .gz), NPY and NPZ, ROS bags, PX4 and "
-    "ArduPilot logs, MAT, HDF5, Parquet and Feather"
-)
-"""For messages about files of another kind."""
-
 LARGEST = 1e150
 """Magnitudes from here on are rejected like infinities: their squares overflow."""
 

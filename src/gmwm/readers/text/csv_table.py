@@ -65,9 +65,15 @@ class CsvTable(Table):
         if damages and not head:
             damage_notice(path.name, damages[0], is_taken)
         layout = with_dialect(find_layout(path.name, head), path.name, head)
-        about = {"tentative": layout.tentative, "notices": list(layout.notices)}
-        own = {"path": path, "layout": layout, "is_taken": is_taken}
-        return cls(source=path.name, names=layout.names, **about, **own)
+        return cls(
+            source=path.name,
+            names=layout.names,
+            tentative=layout.tentative,
+            notices=list(layout.notices),
+            path=path,
+            layout=layout,
+            is_taken=is_taken,
+        )
 
     def _note_damage(self, what: str) -> None:
         found = damage_notice(self.source, what, self.is_taken)

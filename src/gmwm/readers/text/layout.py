@@ -13,7 +13,7 @@ from gmwm.errors import InputError
 from gmwm.issues import Notice, notice
 from gmwm.readers import tuning
 from gmwm.readers.names import meaning, of_dates
-from gmwm.readers.table import READABLE
+from gmwm.readers.registry import READABLE
 from gmwm.readers.text.cells import BLANKS, date_columns, number, split_header, split_line
 
 _COMMENT_MARKS = ("#", "%", "//")
