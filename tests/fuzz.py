@@ -43,11 +43,9 @@ from gmwm._core.runs import do_runs
 from gmwm.diagnosis import health
 from gmwm.estimate import bootstrap, cramer_rao
 from gmwm.export import TARGETS, export, read_numbers
-from gmwm.ins.field import Measured
-from gmwm.ins.field.fix_file import read_fix_log
-from gmwm.ins.field.imu_file import read_imu_log
-from gmwm.ins.logs import read_log
+from gmwm.ins.logs import Measured, read_fix_log, read_imu_log
 from gmwm.ins.spec import experiment_from, read_document
+from gmwm.ins.trajectory.trajectory_file import read_log
 from gmwm.report import read_datasheet, write_report
 
 SECONDS, BYTES = 20, 2 << 30

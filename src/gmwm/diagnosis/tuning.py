@@ -95,6 +95,10 @@ BESIDE_REPEATED, MUCH_REPEATED = 4.0, 0.05
 has a ratio of 1.6 (Gaussian) to 2.7 (Laplace). Part of the samples that make the white noise 2.5 %
 too small."""
 
+CUT_TO_ZERO = 1.1
+"""Zeros times those two steps off over the square of those one step off: at most one of noise; 2 to
+1.26 of Gaussian noise cut in steps up to 0.7 of it."""
+
 LAST_OF_END, FEWEST_OF_END, FEWEST_OF_PART, PARTS_OF_END = 1.0 / 32.0, 1024, 8, 16
 """Part of the samples, and samples at least, next to an extreme in which the fall of the density is
 looked for; samples of one of so many parts of the record that show it."""

@@ -225,9 +225,6 @@ def _wanted(model: Model) -> dict[str, _Line]:
     return {line.key: line for line in wanted}
 
 
-# -- regions --------------------------------------------------------------------------------------
-
-
 def _given_runs(
     model: Model,
     wv: WaveletVariance,
@@ -331,9 +328,6 @@ def _allowance(combination: FloatArray, covariance: FloatArray) -> FloatArray:
     )
 
 
-# -- lines ----------------------------------------------------------------------------------------
-
-
 def _coefficients(
     wv: WaveletVariance, parts: Sequence[tuple[_Line, _Run]]
 ) -> tuple[FloatArray, FloatArray]:
@@ -359,9 +353,6 @@ def _fitted(model: Model, values: Mapping[str, float]) -> Model:
         elif key in values:
             terms.append(term.with_values(**{key: values[key]}))
     return Model(tuple(terms))
-
-
-# -- notices --------------------------------------------------------------------------------------
 
 
 def _slope_notices(wv: WaveletVariance, given: Sequence[tuple[_Line, _Run]]) -> list[Notice]:

@@ -19,7 +19,7 @@ from .registry import (
     is_frame as is_frame,
     is_text as is_text,
 )
-from .table import label as label
+from .table import label as label, load_columns as load_columns
 from .text import (
     DATE as DATE,
     CsvTable as CsvTable,

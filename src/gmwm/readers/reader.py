@@ -42,7 +42,7 @@ from gmwm.readers.names import NUMBERS_OF_SENSORS, bare, meaning, stated_seconds
 from gmwm.readers.recording import Channel, Recording, auxiliary_channel
 from gmwm.readers.registry import NAMES, Wanted, open_tables
 from gmwm.readers.rest import rest_notices
-from gmwm.readers.table import Table
+from gmwm.readers.table import Table, load_columns
 
 
 def read(
@@ -275,15 +275,15 @@ def _load(
     wanted = {*roles.columns, *(column.index for column in roles.auxiliary)}
     kept, notices = list(roles.auxiliary), list[Notice]()
     try:
-        arrays = table.load_or_map(sorted(wanted))
+        arrays = load_columns(table, sorted(wanted))
     except InputError:
         if not roles.auxiliary:
             raise
-        arrays, kept = table.load_or_map(roles.columns), []
+        arrays, kept = load_columns(table, roles.columns), []
         n = arrays[roles.columns[0]].size
         for column in roles.auxiliary:
             with suppress(InputError):
-                values = table.load_or_map([column.index])[column.index]
+                values = load_columns(table, [column.index])[column.index]
                 if values.size == n:
                     arrays[column.index] = values
                     kept.append(column)

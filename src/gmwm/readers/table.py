@@ -83,26 +83,6 @@ class Table(ABC):
                 memory.require(tuning.BYTES_PER_SAMPLE * max(samples, held), self.source)
         return {column: _joined(parts.pop(column)) for column in columns}
 
-    def load_or_map(self, columns: Sequence[int]) -> Columns:
-        """Read some columns; those of a long file are kept on disk and mapped.
-
-        A file is long if it needs more than `gmwm._core.memory.held`.
-        """
-        try:
-            with memory.limited(memory.held()):
-                return self.load(columns)
-        except InputError as error:
-            if error.code != "memory":
-                raise
-        spools = {column: Spool(1) for column in columns}
-        with memory.limited(max(memory.budget() / (1 << 30), tuning.GIGABYTES_OF_BLOCK)):
-            for block in self.segments(columns, tuning.ROWS_OF_BLOCK):
-                for column, values in block.items():
-                    spools[column].append(values)
-        if not spools[columns[0]].n:
-            raise InputError(f"{self.source} holds no samples: record longer")
-        return {column: spool.array()[:, 0] for column, spool in spools.items()}
-
     def check_usable(self, column: int, values: FloatArray, first: int) -> None:
         """Reject infinite values and those too large for use; ``first`` is the row of the first."""
         if not usable(values):
@@ -114,6 +94,27 @@ class Table(ABC):
                 f"number{others}: cut the file before that row, or save NaN if the sample is "
                 "missing"
             )
+
+
+def load_columns(table: Table, columns: Sequence[int]) -> Columns:
+    """Read some columns; those of a long file are kept on disk and mapped.
+
+    A file is long if it needs more than `gmwm._core.memory.held`.
+    """
+    try:
+        with memory.limited(memory.held()):
+            return table.load(columns)
+    except InputError as error:
+        if error.code != "memory":
+            raise
+    spools = {column: Spool(1) for column in columns}
+    with memory.limited(max(memory.budget() / (1 << 30), tuning.GIGABYTES_OF_BLOCK)):
+        for block in table.segments(columns, tuning.ROWS_OF_BLOCK):
+            for column, values in block.items():
+                spools[column].append(values)
+    if not spools[columns[0]].n:
+        raise InputError(f"{table.source} holds no samples: record longer")
+    return {column: spool.array()[:, 0] for column, spool in spools.items()}
 
 
 def _joined(parts: list[FloatArray]) -> FloatArray:

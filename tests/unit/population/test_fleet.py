@@ -13,7 +13,7 @@ import gmwm
 from fleets import QUICK
 from gmwm import Calibration, Fleet, InputError, Model, RandomWalk, WhiteNoise
 from gmwm._core.notices import Notice
-from gmwm.population import DERIVED, SCHEMA, Item, Task, task as tasks
+from gmwm.population import DERIVED, SCHEMA, Item, Number, Task, task as tasks
 
 READING = ("rate", "units")
 
@@ -138,7 +138,7 @@ def test_numbers_of_a_filter_are_those_of_bound(lot, outputs):
     found = outputs[1]
     expected = gmwm.bound(found[lot[0]]["gyro_x"], horizon=60.0)
     number = found.units[lot[0]].numbers["gyro_x"]
-    assert number["filter_N"] == (expected.N, expected.stderr["N"], True)
+    assert number["filter_N"] == Number(expected.N, expected.stderr["N"], True)
     # Without a walk in the model, K is an upper bound.
     assert number["filter_K"].value > 0.0
     assert not number["filter_K"].found

@@ -21,7 +21,7 @@ from gmwm.process import as_model
 from gmwm.selection import tuning
 from gmwm.selection.bandwidth import Bandwidth, _Beside
 from gmwm.selection.ranking import Candidate, Choices, candidate_of
-from gmwm.selection.select import Selection, _simplest_of_ties
+from gmwm.selection.select import _SHOWN, Selection, _simplest_of_ties
 
 FILTER = Bandwidth(
     LowPassNoise(bandwidth=20.0, order=2.0, damping=0.7), LowPassNoise(order=2.0, damping=0.7), 2
@@ -86,21 +86,19 @@ def test_the_smallest_of_those_within_two_comes_first_and_the_rest_stays():
     lines = str(selection).splitlines()
     assert [line[:2] for line in lines[1:5]] == [" =", " =", ">=", "  "]
     assert [float(line[2:12]) for line in lines[1:5]] == pytest.approx([0.0, 1.0, 1.9, 2.1])
-    assert "these tie" in lines[5] and len(lines) == 6
+    assert "fit equally well" in lines[5] and len(lines) == 6
     other = str(replace(selection, chosen=ranking[3]))
-    assert "simpler than the first" in other and "> " in other
+    assert "chosen: simpler" in other and "> " in other
 
 
 def test_more_candidates_than_are_shown_are_counted():
-    from gmwm.selection.select import _SHOWN
-
     fit = gmwm.fit(WhiteNoise(), WhiteNoise(1.0).simulate(100, 1.0, 1), dt=1.0)
     for extra in (0, 1, 3):
         ranking = tuple(candidate(5.0 * k) for k in range(_SHOWN + extra))
         text = str(Selection(ranking, ranking[0], fit))
         assert (f"and {extra} more" in text) is (extra > 0)
         assert text.count("white noise") == _SHOWN
-        assert "these tie" not in text
+        assert "equally" not in text
 
 
 def test_a_candidate_of_a_fit_has_its_statistic_and_price():

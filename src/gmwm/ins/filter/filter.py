@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -49,10 +49,10 @@ class InitialSd:
         rad.
     """
 
-    position: float = 1.0
-    velocity: float = 0.1
-    tilt: float = np.radians(0.1)
-    heading: float = np.radians(0.5)
+    position: float = field(default=1.0, metadata={"unit": "m"})
+    velocity: float = field(default=0.1, metadata={"unit": "m/s"})
+    tilt: float = field(default=np.radians(0.1), metadata={"unit": "rad"})
+    heading: float = field(default=np.radians(0.5), metadata={"unit": "rad"})
 
     def __post_init__(self) -> None:
         for name in ("position", "velocity", "tilt", "heading"):

@@ -6,6 +6,7 @@ field; pydantic says where it stood.
 
 from __future__ import annotations
 
+import dataclasses
 import re
 from collections.abc import Mapping
 from typing import Annotated, Any, ClassVar, Self, TypeVar
@@ -15,12 +16,15 @@ from pydantic import (
     BeforeValidator,
     ConfigDict,
     Field,
+    GetCoreSchemaHandler,
     StringConstraints,
     ValidationError,
     ValidatorFunctionWrapHandler,
     WrapValidator,
+    create_model,
     model_validator,
 )
+from pydantic_core import CoreSchema, core_schema
 
 from gmwm._core import checks
 from gmwm._core.units import factor
@@ -67,6 +71,23 @@ class Spec(BaseModel):
     def given(self) -> dict[str, Any]:
         """The values that were written, by key."""
         return {name: getattr(self, name) for name in self.model_fields_set}
+
+
+class Declared:
+    """Marks a key that makes a dataclass at once, whose fields have their ``unit`` as metadata."""
+
+    def __get_pydantic_core_schema__(
+        self, source: Any, handler: GetCoreSchemaHandler
+    ) -> CoreSchema:
+        """Schema of the keys with their units, and then of the dataclass."""
+        fields: dict[str, Any] = {
+            each.name: (Annotated[float, number(each.metadata["unit"])], each.default)
+            for each in dataclasses.fields(source)
+        }
+        form = create_model(source.__name__, __base__=Spec, **fields)
+        return core_schema.no_info_after_validator_function(
+            lambda found: source(**found.given), handler.generate_schema(form)
+        )
 
 
 def _sentence(error: ValidationError, where: str, needs: str) -> tuple[str, str]:

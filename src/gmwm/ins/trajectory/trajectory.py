@@ -13,13 +13,13 @@ from gmwm._core.checks import is_number, positive, real_numbers, sampling_interv
 from gmwm._core.spool import release, windows
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
-from gmwm.ins.logs import read_log
 from gmwm.ins.trajectory.splines import (
     smoothed,
     track_velocity,
     unwrapped_angles,
     unwrapped_longitudes,
 )
+from gmwm.ins.trajectory.trajectory_file import read_log
 
 _ATTITUDE_CUTOFF = 5.0  # of that of the track
 HIGHEST_LATITUDE = math.radians(89.0)

@@ -5,11 +5,9 @@ import pytest
 
 from gmwm._core.distributions import chi2
 from gmwm.errors import InputError
-from gmwm.ins import tuning
-from gmwm.ins.filter.aiding import KINDS, Aiding, Fixes, Outage, barometer, gnss, standstills
+from gmwm.ins import Aiding, Fixes, Outage, barometer, car_drive, emulate, gnss, standstills, tuning
+from gmwm.ins.filter import KINDS
 from gmwm.ins.geometry import matrix_from_rpy, ned_difference
-from gmwm.ins.imu.emulation import emulate
-from gmwm.ins.trajectory.missions import car_drive
 
 
 @pytest.fixture(scope="module")

@@ -17,14 +17,25 @@ from gmwm import (
     WhiteNoise,
 )
 from gmwm.errors import InputError
-from gmwm.ins.filter.aiding import Aiding, Fixes, Outage, barometer, gnss, standstills
-from gmwm.ins.filter.filter import Filter, InitialSd, navigate
-from gmwm.ins.filter.mechanization import integrate
+from gmwm.ins import (
+    Aiding,
+    Fixes,
+    Imu,
+    InitialSd,
+    NavState,
+    Outage,
+    SensorModels,
+    barometer,
+    car_drive,
+    emulate,
+    gnss,
+    helicopter_mapping,
+    integrate,
+    navigate,
+    standstills,
+)
+from gmwm.ins.filter import Filter
 from gmwm.ins.geometry import matrix_from_rotation_vector, matrix_from_rpy, rpy_from_matrix
-from gmwm.ins.imu.emulation import Imu, emulate
-from gmwm.ins.imu.sensors import SensorModels
-from gmwm.ins.trajectory.missions import car_drive, helicopter_mapping
-from gmwm.ins.trajectory.trajectory import NavState
 
 SENSORS = SensorModels.of(
     {

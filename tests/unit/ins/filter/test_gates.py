@@ -8,13 +8,19 @@ from scipy.stats import chi2
 
 from gmwm import GaussMarkov, WhiteNoise
 from gmwm.errors import InputError
-from gmwm.ins import tuning
-from gmwm.ins.filter import filter_kernels
-from gmwm.ins.filter.aiding import KINDS, Aiding, Fixes, Outage, barometer, gnss
-from gmwm.ins.filter.filter import navigate
-from gmwm.ins.imu.emulation import emulate
-from gmwm.ins.imu.sensors import SensorModels
-from gmwm.ins.trajectory.missions import car_drive
+from gmwm.ins import (
+    Aiding,
+    Fixes,
+    Outage,
+    SensorModels,
+    barometer,
+    car_drive,
+    emulate,
+    gnss,
+    navigate,
+    tuning,
+)
+from gmwm.ins.filter import KINDS, filter_kernels
 
 DT = 0.05
 SENSORS = SensorModels.of(

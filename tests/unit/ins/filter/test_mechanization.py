@@ -4,7 +4,25 @@ import numpy as np
 import pytest
 
 from gmwm.errors import InputError
-from gmwm.ins.filter.mechanization import integrate, step
+from gmwm.ins import (
+    Accelerate,
+    Climb,
+    Imu,
+    NavState,
+    Stop,
+    Straight,
+    Trajectory,
+    Turn,
+    car_drive,
+    emulate,
+    fixed_wing_loiter,
+    helicopter_mapping,
+    integrate,
+    perform,
+)
+from gmwm.ins.filter import Kinematics
+from gmwm.ins.filter.mechanization import step
+from gmwm.ins.filter.records import Increments
 from gmwm.ins.geometry import (
     RATE,
     matrix_from_rotation_vector,
@@ -12,18 +30,7 @@ from gmwm.ins.geometry import (
     ned_difference,
     offset,
 )
-from gmwm.ins.imu.emulation import Imu, emulate
-from gmwm.ins.trajectory.manoeuvres import (
-    Accelerate,
-    Climb,
-    Manoeuvre,
-    Stop,
-    Straight,
-    Turn,
-    perform,
-)
-from gmwm.ins.trajectory.missions import car_drive, fixed_wing_loiter, helicopter_mapping
-from gmwm.ins.trajectory.trajectory import NavState, Trajectory
+from gmwm.ins.trajectory.manoeuvres import Manoeuvre
 from marks import slow
 
 NORTH = (math.radians(46.5), 0.1, 400.0)
@@ -147,7 +154,8 @@ def test_coning_leaves_what_savage_says(corrected: bool) -> None:
     for i in range(n):
         v[:] = lla[:] = 0.0  # it would fall
         before = rotation[max(i - 1, 0)] if corrected else rotation[i]
-        step(C, v, lla, *rotation[i], 0.0, 0.0, 0.0, *before, 0.0, 0.0, 0.0, dt)
+        now = Increments(*rotation[i], 0.0, 0.0, 0.0)
+        step(Kinematics(C, v, lla), now, Increments(*before, 0.0, 0.0, 0.0), dt)
 
     # After whole turns only the frame has moved: at the equator about north.
     end = matrix_from_rotation_vector(np.array([-RATE * n * dt, 0.0, 0.0])) @ start
@@ -177,10 +185,8 @@ def test_rate_and_force_that_change_linearly_leave_no_second_order_error(seed: i
         turned = matrix_from_rotation_vector(dt * (rate[0] * u + 0.5 * rate[1] * u**2))
         exact += w * dt * turned @ (force[0] + force[1] * u)
     (angle, push), (angle_before, push_before) = integrals(0.0), integrals(-1.0)
-    found = step(
-        np.eye(3), np.zeros(3), np.array([0.5, 0.1, 0.0]),
-        *angle, *push, *angle_before, *push_before, dt,
-    )  # fmt: skip
+    at = Kinematics(np.eye(3), np.zeros(3), np.array([0.5, 0.1, 0.0]))
+    found = step(at, Increments(*angle, *push), Increments(*angle_before, *push_before), dt)
     sculling = (np.cross(angle_before, push) + np.cross(push_before, angle)) / 12.0
     np.testing.assert_allclose(found, exact, atol=0.02 * np.min(np.abs(sculling)), rtol=0.0)
 
@@ -190,7 +196,8 @@ def test_the_step_returns_the_specific_force_of_the_frame() -> None:
     force = np.array([0.02, -0.01, -0.1])
     expected = C @ force
     v, lla = np.array([1.0, 2.0, 0.0]), np.array([0.5, 0.1, 0.0])
-    found = step(C, v, lla, 0.0, 0.0, 0.0, *force, 0.0, 0.0, 0.0, *force, 0.01)
+    now = Increments(0.0, 0.0, 0.0, *force)
+    found = step(Kinematics(C, v, lla), now, now, 0.01)
     np.testing.assert_allclose(found, expected, atol=1e-7)
 
 
@@ -209,14 +216,15 @@ def test_the_attitude_stays_orthonormal() -> None:
     C, v, lla = np.eye(3), np.zeros(3), np.array(NORTH)
     for turn in rng.normal(0.0, 0.05, size=(5000, 3)):
         v[:] = 0.0  # it would fall
-        step(C, v, lla, *turn, 0.0, 0.0, -0.098, *turn, 0.0, 0.0, -0.098, 0.01)
+        now = Increments(*turn, 0.0, 0.0, -0.098)
+        step(Kinematics(C, v, lla), now, now, 0.01)
     assert np.max(np.abs(C @ C.T - np.eye(3))) < 5000 * 1e-15
 
 
 def test_a_start_at_a_pole_is_refused() -> None:
     imu = Imu(0.01, np.zeros((3, 3)), np.zeros((3, 3)))
     state = NavState(np.array([1.565, 0.0, 0.0]), np.zeros(3), np.zeros(3))
-    with pytest.raises(InputError, match=r"latitude 89\.\d+ deg is too near the pole"):
+    with pytest.raises(InputError, match=r"latitude 89\.\d+ deg at index 0 is too near a pole"):
         integrate(imu, state)
 
 

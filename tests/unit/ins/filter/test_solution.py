@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from gmwm.errors import InputError
-from gmwm.ins.filter.filter import modified, skew, unmodified
-from gmwm.ins.filter.solution import FilterInnovations, Solution
+from gmwm.ins import FilterInnovations, Solution, Trajectory
+from gmwm.ins.filter import modified, unmodified
+from gmwm.ins.filter.filter import skew
 from gmwm.ins.geometry import matrix_from_rotation_vector, matrix_from_rpy
-from gmwm.ins.trajectory.trajectory import Trajectory
 
 
 def made(time, lla, velocity, matrix):

@@ -4,12 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from gmwm.ins.geometry import (
-    gravity,
-    ned_difference,
-    offset,
-    radii,
-)
+from gmwm.ins.geometry import gravity, ned_difference, offset, radii
 
 LATITUDES = st.floats(-math.radians(88), math.radians(88))
 

@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from gmwm.errors import InputError
-from gmwm.ins.imu.recorded import Recorded
-from gmwm.ins.imu.sensors import AXES
+from gmwm.ins import Recorded
+from gmwm.ins.imu import AXES
 from gmwm.readers.recording import Recording
 
 UNITS = {"gyro": "rad/s", "accel": "m/s^2"}

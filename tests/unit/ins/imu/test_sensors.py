@@ -5,7 +5,8 @@ import pytest
 
 from gmwm import GaussMarkov, QuantizationNoise, RandomWalk, RateRamp, WhiteNoise
 from gmwm.errors import InputError
-from gmwm.ins.imu.sensors import AXES, SensorModels
+from gmwm.ins import SensorModels
+from gmwm.ins.imu import AXES
 
 PLAIN = {"gyro": WhiteNoise(1e-4), "accel": WhiteNoise(1e-3)}
 

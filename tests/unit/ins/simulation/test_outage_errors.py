@@ -8,10 +8,9 @@ from hypothesis import given, settings, strategies as st
 from scipy.stats import binom, ttest_rel
 
 from gmwm.errors import InputError
-from gmwm.ins.filter.aiding import Outage
-from gmwm.ins.simulation.filter_errors import FilterErrors
-from gmwm.ins.simulation.outage_errors import QUANTITIES, difference, pooled_sizes, sizes, spread
-from gmwm.ins.simulation.trials import MonteCarlo
+from gmwm.ins import FilterErrors, MonteCarlo, Outage, difference, spread
+from gmwm.ins.simulation import QUANTITIES
+from gmwm.ins.simulation.outage_errors import pooled_sizes, sizes
 
 TIME = np.array([0.0, 30.0, 30.0, 60.0, 60.0])
 BEFORE = np.array([False, True, False, True, False])

@@ -9,16 +9,27 @@ from scipy.stats import chi2, kstest
 
 from gmwm import GaussMarkov, QuantizationNoise, RandomWalk, WhiteNoise
 from gmwm.errors import InputError
-from gmwm.ins.filter.aiding import Aiding, Outage, barometer, gnss
-from gmwm.ins.filter.filter import InitialSd
-from gmwm.ins.filter.solution import Solution
-from gmwm.ins.imu.recorded import Recorded
-from gmwm.ins.imu.sensors import AXES, SensorErrors, SensorModels
-from gmwm.ins.simulation.filter_errors import GROUPS, PER_RUN, FilterErrors
-from gmwm.ins.simulation.scenario import Scenario, Simulated
-from gmwm.ins.simulation.trials import disturbed, monte_carlo
-from gmwm.ins.trajectory.missions import helicopter_mapping
-from gmwm.ins.trajectory.trajectory import NavState
+from gmwm.ins import (
+    Aiding,
+    FilterErrors,
+    InitialSd,
+    NavState,
+    Outage,
+    Recorded,
+    Scenario,
+    SensorErrors,
+    SensorModels,
+    Simulated,
+    Solution,
+    barometer,
+    gnss,
+    helicopter_mapping,
+    monte_carlo,
+)
+from gmwm.ins.imu import AXES
+from gmwm.ins.simulation import GROUPS
+from gmwm.ins.simulation.filter_errors import PER_RUN
+from gmwm.ins.simulation.trials import disturbed
 from gmwm.readers.recording import Recording
 
 DT = 0.05

@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from gmwm.errors import InputError
+from gmwm.ins import car_drive, emulate, fixed_wing_loiter, helicopter_mapping
 from gmwm.ins.geometry import ned_difference
-from gmwm.ins.imu.emulation import emulate
-from gmwm.ins.trajectory.missions import car_drive, fixed_wing_loiter, helicopter_mapping
 
 
 @pytest.mark.parametrize("spacing", [150.0, 300.0, 570.0])

@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from gmwm.errors import InputError
+from gmwm.ins import Trajectory, through
 from gmwm.ins.geometry import ned_difference, offset
-from gmwm.ins.trajectory.routes import through
-from gmwm.ins.trajectory.trajectory import Trajectory
 
 START = np.array([math.radians(47.0), math.pi - 1e-4, 300.0])
 CORNERS = np.array(

@@ -2,7 +2,8 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
-from gmwm.ins.trajectory.splines import coefficients, smoothed, unwrapped_angles
+from gmwm.ins.trajectory import coefficients, unwrapped_angles
+from gmwm.ins.trajectory.splines import smoothed
 
 
 @pytest.mark.parametrize("n", [1, 2, 3, 10])
