@@ -1,5 +1,7 @@
 """Bias of classical and robust wavelet variances where one per cent of the samples are outliers."""
 
+import argparse
+
 import numpy as np
 
 import gmwm
@@ -34,4 +36,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
+    argparse.ArgumentParser(description=__doc__.splitlines()[0]).parse_args()
     main()

@@ -9,6 +9,7 @@ Carlo draws the errors, filters them and compares with the truth, as a study doe
 
 from __future__ import annotations
 
+import argparse
 from time import process_time
 
 import numpy as np
@@ -80,4 +81,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
+    argparse.ArgumentParser(description=__doc__.splitlines()[0]).parse_args()
     main()

@@ -6,6 +6,7 @@
 
 from __future__ import annotations
 
+import argparse
 import os
 import resource
 import tempfile
@@ -50,4 +51,5 @@ def main():
 
 
 if __name__ == "__main__":
+    argparse.ArgumentParser(description=__doc__.splitlines()[0]).parse_args()
     main()

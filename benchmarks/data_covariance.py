@@ -1,5 +1,6 @@
 """Full covariance of the wavelet variances of a million samples: from the data and from a model."""
 
+import argparse
 import resource
 from time import perf_counter
 
@@ -39,4 +40,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
+    argparse.ArgumentParser(description=__doc__.splitlines()[0]).parse_args()
     main()

@@ -8,7 +8,7 @@ and errors, which simulate and fit records, and real are exact covariance analys
 
 from __future__ import annotations
 
-import sys
+import argparse
 import warnings
 from collections.abc import Mapping
 
@@ -388,8 +388,12 @@ def real(folder: str) -> None:
 
 if __name__ == "__main__":
     warnings.simplefilter("ignore", gmwm.FitWarning)
-    if sys.argv[1:2] == ["real"]:
-        real(sys.argv[2])
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("parts", nargs="*", default=["length", "tightness", "rules", "flight"],
+                        help="tables by name; or 'real FOLDER'")  # fmt: skip
+    parts = parser.parse_args().parts
+    if parts[0] == "real":
+        real(parts[1])
     else:
-        for part in sys.argv[1:] or ["length", "tightness", "rules", "flight"]:
+        for part in parts:
             globals()[part]()

@@ -5,6 +5,8 @@ Run with ``python benchmarks/imperfections.py``; the table of docs/filter-number
 
 from __future__ import annotations
 
+import argparse
+
 import numpy as np
 from scipy.spatial.transform import Rotation
 
@@ -62,4 +64,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
+    argparse.ArgumentParser(description=__doc__.splitlines()[0]).parse_args()
     main()

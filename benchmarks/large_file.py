@@ -73,7 +73,9 @@ def main() -> None:
         seen, seconds = watched([*gmwm_calibrate, "-o", str(results)])
         found = gmwm.load(results / "calibration.json")
     channel = 8.0 * rows
-    print(f"{given.gigabytes:g} GB, {rows:,} rows, {channel / 1e6:.0f} MB a channel: {seconds:.0f} s")
+    print(
+        f"{given.gigabytes:g} GB, {rows:,} rows, {channel / 1e6:.0f} MB a channel: {seconds:.0f} s"
+    )
     print(f"a short file takes {base / 1e6:.0f} MB; beyond that, in channels:")
     for part in np.array_split(seen, 10):
         own, mapped = (part[:, 1].max() - base) / channel, part[:, 2].max() / channel

@@ -7,7 +7,7 @@ navigation filter on a loiter with ten sets of a sensor, by Monte Carlo beside c
 
 from __future__ import annotations
 
-import sys
+import argparse
 from textwrap import fill
 from time import process_time
 
@@ -135,5 +135,10 @@ def _largest(size: int, runs: int) -> float:
 
 
 if __name__ == "__main__":
-    for part in sys.argv[1:] or ["chains", "flight"]:
-        {"chains": chains, "flight": flight}[part]()
+    tables = {"chains": chains, "flight": flight}
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument(
+        "parts", nargs="*", default=list(tables), help="chains, flight; by default both"
+    )
+    for part in parser.parse_args().parts:
+        tables[part]()

@@ -7,6 +7,7 @@ up tables, as the first call in a process does.
 
 from __future__ import annotations
 
+import argparse
 from collections.abc import Callable
 from time import perf_counter
 
@@ -15,7 +16,8 @@ import numpy as np
 from gmwm import WhiteNoise
 from gmwm.variance.covariance.haar import dyadic_levels, haar_covariance
 from gmwm.variance.covariance.robust import robust_covariance
-from gmwm.variance.kernels import cumulative, haar_coefficients, haar_moments
+from gmwm.variance.kernels import cumulative, haar_coefficients
+from gmwm.variance.levels import haar_moments
 from gmwm.variance.robust import EFFICIENCY, robust_variance
 
 SAMPLES = 1_000_000
@@ -41,7 +43,7 @@ def main() -> None:
 
     def classical() -> list[float]:
         integral = cumulative(x, 0.0)
-        return [haar_moments(integral, runs, m)[1] for m in levels]
+        return haar_moments(x, integral, runs, np.array(levels, dtype=float))[:, 1].tolist()
 
     def robust() -> list[float]:
         integral = cumulative(x, 0.0)
@@ -70,4 +72,5 @@ def _report(base: str, before: tuple[float, float], name: str, after: tuple[floa
 
 
 if __name__ == "__main__":
+    argparse.ArgumentParser(description=__doc__.splitlines()[0]).parse_args()
     main()

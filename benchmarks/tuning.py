@@ -11,6 +11,7 @@ the right model move, in standard errors (root mean square).
 
 from __future__ import annotations
 
+import argparse
 import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -176,4 +177,5 @@ def _weight(pair: list[Outcome], usual: Outcome) -> float:
 
 
 if __name__ == "__main__":
+    argparse.ArgumentParser(description=__doc__.splitlines()[0]).parse_args()
     main()

@@ -1,6 +1,7 @@
 """Draw the rooms of the package by layer, from the import contract: ``docs/img/architecture.svg``.
 
-Each box has the first sentence of the room's docstring. A room imports only from boxes below it.
+Each box has the first sentence of the room's docstring and, on the right, what the room makes of the
+data. A room imports only from boxes below it.
 """
 
 import ast
@@ -12,6 +13,20 @@ from pathlib import Path
 DOCS = Path(__file__).parent
 SOURCE = DOCS.parent / "src" / "gmwm"
 WIDTH, ROW, GAP, LETTERS = 920, 58, 10, 6.4
+MADE = {
+    "readers": "file -> Recording",
+    "variance": "-> WaveletVariance",
+    "diagnosis": "-> Health",
+    "estimate": "-> Fit",
+    "selection": "-> Selection",
+    "calibration": "-> Calibration",
+    "ins": "-> Solution",
+    "filter_numbers": "-> FilterNumbers",
+    "export": "-> file of a program",
+    "population": "-> SensorComparison, Fleet",
+    "report": "-> page",
+}
+"""What a room makes of the data."""
 
 
 def layers() -> list[list[str]]:
@@ -40,6 +55,8 @@ def picture() -> str:
                 f'<rect x="{x:.0f}" y="{y}" width="{width:.0f}" height="{ROW}" rx="6" '
                 'fill="#eef3f8" stroke="#5b7c99"/>'
                 f'<text x="{x + 12:.0f}" y="{y + 20}" font-weight="bold">{escape(room)}</text>'
+                f'<text x="{x + width - 12:.0f}" y="{y + 20}" text-anchor="end" '
+                f'fill="#2a6">{MADE.get(room, "").replace("->", "→")}</text>'
             )
             lines = textwrap.wrap(sentence(room), int((width - 24) / LETTERS))[:2]
             for i, line in enumerate(lines):

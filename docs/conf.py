@@ -34,11 +34,11 @@ html_title = f"gmwm {release}"
 html_copy_source = html_show_sourcelink = False
 
 ROOMS = {
-    "readers": "Recordings", "diagnosis": "What is wrong with a recording",
+    "readers": "Recordings", "diagnosis": "Health of a recording",
     "variance": "Wavelet and Allan variance", "process": "Processes and models",
     "estimate": "Estimation", "selection": "Selection", "calibration": "Calibration",
-    "comparison": "Comparison", "fleet": "Many units", "budget": "Error budget",
-    "filter_numbers": "Numbers for a filter", "export": "Files for other programs",
+    "population": "Several recordings, many units",
+    "filter_numbers": "Filter numbers and error budget", "export": "Files for other programs",
     "ins": "Navigation", "errors": "Errors",
 }  # fmt: skip
 """Room -> title of its page."""
