@@ -1,7 +1,7 @@
 """Draw the rooms of the package by layer, from the import contract: ``docs/img/architecture.svg``.
 
-Each box has the first sentence of the room's docstring and, on the right, what the room makes of the
-data. A room imports only from boxes below it.
+Each box has the first sentence of the room's docstring and, on the right, what the room makes of
+the data. A room imports only from boxes below it.
 """
 
 import ast
