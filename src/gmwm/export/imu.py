@@ -7,9 +7,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from gmwm.issues import Notice
 from gmwm.errors import InputError
 from gmwm.filter_numbers import FilterNumbers
+from gmwm.issues import Notice
 from gmwm.process import GaussMarkov, Model, RandomWalk, WhiteNoise
 
 SENSORS = {"gyro": "gyroscope", "accel": "accelerometer"}
