@@ -551,7 +551,7 @@ KINDS = {
     ),
     "imu": Kind(
         4, file_of("i.csv", lambda rng: mutated_text(rng, recording(rng))),
-        lambda rng, path: read_imu_log(path, rng.choice((None, 100.0)), SI),
+        lambda rng, path: read_imu_log(path, rate=rng.choice((None, 100.0)), units=SI),
     ),
     "fixes": Kind(
         6, file_of("f.csv", lambda rng: mutated_text(rng, fixes(rng))),

@@ -26,7 +26,7 @@ from gmwm.calibration.calibration import Calibration
 from gmwm.cli.calibrate import show
 from gmwm.cli.console import progress_bar
 from gmwm.cli.demo import show_truth
-from gmwm.estimate.result.fit import Fit
+from gmwm.estimate import Fit
 from gmwm.process import as_model
 from gmwm.variance.wavelet import WaveletVariance
 from places import GOLDEN

@@ -8,10 +8,6 @@ FALSE_ALARM = 1e-3
 LONG_RECORD = 3600.0
 """s: slow errors of inertial sensors have correlation times of minutes."""
 
-SAME_PEAK = 0.02
-"""Relative difference of the frequency of one line or resonance in several stretches: lines of
-engines and fans wander by about as much (docs/real-data.md)."""
-
 JITTER, LARGE_JITTER = 0.1, 0.3
 """Root mean square of the steps of time stamps, in sampling intervals, for a note and a warning."""
 

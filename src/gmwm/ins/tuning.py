@@ -15,22 +15,22 @@ STANDSTILL = 1e-3
 """m/s, below which the vehicle of a simulated trajectory stands."""
 
 POSITION_SD = (1.0, 1.0, 1.5)
-"""Of fixes that state none, to the north, east and down, m: of a good receiver in the open."""
+"""m north, east and down, for fixes without their own: a good receiver in the open."""
 
 VELOCITY_SD = (0.1, 0.1, 0.15)
-"""The same of velocities, m/s."""
+"""m/s, likewise."""
 
 GATE = 1e-5
-"""Probability of a larger innovation beyond which a standstill is not believed: one in a day of one
-a second is rejected falsely."""
+"""Probability of a larger innovation at which a standstill is rejected: at one a second, one in a
+day is rejected falsely."""
 
 GATE_PATIENCE = 5
-"""Rejections in a row after which the filter is more likely wrong than the fixes: of 3 % outliers,
-five in a row come once in 40 million."""
+"""Rejections in a row after which the filter is more likely wrong than the fixes: with 3 %
+outliers, five in a row come once in 40 million."""
 
 BAROMETER = (10.0, 3600.0)
-"""m and s: how far the height of a pressure is off once it is set at the start, and for how long;
-weather changes it by some hPa, 8 m each, in hours."""
+"""m and s: drift of a barometric height set at the start, and its correlation time: weather changes
+the pressure by some hPa, 8 m each, in hours."""
 
 # -- verdicts -------------------------------------------------------------------------------------
 
@@ -38,7 +38,7 @@ CONTRADICTED = 0.001
 """Probability below which a filter is called inconsistent, or its innovations contradict it."""
 
 CONFIDENCE = 0.95
-"""Of bands and intervals."""
+"""Confidence of bands and intervals."""
 
 # -- validations ----------------------------------------------------------------------------------
 
@@ -46,16 +46,16 @@ SETTLED = 0.25
 """Fraction of the trajectory after which the filter with GNSS is judged."""
 
 KEPT_EPOCHS = 300
-"""Epochs of a run whose errors are kept, besides those of outages: a figure shows no more."""
+"""Number of epochs of a run whose errors are kept, besides outages: a figure shows no more."""
 
 OUTAGE_EPOCHS = 1.0
 """s between epochs that are kept in an outage."""
 
 BOOTSTRAP_DRAWS = 4000
-"""Of the runs, for intervals of 95 %: 100 draws lie beyond each end."""
+"""Draws of the runs for intervals of 95 %: 100 draws lie beyond each end."""
 
 BIAS_WINDOW = 60.0
-"""s over which a recording is averaged to see how far its slow errors go: outages of a minute."""
+"""s over which a recording is averaged to measure its slow errors: an outage of a minute."""
 
 # -- reduced models -------------------------------------------------------------------------------
 
@@ -69,10 +69,10 @@ SHORTEST_PEAK = 0.189
 """s, shortest averaging time at which a peak is read off: a correlation time of 0.1 s."""
 
 SLOPE = 3e-3
-"""Of the score over the logarithm of a factor, below which the search for factors ends."""
+"""Slope of the score over the logarithm of a factor at which the search for factors ends."""
 
 INERTIA = 1e-3
-"""Of the score, for a factor's squared distance from 1: what does not matter stays there."""
+"""Score for a factor's squared distance from 1: factors without effect stay at 1."""
 
 LINEAR_TILT, LINEAR_HEADING = math.radians(5.0), math.radians(25.0)
 """rad, true attitude errors (1 sigma) at the end of an outage, beyond which covariance analysis
@@ -82,4 +82,4 @@ warns. 40 simulated runs of a loiter with the true model: NEES of the nine navig
 # -- studies --------------------------------------------------------------------------------------
 
 LEAST_NUMBER, LARGEST_NUMBER = 1e-60, 1e60
-"""SI, of a study, beyond which powers of it overflow or vanish; nothing physical comes near."""
+"""Range of numbers in a study, SI: beyond it, powers overflow or vanish."""

@@ -201,16 +201,11 @@ class Fleet(Mapping[str, Calibration | Notice]):
         with moved_together(store.folder) as new:
             pq.write_table(pa.Table.from_pylist(list(self.rows), schema=SCHEMA), new / table)
             self.report(new / page)
-            listed = [
-                Listed(
-                    printable(each.path),
-                    each.name,
-                    each.result if isinstance(each.result, Notice) else None,
-                )
-                for each in self.units.values()
-            ]
-            found = Index(self.horizon, self.options, tuple(listed), self.notices)
-            found.save(new / index)
+            listed = tuple(
+                Listed(printable(path), unit.name, self.failed.get(path))
+                for path, unit in self.units.items()
+            )
+            Index(self.horizon, self.options, listed, self.notices).save(new / index)
 
 
 def _some(names: Sequence[str]) -> str:

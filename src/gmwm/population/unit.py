@@ -21,26 +21,13 @@ DERIVED = {"filter_N": "u/sqrt(Hz)", "filter_K": "u/s/sqrt(Hz)", "floor_B": "u"}
 """Numbers that units of any model structure have, and their units: the N and K of a filter for the
 horizon (`gmwm.bound`), and the bias instability B."""
 
-_TEXT, _NUMBER, _TEXTS = pa.string(), pa.float64(), pa.list_(pa.string())
-SCHEMA = pa.schema(
-    {
-        "device": _TEXT,
-        "path": _TEXT,
-        "channel": _TEXT,
-        "quantity": _TEXT,
-        "model": _TEXT,
-        "parameter": _TEXT,
-        "kind": _TEXT,
-        "value": _NUMBER,
-        "stderr": _NUMBER,
-        "lower": _NUMBER,
-        "upper": _NUMBER,
-        "unit": _TEXT,
-        "valid": pa.bool_(),
-        "reasons": _TEXTS,
-        "notices": _TEXTS,
-    }
+_TYPES = dict.fromkeys(("value", "stderr", "lower", "upper"), pa.float64())
+_TYPES |= {"valid": pa.bool_()} | dict.fromkeys(("reasons", "notices"), pa.list_(pa.string()))
+_NAMES = (
+    "device path channel quantity model parameter kind value stderr lower upper unit valid reasons "
+    "notices"
 )
+SCHEMA = pa.schema([(name, _TYPES.get(name, pa.string())) for name in _NAMES.split()])
 """Columns of the table; null where one does not apply. ``kind`` is that of `gmwm.Estimate`, or
 "derived" for the numbers of `DERIVED`; of an upper limit ("bound") ``value`` is null. ``reasons``
 are the codes of why a fit, a channel or a unit is not valid."""

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self, cast
 
 from gmwm._core import checks
 from gmwm._core.documents import Document
-from gmwm._core.frames import frame
 from gmwm._core.jobs import one_blas_thread
+from gmwm._core.tables import frame
 from gmwm._core.text import Printed, wrapped
 from gmwm.errors import InputError
 from gmwm.estimate import Data, Fit, are_several, estimate

@@ -19,13 +19,13 @@ from gmwm.ins.filter.covariance_kernels import (
 from gmwm.ins.filter.measurements import IS_GNSS, IS_INFERRED, observe
 from gmwm.ins.filter.mechanization import step
 from gmwm.ins.filter.records import (
-    Estimate,
     Events,
+    FilterState,
     Increments,
     Innovated,
     Kept,
     Kinematics,
-    Progress,
+    RunPlace,
     Samples,
     SensorTable,
     Settings,
@@ -86,11 +86,11 @@ def axis_sums(
 def run(
     samples: Samples,
     settings: Settings,
-    estimate: Estimate,
+    estimate: FilterState,
     events: Events,
     innovated: Innovated,
     kept: Kept,
-    progress: Progress,
+    where: RunPlace,
     last: int,
 ) -> int:
     """Filter a record; returns the epoch at which it diverged, -1 at its end, or `PAUSED`.
@@ -103,7 +103,7 @@ def run(
     lla = at.lla
     n, dt = samples.rotation.shape[0], samples.dt
     work = new_workspace(P.shape[0])
-    place, carry = progress.place, progress.carry
+    place, carry = where.place, where.carry
     epoch, event, out, steps = place[0], place[1], place[2], place[3]
     while True:
         # What is asked for at this epoch: results before, measurements, results after.
@@ -117,7 +117,7 @@ def run(
                 work.rate[i] = turned / dt
             while event < events.epoch.size and events.epoch[event] == epoch:
                 _measure(
-                    event, samples, settings, estimate, events, innovated, progress, attitude, work
+                    event, samples, settings, estimate, events, innovated, where, attitude, work
                 )
                 event += 1
             for i in range(x.size):
@@ -161,10 +161,10 @@ def _measure(
     event: int,
     samples: Samples,
     settings: Settings,
-    estimate: Estimate,
+    estimate: FilterState,
     events: Events,
     innovated: Innovated,
-    progress: Progress,
+    where: RunPlace,
     attitude: float,
     work: Workspace,
 ) -> None:
@@ -180,7 +180,7 @@ def _measure(
     if moved:
         _look(samples, settings.table, estimate, events.epoch[event], events.offset[event], work)
         at, rate = work.there, work.rate_there
-    rejected = progress.rejected
+    rejected = where.rejected
     gated = gate < np.inf and (IS_INFERRED[kind] or rejected[kind] < _PATIENCE)
     if gated:
         _copy(P, work.estimated, work.P_held, work.estimated_held)
@@ -210,14 +210,14 @@ def _measure(
         innovated.used[event] = False
         _copy(work.P_held, work.estimated_held, P, work.estimated)
     elif IS_GNSS[kind]:
-        progress.carry[6] = 0.0
+        where.carry[6] = 0.0
 
 
 @compiled()
 def _look(
     samples: Samples,
     table: SensorTable,
-    estimate: Estimate,
+    estimate: FilterState,
     epoch: int,
     offset: float,
     work: Workspace,
@@ -333,7 +333,7 @@ def _advance(
 
 
 @compiled()
-def _keep(k: int, estimate: Estimate, table: SensorTable, kept: Kept) -> None:
+def _keep(k: int, estimate: FilterState, table: SensorTable, kept: Kept) -> None:
     at, P, x = estimate
     for i in range(3):
         kept.nav[k, i], kept.nav[k, 3 + i] = at.lla[i], at.v[i]

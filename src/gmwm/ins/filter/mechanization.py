@@ -128,6 +128,8 @@ def integrate(imu: Imu, initial: NavState) -> Trajectory:
 
     The height of an unaided navigator is unstable: an error grows by a factor e in about 570 s.
 
+    Raises InputError if it starts closer than 1 deg to a pole, where north cannot be steered by.
+
     Parameters
     ----------
     imu : Imu
@@ -139,11 +141,6 @@ def integrate(imu: Imu, initial: NavState) -> Trajectory:
     -------
     Trajectory
         n + 1 epochs; roll and yaw within [-pi, pi], the longitude runs on past 180 deg.
-
-    Raises
-    ------
-    InputError
-        If it starts closer than 1 deg to a pole, where north cannot be steered by.
     """
     check_latitudes(initial.lla[None, :], "initial")
     lla, velocity, rpy = (np.empty((imu.n + 1, 3)) for _ in range(3))

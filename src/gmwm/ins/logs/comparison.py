@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -237,8 +237,8 @@ class Comparison:
                 f"It shows differences of {100.0 * (1.0 - self.resolved):.0f} % or more; for 10 % "
                 f"record {self.length_needed / 60.0:.0f} min."
             )
-        names = " and ".join(shown)
-        words: dict[str, Any] = {"names": names, "but": but, "resolution": resolution}
+        tied = " and ".join(shown)
+        words: dict[str, Any] = {"names": tied, "but": but, "resolution": resolution}
         return notice("tie", values=values, variant="log", **words)
 
     @property
@@ -277,17 +277,9 @@ class Comparison:
                 for name, each in self.outcomes.items()
             },
             "pairs": [
-                {
-                    "first": a,
-                    "second": b,
-                    "ratio": p.ratio,
-                    "lower": p.lower,
-                    "upper": p.upper,
-                    "p_value": p.p_value,
-                    "score": p.score,
-                    "score_p_value": p.score_p_value,
-                }
-                for (a, b), p in self.pairs.items()
+                {"first": a, "second": b}
+                | {key: value for key, value in asdict(pair).items() if key != "error"}
+                for (a, b), pair in self.pairs.items()
             ],
             "verdict": self.verdict.to_dict(),
             "notices": [each.to_dict() for each in self.notices],
@@ -336,16 +328,11 @@ class Comparison:
         lines += plain_table(("", *PARTS, "NEES/dof", "NIS/dof"), rows).splitlines()
         lines += ["", f"Errors over those of {first}, paired"]
         pairs = {name: self.pairs[name, first] for name in others}
-        cells = [
-            (
-                name,
-                f"{p.ratio:.3f}",
-                f"({p.lower:.3f} .. {p.upper:.3f})",
-                f"{p.score:+.2f}",
-                f"{p.score_p_value:.2g}",
-            )
-            for name, p in pairs.items()
-        ]
+        cells = []
+        for name, p in pairs.items():
+            interval = f"({p.lower:.3f} .. {p.upper:.3f})"
+            score = f"{p.score:+.2f}", f"{p.score_p_value:.2g}"
+            cells.append((name, f"{p.ratio:.3f}", interval, *score))
         lines += plain_table(("", "ratio", "95 %", "score", "p"), cells).splitlines()
         return "\n".join([*lines, "", *wrapped(self.verdict.text)])
 

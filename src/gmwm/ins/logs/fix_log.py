@@ -26,16 +26,7 @@ _POSITION = ("latitude", "longitude", "height")
 _NED = ("north", "east", "down")
 _VELOCITY = tuple(f"velocity {axis}" for axis in _NED)
 _LIMITS = {"latitude": 0.5 * np.pi, "longitude": 2.0 * np.pi}
-_DIRECTIONS = {
-    "north": "north",
-    "n": "north",
-    "east": "east",
-    "e": "east",
-    "down": "down",
-    "d": "down",
-    "up": "up",
-    "u": "up",
-}
+_DIRECTIONS = {short: name for name in (*_NED, "up") for short in (name, name[0])}
 _AXIS_OF_POSITION = dict(zip(_POSITION, _NED, strict=True))
 _AXES_OF_ACCURACY = {"horizontal": ("north", "east"), "vertical": ("down",)}
 _VELOCITY_WORDS = frozenset({"velocity", "vel", "v", "speed"})
@@ -50,21 +41,12 @@ _RTKLIB = re.compile(r"^%\s*(GPST|UTC|JST)\s")
 _WEEK = re.compile(r"^\s*(\d{4})\s+(\d{1,6}\.\d+)(?=\s)")
 _GPS_EPOCH = 315964800  # s from 1970-01-01 to 1980-01-06, on one calendar
 _WEEK_LENGTH = 604800
-_RTKLIB_NAMES = {
-    "sdn(m)": "sd_north",
-    "sde(m)": "sd_east",
-    "sdu(m)": "sd_up",
-    "vn(m/s)": "velocity_north",
-    "ve(m/s)": "velocity_east",
-    "vu(m/s)": "velocity_up",
-    "sdvn": "sd_velocity_north",
-    "sdve": "sd_velocity_east",
-    "sdvu": "sd_velocity_up",
-    "latitude(deg)": "latitude_deg",
-    "longitude(deg)": "longitude_deg",
-    "height(m)": "height_m",
-    "ns": "satellites",
-}
+_RTKLIB_COLUMNS = """
+sdn(m):sd_north sde(m):sd_east sdu(m):sd_up vn(m/s):velocity_north ve(m/s):velocity_east
+vu(m/s):velocity_up sdvn:sd_velocity_north sdve:sd_velocity_east sdvu:sd_velocity_up
+latitude(deg):latitude_deg longitude(deg):longitude_deg height(m):height_m ns:satellites
+"""
+_RTKLIB_NAMES = dict(each.split(":") for each in _RTKLIB_COLUMNS.split())
 
 
 @dataclass(frozen=True, eq=False)

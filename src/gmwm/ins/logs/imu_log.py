@@ -76,13 +76,11 @@ def read_imu(
         If the file cannot be used, an axis or more than `gmwm.ins.logs.tuning.LONGEST_FILLED` of
         samples is missing, or the specific force is far from gravity: most often a wrong unit.
     """
-    return read_imu_log(path, rate, units, channels, time, start, **reading).imu
+    return read_imu_log(path, channels, time, start, rate=rate, units=units, **reading).imu
 
 
 def read_imu_log(
     path: str | os.PathLike[str],
-    rate: float | None = None,
-    units: Mapping[str, str] | None = None,
     channels: Columns = None,
     time: str | int | bool | None = None,
     start: float | None = None,
@@ -90,7 +88,7 @@ def read_imu_log(
 ) -> ImuLog:
     """Read an IMU record with its clock; see `read_imu`."""
     columns, reversed_axes = _signs(channels)
-    recording = read(path, rate, units, columns, time, **reading).of_one_rate("navigation")
+    recording = read(path, channels=columns, time=time, **reading).of_one_rate("navigation")
     missing = [axis for axis in AXES if axis not in recording.names]
     if missing:
         raise InputError(

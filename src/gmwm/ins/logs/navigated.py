@@ -30,26 +30,11 @@ from gmwm.issues import Notice, notice, worst_first
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_COLUMNS = (
-    "time_s",
-    "latitude_deg",
-    "longitude_deg",
-    "height_m",
-    "velocity_north_mps",
-    "velocity_east_mps",
-    "velocity_down_mps",
-    "roll_deg",
-    "pitch_deg",
-    "yaw_deg",
-    "sd_north_m",
-    "sd_east_m",
-    "sd_down_m",
-    "sd_velocity_north_mps",
-    "sd_velocity_east_mps",
-    "sd_velocity_down_mps",
-    "sd_tilt_north_deg",
-    "sd_tilt_east_deg",
-    "sd_heading_deg",
+_HEADER = (
+    "time_s,latitude_deg,longitude_deg,height_m,velocity_north_mps,velocity_east_mps,"
+    "velocity_down_mps,roll_deg,pitch_deg,yaw_deg,sd_north_m,sd_east_m,sd_down_m,"
+    "sd_velocity_north_mps,sd_velocity_east_mps,sd_velocity_down_mps,sd_tilt_north_deg,"
+    "sd_tilt_east_deg,sd_heading_deg"
 )
 
 
@@ -142,11 +127,8 @@ class Navigated:
     @property
     def kinds(self) -> tuple[str, ...]:
         """Kinds of fixes that were used."""
-        return tuple(
-            each.kind
-            for each in self.measured.aiding.fixes
-            if each.kind != "standstill" and each.time.size
-        )
+        fixes = [each for each in self.measured.aiding.fixes if each.time.size]
+        return tuple(each.kind for each in fixes if each.kind != "standstill")
 
     @property
     def rejections(self) -> tuple[Notice, ...]:
@@ -272,7 +254,8 @@ class Navigated:
         lines += [f"{kind:10} {self.test(kind)}" for kind in self.kinds]
         far, at = self.farthest
         lines.append(f"largest: {far:.3g} sigma at {at:.10g} s")
-        for sentence in (*self.accuracy, self.verdict.text):
+        verdict, hint = self.verdict.text, self.verdict.hint
+        for sentence in (*self.accuracy, f"{verdict} ({hint})" if hint else verdict):
             lines += ["", *wrapped(sentence)]
         lines += ["", *wrapped(self.resolution.sentence)]
         return "\n".join(lines)
@@ -285,13 +268,8 @@ class Navigated:
     @property
     def notices(self) -> tuple[Notice, ...]:
         """Notices of the sensor models, the files, the start, and of rejected fixes."""
-        measured = self.measured
-        return (
-            *measured.sensors.notices,
-            *measured.notices,
-            *self.alignment.notices,
-            *self.rejections,
-        )
+        given = (*self.measured.sensors.notices, *self.measured.notices)
+        return (*given, *self.alignment.notices, *self.rejections)
 
     @property
     def accuracy(self) -> list[str]:
@@ -354,25 +332,15 @@ class Navigated:
         """
         kept = ~self.solution.before
         solution, sd = self.solution, self.solution.sd[kept]
+        time, height = self.clock(solution.time[kept]), solution.lla[kept, 2]
         angles = np.degrees(solution.lla[kept, :2])
         angles[:, 1] = (angles[:, 1] + 180.0) % 360.0 - 180.0
-        rpy = np.degrees(solution.rpy[kept])
-        columns = np.column_stack(
-            [
-                self.clock(solution.time[kept]),
-                angles,
-                solution.lla[kept, 2],
-                solution.velocity[kept],
-                rpy,
-                sd[:, :6],
-                np.degrees(sd[:, 6:]),
-            ]
-        )
-        digits = ["%.6f", "%.10f", "%.10f", "%.4f", *["%.5f"] * 3, *["%.5f"] * 3, *["%.4g"] * 9]
+        motion = np.hstack([solution.velocity[kept], np.degrees(solution.rpy[kept])])
+        deviations = np.hstack([sd[:, :6], np.degrees(sd[:, 6:])])
+        columns = np.column_stack([time, angles, height, motion, deviations])
+        digits = ["%.6f", "%.10f", "%.10f", "%.4f", *["%.5f"] * 6, *["%.4g"] * 9]
         with written(path) as stream:
-            np.savetxt(
-                stream, columns, digits, delimiter=",", header=",".join(_COLUMNS), comments=""
-            )
+            np.savetxt(stream, columns, digits, delimiter=",", header=_HEADER, comments="")
         return path
 
     # -- figures ----------------------------------------------------------------------------------

@@ -112,16 +112,13 @@ def over_time(runs: FilterErrors, start: float = 0.0, end: float = np.inf) -> Co
 
     The errors of one run are correlated, so that a run counts as one draw; Student's t.
 
+    Raises InputError if no errors were kept in that time.
+
     Parameters
     ----------
     runs : FilterErrors
     start, end : float, optional
         s.
-
-    Raises
-    ------
-    InputError
-        If no errors were kept in that time.
     """
     epochs = np.flatnonzero((runs.time >= start) & (runs.time <= end) & ~runs.before)
     if not epochs.size:

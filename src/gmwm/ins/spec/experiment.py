@@ -152,17 +152,14 @@ class ExperimentSpec(Spec):
 def experiment_from(content: Mapping[str, Any], folder: Path = Path()) -> Experiment:
     """An experiment from the content of a file.
 
+    Raises InputError if something is missing, unknown or cannot be used.
+
     Parameters
     ----------
     content : mapping
         trajectory, truth and filters, and what else is not as usual; see the documentation.
     folder : Path, optional
         That paths are relative to.
-
-    Raises
-    ------
-    InputError
-        If something is missing, unknown or cannot be used.
     """
     spec = ExperimentSpec.parse(content)
     trajectory, outages = _trajectory(spec, folder), _outages(spec)

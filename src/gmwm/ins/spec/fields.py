@@ -119,19 +119,16 @@ def value(given: Any, si_unit: str) -> float:
     Raises InputError if it is not a finite number, or its unit is of another dimension.
     """
     if checks.is_number(given):
-        return _plausible(float(given), given)
-    match = _NUMBER.fullmatch(given) if isinstance(given, str) else None
-    if match is None:
-        raise InputError(
-            f"{checks.shown(given)} is not a number: write one, with a unit like {si_unit} or "
-            "without for SI"
-        )
-    number, unit = match.groups()
-    found = float(number) * (factor(unit, si_unit) if unit else 1.0)
-    return _plausible(found, given)
-
-
-def _plausible(found: float, given: Any) -> float:
+        found = float(given)
+    else:
+        match = _NUMBER.fullmatch(given) if isinstance(given, str) else None
+        if match is None:
+            raise InputError(
+                f"{checks.shown(given)} is not a number: write one, with a unit like {si_unit} or "
+                "without for SI"
+            )
+        number, unit = match.groups()
+        found = float(number) * (factor(unit, si_unit) if unit else 1.0)
     if found != 0.0 and not tuning.LEAST_NUMBER < abs(found) < tuning.LARGEST_NUMBER:
         raise InputError(f"{checks.shown(given)} is beyond what sensors and drives have: check it")
     return found
@@ -142,14 +139,6 @@ def number(si_unit: str) -> BeforeValidator:
     return BeforeValidator(lambda given: value(given, si_unit))
 
 
-def _says_it_better(error: Any) -> bool:
-    """Whether a part has the form and another fault, or lacks a key."""
-    kind, loc = error["type"], error["loc"]
-    return kind in ("value_error", "greater_than") or (
-        kind == "missing" and isinstance(loc[-1], str)
-    )
-
-
 def written(form: str) -> WrapValidator:
     """Something of a form, which the message shows where another was written."""
 
@@ -157,19 +146,22 @@ def written(form: str) -> WrapValidator:
         try:
             return handler(given)
         except ValidationError as error:
-            if any(_says_it_better(each) for each in error.errors()):
-                raise
+            # A part that has the form and another fault, or lacks a key, says it better.
+            for each in error.errors():
+                lacks = each["type"] == "missing" and isinstance(each["loc"][-1], str)
+                if lacks or each["type"] in ("value_error", "greater_than"):
+                    raise
             raise ValueError(f"{checks.shown(given)}: write {form}") from None
 
     return WrapValidator(check)
 
 
-def _spread(given: Any) -> Any:
-    return given if isinstance(given, list | tuple) else (given,) * 3
-
-
 T = TypeVar("T")
-Three = Annotated[tuple[T, T, T], written("three values, or one for all"), BeforeValidator(_spread)]
+Three = Annotated[
+    tuple[T, T, T],
+    written("three values, or one for all"),
+    BeforeValidator(lambda given: given if isinstance(given, list | tuple) else (given,) * 3),
+]
 Seconds = Annotated[float, number("s")]
 Meters = Annotated[float, number("m")]
 Radians = Annotated[float, number("rad")]

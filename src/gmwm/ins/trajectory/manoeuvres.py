@@ -223,6 +223,9 @@ def perform(
 ) -> Trajectory:
     """The trajectory of a vehicle that does one manoeuvre after the other; its yaw is not wrapped.
 
+    Raises InputError if nothing is to be done, a body that is not level climbs at no speed, or the
+    way leads to a pole.
+
     Parameters
     ----------
     manoeuvres : iterable of Straight, Accelerate, Stop, Turn or Climb
@@ -244,12 +247,6 @@ def perform(
     level : bool, optional
         True for a body that does not pitch, as a helicopter that climbs vertically; by default it
         points where it goes.
-
-    Raises
-    ------
-    InputError
-        If nothing is to be done, a body that is not level climbs at no speed, or the way leads to
-        a pole.
     """
     dt, ramp = sampling_interval(dt), positive("ramp", ramp)
     origin = finite_numbers(start, "start")

@@ -46,6 +46,9 @@ def helicopter_mapping(
 ) -> Trajectory:
     """Airborne laser scanning: a vertical climb, then parallel strips flown to and fro.
 
+    Raises InputError if an argument is not positive, or the spacing is wider than the diameter of a
+    turn.
+
     Parameters
     ----------
     duration, dt : float, optional
@@ -59,11 +62,6 @@ def helicopter_mapping(
     spacing : float, optional
         Distance of one strip from the next, m. If it is less than the diameter of a turn at
         6 deg/s, the turn begins to the other side.
-
-    Raises
-    ------
-    InputError
-        If an argument is not positive, or the spacing is wider than the diameter of a turn.
     """
     rate = math.radians(6.0)
     strip, spacing = positive("strip", strip), positive("spacing", spacing)
@@ -141,6 +139,8 @@ def fixed_wing_loiter(
 ) -> Trajectory:
     """A small fixed-wing aircraft that circles, now right, now left, with climbs between.
 
+    Raises InputError if an argument is not positive.
+
     Parameters
     ----------
     duration, dt : float, optional
@@ -151,11 +151,6 @@ def fixed_wing_loiter(
         At the start, rad.
     speed, radius : float, optional
         Speed, m/s, and radius of the circles, m.
-
-    Raises
-    ------
-    InputError
-        If an argument is not positive.
     """
     rate = positive("speed", speed) / positive("radius", radius)
 

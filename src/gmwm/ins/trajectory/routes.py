@@ -44,6 +44,9 @@ def through(
     It starts at the first waypoint in the direction of the second and ends at the last one. Legs
     have a constant heading. Heights change on the straight parts; corners are level.
 
+    Raises InputError if legs are too short for the turns at their ends or for the climb, or one
+    turns back.
+
     Parameters
     ----------
     waypoints : (k, 3) array_like
@@ -54,11 +57,6 @@ def through(
         Highest rate of turn, rad/s.
     dt, ramp, flat, level : optional
         See `perform`.
-
-    Raises
-    ------
-    InputError
-        If legs are too short for the turns at their ends or for the climb, or one turns back.
     """
     points = finite_numbers(waypoints, "waypoints")
     if points.ndim != 2 or points.shape[1] != 3 or len(points) < 2:

@@ -15,7 +15,7 @@ from gmwm import (
     Sinusoid,
     WhiteNoise,
 )
-from gmwm.ins import Imu, NavState, SensorModels, Stop, emulate, integrate, perform
+from gmwm.ins import Imu, NavState, SensorModels, integrate
 from gmwm.ins.filter import (
     Kinematics,
     SensorStates,
@@ -271,22 +271,6 @@ def test_carry_is_dense_propagation_sample_by_sample(k, seed, extra):
     np.testing.assert_array_equal(found, found.T)
 
 
-def test_a_step_of_ten_samples_is_near_ten_steps_of_one():
-    rng = np.random.default_rng(3)
-    states = SensorStates.of(SENSORS, DT, 10)
-    scale = np.hstack([np.repeat([1.0, 0.1, 1e-3], 3), np.full(states.m, 1e-4)])
-    P = random_covariance(9 + states.m, rng, scale)
-    state = nav_state(STATES[0])
-    coarse = propagated(P, kernel_matrices(state, 10 * DT), states, 10)
-    fine, change = P, kernel_matrices(state, DT)
-    for _ in range(10):
-        fine = propagated(fine, change, states, 1)
-    unit = np.sqrt(np.diag(fine))
-    unit[unit == 0.0] = 1.0
-    np.testing.assert_allclose(coarse / unit / unit[:, None], fine / unit / unit[:, None],
-                               rtol=0.0, atol=1e-5)  # fmt: skip
-
-
 def test_noise_over_many_steps_needs_no_start():
     """From P = 0: the variances of white noise and what it is integrated to."""
     sensors = SensorModels.of({"gyro": WhiteNoise(1e-4), "accel": WhiteNoise(2e-3)})
@@ -359,18 +343,3 @@ def test_the_square_of_a_tilt_has_the_mean_square_that_is_allowed_for():
     assert P[5, 5] == pytest.approx(np.mean(errors**2), rel=0.03)
     assert gathered == pytest.approx(np.sqrt(P[5, 5]), rel=1e-12)
     assert np.count_nonzero(P) == 5  # nothing else is touched
-
-
-def test_a_tilted_navigator_falls_as_is_allowed_for():
-    """Two seconds of an error-free IMU at rest, navigated with a tilt of 2 deg."""
-    tilt = np.radians(2.0)
-    stand = perform([Stop(2.0)], start=(0.8, 0.1, 300.0), heading=0.0, dt=DT)
-    imu, start = emulate(stand), stand.state(0)
-    wrong = integrate(
-        imu, NavState(start.lla, start.velocity, start.rpy + np.array([tilt, 0.0, 0.0]))
-    )
-    fall = (wrong.velocity[-1, 2] - stand.velocity[-1, 2]) / stand.duration
-    P = np.zeros((9, 9))
-    P[6, 6] = tilt**2
-    # The fourth moment of one normal tilt is three times that of a fixed one.
-    assert np.sqrt(3.0) * fall == pytest.approx(tilt_squared(P, 9.81, 1.0, 0.0), rel=0.01)

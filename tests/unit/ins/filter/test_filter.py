@@ -333,16 +333,6 @@ def test_a_filter_that_diverges_says_when(wrong):
     assert np.all(np.isfinite(solution.errors(truth)))
 
 
-def test_measurements_after_divergence_are_not_counted():
-    truth = helicopter_mapping(duration=60.0, dt=0.02)
-    imu = emulate(truth)
-    errors = np.full((imu.n, 3), 1e7)
-    late = gnss(truth).without([Outage(0.0, 55.0)])
-    solution = navigate(imu.with_errors(0.0 * errors, errors), truth.state(0), SENSORS, late)
-    assert solution.diverged_at is not None
-    assert np.all(np.isnan(solution.innovations.nis))
-
-
 @pytest.mark.parametrize("bad", [np.nan, np.inf])
 def test_numbers_that_are_none_are_refused(hop, bad):
     imu = emulate(hop)

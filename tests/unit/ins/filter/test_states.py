@@ -103,14 +103,6 @@ def test_a_ramp_is_a_slope_that_is_not_known():
     np.testing.assert_allclose(with_bias.covariance, np.diag([9.0, 0.16]))
 
 
-def test_a_ramp_that_is_known_adds_to_the_mean():
-    states = states_of(RateRamp(-0.4), drift_known=True)
-    k = 12
-    expected = DT * RateRamp(-0.4).simulate(k, DT, 1).sum()
-    assert states.table.gain[k] @ states.mean == pytest.approx(expected)
-    assert not np.any(states.covariance)
-
-
 def test_a_bias_joins_a_random_walk_or_stands_alone():
     walk = states_of(RandomWalk(0.2), bias=3.0)
     assert walk.names == ("accel_y: random walk",)
@@ -135,15 +127,6 @@ def test_states_are_in_the_order_of_the_axes():
     assert [states.table.partner[i] for i in pair] == pair[::-1]
     assert all("resonance" in states.names[i] for i in pair)
     np.testing.assert_allclose(states.table.integral[:, 3], np.arange(4) * DT)
-
-
-def test_no_states_at_all():
-    states = SensorStates.of(
-        SensorModels.of({"gyro": WhiteNoise(2.0), "accel": WhiteNoise(3.0)}), DT, 4
-    )
-    assert states.m == 0
-    assert states.table.phi.shape == (5, 0)
-    np.testing.assert_allclose(states.table.integral[4], 4 * DT * np.repeat([4.0, 9.0], 3))
 
 
 def test_extra_markov_states_touch_no_sensor():

@@ -118,16 +118,6 @@ def test_covariance_is_that_of_simulated_errors():
     assert np.mean(squares) == pytest.approx(1.0, abs=4.0 * np.sqrt(2.0 / (9.0 * runs)))
 
 
-def test_a_model_without_its_slow_terms_would_be_too_optimistic():
-    # What this is for: the same increments, white noise alone believed.
-    imu = moving(400)
-    true = preintegrate(imu, MODELS, start="stationary").covariance[:9, :9]
-    white = {"gyro": WhiteNoise(2e-4), "accel": WhiteNoise(2e-3)}
-    believed = preintegrate(imu, white).covariance
-    nees = np.trace(np.linalg.solve(believed, true)) / 9.0
-    assert nees > 1.5
-
-
 @pytest.mark.parametrize("rate", [0.0, 1.0])
 def test_agrees_with_combined_preintegration_of_gtsam(rate):
     # GTSAM integrates by Euler's rule: it agrees to the order of a step.

@@ -10,7 +10,7 @@ from gmwm.ins import Scenario, SensorModels, experiment_from
 from gmwm.ins.imu import AXES
 from gmwm.ins.logs import LogSpec
 from gmwm.ins.spec import experiment, read_document
-from gmwm.ins.spec.experiment import MISSIONS, ExperimentSpec
+from gmwm.ins.spec.experiment import ExperimentSpec
 from gmwm.process import RandomWalk
 from places import REPOSITORY
 
@@ -62,18 +62,6 @@ def test_every_key_reaches_the_scenario() -> None:
     sd = scenario.initial_sd
     np.testing.assert_allclose([sd.position, sd.velocity, sd.tilt, sd.heading], expected)
     assert (found.runs, found.seed) == (7, 3)
-
-
-def test_gnss_of_velocity_alone() -> None:
-    gnss = {"position_sd": "none", "velocity_sd": 0.1}
-    (only,) = experiment_from(LEAST | {"gnss": gnss}).scenario.aiding.fixes
-    assert only.kind == "velocity"
-
-
-@pytest.mark.parametrize("name", MISSIONS)
-def test_missions(name: str) -> None:
-    found = experiment_from(LEAST | {"trajectory": name})
-    assert found.scenario.trajectory.duration == pytest.approx(30.0)
 
 
 def test_outages_may_touch_and_end_with_the_trajectory() -> None:

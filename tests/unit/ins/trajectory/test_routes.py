@@ -45,12 +45,6 @@ def test_the_track_follows_the_legs() -> None:
     assert np.hypot(*found.velocity[:, :2].T) == pytest.approx(30.0, abs=1e-3)
 
 
-def test_a_straight_route_has_no_corner() -> None:
-    found, _ = fly(np.array([[0, 0, 0], [600, 0, 0], [900, 0, 0.0]]))
-    np.testing.assert_allclose(found.rpy[:, 2], 0.0, atol=1e-9)
-    assert found.duration == pytest.approx(30.0, abs=0.05)
-
-
 def test_heights_change_between_corners() -> None:
     found, waypoints = fly(CORNERS)
     for waypoint in waypoints[1:-1]:
