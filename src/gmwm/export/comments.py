@@ -5,6 +5,7 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Mapping, Sequence
 
+from gmwm._core.tables import plain_table
 from gmwm._core.units import si_parameter_unit
 from gmwm.export.imu import Axis, ImuNumbers, Triad
 
@@ -111,7 +112,9 @@ def _table(imu: ImuNumbers, triad: Triad) -> list[str]:
     keys = [key for key, _ in columns]
     times = sorted({time for axis in triad.axes for time in axis.nees})
     shared = triad.shared_nees
-    rows = []
+    heads, rows = ["", *keys], []
+    for time in times:
+        heads += [f"NEES\n{time:g} s"] if shared is None else [f"{time:g} s\nshared", "\nown"]
     if shared is not None:
         upper = frozenset(key for key in keys if triad.is_upper(key))
         rows.append(["shared", *_values(triad, upper, keys), *[""] * 2 * len(times)])
@@ -121,22 +124,10 @@ def _table(imu: ImuNumbers, triad: Triad) -> list[str]:
             row += [] if shared is None else [_nees(shared.get(axis.name, {}), time)]
             row.append(_nees(axis.nees, time))
         rows.append(row)
-    first = max(len(row[0]) for row in rows)
-    heads = [f"NEES {time:g} s" for time in times]
-    lines = [
-        f"{triad.quantity}: {', '.join(f'{k} [{_unit(u, triad.quantity)}]' for k, u in columns)}"
-    ]
-    if shared is None:
-        widths = [first, *[11] * len(keys), *(max(6, len(head)) for head in heads)]
-    else:
-        over = " " * (first + 12 * len(keys))
-        lines.append((over + "".join(f"{head:>14}" for head in heads)).rstrip())
-        heads = ["shared", "own"] * len(times)
-        widths = [first, *[11] * len(keys), *[6] * len(heads)]
-    for name, *cells in [["", *keys, *heads], *rows]:
-        line = " ".join(f"{cell:>{width}}" for cell, width in zip(cells, widths[1:], strict=True))
-        lines.append(f"{name:<{first}} {line}".rstrip())
-    return lines
+    units = ", ".join(f"{key} [{_unit(unit, triad.quantity)}]" for key, unit in columns)
+    title = f"{triad.quantity}: {units}"
+    title += "; NEES" if shared is not None and times else ""
+    return [*wrapped(title), *plain_table(heads, rows).splitlines()]
 
 
 def _values(of: Axis | Triad, upper: frozenset[str], keys: Sequence[str]) -> list[str]:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
+from gmwm._core.tables import plain_table
 from gmwm._core.text import brief, bullets
 from gmwm._core.typing import BoolArray, FloatArray
 from gmwm._core.units import factor
@@ -174,29 +175,26 @@ class ErrorBudget:
             "Error (1 sigma) after free inertial coasting, level and not manoeuvring, from",
             f"exact attitude, velocity and position; {STARTS[self.calibrated]}.",
         ]
-        names = max(len(row.channel) for row in self.rows)
-        labels = max(len(row.component) for row in self.rows)
-        head = 2 + names + 2 + labels
         for quantity in QUANTITIES:
             channels = [c for c in self.channels if quantity in self.quantities(c)]
             if not channels:
                 continue
-
-            def cells(values: Sequence[float] | FloatArray, scale: float = per_si(quantity)) -> str:
-                return "".join(f"{brief(scale * value, 3):>10}" for value in values)
-
-            times = "".join(f"{f'{t:g} s':>10}" for t in self.times)
-            lines += ["", f"{f'{quantity} [{FIELD_UNITS[quantity]}]':<{head}}{times}"]
+            table = []
             for channel in channels:
                 rows = self._rows(channel, quantity)
-                texts = [f"{row.component:<{labels}}{cells(row.values)}" for row in rows]
+                parts = [(row.component, np.array(row.values)) for row in rows]
                 if len(rows) > 1:
-                    texts.append(f"{'total':<{labels}}{cells(self.total(channel)[quantity])}")
-                own = [channel, *[""] * len(texts)]
-                lines += [f"  {name:<{names}}  {text}" for name, text in zip(own, texts)]  # noqa: B905
+                    parts.append(("total", self.total(channel)[quantity]))
+                table += [["" if i else channel, *part] for i, part in enumerate(parts)]
             if HORIZONTAL in self.groups and quantity in self.quantities():
                 label = "tilt" if quantity == "attitude" else "horizontal, radial"
-                lines.append(f"  {label:<{head - 2}}{cells(self.total()[quantity])}")
+                table.append([label, "", self.total()[quantity]])
+            cells = [
+                [name, component, *(brief(per_si(quantity) * value, 3) for value in values)]
+                for name, component, values in table
+            ]
+            heads = [f"{quantity} [{FIELD_UNITS[quantity]}]", "", *(f"{t:g} s" for t in self.times)]
+            lines += ["", plain_table(heads, cells)]
         notes = bullets(self.notes)
         return "\n".join([*lines, *([""] if notes else []), *notes])
 

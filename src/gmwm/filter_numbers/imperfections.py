@@ -49,22 +49,16 @@ class Motion:
                 f"motion {checks.shown(motion)} is not known: write {', '.join(tuning.MOTIONS)}, "
                 "or give a recording"
             )
-        series = {
-            kind: [c.values for c in motion.inertial if c.quantity == kind]
-            for kind in ("gyro", "accel")
-        }
-        for kind, found in series.items():
+        sizes, memories = [], []
+        for kind in ("gyro", "accel"):
+            found = [c.values for c in motion.inertial if c.quantity == kind]
             if not found:
                 raise InputError(
                     f"{motion.source}: has no {kind} channel: give a recording of both"
                 )
-        sizes = {kind: [float(np.nanstd(v)) for v in found] for kind, found in series.items()}
-        memory = [_memory(v, 1.0 / motion.rate) for found in series.values() for v in found]
-        return cls(
-            float(np.sqrt(np.mean(np.square(sizes["gyro"])))),
-            float(np.sqrt(np.mean(np.square(sizes["accel"])))),
-            float(np.median(memory)),
-        )
+            sizes.append(float(np.sqrt(np.mean([np.nanvar(values) for values in found]))))
+            memories += [_memory(values, 1.0 / motion.rate) for values in found]
+        return cls(*sizes, float(np.median(memories)))
 
 
 @dataclass(frozen=True)

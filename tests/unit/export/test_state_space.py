@@ -10,7 +10,6 @@ import gmwm
 from gmwm import (
     ARMA,
     GaussMarkov,
-    InputError,
     QuantizationNoise,
     RandomWalk,
     RateRamp,
@@ -120,15 +119,3 @@ def test_the_walk_of_a_calibration_begins_at_zero():
     found = json.loads(gmwm.export(calibration, "state-space"))["channels"]["gyro_x"]
     assert len(found["states"]) == 1
     assert found["discrete"]["P0"] == found["continuous"]["P0"] == [[0.0]]
-
-
-def test_numbers_without_a_rate_have_no_samples():
-    with pytest.raises(InputError, match="hold no sampling rate"):
-        gmwm.export(numbers("N+K", rate=float("nan")), "state-space")
-
-
-def test_white_noise_alone_has_no_state():
-    found = channel(gmwm.process.as_model(WhiteNoise(2.0)), DT, "gyro")
-    for matrices in (found["discrete"], found["continuous"]):
-        assert matrices["F"].shape == matrices["P0"].shape == (0, 0)
-        assert matrices["H"].shape == (1, 0) and matrices["Q"].shape[0] == 0

@@ -62,12 +62,6 @@ def test_no_direction_of_any_chain_is_too_optimistic_with_a_walk(name, horizon):
     assert worst_direction(TRUTHS[name], numbers, 60.0, every_fix=True) < WORST
 
 
-@pytest.mark.parametrize("name", ["one", "three", "flicker"])
-def test_nor_after_a_long_time_with_aiding(name):
-    numbers = gmwm.bound(TRUTHS[name], "N+K", 60.0)
-    assert worst_direction(TRUTHS[name], numbers, 1200.0) < WORST
-
-
 @pytest.mark.parametrize("tau", [None, 30.0])
 @pytest.mark.parametrize("name", STATIONARY)
 def test_nor_with_a_gauss_markov_process(name, tau):
@@ -213,13 +207,6 @@ def test_a_process_far_slower_than_the_horizon_is_not_taken_for_a_walk(form):
     start = np.hypot(numbers.initial_sd, sum(numbers.sigma))
     assert 1e-2 <= start < 1.5e-2
     assert worst_direction(truth, numbers, 60.0, every_fix=True) < WORST
-
-
-def test_limits_at_zero_frequency_are_dominated():
-    truth = Model(tuple(GaussMarkov(1e-4, 10.0**k) for k in range(-1, 4)))
-    numbers = gmwm.bound(truth, "N+GM", 0.1, dt=1e-4)
-    f = np.geomspace(1e-12, 5e3, 3000)
-    assert np.min(numbers.model.psd(f, 1e-4) / truth.psd(f, 1e-4)) > 1.0 - 1e-5
 
 
 def test_a_spectrum_alone_is_dominated_without_a_prediction():
@@ -510,13 +497,6 @@ def test_the_region_reaches_to_the_joint_interval(fitted):
         assert values[:, i].max() < 1.1 * wide[key][1]
 
 
-def test_the_default_reports_what_it_does_not_cover(fitted):
-    codes = [notice.code for notice in gmwm.bound(fitted).notices]
-    assert "uncertainty-not-covered" in codes
-    codes = [notice.code for notice in gmwm.bound(fitted, level=0.95).notices]
-    assert "uncertainty-not-covered" not in codes
-
-
 # ---- What no walk stands for ----
 
 
@@ -665,12 +645,3 @@ def test_what_is_left_out_is_reported_with_its_unit():
         (notice,) = [each for each in found if each.code == "line-left-out"]
         assert shown in notice.text
         assert notice.values["amplitude"] == 2e-2
-
-
-def test_what_is_asked_again_is_not_made_again():
-    model = WhiteNoise(1e-3) + RandomWalk(1e-5)
-    first = gmwm.bound(model)
-    assert gmwm.bound(model) is first
-    # A process of one's own may hold what its values do not show: equal is not the same.
-    assert gmwm.bound(WhiteNoise(1e-3) + RandomWalk(1e-5)) is not first
-    assert gmwm.bound(model, horizon=30.0).horizon == 30.0

@@ -19,7 +19,6 @@ from gmwm import (
     WhiteNoise,
 )
 from gmwm.ins import SensorModels, covariance_analysis, loiter_with_outages
-from gmwm.study.sensor_tables import TABLE_6
 
 ONE = TRUTHS["one"]
 SENSOR = {
@@ -104,15 +103,6 @@ def test_the_truth_passes_exactly():
     for check in found.checks:
         assert check.nees == pytest.approx(1.0, abs=1e-4)
         assert check.true == pytest.approx(check.believed, rel=1e-4)
-
-
-def test_times_ten_is_too_timid(sheet):
-    ten = gmwm.certify(SENSOR, {kind: (10 * N, 10 * K) for kind, (N, K) in SHEET.items()}, dt=0.1)
-    for check in ten.of("outage"):
-        assert check.nees < 0.7
-    safe = gmwm.certify(SENSOR, sheet.recommended, dt=0.1)
-    for check, better in zip(ten.of("outage"), safe.of("outage"), strict=True):
-        assert check.believed > 1.5 * better.believed
 
 
 def test_relative_poses_are_those_of_a_simulated_filter():
@@ -281,16 +271,6 @@ def test_sizes_that_cannot_be_used():
         Imperfections(scale_error=-0.1)
     with pytest.raises(InputError, match="nothing that white noise"):
         gmwm.certify(QuantizationNoise(1e-3), (1e-4, 1e-6))
-
-
-def test_the_demo_sensor_explains_times_ten():
-    """What is read off its white noise has to be multiplied, number by number."""
-    read_off = {kind: (TABLE_6.models[f"{kind}_x"].params["N"], 1e-7) for kind in ("gyro", "accel")}
-    found = gmwm.certify(TABLE_6.models, read_off, dt=0.1)
-    for quantity in ("gyro", "accel"):
-        N, K = factors(found, quantity)["error model with slow terms"]
-        assert N > 1.0
-        assert K > 50.0
 
 
 # ---- Numbers in use ----

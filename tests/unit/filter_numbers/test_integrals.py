@@ -190,14 +190,6 @@ def test_stationary_start_equals_the_quadratic_form_of_the_autocovariance(proces
     np.testing.assert_allclose(rms(process, steps * dt, dt), expected, rtol=1e-9)
 
 
-@pytest.mark.parametrize("steps", [2.0, 9.5, 200.0])
-def test_a_walk_between_samples(steps):
-    dt, k = 0.2, np.arange(int(np.ceil(steps)))
-    covariance = 0.3**2 * dt * np.minimum.outer(k, k)
-    found = rms(RandomWalk(0.3), steps * dt, dt, True)
-    np.testing.assert_allclose(found, by_covariance(covariance, steps * dt, dt), rtol=1e-9)
-
-
 @pytest.mark.parametrize("steps", [2, 7, 600])
 def test_flicker_from_its_first_sample(steps):
     dt, level = 0.05, 0.3
@@ -370,25 +362,6 @@ def test_the_unit_of_time_does_not_matter(process, known):
     )
     back = scale ** np.arange(1.0, 4.0)[:, None]
     np.testing.assert_allclose(minutes, back * seconds, rtol=1e-6)
-
-
-@pytest.mark.parametrize("known", [True, False])
-@pytest.mark.parametrize("process", EXAMPLES, ids=repr)
-def test_errors_are_proportional_to_the_amplitude(process, known):
-    name = next(p.name for p in process.parameters if p.role != "shape")
-    factor = 16.0 if name == "sigma2" else 4.0  # powers of two: rounding is the same
-    louder = process.with_values(**{name: factor * process.values[name]})
-    np.testing.assert_allclose(
-        rms(louder, 5.0, 0.01, known), 4.0 * rms(process, 5.0, 0.01, known), rtol=1e-9
-    )
-
-
-def test_many_times_are_the_same_as_one_after_the_other():
-    times = [0.04, 0.35, 1.234, 80.0]
-    for process in (WhiteNoise(0.1), BiasInstability(0.2), GaussMarkov(0.3, 4.0)):
-        together = integral_rms(process, times, 0.02, known_start=False)
-        apart = np.stack([rms(process, t, 0.02) for t in times], axis=1)
-        np.testing.assert_allclose(together, apart, rtol=1e-6)
 
 
 def test_nothing_has_added_up_at_the_first_sample_of_a_noise_that_starts_at_zero():

@@ -9,7 +9,7 @@ import gmwm
 from error_models import DT, TRUTHS
 from gmwm import BiasInstability, GaussMarkov, Process, RandomWalk, WhiteNoise
 from gmwm.errors import InputError
-from gmwm.filter_numbers import Chain, propagation as chains
+from gmwm.filter_numbers import Chain
 from gmwm.process import as_model
 
 FREE = (0.0, 0.0, 0.0)
@@ -159,17 +159,3 @@ def test_a_process_known_by_simulation_only_is_refused():
 
     with pytest.raises(InputError, match="simulation only"):
         free(1).errors(WhiteNoise(1.0) + Drawn(), TINY, DT, (1.0,))
-
-
-def test_how_the_truth_grows_is_computed_once_in_a_search(monkeypatch):
-    power, computed = chains.power, []
-
-    def counted(M, Q, times):
-        computed.append(times)
-        return power(M, Q, times)
-
-    monkeypatch.setattr(chains, "power", counted)
-    truth = WhiteNoise(1.23e-3) + GaussMarkov(4.56e-4, 7.0)
-    for K in (1.1e-5, 2.2e-5, 3.3e-5):
-        free(1).errors(truth, WhiteNoise(1.2e-3) + RandomWalk(K), DT, (7.0,))
-    assert len(computed) == 1 + 3

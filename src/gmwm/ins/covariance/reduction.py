@@ -188,17 +188,28 @@ def reduce(
     _, logs = smallest_score(score, [np.zeros(len(names))])
     best = scaled(logs)
     full, read, reduced = (course.analyse(truth, each) for each in (truth, start, best))
-    errors = []
-    for outage in scenario.outages:
+
+    def error(outage: Outage) -> ReducedError:
         at = full.index(outage.end)
-        sds = (full.sd, read.sd, read.predicted_sd, reduced.sd, reduced.predicted_sd)
-        horizontal = (float(np.hypot(*sd[at, :2])) for sd in sds)
-        errors.append(ReducedError(outage.duration, *horizontal, float(reduced.nees()[at])))
+
+        def horizontal(sd: FloatArray) -> float:
+            return float(np.hypot(*sd[at, :2]))
+
+        return ReducedError(
+            duration=outage.duration,
+            full=horizontal(full.sd),
+            read_off=horizontal(read.sd),
+            read_off_predicted=horizontal(read.predicted_sd),
+            reduced=horizontal(reduced.sd),
+            reduced_predicted=horizontal(reduced.predicted_sd),
+            nees=float(reduced.nees()[at]),
+        )
+
     return Reduction(
         form=form,
         models=best,
         inflation=dict(zip(names, map(float, np.exp(logs)), strict=True)),
-        errors=tuple(errors),
+        errors=tuple(map(error, scenario.outages)),
         notices=(*reduced.notices, *([notice("judged-on-loiter")] if assumed else ())),
     )
 
@@ -221,6 +232,9 @@ def read_off(models: SensorModels, form: str, longest: float, dt: float) -> Sens
         if form == "N+K":
             at_end = float(np.interp(np.log(longest), np.log(tau), deviation))
             reduced[axis] = WhiteNoise(white) + RandomWalk(at_end * np.sqrt(3.0 / longest))
+            states = model.state_space(dt)
+            variance = float(states.output @ states.initial_covariance @ states.output)
+            bias_sd[axis] = float(np.sqrt(variance + models.bias_sd[axis] ** 2))
         else:
             slow = np.where(tau > tuning.WHITE_AT, deviation, 0.0)
             # Without the white noise's own part, the maximum is that of the slow terms.
@@ -229,11 +243,7 @@ def read_off(models: SensorModels, form: str, longest: float, dt: float) -> Sens
             height = float(rest[top]) or float(deviation[-1])
             at = max(float(tau[top]), tuning.SHORTEST_PEAK)
             reduced[axis] = WhiteNoise(white) + GaussMarkov.of_peak(height, at)
-        bias_sd[axis] = 0.0
-        if form == "N+K":
-            states = model.state_space(dt)
-            slow = float(states.output @ states.initial_covariance @ states.output)
-            bias_sd[axis] = float(np.sqrt(slow + models.bias_sd[axis] ** 2))
+            bias_sd[axis] = 0.0
     return SensorModels(reduced, bias_sd)
 
 

@@ -8,7 +8,7 @@ from scipy.stats import chi2, t
 
 from gmwm import AR, GaussMarkov, QuantizationNoise, RandomWalk, RateRamp, Resonance, WhiteNoise
 from gmwm.errors import InputError
-from gmwm.ins.covariance.analysis import Course, covariance_analysis
+from gmwm.ins.covariance.analysis import covariance_analysis
 from gmwm.ins.filter.aiding import Aiding, Outage, barometer, gnss, standstills
 from gmwm.ins.filter.filter import Filter, InitialSd
 from gmwm.ins.imu.emulation import emulate
@@ -129,22 +129,6 @@ def test_a_filter_without_sensor_states():
     sd = np.sqrt(np.diagonal(wrong.sensor_actual, axis1=1, axis2=2))
     expected = [np.hypot(4e-4, 1e-4)] * 3 + [np.hypot(3e-3, 3e-3)] * 3
     np.testing.assert_allclose(sd, np.tile(expected, (sd.shape[0], 1)), rtol=1e-9)
-
-
-def test_rates_are_those_of_the_increment_that_ends_at_the_epoch_and_at_first_of_the_first():
-    course = Course.of(RICH, IMU).track
-    assert course.epoch[0] == 0
-    np.testing.assert_array_equal(course.end_rate[0], IMU.rotation[0] / DT)
-    np.testing.assert_array_equal(course.end_rate[1:], IMU.rotation[course.epoch[1:] - 1] / DT)
-
-
-def test_a_course_is_cut_once_for_many_models():
-    course = Course.of(PLAIN, IMU)
-    for believed in (FULL, STATELESS, SLOW_ONLY, FULL):
-        again = covariance_analysis(PLAIN, FULL, believed)
-        found = course.analyse(FULL, believed)
-        np.testing.assert_array_equal(found.actual, again.actual)
-        np.testing.assert_array_equal(found.predicted, again.predicted)
 
 
 # ---- Laws ----

@@ -10,8 +10,6 @@ from gmwm.ins.covariance import reduction
 from gmwm.ins.covariance.analysis import Course, covariance_analysis
 from gmwm.ins.covariance.reduction import (
     FORMS,
-    ReducedError,
-    Reduction,
     read_off,
     reduce,
     with_outages,
@@ -63,21 +61,6 @@ def scaled(models, form, factors):
         }
         changed[axis] = model.with_params(values)
     return SensorModels(changed, models.bias_sd)
-
-
-def test_the_form_is_kept(found):
-    assert list(found.models.models) == list(AXES)
-    for axis in AXES:
-        assert list(found.models.models[axis].params) == list(FORMS[found.form])
-    start = read_off(FULL, found.form, 30.0, DT)
-    factors = list(found.inflation.values())
-    assert list(found.inflation) == [
-        f"{kind} {name}" for kind in ("gyro", "accel") for name in FORMS[found.form]
-    ]
-    expected = scaled(start, found.form, factors)
-    for axis in AXES:
-        assert found.models.models[axis].params == pytest.approx(expected.models[axis].params)
-    assert found.models.bias_sd == start.bias_sd
 
 
 def test_errors_are_those_of_a_covariance_analysis(found):
@@ -212,27 +195,6 @@ def test_white_noise_alone_can_be_reduced():
 
 
 # ---- Words ----
-
-
-def test_text():
-    found = Reduction(
-        form="N+K",
-        models=WALK,
-        inflation={"gyro N": 1.4712, "gyro K": 0.59, "accel N": 12.0, "accel K": 0.01351},
-        errors=(
-            ReducedError(10.0, 5.997, 6.125, 5.672, 6.12, 6.242, 0.9771),
-            ReducedError(60.0, 157.91, 162.5, 137.2, 161.4, 162.2, 1.03),
-        ),
-    )
-    assert str(found) == (
-        "Reduced model N+K, factors on what an Allan plot shows:\n"
-        "  gyro N x 1.47, gyro K x 0.59, accel N x 12, accel K x 0.0135\n"
-        "\n"
-        "Horizontal error at the end of an outage, 1 sigma [m]; in brackets as predicted\n"
-        "  outage  full model              read off               reduced  NEES/dof\n"
-        "    10 s       5.997      6.125 (   5.672)       6.12 (   6.242)     0.977\n"
-        "    60 s       157.9      162.5 (   137.2)      161.4 (   162.2)      1.03"
-    )
 
 
 @pytest.mark.parametrize(
