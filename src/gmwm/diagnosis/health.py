@@ -1,4 +1,4 @@
-"""What was found in a recording: notices for people, and numbers for programs."""
+"""Results of an examination: notices for people, numbers for programs."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class Repetition:
 
 @dataclass(frozen=True)
 class ChannelHealth:
-    """What a program wants to know of one channel.
+    """Numbers of one channel, for programs.
 
     lines: Frequency (Hz) and amplitude (u) of each periodic line, strongest first.
     resonances: Undamped natural frequency (Hz) and damping ratio of each resonance, strongest
@@ -74,7 +74,7 @@ class ChannelHealth:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Health(Document, Printed):
-    """What was found in a recording.
+    """Faults and features of a recording.
 
     Attributes
     ----------
