@@ -37,15 +37,6 @@ def pytest_collection_finish():
     gc.freeze()
 
 
-@pytest.fixture(scope="session", autouse=True)
-def _one_reader():
-    """Of files whose libraries are compiled: a process for each takes a third of a second."""
-    from gmwm.readers.formats.trial import one_reader
-
-    with one_reader():
-        yield
-
-
 @pytest.fixture
 def run(monkeypatch, capsys, tmp_path):
     """Run ``gmwm ARGUMENTS`` in an empty folder: exit code, what was printed, what was reported."""

@@ -46,7 +46,6 @@ from gmwm.export import TARGETS, export, read_numbers
 from gmwm.ins.logs import Measured, read_fix_log, read_imu_log
 from gmwm.ins.spec import experiment_from, read_document
 from gmwm.ins.trajectory.trajectory_file import read_log
-from gmwm.readers.formats.trial import one_reader
 from gmwm.report import read_datasheet, write_report
 
 SECONDS, BYTES = 20, 2 << 30
@@ -756,8 +755,7 @@ def main() -> None:
     given = parser.parse_args()
     logging.disable()
     names = given.only or list(KINDS)
-    with one_reader():
-        tallies = run(names, given.cases, given.seed, given.first, given.store).values()
+    tallies = run(names, given.cases, given.seed, given.first, given.store).values()
     total = sum(sum(each.outcomes.values()) for each in tallies)
     failures = sum(each.failures for each in tallies)
     seconds, largest = sum(each.total for each in tallies), max(each.largest for each in tallies)

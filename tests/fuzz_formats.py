@@ -20,8 +20,8 @@ import bags
 import flight_logs
 import gmwm
 from gmwm._core.memory import limited
-from gmwm.readers.binary import LAYOUTS
-from gmwm.readers.formats.kinds import NAMES
+from gmwm.readers import NAMES
+from gmwm.readers.formats.binary import LAYOUTS
 
 SI = {"gyro": "rad/s", "accel": "m/s^2"}
 ROWS = 96

@@ -221,54 +221,96 @@ def _catalogue(*rooms: Sequence[Issue]) -> dict[str, Issue]:
 
 
 _READERS = (
-    Issue("axis-unit", "{text}", severity="warning", topic="recording"),
-    Issue("clock-jumps", "{text}", topic="clock"),
-    Issue("clock-off-grid", "{text}", topic="clock"),
-    Issue("clock-set", "{text}", severity="warning", topic="clock"),
-    Issue("clock-shifts", "{text}", severity="warning", topic="clock"),
-    Issue("clock-wraps", "{text}", topic="reading"),
-    Issue("column-numbers", "{text}", topic="reading"),
-    Issue("columns-auxiliary", "{text}", topic="reading"),
-    Issue("columns-not-used", "{text}", topic="reading"),
-    Issue("columns-unreadable", "{text}", topic="reading"),
-    Issue("counts", "{text}", severity="bad", topic="recording", lacks="units_agree",
-          reason="counts, not in the unit given", spoils=("gyro", "accel")),
-    Issue("damaged", "{text}", severity="warning", topic="recording"),
+    Issue("clock-jumps", {
+          "": "the clock jumps by {longest:.12g} s, {time:.12g} s after the start: "
+              "{missing:,.0f} sample{missing:s?} missing",
+          "many": "the clock jumps {count:,} times, farthest by {longest:.12g} s, {time:.12g} s "
+                  "after the start: in all {missing:,.0f} samples missing"}, topic="clock"),
+    Issue("clock-off-grid", "{which} not near a whole number of sampling intervals: the samples "
+          "after it were placed at the nearest", topic="clock"),
+    Issue("clock-wraps", "the counter of the time stamps overflowed: they were continued",
+          topic="reading"),
+    Issue("column-numbers", "line {line} was read as column numbers and left out", topic="reading"),
+    Issue("columns-auxiliary", "auxiliary channels: {listed}", topic="reading"),
+    Issue("columns-not-used", "column{count:s?} not used: {listed}", topic="reading"),
+    Issue("columns-unreadable", "{what} left out", topic="reading"),
+    Issue("counts", "{listed}: every sample is a whole number, with a noise of {noise:.3g}: counts "
+          "of the converter, not {unit}",
+          "multiply them by the size of a count from the data sheet", severity="bad",
+          topic="recording", lacks="units_agree", reason="counts, not in the unit given",
+          spoils=("gyro", "accel")),
+    Issue("damaged", "the file {what}; the rest is used", severity="warning", topic="recording"),
     Issue("dates", {
-        "": "{text}",
-        "fixes": "dates ({scale}) are counted in seconds since 1970-01-01, without leap seconds",
-    }, topic="recording"),
-    Issue("gravity", "{text}", severity="bad", topic="recording", lacks="units_agree",
-          reason="gravity contradicts the unit", spoils=("gyro", "accel")),
-    Issue("gravity-absent", "{text}", severity="warning", topic="reading"),
-    Issue("gyro-unit", "{text}", severity="warning", topic="recording"),
-    Issue("log-dropouts", "{text}", topic="recording"),
-    Issue("mean-rate", "{text}", severity="warning", topic="recording"),
-    Issue("missing-samples", "{text}", topic="reading"),
-    Issue("part", "{text}", topic="reading"),
-    Issue("partial-record", "{text}", severity="warning", topic="reading"),
-    Issue("preamble", "{text}", topic="reading"),
-    Issue("rate-changes", "{text}", severity="bad", topic="clock", lacks="rate_constant",
-          reason="the sampling rate changed", spoils=("gyro", "accel")),
-    Issue("rate-stated", "{text}", topic="reading"),
-    Issue("rate-unlikely", "{text}", severity="warning", topic="reading"),
-    Issue("rows-repeated", "{text}", topic="clock"),
-    Issue("sensors-in-turns", "{text}", severity="warning", topic="reading"),
-    Issue("sentinel", "{text}", severity="warning", topic="reading", masks=True),
-    Issue("stamps-astray", "{text}", topic="clock"),
-    Issue("stamps-in-bursts", "{text}", topic="reading"),
-    Issue("stamps-in-turns", "{text}", topic="reading"),
-    Issue("summer-time", "{text}", severity="warning", topic="reading"),
-    Issue("swapped", "{text}", severity="bad", topic="recording", lacks="units_agree",
-          reason="gyro and accelerometer swapped", spoils=("gyro", "accel")),
-    Issue("temperature-interpolated", "{text}", topic="reading"),
-    Issue("time-column", "{text}", topic="reading"),
-    Issue("time-of-day", "{text}", topic="recording"),
-    Issue("time-stamps", "{text}", topic="reading"),
-    Issue("topic", "{text}", topic="reading"),
-    Issue("topics-joined", "{text}", topic="reading"),
-    Issue("units-contradicted", "{text}", severity="warning", topic="reading"),
-    Issue("units-from-names", "{text}", topic="reading"),
+          "": "column {column!r} holds dates: they count as seconds since 1970-01-01",
+          "fixes": "dates ({scale}) are counted in seconds since 1970-01-01, without leap seconds",
+          }, topic="recording"),
+    Issue("gravity", {
+          "unit": "the mean of the accelerometer is {in_file:.4g} {unit} long, which is gravity in "
+                  "{likely}",
+          "increments": "the accelerometer reads {usual:.4g} m/s^2, gravity over one sampling "
+                        "interval: increments of velocity, not accelerations",
+          "scale": "the accelerometer reads {usual:.4g} m/s^2, {ratio:.3g} times gravity: neither "
+                   "gravity nor an accelerometer without it"},
+          "check its scale and range, and that the numbers are not counts", severity="bad",
+          topic="recording", lacks="units_agree", reason="gravity contradicts the unit",
+          spoils=("gyro", "accel")),
+    Issue("gravity-absent", "Sensor Logger has subtracted gravity from these accelerations, by "
+          "what other sensors say", "use TotalAcceleration or AccelerometerUncalibrated",
+          severity="warning", topic="reading"),
+    Issue("gyro-unit", {
+          "noise": "white noise of {size:.3g} deg/s/sqrt(Hz) is more than gyros at rest have",
+          "mean": "a mean rate of {size:.3g} deg/s is more than gyros at rest have"},
+          "check the unit and the sampling rate{explained}", severity="warning",
+          topic="recording"),
+    Issue("log-dropouts", "the logger dropped {count} stretches, {duration:.3g} s in all",
+          topic="recording"),
+    Issue("mean-rate", "a mean rate of {size:.3g} deg/s is more than the bias of most gyros: the "
+          "sensor turned all the time, or is a cheap gyro that was not calibrated",
+          "make sure that it was at rest", severity="warning", topic="recording"),
+    Issue("missing-samples", {
+          "all": "{each}all {n:,} samples missing",
+          "one": "{each}{missing:,} of {n:,} samples missing, in one gap",
+          "many": "{each}{missing:,} of {n:,} samples missing, in {gaps:,} gaps, the longest "
+                  "{longest:,} sample{longest:s?}"}, topic="reading"),
+    Issue("part", "the part from {start:.6g} to {stop:.6g} s is used; times count from its start",
+          topic="reading"),
+    Issue("partial-record", "the last record is cut off, {bytes} of its {size} bytes are there: "
+          "left out", severity="warning", topic="reading"),
+    Issue("preamble", "the lines before the header (line {line}) were left out", topic="reading"),
+    Issue("rate-changes", "the sampling rate goes from {before:.4g} to {after:.4g} Hz at about "
+          "{time:.4g} s, and {rate:.6g} Hz is taken for all of it",
+          "use the part before or after ({row})", severity="bad", topic="clock",
+          lacks="rate_constant", reason="the sampling rate changed", spoils=("gyro", "accel")),
+    Issue("rate-stated", "the rate stated, {rate:g} Hz, is used", topic="reading"),
+    Issue("rate-unlikely", "inertial sensors hardly have a rate of {rate:.6g} Hz",
+          "check the unit of the time column", severity="warning", topic="reading"),
+    Issue("rows-repeated", {"": "{count:,} row repeats a row before",
+                            "many": "{count:,} rows repeat rows before"}, "left out",
+          topic="clock"),
+    Issue("sentinel", "{samples} {value:.10g}{alike}, {meaning}, first at {place}: taken as "
+          "missing", "look at the recorder", severity="warning", topic="reading", masks=True),
+    Issue("stamps-astray", "{stamps} far from the clock, at most by {largest:.3g} s ({place}): the "
+          "samples were taken as evenly spaced", topic="clock"),
+    Issue("stamps-in-bursts", "{rows} rows come with one stamp, usually: it is taken as that of "
+          "the last of them, and the others are one sampling interval apart",
+          "if the rows are of several sensors, keep those of one", topic="reading"),
+    Issue("swapped", "{contradiction}", "check which column is which channel", severity="bad",
+          topic="recording", lacks="units_agree", reason="gyro and accelerometer swapped",
+          spoils=("gyro", "accel")),
+    Issue("temperature-interpolated", "{listed}: {count:,} values, interpolated to the samples of "
+          "{first}", topic="reading"),
+    Issue("time-column", "time is column {used}; time= selects {others}", topic="reading"),
+    Issue("time-of-day", "times of day (hhmmss) count as seconds since midnight",
+          topic="recording"),
+    Issue("time-stamps", "time stamps ({column}, {units}) give {rate:.6g} Hz{steps}",
+          topic="reading"),
+    Issue("topic", {"": "{sensors} of topic {topic}",
+                    "others": "read from {topic}; there are also {listed}"}, topic="reading"),
+    Issue("topics-joined", "{count} topics at {listed}: the {duration:.6g} s that they share are "
+          "used", topic="reading"),
+    Issue("units-contradicted", "the units given contradict {origin}: {listed}",
+          severity="warning", topic="reading"),
+    Issue("units-from-names", "units from {origin}: {listed}", topic="reading"),
 )  # fmt: skip
 
 _VARIANCE = (

@@ -23,7 +23,6 @@ from gmwm.errors import InputError, printable
 if TYPE_CHECKING:
     from pydantic import TypeAdapter, ValidationError
 
-    from gmwm._core.forms import Form
 
 _LARGEST = 1 << 25
 """Bytes of a document: forty times those of six channels; read, it needs thirty times as many."""
@@ -186,11 +185,6 @@ class Document:
     def _restored(cls, value: Any) -> Self:
         return value if isinstance(value, cls) else cls.from_dict(value)
 
-    @classmethod
-    def document_form(cls) -> type[Form] | None:
-        """What each key of the content must hold, where the fields do not say it."""
-        return None
-
     def to_dict(self) -> dict[str, Any]:
         """Everything, in JSON types; see `from_dict`."""
         return {"schema": self.SCHEMA, "schema_version": self.SCHEMA_VERSION, **self.content()}
@@ -214,8 +208,7 @@ class Document:
                 f"{cls.SCHEMA_VERSION}): make the {what} again or update gmwm"
             )
         try:
-            form = cls.document_form()
-            return cls.from_content(form.checked(content) if form else content)
+            return cls.from_content(content)
         except InputError as error:
             raise InputError(f"the {what} cannot be rebuilt ({error}): make it again") from None
         except (

@@ -16,7 +16,7 @@ HINTS = {
     "channel-unknown": "--channel gyro_x=COLUMN for each channel",
     "channels-swapped": "--channel accel_x=COLUMN for each channel",
     "clock": "--rate 100 --time none",
-    "damaged": "get a whole copy, or take what is there, --damaged",
+    "damaged": "get a whole copy, or use what is left of it, --damaged",
     "earlier-runs": "--resume, or -o FOLDER",
     "gyro-unit-missing": "--gyro-unit deg/s",
     "heading-unknown": "--heading DEG, or heading: in the file",
@@ -32,8 +32,6 @@ HINTS = {
     "rate-contradicted": "leave out the rate to use that of the stamps, or add --time none",
     "runs-in-use": "-o FOLDER",
     "sensor-absent": "record them too, or calibrate the rest alone, --channels {sensor}",
-    "sensors-in-turns": "keep the rows of one, or, if there is but one, --rate {rate:.6g} "
-    "--time none",
     "time-unit": "--rate {rate:.6g}, or name the column {column}",
     "topic": "--topic NAME",
     "topics-apart": "--topic NAME or --clock log",

@@ -10,29 +10,13 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from gmwm.errors import InputError
+from gmwm.readers import CLOCKS, NAMES as FORMATS
 
 if TYPE_CHECKING:
     from gmwm.process import Model, Process
     from gmwm.readers import Recording
 
 _TERM = re.compile(r"\s*(?:([1-9])\s*\*?\s*)?([A-Za-z]+)\s*")
-
-CLOCKS = ("header", "log")
-"""As in `gmwm.read`, which would take long to import for a line of help."""
-
-FORMATS = (
-    "text",
-    "numpy",
-    "hdf5",
-    "mat",
-    "parquet",
-    "feather",
-    "rosbag",
-    "rosbag2",
-    "ulog",
-    "ardupilot",
-)
-"""The same."""
 
 
 PATH = click.Path(path_type=Path)
@@ -117,7 +101,7 @@ reading_options = together(
     ),
     option(
         "--damaged",
-        "Take what is there of a text or a flight log that is cut off or damaged in places;"
+        "Use what is left of a text or a flight log that is cut off or damaged in places;"
         " it is refused otherwise.",
     ),
 )

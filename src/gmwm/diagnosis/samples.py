@@ -20,7 +20,7 @@ def gap_notices(channels: Sequence[Channel], dt: float) -> list[Notice]:
     """Say how much is missing; once for the recording where all channels miss the same."""
     found = []
     for channel in channels:
-        missing = Missing().and_then(channel.values)
+        missing = Missing.of(channel.values)
         if not missing.samples:
             continue
         share = missing.samples / channel.n

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from gmwm._core.notices import Notice
+from gmwm.issues import Notice
 from gmwm.errors import InputError
 from gmwm.filter_numbers import FilterNumbers
 from gmwm.process import GaussMarkov, Model, RandomWalk, WhiteNoise

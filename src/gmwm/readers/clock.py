@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gmwm._core.notices import Notice
 from gmwm._core.typing import BoolArray, FloatArray, IntArray, median
 from gmwm.errors import InputError
+from gmwm.issues import Notice, notice
 from gmwm.readers import tuning
 from gmwm.readers.grid import Change, Jumps, Uneven, find_change, find_jumps, place_uneven
 
@@ -53,7 +53,7 @@ class Clock:
     same: Callable[[IntArray], BoolArray]
 
     def error(self, row: int | None, text: str, hint: str = _WAY_OUT) -> InputError:
-        """What is wrong with the stamps, with the file, the column and the place."""
+        """An error about the stamps, with the file, the column and the place."""
         place = "" if row is None else f", {self.where(row)}"
         return InputError(f"{self.source}, {self.column}{place}: {text}", "clock", hint)
 
@@ -100,15 +100,12 @@ def timing_of(clock: Clock, expected: float | None = None) -> Timing:
     if kept is not None:
         rows, where = kept, clock.where
         clock = replace(clock, stamps=clock.stamps[rows], where=lambda row: where(int(rows[row])))
-        text = (
-            f"{copies.size:,} row{'s repeat rows' if copies.size > 1 else ' repeats a row'} before"
-        )
-        last.append(Notice("rows-repeated", "note", "", text, {"count": copies.size}, "left out"))
+        variant = "many" if copies.size > 1 else ""
+        last.append(notice("rows-repeated", "", {"count": copies.size}, variant=variant))
     continued = _unwrapped(clock.stamps)
     if continued is not None:
         clock = replace(clock, stamps=continued)
-        text = "the counter of the time stamps overflowed: they were continued"
-        last.insert(0, Notice("clock-wraps", "note", "", text))
+        last.insert(0, notice("clock-wraps"))
     found = _grid(clock)
     jumps = found.jumps
     if not _SHORTEST_STEP < jumps.interval < 1.0 / _SHORTEST_STEP:
@@ -128,11 +125,9 @@ def timing_of(clock: Clock, expected: float | None = None) -> Timing:
     is_told = expected is not None or not is_guess
     slowest, fastest = tuning.RATES_OF_SENSORS if is_told else tuning.RATES_OF_SECONDS
     if not slowest <= rate <= fastest:
-        hint = "check the unit of the time column"
-        if not is_told:
-            hint = "the time column states no unit: name it, such as 'time [s]' or 'time [ms]'"
-        text = f"inertial sensors hardly have a rate of {rate:.6g} Hz"
-        notices.append(Notice("rate-unlikely", "warning", "", text, {"rate": rate}, hint))
+        hint = "the time column states no unit: name it, such as 'time [s]' or 'time [ms]'"
+        told = None if is_told else hint
+        notices.append(notice("rate-unlikely", "", {"rate": rate}, hint=told))
     if kept is not None:
         jumps = jumps.with_copies(kept, copies)
     return Timing(rate, jumps, (*notices, *last), found.jitter)
@@ -282,6 +277,7 @@ def without_unit(
 def _check_jumps(clock: Clock, found: _Grid, seconds: float) -> None:
     """Reject a clock whose rate changes much, or whose jumps are not lost rows."""
     jumps, n = found.jumps, clock.stamps.size
+    off_grid = int(np.count_nonzero(jumps.is_off_grid))
     if found.change is not None:
         first, then = (rate / seconds for rate in found.change.rates)
         if max(first / then, then / first) > tuning.SHARP_CHANGE:
@@ -297,9 +293,9 @@ def _check_jumps(clock: Clock, found: _Grid, seconds: float) -> None:
             "as if the stamps were rounded too coarsely"
         )
         raise clock.error(int(jumps.rows[0]), text)
-    if jumps.off_grid > tuning.MOST_OFF_GRID * n and found.uneven is None:
+    if off_grid > tuning.MOST_OFF_GRID * n and found.uneven is None:
         text = (
-            f"{jumps.off_grid:,} of {n:,} steps are not near a whole number of the usual one of "
+            f"{off_grid:,} of {n:,} steps are not near a whole number of the usual one of "
             f"{jumps.interval:.6g}, so that the sampling rate is not known"
         )
         raise clock.error(None, text)
@@ -311,88 +307,58 @@ def _check_jumps(clock: Clock, found: _Grid, seconds: float) -> None:
         )
         raise clock.error(None, text)
     if jumps.total > n:
+        longest = int(np.argmax(jumps.missing))
         text = (
-            f"the clock jumps by {jumps.missing[jumps.longest]:,.6g} sampling intervals, and in "
+            f"the clock jumps by {jumps.missing[longest]:,.6g} sampling intervals, and in "
             f"all {jumps.total:,.6g} samples are missing where there are {n:,}, more than half of "
             "the recording"
         )
         hint = f"use the part before or after, or, {_WAY_OUT}"
-        raise clock.error(int(jumps.rows[jumps.longest]), text, hint)
+        raise clock.error(int(jumps.rows[longest]), text, hint)
 
 
 def _notices(clock: Clock, found: _Grid, seconds: float, *, is_guess: bool) -> list[Notice]:
     """The rate and the jitter, jumps, a change of the rate, and what is uneven."""
-    jumps, jitter = found.jumps, found.jitter
+    jumps, jitter, uneven = found.jumps, found.jitter, found.uneven
     interval = jumps.interval * seconds
-    rate = 1.0 / interval
-    unit = UNITS.get(seconds, clock.own_unit) + (", inferred from the steps" if is_guess else "")
-    text = f"time stamps ({clock.column}, {unit}) give {rate:.6g} Hz"
+    rate, steps = 1.0 / interval, ""
     if jitter >= tuning.JITTER_SHOWN:
-        far = jitter * interval
-        size = f"{far:.3g} s" if far >= _SHORTEST_SHOWN else f"{1e6 * far:.3g} us"
-        text += f"; their steps vary by {size} rms ({100.0 * jitter:.2f} % of a step)"
+        rms = jitter * interval
+        size = f"{rms:.3g} s" if rms >= _SHORTEST_SHOWN else f"{1e6 * rms:.3g} us"
+        steps = f"; their steps vary by {size} rms ({100.0 * jitter:.2f} % of a step)"
+    units = UNITS.get(seconds, clock.own_unit) + (", inferred from the steps" if is_guess else "")
     values = {"rate": rate, "unit": seconds, "jitter": jitter}
-    notices = [Notice("time-stamps", "note", "", text, values)]
+    notices = [notice("time-stamps", "", values, column=clock.column, units=units, steps=steps)]
 
     def when(row: int) -> float:
         return float(clock.stamps[row] - clock.stamps[0]) * seconds
 
     if count := jumps.rows.size:
-        digits = 1 - math.floor(math.log10(interval))
-        length = round(float(jumps.steps[jumps.longest] - 1.0) * interval, digits)
-        time = round(when(int(jumps.rows[jumps.longest]) - 1), digits)
-        total = f"{jumps.total:,.0f} sample{'s' if jumps.total > 1.0 else ''} missing"
-        place = f"by {length:.12g} s, {time:.12g} s after the start"
-        times = f"{count:,} times, farthest "
-        text = f"the clock jumps {times if count > 1 else ''}{place}: "
-        text += f"in all {total}" if count > 1 else total
+        digits, far = 1 - math.floor(math.log10(interval)), int(np.argmax(jumps.missing))
+        length = round(float(jumps.steps[far] - 1.0) * interval, digits)
+        time = round(when(int(jumps.rows[far]) - 1), digits)
         values = {"count": count, "missing": jumps.total, "longest": length, "time": time}
-        notices.append(Notice("clock-jumps", "note", "", text, values))
-    if off := jumps.off_grid:
-        which = (
-            f"{off:,} of these jumps {'are' if off > 1 else 'is'}" if count > 1 else "the jump is"
-        )
-        text = (
-            f"{which} not near a whole number of sampling intervals: the samples after it were "
-            "placed at the nearest"
-        )
-        notices.append(Notice("clock-off-grid", "note", "", text, {"count": off}))
+        variant = "many" if count > 1 else ""
+        notices.append(notice("clock-jumps", "", values, variant=variant))
+    if off := int(np.count_nonzero(jumps.is_off_grid)):
+        these = f"{off:,} of these jumps {'are' if off > 1 else 'is'}"
+        which = these if count > 1 else "the jump is"
+        notices.append(notice("clock-off-grid", "", {"count": off}, which=which))
     if found.change is not None:
         before, after = (each / seconds for each in found.change.rates)
         row, time = clock.where(found.change.row), when(found.change.row)
-        text = (
-            f"the sampling rate goes from {before:.4g} to {after:.4g} Hz at about {time:.4g} s, "
-            f"and {rate:.6g} Hz is taken for all of it"
-        )
         values = {"before": before, "after": after, "rate": rate, "time": time}
-        hint = f"use the part before or after ({row})"
-        notices.append(Notice("rate-changes", "bad", "", text, values, hint))
-    if found.uneven is not None:
-        notices += _uneven_notices(clock, found.uneven, interval)
-    return notices
-
-
-def _uneven_notices(clock: Clock, found: Uneven, interval: float) -> list[Notice]:
-    """Bursts, and stamps far from the grid."""
-    notices = []
-    if found.burst > 1:
-        text = (
-            f"{found.burst} rows come with one stamp, usually: it is taken as that of the last "
-            "of them, and the others are one sampling interval apart"
-        )
-        hint = "if the rows are of several sensors, keep those of one"
-        notices.append(Notice("stamps-in-bursts", "note", "", text, {"rows": found.burst}, hint))
-    astray = np.flatnonzero(np.abs(found.late) > tuning.ASTRAY + found.burst)
-    if astray.size:
-        worst = astray[np.argmax(np.abs(found.late[astray]))]
-        by = float(found.late[worst]) * interval
-        count = f"{astray.size:,} time stamp{'s are' if astray.size > 1 else ' is'}"
-        text = (
-            f"{count} far from the clock, at most by {by:.3g} s "
-            f"({clock.where(int(found.last[worst]))}): the samples were taken as evenly spaced"
-        )
-        values = {"count": astray.size, "largest": by}
-        notices.append(Notice("stamps-astray", "note", "", text, values))
+        notices.append(notice("rate-changes", "", values, row=row))
+    if uneven is not None and uneven.burst > 1:
+        notices.append(notice("stamps-in-bursts", "", {"rows": uneven.burst}))
+    if uneven is not None:
+        astray = np.flatnonzero(np.abs(uneven.late) > tuning.ASTRAY + uneven.burst)
+        if astray.size:
+            worst = astray[np.argmax(np.abs(uneven.late[astray]))]
+            values = {"count": astray.size, "largest": float(uneven.late[worst]) * interval}
+            stamps = f"{astray.size:,} time stamp{'s are' if astray.size > 1 else ' is'}"
+            place = clock.where(int(uneven.last[worst]))
+            notices.append(notice("stamps-astray", "", values, stamps=stamps, place=place))
     return notices
 
 

@@ -37,19 +37,9 @@ class Jumps:
         return float(np.sum(self.missing))
 
     @property
-    def longest(self) -> int:
-        """Index of the longest jump."""
-        return int(np.argmax(self.missing))
-
-    @property
     def is_off_grid(self) -> BoolArray:
         """Whether each jump is far from a whole number of sampling intervals."""
         return np.asarray(np.abs(self.steps - 1.0 - self.missing) > tuning.OFF_GRID)
-
-    @property
-    def off_grid(self) -> int:
-        """Number of such jumps."""
-        return int(np.count_nonzero(self.is_off_grid))
 
     @property
     def are_bursts(self) -> bool:

@@ -13,13 +13,11 @@ from typing import Any, Literal
 import numpy as np
 
 from gmwm._core.files import existing_file
-from gmwm._core.notices import Notice
 from gmwm._core.typing import BoolArray, FloatArray, IntArray, known_of
 from gmwm._core.units import SI_UNIT, factor, quantity_of
 from gmwm.errors import InputError
+from gmwm.issues import Notice, notice
 from gmwm.readers import tuning
-from gmwm.readers.binary import BinaryTable, layout_of
-from gmwm.readers.channel_units import channel_units
 from gmwm.readers.clock import (
     Clock,
     Timing,
@@ -29,22 +27,22 @@ from gmwm.readers.clock import (
     timing_of,
     without_unit,
 )
-from gmwm.readers.formats import (
-    Part,
-    Wanted,
-    has_sensors,
-    joined,
-    open_tables,
-    shares,
-    with_temperature,
+from gmwm.readers.columns import (
+    AuxiliaryColumn,
+    Given,
+    Reference,
+    Roles,
+    channel_units,
+    roles_of,
 )
+from gmwm.readers.formats.binary import BinaryTable, layout_of
+from gmwm.readers.joining import Part, has_sensors, joined, shares, with_temperature
 from gmwm.readers.missing import without_sentinels
 from gmwm.readers.names import NUMBERS_OF_SENSORS, bare, meaning, stated_seconds
 from gmwm.readers.recording import Channel, Recording, auxiliary_channel
+from gmwm.readers.registry import NAMES, Wanted, open_tables
 from gmwm.readers.rest import rest_notices
-from gmwm.readers.roles import AuxiliaryColumn, Given, Reference, Roles, roles_of
-from gmwm.readers.spool import load_columns
-from gmwm.readers.table import Table, column_of
+from gmwm.readers.table import Table, load_columns
 
 
 def read(
@@ -98,12 +96,10 @@ def read(
     clock : {"header", "log"}, optional
         Stamps of messages: those of their headers, or the times at which they were recorded.
     format : str, optional
-        What the file is, where its first bytes and its name do not show it: ``"text"``,
-        ``"numpy"``, ``"hdf5"``, ``"mat"``, ``"parquet"``, ``"feather"``, ``"rosbag"``,
-        ``"rosbag2"``, ``"ulog"`` or ``"ardupilot"``.
+        What the file is, where its first bytes and its name do not show it: one of FORMATS.
     damaged : bool, optional
-        Take what is there of a text or a flight log that is cut off or damaged in places; it is
-        refused otherwise. Other formats have what their ends are needed for.
+        Use what is left of a text or a flight log that is cut off or damaged in places; it is
+        rejected otherwise. Damaged files of other formats cannot be read.
 
     Returns
     -------
@@ -139,20 +135,19 @@ def read(
     else:
         topics = (topic,) if isinstance(topic, str) else tuple(topic)
         tables = open_tables(path, Wanted(topics, clock, channels is not None, damaged), format)
-    return _read(tables, Given(rate, units or {}, channels, time))
-
-
-def _read(tables: Sequence[Table], given: Given) -> Recording:
-    """The recording of one table or of several."""
+    given = Given(rate, units or {}, channels, time)
     if len(tables) == 1:
         return recording_of(tables[0], given).recording
     own = [table for table in tables if has_sensors(table)]
-    chosen = [(own[0], given.channels)] if len(own) == 1 else shares(own, given.channels)
+    chosen = [(own[0], channels)] if len(own) == 1 else shares(own, channels)
     parts = [recording_of(table, replace(given, channels=only)) for table, only in chosen]
     for table in tables:
         if table not in own:
             parts[0] = with_temperature(parts[0], table)
     return joined(parts)
+
+
+read.__doc__ = str(read.__doc__).replace("FORMATS", ", ".join(f'``"{name}"``' for name in NAMES))
 
 
 def recording_of(table: Table, given: Given) -> Part:
@@ -175,8 +170,7 @@ def recording_of(table: Table, given: Given) -> Part:
         seconds = meaning(table.names[roles.time]).seconds
         if seconds in (None, 1.0) and is_time_of_day(arrays[roles.time]):
             arrays[roles.time] = seconds_of_day(arrays[roles.time])
-            text = "times of day (hhmmss) count as seconds since midnight"
-            odd.append(Notice("time-of-day", "note", "", text))
+            odd.append(notice("time-of-day"))
         start = float(arrays[roles.time][0]) * (seconds or 1.0)
     for name, index in roles.channels.items():
         largest = tuning.BEYOND_SENSORS / factor(unit_of[name], SI_UNIT[quantity_of(unit_of[name])])
@@ -250,7 +244,7 @@ def _check_one_sensor(table: Table, roles: Roles) -> None:
         turns = np.count_nonzero(np.diff(numbers))
         if 1 < several <= tuning.MOST_SENSORS and turns > tuning.IN_TURNS * numbers.size:
             raise InputError(
-                f"{table.source}, {column_of(table, index)}: rows of {several} sensors come in "
+                f"{table.source}, {table.column(index)}: rows of {several} sensors come in "
                 "turns: keep those of one",
                 "several-sensors",
             )
@@ -268,7 +262,7 @@ def _unknown_rate(table: Table, time: int | None, stated: float | None) -> Input
     steps = np.diff(table.load([time])[time])
     if not steps.size:
         return None  # too few samples is what is wrong then
-    return without_unit(table.source, column_of(table, time), float(np.median(steps)))
+    return without_unit(table.source, table.column(time), float(np.median(steps)))
 
 
 def _load(
@@ -294,8 +288,8 @@ def _load(
                     arrays[column.index] = values
                     kept.append(column)
         names = ", ".join(repr(column.name) for column in roles.auxiliary if column not in kept)
-        text = f"auxiliary channels that cannot be read, or have another length, left out: {names}"
-        notices.append(Notice("columns-unreadable", "note", "", text))
+        what = f"auxiliary channels that cannot be read, or have another length ({names})"
+        notices.append(notice("columns-unreadable", what=what))
     n = arrays[roles.columns[0]].size
     most = max(n - int(np.count_nonzero(np.isnan(arrays[i]))) for i in roles.channels.values())
     if most < tuning.FEWEST_SAMPLES:
@@ -322,12 +316,15 @@ def _timing(
 
     found = meaning(table.names[time])
     clock = Clock(
-        table.source, column_of(table, time), arrays[time], found.seconds, found.stated,
-        table.where, same,
-    )  # fmt: skip
+        table.source,
+        table.column(time),
+        arrays[time],
+        found.seconds,
+        found.stated,
+        table.where,
+        same,
+    )
     timing = timing_of(clock, stated)
     if stated is None:
         return timing
-    text = f"the rate stated, {stated:g} Hz, is used"
-    used = Notice("rate-stated", "note", "", text, {"rate": stated})
-    return replace(timing, notices=(*timing.notices, used))
+    return replace(timing, notices=(*timing.notices, notice("rate-stated", "", {"rate": stated})))

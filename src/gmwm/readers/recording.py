@@ -10,25 +10,16 @@ from typing import Any
 import numpy as np
 
 from gmwm._core import checks
-from gmwm._core.notices import Notice
 from gmwm._core.spool import scaled
 from gmwm._core.text import Printed
 from gmwm._core.typing import FloatArray
 from gmwm._core.units import AUXILIARY, SI_UNIT, AuxiliaryUnit, auxiliary_unit, factor, quantity_of
 from gmwm.errors import InputError, MissingNameError, printable
+from gmwm.issues import Notice, codes, notice
 from gmwm.readers import tuning
 from gmwm.readers.missing import Missing, missing_notices
 
-READING = frozenset(
-    {"column-numbers", "preamble", "columns-not-used", "columns-auxiliary", "columns-unreadable"}
-    | {"time-column", "units-from-names", "units-contradicted"}
-    | {"time-stamps", "clock-jumps", "clock-off-grid", "rate-changes", "rate-stated"}
-    | {"rate-unlikely"}
-    | {"stamps-in-bursts", "rows-repeated", "stamps-astray", "clock-wraps"}
-    | {"sentinel", "gravity-absent"}
-    | {"missing-samples", "part", "topic", "topics-joined", "temperature-interpolated"}
-    | {"partial-record", "still-stretches"}
-)
+READING = codes(topic="reading") | codes(topic="clock")
 """Codes of the notices about how a file was read."""
 
 
@@ -152,25 +143,14 @@ class Recording(Mapping[str, Channel], Printed):
     ) -> Recording:
         """Build a recording from arrays in any unit.
 
-        Parameters
-        ----------
-        arrays : mapping of str to (n,) array_like, or iterable of pairs
-            Channel name -> samples, NaN where one is missing. Of pairs that are made one by one,
-            each series is in memory once.
-        rate : float
-            Sampling rate, Hz.
-        units : mapping of str to str
-            Channel name, or "gyro" and "accel" for all of them, -> unit: ``{"gyro": "deg/s"}``. A
-            channel in degC, K, V, mV or s is auxiliary.
-        source : str, optional
-        notices : sequence of Notice, optional
-            What else there is to know; what is missing is added.
-
-        Raises
-        ------
-        InputError
-            If the rate is not positive, a unit is missing or unknown, or the channels are not
-            series of numbers of one length, none infinite.
+        arrays: Channel name -> samples (n,), NaN where one is missing; or pairs of these, of which
+            each series is in memory once if they are made one by one.
+        rate: Sampling rate, Hz.
+        units: Channel name, or "gyro" and "accel" for all of them, -> unit: ``{"gyro": "deg/s"}``.
+            A channel in degC, K, V, mV or s is auxiliary.
+        notices: Added to those about missing samples.
+        Raises InputError if the rate is not positive, a unit is missing or unknown, or the channels
+            are not series of numbers of one length, none infinite.
         """
         if not tuning.SLOWEST_RATE <= rate <= tuning.FASTEST_RATE:
             limits = f"{tuning.SLOWEST_RATE:g} to {tuning.FASTEST_RATE:g}"
@@ -246,10 +226,7 @@ class Recording(Mapping[str, Channel], Printed):
     def of_one_rate(self, what: str) -> Recording:
         """The recording, if all channels of its sensors have one sampling rate.
 
-        Raises
-        ------
-        InputError
-            If they have several, which ``what`` does not work with.
+        Raises InputError if they have several, which ``what`` does not work with.
         """
         parts = self.by_rate()
         if len(parts) > 1:
@@ -266,28 +243,16 @@ class Recording(Mapping[str, Channel], Printed):
         return self.n * self.dt
 
     def part(self, start: float = 0.0, stop: float | None = None) -> Recording:
-        """The recording between two times.
+        """The recording between two times, whose own times count from ``start``.
 
-        Parameters
-        ----------
-        start, stop : float, optional
-            s from the first sample; by default to the end.
-
-        Returns
-        -------
-        Recording
-            Its own times count from ``start``.
-
-        Raises
-        ------
-        InputError
-            If fewer than 64 samples lie between, or the sampling rate changes, so that the times
-            are not those of the file.
+        start, stop: s from the first sample; by default to the end.
+        Raises InputError if fewer than 64 samples lie between, or the sampling rate changes, so
+            that the times are not those of the file.
         """
         end = self.duration if stop is None else min(float(stop), self.duration)
         if start == 0.0 and end == self.duration:
             return self
-        if any(notice.code == "rate-changes" for notice in self.notices):
+        if any(each.code == "rate-changes" for each in self.notices):
             raise InputError(
                 f"{self.source or 'the recording'}: the sampling rate changes, so that a part has "
                 "another rate than the whole: cut the file where it changes"
@@ -301,15 +266,10 @@ class Recording(Mapping[str, Channel], Printed):
             replace(c, values=c.values[round(start / c.dt) : round(end / c.dt)])
             for c in self.channels
         )
-        text = f"the part from {start:.6g} to {end:.6g} s is used; times count from its start"
-        part = Notice("part", "note", "", text, {"start": float(start), "stop": end})
-        kept = [notice for notice in self.notices if notice.code != "missing-samples"]
+        part = notice("part", "", {"start": float(start), "stop": end})
+        kept = [each for each in self.notices if each.code != "missing-samples"]
         notices = (*kept, part, *notices_of_gaps(channels))
         return replace(self, channels=channels, notices=notices)
-
-    @property
-    def _rates(self) -> str:
-        return " and ".join(f"{part.rate:g}" for part in self.by_rate())
 
     def __getitem__(self, name: str) -> Channel:
         for channel in self.channels:
@@ -325,12 +285,16 @@ class Recording(Mapping[str, Channel], Printed):
     def __len__(self) -> int:
         return len(self.channels)
 
+    @property
+    def _size(self) -> str:
+        rates = " and ".join(f"{part.rate:g}" for part in self.by_rate())
+        return f"{rates} Hz, {self.duration:.6g} s"
+
     def __repr__(self) -> str:
-        size = f"{self._rates} Hz, {self.duration:.6g} s"
-        return f"<Recording of {self.source or 'arrays'}: {', '.join(self.names)}; {size}>"
+        return f"<Recording of {self.source or 'arrays'}: {', '.join(self.names)}; {self._size}>"
 
     def __str__(self) -> str:
-        head = f"{self.source or 'recording'}: {self._rates} Hz, {self.duration:.6g} s"
+        head = f"{self.source or 'recording'}: {self._size}"
         return "\n".join(
             [head, *(f"  {channel}" for channel in self.channels), *map(str, self.notices)]
         )
@@ -359,9 +323,7 @@ def _series(name: str, values: FloatArray) -> FloatArray:
 
 def notices_of_gaps(channels: Iterable[Channel]) -> list[Notice]:
     """What is missing in channels that are whole."""
-    return missing_notices(
-        {channel.name: Missing().and_then(channel.values) for channel in channels}
-    )
+    return missing_notices({channel.name: Missing.of(channel.values) for channel in channels})
 
 
 def require_recording(given: Any) -> None:

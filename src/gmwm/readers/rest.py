@@ -7,10 +7,10 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from gmwm._core.notices import Notice
 from gmwm._core.typing import QUARTILE, FloatArray, known_of, median
 from gmwm._core.units import SI_UNIT, factor
 from gmwm.errors import InputError
+from gmwm.issues import Notice, notice
 from gmwm.readers import tuning
 from gmwm.readers.names import AXES
 from gmwm.readers.recording import Recording
@@ -51,7 +51,7 @@ def rest_notices(
     if swapped:
         return swapped
     counts = _counts(recording, unit_of)
-    are_counts = {notice.where for notice in counts}
+    are_counts = {each.where for each in counts}
     others = (*_gravity(recording, force, given, has_layout), *_gyro(rate))
     rest = [each for each in others if each.severity == "bad" or each.where not in are_counts]
     return (*counts, *rest)
@@ -137,7 +137,7 @@ def _swapped(
         hint = 'give the columns, e.g. channels={"accel_x": 0, "gyro_x": 3}'
         raise InputError(f"{source}: {text}", "channels-swapped", hint)
     values = {"gyro": rate.size, "accel": force.size, "likely": units[0]}
-    return (Notice("swapped", "bad", "", text, values, "check which column is which channel"),)
+    return (notice("swapped", "", values, contradiction=text),)
 
 
 def _gravity(
@@ -151,44 +151,46 @@ def _gravity(
     is_given = any(key in given for key in ("accel", *(f"accel_{axis}" for axis in AXES)))
     if not likely:
         return _scale(recording, force, must_show=has_layout and not is_given)
-    text = (
-        f"the mean of the accelerometer is {in_file:.4g} {force.unit} long, which is gravity in "
-        f"{likely[0]}"
-    )
+    values = {"norm": force.size, "unit": force.unit, "likely": likely[0]}
+    hint = f"check the unit: all accelerometer values are off by {_GRAVITY / force.size:.4g}"
+    found = notice("gravity", "accel", values, variant="unit", hint=hint, in_file=in_file)
     if not is_given:
         raise InputError(
-            f"{recording.source}: {text}",
+            f"{recording.source}: {found.text}",
             "accel-unit-missing",
             f'give the unit, units={{"accel": "{likely[0]}"}}',
             {"unit": likely[0]},
         )
-    values = {"norm": force.size, "unit": force.unit, "likely": likely[0]}
-    hint = f"check the unit: all accelerometer values are off by {_GRAVITY / force.size:.4g}"
-    return (Notice("gravity", "bad", "accel", text, values, hint),)
+    return (found,)
 
 
 def _scale(recording: Recording, force: _Sensor, *, must_show: bool) -> tuple[Notice, ...]:
     """A length that is gravity in no unit, and too large for an accelerometer without gravity."""
-    ratio, values = force.usual / _GRAVITY, {"norm": force.size}
-    text = f"the accelerometer reads {force.usual:.4g} m/s^2, {ratio:.3g} times gravity"
+    values, usual, ratio = {"norm": force.size}, force.usual, force.usual / _GRAVITY
     if must_show and not 0.5 < ratio < 2.0:
         raise InputError(
-            f"{recording.source}: {text}: the file has another layout",
+            f"{recording.source}: the accelerometer reads {usual:.4g} m/s^2, {ratio:.3g} times "
+            "gravity: the file has another layout",
             "layout",
             'give the layout of this file, or units={"accel": "m/s^2"} if there is no gravity',
         )
     if _is_gravity(force.size * recording.rate, tuning.GRAVITY_SURE):
-        text += ", gravity over one sampling interval: increments of velocity, not accelerations"
         hint = "divide the increments, and those of the gyro, by the sampling interval"
-        return (Notice("gravity", "bad", "", text, values, hint),)
-    is_absent = (
-        force.usual < tuning.NO_GRAVITY or force.scatter > tuning.NOISE_OF_GRAVITY * force.usual
-    )
+        return (notice("gravity", "", values, variant="increments", hint=hint, usual=usual),)
+    is_absent = usual < tuning.NO_GRAVITY or force.scatter > tuning.NOISE_OF_GRAVITY * usual
     if is_absent or abs(ratio - 1.0) < tuning.SCALE_AGREES:
         return ()
-    text += ": neither gravity nor an accelerometer without it"
-    hint = "check its scale and range, and that the numbers are not counts"
-    return (Notice("gravity", "warning", "accel", text, values, hint),)
+    return (
+        notice(
+            "gravity",
+            "accel",
+            values,
+            severity="warning",
+            variant="scale",
+            usual=usual,
+            ratio=ratio,
+        ),
+    )
 
 
 def _gyro(rate: _Sensor | None) -> tuple[Notice, ...]:
@@ -199,12 +201,7 @@ def _gyro(rate: _Sensor | None) -> tuple[Notice, ...]:
         return (_gyro_unit(rate),)
     if rate.size - tuning.SURE_MEAN * rate.size_error < tuning.USUAL_BIAS:
         return ()
-    text = (
-        f"a mean rate of {rate.size / _DEGREE:.3g} deg/s is more than the bias of most gyros: "
-        "the sensor turned all the time, or is a cheap gyro that was not calibrated"
-    )
-    hint = "make sure that it was at rest"
-    return (Notice("mean-rate", "warning", "gyro", text, {"mean": rate.size}, hint),)
+    return (notice("mean-rate", "gyro", {"mean": rate.size}, size=rate.size / _DEGREE),)
 
 
 def _gyro_unit(rate: _Sensor) -> Notice:
@@ -224,17 +221,15 @@ def _gyro_unit(rate: _Sensor) -> Notice:
         for unit in likely
         if abs(math.log(ratios[unit] / ratios[likely[0]])) < math.log(tuning.UNITS_APART)
     ]
-    if rate.density > tuning.NOISIEST_GYRO:
-        text = f"white noise of {rate.density / _DEGREE:.3g} deg/s/sqrt(Hz)"
-    else:
-        text = f"a mean rate of {rate.size / _DEGREE:.3g} deg/s"
     values: dict[str, object] = {"density": rate.density, "mean": rate.size, "unit": rate.unit}
-    hint = "check the unit and the sampling rate"
+    explained = ""
     if near:
         values["likely"] = near[0]
-        hint += f": {' or '.join(near)}, not {rate.unit}, would explain it"
-    text += " is more than gyros at rest have"
-    return Notice("gyro-unit", "warning", "gyro", text, values, hint)
+        explained = f": {' or '.join(near)}, not {rate.unit}, would explain it"
+    is_noisy = rate.density > tuning.NOISIEST_GYRO
+    size = (rate.density if is_noisy else rate.size) / _DEGREE
+    variant = "noise" if is_noisy else "mean"
+    return notice("gyro-unit", "gyro", values, variant=variant, size=size, explained=explained)
 
 
 def _is_plausible(density: float, mean: float) -> bool:
@@ -255,12 +250,8 @@ def _counts(recording: Recording, unit_of: Mapping[str, str]) -> tuple[Notice, .
         if not found:
             continue
         noise = float(np.max(_noise_of([recording[name].values / sizes[name] for name in found])))
-        text = (
-            f"{', '.join(found)}: every sample is a whole number, with a noise of {noise:.3g}: "
-            f"counts of the converter, not {units[found[0]]}"
-        )
-        hint = "multiply them by the size of a count from the data sheet"
-        notices.append(Notice("counts", "bad", sensor, text, {"noise": noise}, hint))
+        listed, unit = ", ".join(found), units[found[0]]
+        notices.append(notice("counts", sensor, {"noise": noise}, listed=listed, unit=unit))
     return tuple(notices)
 
 

@@ -1,87 +1,131 @@
-"""What every kind of file offers to the reader: columns, not yet read."""
+"""A file as columns that are not read yet: what every format gives to the reader."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from typing import Protocol
+import warnings
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from importlib import import_module
+from types import ModuleType
 
 import numpy as np
 
-from gmwm._core.notices import Notice
+from gmwm._core import memory
+from gmwm._core.spool import Spool
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
-
-READABLE = (
-    "gmwm reads CSV and other delimited text (plain or .gz), NPY and NPZ, ROS bags, PX4 and "
-    "ArduPilot logs, MAT, HDF5, Parquet and Feather"
-)
-"""For messages about files of another kind."""
-
+from gmwm.issues import Notice, notice
+from gmwm.readers import tuning
 
 LARGEST = 1e150
-"""Magnitudes from here on are refused like infinities: their squares overflow."""
+"""Magnitudes from here on are rejected like infinities: their squares overflow."""
+
+Columns = dict[int, FloatArray]
+"""Index of a column -> its values, NaN where a sample is missing."""
 
 
-class Table(Protocol):
-    """A file of columns of equal length.
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Table(ABC):
+    """Columns of equal length.
 
-    source: The file's name, for messages.
+    source: Name of the file, for messages.
     names: One for each column, as written in the file; ``""`` where a column has none.
+    rate: Sampling rate that the file states, Hz.
     tentative: Whether the names come from a comment and may be something else.
-    rate: Sampling rate that the file itself states, Hz.
-    notices: What was noticed while opening it.
+    notices: What was noticed while opening and reading the file.
+    stamps: What messages call the time stamps, where they are no column of the file.
+    origin: What says the units, for messages.
     """
 
-    @property
-    def source(self) -> str: ...
-    @property
-    def names(self) -> tuple[str, ...]: ...
-    @property
-    def tentative(self) -> bool: ...
-    @property
-    def rate(self) -> float | None: ...
-    @property
-    def notices(self) -> tuple[Notice, ...]: ...
+    source: str
+    names: tuple[str, ...]
+    rate: float | None = None
+    tentative: bool = False
+    notices: list[Notice] = field(default_factory=list)
+    stamps: str = ""
+    origin: str = "the names of the columns"
 
-    def load(self, columns: Sequence[int]) -> dict[int, FloatArray]:
-        """Read some columns, by their indices, each once.
+    @abstractmethod
+    def segments(self, columns: Sequence[int], rows: int) -> Iterator[Columns]:
+        """Columns by their indices, about ``rows`` rows at a time, or one whole column at a time.
 
-        Returns: finite values, NaN where a sample is missing.
+        Raises InputError if a column cannot be read, or holds anything but usable numbers.
         """
 
-    def segments(self, columns: Sequence[int], rows: int) -> Iterator[dict[int, FloatArray]]:
-        """The same, about ``rows`` at a time."""
-
+    @abstractmethod
     def where(self, row: int) -> str:
-        """Say where a row of data is, e.g. ``"line 12"``."""
+        """The place of a row of data, e.g. ``"line 12"``."""
+
+    def expected_rows(self) -> float:
+        """Number of rows before the file is read; 0 if unknown."""
+        return 0.0
+
+    def column(self, index: int) -> str:
+        """How messages call a column."""
+        return self.stamps or f"column {label(self.names, index)}"
+
+    def load(self, columns: Sequence[int]) -> Columns:
+        """Read some columns, by their indices, each once, into memory.
+
+        Raises InputError, with the code "memory" if there is not enough.
+        """
+        samples, held = self.expected_rows() * len(columns), 0
+        memory.require(tuning.BYTES_PER_SAMPLE * samples, self.source)
+        allowed = memory.budget()
+        parts: dict[int, list[FloatArray]] = {column: [] for column in columns}
+        for block in self.segments(columns, tuning.ROWS_OF_BLOCK):
+            for column, values in block.items():
+                parts[column].append(values)
+                held += values.size
+            if tuning.BYTES_PER_SAMPLE * held > allowed:
+                memory.require(tuning.BYTES_PER_SAMPLE * max(samples, held), self.source)
+        return {column: _joined(parts.pop(column)) for column in columns}
+
+    def check_usable(self, column: int, values: FloatArray, first: int) -> None:
+        """Reject infinite values and those too large for use; ``first`` is the row of the first."""
+        if not usable(values):
+            rows = np.flatnonzero(np.abs(values) >= LARGEST)
+            others = f", and {rows.size - 1:,} more such" if rows.size > 1 else ""
+            raise InputError(
+                f"{self.source}, column {label(self.names, column)}, "
+                f"{self.where(first + int(rows[0]))}: {values[rows[0]]} is not a usable "
+                f"number{others}: cut the file before that row, or save NaN if the sample is "
+                "missing"
+            )
+
+
+def load_columns(table: Table, columns: Sequence[int]) -> Columns:
+    """Read some columns; those of a long file are kept on disk and mapped.
+
+    A file is long if it needs more than `gmwm._core.memory.held`.
+    """
+    try:
+        with memory.limited(memory.held()):
+            return table.load(columns)
+    except InputError as error:
+        if error.code != "memory":
+            raise
+    spools = {column: Spool(1) for column in columns}
+    with memory.limited(max(memory.budget() / (1 << 30), tuning.GIGABYTES_OF_BLOCK)):
+        for block in table.segments(columns, tuning.ROWS_OF_BLOCK):
+            for column, values in block.items():
+                spools[column].append(values)
+    if not spools[columns[0]].n:
+        raise InputError(f"{table.source} holds no samples: record longer")
+    return {column: spool.array()[:, 0] for column, spool in spools.items()}
+
+
+def _joined(parts: list[FloatArray]) -> FloatArray:
+    if len(parts) == 1:
+        return parts[0]
+    return np.concatenate(parts) if parts else np.zeros(0)
 
 
 def label(names: Sequence[str], index: int) -> str:
     """How messages call a column: its name, or its place if it has none."""
-    if names[index]:
-        return repr(names[index])
-    return f"{index} (counted from 0)"
-
-
-def column_of(table: Table, index: int) -> str:
-    """How messages call a column, or the stamps of messages that have no columns of their own."""
-    stamps: str = getattr(table, "stamps", "")
-    return stamps or f"column {label(table.names, index)}"
-
-
-def damage_notice(source: str, what: str, is_taken: bool | None) -> Notice:
-    """What is to be said of a damaged file of which what is there is taken.
-
-    what: Is wrong with it, and where.
-    is_taken: Whether the caller asks for that; None if it cannot be asked for.
-    Raises InputError, with the code "damaged" if it can be, unless it is.
-    """
-    if is_taken is None:
-        raise InputError(f"{source} {what}: get a whole copy")
-    if not is_taken:
-        hint = "get a whole copy, or take what is there, damaged=True"
-        raise InputError(f"{source} {what}", "damaged", hint)
-    return Notice("damaged", "warning", "", f"the file {what}; what is there is used")
+    return repr(names[index]) if names[index] else f"{index} (counted from 0)"
 
 
 def usable(values: FloatArray) -> bool:
@@ -89,3 +133,60 @@ def usable(values: FloatArray) -> bool:
     # Without an array as long as the values.
     most, least = np.fmax.reduce(values, initial=0.0), np.fmin.reduce(values, initial=0.0)
     return bool(least > -LARGEST and most < LARGEST)
+
+
+def damage_notice(source: str, what: str, is_taken: bool | None) -> Notice:
+    """Notice about a damaged file, the rest of which is used.
+
+    what: What is wrong, and where.
+    is_taken: Whether the caller asks for the rest; None if it cannot be asked for.
+    Raises InputError, with the code "damaged" if it can be asked for, unless it is.
+    """
+    if is_taken is None:
+        raise InputError(f"{source} {what}: get a whole copy")
+    if not is_taken:
+        hint = "get a whole copy, or use what is left of it, damaged=True"
+        raise InputError(f"{source} {what}", "damaged", hint)
+    return notice("damaged", what=what)
+
+
+@contextmanager
+def damage_named(
+    source: str, say: str | Callable[[Exception], str] = "is damaged or cut off: save it again"
+) -> Iterator[None]:
+    """Turn whatever a library raises about a file into one sentence.
+
+    source: Name of the file.
+    say: End of the sentence, or exception -> end of the sentence.
+    """
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # numpy's, about headers of old versions
+            yield
+    except InputError:
+        raise
+    except MemoryError as error:
+        raise InputError(f"{source}: {memory.OUT_OF_MEMORY}", "memory") from error
+    except PermissionError as error:
+        raise InputError(f"{source} cannot be read: check its permissions") from error
+    except Exception as error:  # libraries raise a dozen types for damaged bytes
+        if isinstance(error, ValueError) and "object" in str(error).lower():
+            raise InputError(
+                f"{source} holds Python objects, which are not loaded: save arrays of numbers"
+            ) from error
+        raise InputError(f"{source} {say if isinstance(say, str) else say(error)}") from error
+
+
+def library(module: str, extra: str, source: str) -> ModuleType:
+    """Import a library of an extra of this package.
+
+    source: The file that needs it.
+    Raises InputError with the command that installs it, if it is absent.
+    """
+    try:
+        return import_module(module)
+    except ImportError as error:
+        needed = module.partition(".")[0]
+        raise InputError(
+            f"{source} needs {needed}, which is not installed: pip install 'gmwm[{extra}]'", "extra"
+        ) from error

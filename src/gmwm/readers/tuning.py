@@ -179,9 +179,6 @@ MOST_OF_ONE_STAMP = 1024
 LARGEST_OF_BINARY = 60.0
 """s: larger first steps of a binary file are numbers of another layout."""
 
-RECORDS_AT_ONCE = 1 << 16
-"""Records of a binary file that are read at a time."""
-
 LONGEST_OF_WRAP = 100.0
 """Steps within which a counter that ran over goes on."""
 

@@ -5,8 +5,8 @@ from datetime import UTC, datetime, timedelta, timezone
 
 import pytest
 
-from gmwm.readers import cells
 from gmwm.readers.table import LARGEST
+from gmwm.readers.text import cells
 
 
 def seconds(text):

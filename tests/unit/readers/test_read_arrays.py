@@ -166,7 +166,8 @@ def test_bad_array(save, array, words):
 def test_other_numbers_than_a_file_declares():
     """Regression: damaged files of MATLAB had complex numbers, which were cut with a warning."""
     like = np.zeros(80)
-    table = ArrayTable("a.mat", ("gyro_x",), (Array(like, lambda: like + 1j),))
+    arrays = (Array(like, lambda: like + 1j),)
+    table = ArrayTable(source="a.mat", names=("gyro_x",), arrays=arrays)
     with pytest.raises(InputError, match=r"^a\.mat, column 'gyro_x' holds complex numbers: save"):
         table.load([0])
 

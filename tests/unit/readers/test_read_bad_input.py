@@ -145,7 +145,7 @@ def test_one_that_is_not_finite(damaged):
 
 
 def test_what_is_infinite_is_counted_over_all_blocks(damaged, monkeypatch):
-    from gmwm.readers import csv_table
+    from gmwm.readers.text import csv_table
 
     monkeypatch.setattr(csv_table.blocks, "__defaults__", (0, 1, 500, str))
     path = damaged(12, "1,inf,3,4,-inf,6")
@@ -348,7 +348,7 @@ def test_text_that_is_cut_off_in_its_last_line(write, samples, cut, delimiter):
     path.write_text(text[:-cut])
     message = problem(path)
     assert message.startswith(f"static.csv is cut off in line {len(samples)}: ")
-    assert message.endswith("or take what is there, damaged=True")
+    assert message.endswith("or use what is left of it, damaged=True")
     found = read(path, rate=100, units=SI, damaged=True)
     assert found.n == len(samples) - 1
     assert [each.severity for each in found.notices if each.code == "damaged"] == ["warning"]
@@ -395,11 +395,11 @@ def test_latin_1_header(write, samples):
     path = write(samples, HEADER)
     path.write_bytes(path.read_text().replace("gyro_x", "gyro_x [°/s]").encode("latin-1"))
     message = problem(path)
-    assert "static.csv, line 1: byte 0xb0 is not UTF-8 text: save the file as UTF-8" in message
+    assert "static.csv, line 1: this is not UTF-8 text: save it as UTF-8" in message
 
 
 def test_endless_line(tmp_path, monkeypatch):
-    from gmwm.readers import text_file
+    from gmwm.readers.text import lines as text_file
 
     monkeypatch.setattr(text_file, "_LONGEST_LINE", 1 << 18)
     path = tmp_path / "a.csv"

@@ -7,7 +7,7 @@ import pytest
 
 from gmwm.errors import InputError
 from gmwm.readers import read
-from gmwm.readers.binary import LAYOUTS, layout_of
+from gmwm.readers.formats.binary import LAYOUTS, layout_of
 
 RATE, N = 128.0, 200  # steps that floating point has exactly
 

@@ -277,28 +277,3 @@ def test_an_hour_without_samples_stays_missing_in_utc(tmp_path):
     moments = [FIRST + timedelta(seconds=i + 3600 * (i >= 4000)) for i in range(6000)]
     recording = dated(tmp_path, [each.isoformat() + "Z" for each in moments])
     assert recording["gyro_x"].missing == 3600
-
-
-@pytest.mark.parametrize("mark", [",", "\t"])
-def test_shimmer_has_its_units_below_the_names(tmp_path, rows, mark):
-    sensors = [f"{s}_{axis}" for s in ("Gyro", "Accel_LN", "Accel_WR") for axis in "XYZ"]
-    names = [f"Shimmer_B1D2_{name}_CAL" for name in ("Timestamp_Unix", *sensors)]
-    units = ["ms", *3 * ["deg/s"], *6 * ["m/(s^2)"]]
-    lines = [f"sep={mark}", mark.join(names), mark.join(units)]
-    for i, row in enumerate(rows):
-        sample = (1_600_000_000_000 + 10 * i, *np.rad2deg(row[:3]), *row[3:], 0, 0, 9.5)
-        lines.append(mark.join(map(repr, map(float, sample))))
-    path = tmp_path / "shimmer.csv"
-    path.write_text("\n".join([*lines, ""]))
-    found = read(path)
-    assert found.rate == pytest.approx(100.0, rel=1e-6)
-    np.testing.assert_allclose(values(found), rows, rtol=1e-12, atol=1e-15)
-
-
-def test_a_log_of_gnss_logger_is_refused_with_the_lines_to_take(tmp_path):
-    names = "UncalGyro,utcTimeMillis,elapsedRealtimeNanos,UncalGyroXRadPerSec"
-    line = "UncalGyro,1600000000000,10000000000,0.001,0.002,0.003,0.0,0.0,0.0"
-    path = tmp_path / "gnss_log.txt"
-    path.write_text(f"# \n# Version: v3.0.5.6 Platform: 13\n# \n# {names}\n# \n" + 50 * f"{line}\n")
-    with pytest.raises(InputError, match=r"with lines of several sensors: .* cut -d, -f3-6"):
-        read(path)

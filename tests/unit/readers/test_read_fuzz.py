@@ -12,8 +12,9 @@ import pytest
 from hypothesis import example, given, settings, strategies as st
 
 from gmwm.errors import InputError
-from gmwm.readers import csv_table, read
+from gmwm.readers import read
 from gmwm.readers.names import CANONICAL
+from gmwm.readers.text import csv_table
 
 SI = {"gyro": "rad/s", "accel": "m/s^2"}
 

@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 
 from gmwm._core.units import factor
-from gmwm.readers import csv_table, read
+from gmwm.readers import read
 from gmwm.readers.names import CANONICAL
+from gmwm.readers.text import csv_table
 from places import SHARED
 
 

@@ -8,53 +8,61 @@ of what it holds, ``imu.gyro`` or ``imu/gyro``, where these alone are not clear;
 from __future__ import annotations
 
 import math
-import mmap
 import re
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from functools import lru_cache, partial
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 import numpy as np
 
 from gmwm.errors import InputError
-from gmwm.readers.formats.arrays import (
-    AnyArray,
-    Array,
-    ArrayTable,
-    array_of,
-    damage_named,
-    is_sensor,
-)
-from gmwm.readers.formats.extras import library
+from gmwm.readers.formats import trial
+from gmwm.readers.formats.arrays import AnyArray, Array, ArrayTable, array_of, is_sensor
 from gmwm.readers.names import bare, meaning
+from gmwm.readers.registry import Wanted
+from gmwm.readers.table import damage_named, library
 
 _MAT_73 = b"MATLAB 7.3"
-_GROUPS = re.compile(r"[./]")
-_SIGNATURE, _HEAP = b"\x89HDF\r\n\x1a\n", b"GCOL\x01\0\0\0"
 _TOGETHER = 256 << 20  # bytes of arrays that are read together
 _UNITS = ("units", "unit", "Units", "Unit")
-# The message of an attribute: its name, text of any length as its type, one value: its length.
-_UNIT = re.compile(
-    rb"nits?\0+\x19...\x10\0{3}.{8,16}?(?:\0{4}\x01\0{7}|\x02\0{3})(.{4})", re.DOTALL
-)
+_NO_NUMBERS = ("char", "cell", "object", "function", "opaque", "sparse", "logical")
 
 
-def open_hdf5(path: Path) -> ArrayTable:
+def open_hdf5(path: Path, wanted: Wanted) -> tuple[ArrayTable, ...]:
     """Open an HDF5 file, or a MAT file of version 7.3, whose arrays are stored transposed.
 
     Raises InputError if it is damaged or holds no columns, or h5py is not installed.
     """
+    return (trial.tried(read_hdf5, path),)
+
+
+def open_mat(path: Path, wanted: Wanted) -> tuple[ArrayTable, ...]:
+    """Open a MAT file of version 4 to 7.
+
+    Raises InputError if it is damaged or holds no columns.
+    """
+    return (trial.tried(read_mat, path),)
+
+
+def read_hdf5(path: Path) -> ArrayTable:
+    """Columns of a file that does no harm to its library."""
     h5py = library("h5py", "hdf5", path.name)
     found: dict[str, Array] = {}
-    read = lru_cache(maxsize=1)(partial(_read_data_set, h5py, path))
+
+    @lru_cache(maxsize=1)
+    def read(name: str) -> AnyArray:
+        with h5py.File(path, "r") as file:
+            array: AnyArray = file[name][()]
+        return array
+
     with damage_named(path.name), path.open("rb") as stream, h5py.File(path, "r") as file:
         is_mat = stream.read(len(_MAT_73)) == _MAT_73
-        _check_heaps(stream)
 
         def add(name: str, item: Any) -> None:
-            if not isinstance(item, h5py.Dataset):
+            # What MATLAB refers to, cells and structure arrays, hides in #refs#.
+            if name.startswith("#") or not isinstance(item, h5py.Dataset):
                 return
             if item.external:
                 raise InputError(
@@ -68,46 +76,8 @@ def open_hdf5(path: Path) -> ArrayTable:
             elif item.dtype.kind in "iuf" and item.shape == ():
                 found[name] = array_of(np.asarray(item[()]))
 
-        # What MATLAB refers to, cells and structure arrays, hides in #refs#.
-        file.visititems(lambda name, item: None if name.startswith("#") else add(name, item))
+        file.visititems(add)
     return _table(path.name, found, is_transposed=is_mat)
-
-
-def _check_heaps(stream: BinaryIO) -> None:
-    """Refuse damaged heaps of texts, and units longer than the file, which the library reads
-    without end or into all memory.
-
-    Global heap collections and attributes after the HDF5 file format specification, version 3,
-    secs. II.A, III.E and IV.A.2.m.
-    """
-    with mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ) as data:
-        begin = data.find(_SIGNATURE)
-        if data[begin + (14 if data[begin + 8] < 2 else 10)] != 8:
-            return  # lengths of other sizes are rare
-        start = first = data.find(_HEAP)
-        while start >= 0:
-            end = start + int.from_bytes(data[start + 8 : start + 16], "little")
-            place = start + 16
-            if end > len(data):
-                raise ValueError("a heap beyond the end of the file")
-            while place + 16 <= end:
-                index = int.from_bytes(data[place : place + 2], "little")
-                size = int.from_bytes(data[place + 8 : place + 16], "little")
-                if index == 0 and size == 0:
-                    raise ValueError("free space of no size in a heap")
-                place += 16 + -(-size // 8) * 8 if index else size
-                if place > end:
-                    raise ValueError("more in a heap than it has room for")
-            start = data.find(_HEAP, start + 1)
-        for unit in _UNIT.finditer(data) if first >= 0 else ():
-            if int.from_bytes(unit[1], "little") > len(data):
-                raise ValueError("a unit longer than the file")
-
-
-def _read_data_set(h5py: Any, path: Path, name: str) -> AnyArray:
-    with h5py.File(path, "r") as file:
-        array: AnyArray = file[name][()]
-    return array
 
 
 def _with_unit(name: str, attributes: Mapping[str, Any]) -> str:
@@ -119,11 +89,8 @@ def _with_unit(name: str, attributes: Mapping[str, Any]) -> str:
     return name
 
 
-def open_mat(path: Path) -> ArrayTable:
-    """Open a MAT file of version 4 to 7.
-
-    Raises InputError if it is damaged or holds no columns.
-    """
+def read_mat(path: Path) -> ArrayTable:
+    """Columns of a file that does no harm to its library."""
     from scipy.io import loadmat, whosmat
 
     with damage_named(path.name):
@@ -135,20 +102,19 @@ def open_mat(path: Path) -> ArrayTable:
         def read(name: str) -> Any:
             return (load() if is_small else load(variable_names=(name,)))[name]
 
+        def numbers(name: str) -> AnyArray:
+            return np.squeeze(np.asarray(read(name)))
+
         found: dict[str, Array] = {}
         for name, shape, kind in variables:
             if kind == "struct":
                 for inner, values in _fields(name, read(name)):
                     found[inner] = array_of(values)
-            elif kind not in ("char", "cell", "object", "function", "opaque", "sparse", "logical"):
+            elif kind not in _NO_NUMBERS:
                 # Vectors come without their second dimension, and whole numbers may be stored.
                 like = np.broadcast_to(np.empty(()), tuple(n for n in shape if n != 1))
-                found[name] = Array(like, partial(_as_numbers, read, name))
+                found[name] = Array(like, partial(numbers, name))
     return _table(path.name, found, is_transposed=False)
-
-
-def _as_numbers(read: Callable[[str], Any], name: str) -> AnyArray:
-    return np.squeeze(np.asarray(read(name)))
 
 
 def _fields(name: str, value: Any) -> Iterator[tuple[str, AnyArray]]:
@@ -161,7 +127,7 @@ def _fields(name: str, value: Any) -> Iterator[tuple[str, AnyArray]]:
 
 
 def _table(source: str, found: Mapping[str, Array], is_transposed: bool) -> ArrayTable:
-    """A table of arrays in the shapes that columns have; others are left out."""
+    """A table of the arrays that have the shape of columns."""
     entries: dict[str, Array] = {}
     lasts = Counter(map(_last, found))
     for name, array in found.items():
@@ -173,7 +139,7 @@ def _table(source: str, found: Mapping[str, Array], is_transposed: bool) -> Arra
         elif len(shape) == 2 and shape[0] == 3 < shape[1] and is_sensor(name):
             array = array.map(np.transpose)
         if array.like.ndim <= 2 and array.like.size:
-            # Without its group where that is clear: what stands before "time" changes its meaning.
+            # Without its group where that is clear: a word before "time" changes its meaning.
             entries[_last(name) if lasts[_last(name)] == 1 else name] = array
     if not entries:
         raise InputError(f"{source} holds no arrays of numbers: save samples in it")
@@ -183,4 +149,4 @@ def _table(source: str, found: Mapping[str, Array], is_transposed: bool) -> Arra
 def _last(name: str) -> str:
     """A name without its groups or structures; a unit may have a stroke of its own."""
     plain = bare(name)
-    return _GROUPS.split(plain)[-1] + name[len(plain) :]
+    return re.split("[./]", plain)[-1] + name[len(plain) :]

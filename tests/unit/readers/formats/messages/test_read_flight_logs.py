@@ -22,7 +22,7 @@ from flight_logs import (
     write_dataflash,
     write_ulog,
 )
-from gmwm.readers.formats.messages import dataflash
+from gmwm.readers.logs import dataflash
 from gmwm.readers.names import CANONICAL
 
 

@@ -14,22 +14,20 @@ from pathlib import Path
 
 import numpy as np
 
-from gmwm._core import memory
-from gmwm._core.notices import Notice
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
+from gmwm.issues import notice
 from gmwm.readers import tuning
 from gmwm.readers.names import CANONICAL
-from gmwm.readers.table import LARGEST, usable
+from gmwm.readers.table import LARGEST, Columns, Table, usable
 
 
 @dataclass(frozen=True)
 class BinaryLayout:
-    """How a record is laid out: time (float64), then six numbers, gyro and accelerometer x, y, z.
+    """A record: time (float64), then six numbers, gyro and accelerometer x, y, z.
 
     kind: numpy type of the six numbers.
-    gyro, accel: What one is worth: rad and m/s if they are increments, rad/s and m/s^2 if they are
-        rates.
+    gyro, accel: Scales of the numbers: rad and m/s of increments, rad/s and m/s^2 of rates.
     order: {"=", "<", ">"}, native, little- or big-endian.
     """
 
@@ -95,16 +93,13 @@ def layout_of(text: str) -> BinaryLayout:
     return found
 
 
-@dataclass(frozen=True)
-class BinaryTable:
-    """Records of a binary file."""
+@dataclass(frozen=True, eq=False, kw_only=True)
+class BinaryTable(Table):
+    """Records of a binary file: time in seconds, and the channels in SI units."""
 
     path: Path
     layout: BinaryLayout
     count: int
-    notices: tuple[Notice, ...] = ()
-    rate: float | None = None
-    tentative: bool = False
 
     @classmethod
     def open(cls, path: Path, layout: BinaryLayout) -> BinaryTable:
@@ -112,7 +107,8 @@ class BinaryTable:
 
         Raises InputError if it is too short, or its times are not those of this layout.
         """
-        size, record = path.stat().st_size, layout.record.itemsize
+        record = layout.record.itemsize
+        size = path.stat().st_size
         count, rest = divmod(size, record)
         if count < tuning.FEWEST_SAMPLES:
             raise InputError(
@@ -120,12 +116,13 @@ class BinaryTable:
                 f"{tuning.FEWEST_SAMPLES} are needed: check the layout, or record longer",
                 "layout",
             )
-        notices: tuple[Notice, ...] = ()
-        if rest:
-            text = f"the last record is cut off, {rest} of its {record} bytes are there: left out"
-            notices = (Notice("partial-record", "warning", "", text, {"bytes": rest}),)
-        table = cls(path, layout, count, notices)
-        first = table._read(0, tuning.FEWEST_SAMPLES)["time"]
+        notices = [notice("partial-record", "", {"bytes": rest}, size=record)] if rest else []
+        units = {"gyro": "rad/s", "accel": "m/s^2"}
+        names = ("time [s]", *(f"{name} [{units[name.partition('_')[0]]}]" for name in CANONICAL))
+        table = cls(
+            source=path.name, names=names, notices=notices, path=path, layout=layout, count=count
+        )
+        first = table._raw(0, tuning.FEWEST_SAMPLES)[0]
         with np.errstate(all="ignore"):
             steps = np.diff(first)
             even = np.all(np.isfinite(first)) and np.count_nonzero(steps > 0.0) > steps.size // 2
@@ -138,77 +135,48 @@ class BinaryTable:
             )
         return table
 
-    @property
-    def source(self) -> str:
-        """Name of the file."""
-        return self.path.name
+    def expected_rows(self) -> float:
+        """Number of records."""
+        return float(self.count)
 
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Time in seconds, and the channels in SI units."""
-        units = ("rad/s", "m/s^2")
-        return ("time [s]", *(f"{c} [{units[c.startswith('accel')]}]" for c in CANONICAL))
+    def segments(self, columns: Sequence[int], rows: int) -> Iterator[Columns]:
+        """Columns of ``rows`` records at a time.
 
-    def _read(self, start: int, count: int) -> np.ndarray:
-        record = self.layout.record
-        return np.fromfile(self.path, record, count, offset=start * record.itemsize)
-
-    def load(self, columns: Sequence[int]) -> dict[int, FloatArray]:
-        """Read some columns, block by block.
-
-        Raises InputError if a number is infinite, or there is not enough memory.
+        Raises InputError if a number is infinite.
         """
-        memory.require(tuning.BYTES_PER_SAMPLE * self.count * (len(columns) + 1), self.source)
-        found = {column: np.empty(self.count) for column in {0, *columns}}
-        for start in range(0, self.count, tuning.RECORDS_AT_ONCE):
-            part = self._columns(start, tuning.RECORDS_AT_ONCE, tuple(found))
-            for column, values in part.items():
-                found[column][start : start + values.size] = values
-        interval = self._interval(found[0])
-        return {column: self._scaled(column, found.pop(column), interval, 0) for column in columns}
+        interval = self._interval(rows) if self.layout.increments else 1.0
+        scales = (1.0, *(self.layout.gyro / interval,) * 3, *(self.layout.accel / interval,) * 3)
+        for start in range(0, self.count, rows):
+            raw, found = self._raw(start, rows), {}
+            for column in columns:
+                with np.errstate(all="ignore"):
+                    found[column] = raw[column] * scales[column]
+                if not usable(found[column]):
+                    row = int(np.flatnonzero(np.abs(found[column]) >= LARGEST)[0])
+                    raise InputError(
+                        f"{self.source}, {self.where(start + row)}: {found[column][row]} is not a "
+                        "usable number: check the layout"
+                    )
+            yield found
 
-    def segments(self, columns: Sequence[int], rows: int) -> Iterator[dict[int, FloatArray]]:
-        """The same, ``rows`` at a time."""
-        starts = range(0, self.count, rows)
-        interval = 1.0
-        if self.layout.increments:
-            times = [self._columns(start, rows, (0,))[0] for start in starts]
-            interval = self._interval(np.concatenate(times))
-        for start in starts:
-            found = self._columns(start, rows, tuple({0, *columns}))
-            yield {c: self._scaled(c, found[c], interval, start) for c in columns}
+    def _raw(self, start: int, rows: int) -> list[FloatArray]:
+        """Time and six numbers of some records as they are."""
+        record = self.layout.record
+        block = np.fromfile(self.path, record, rows, offset=start * record.itemsize)
+        block = block[: self.count - start]
+        return [block["time"].astype(float), *block["values"].T.astype(float)]
 
-    def _columns(self, start: int, rows: int, columns: Sequence[int]) -> dict[int, FloatArray]:
-        """Numbers of some records as they are."""
-        block = self._read(start, rows)[: self.count - start]
-        found = {0: block["time"]} | {i: block["values"][:, i - 1] for i in columns if i}
-        return {column: found[column].astype(float) for column in columns}
-
-    def _interval(self, times: FloatArray) -> float:
-        """Seconds between records that follow each other; 1 where numbers are rates."""
-        if not self.layout.increments:
-            return 1.0
+    def _interval(self, rows: int) -> float:
+        """Seconds between records that follow each other."""
+        times = [self._raw(start, rows)[0] for start in range(0, self.count, rows)]
         with np.errstate(all="ignore"):
-            steps = np.diff(times)
+            steps = np.diff(np.concatenate(times))
             usual = float(np.median(steps))
             near = steps[np.abs(steps / usual - 1.0) < 0.5]
         if not (near.size and usual > 0.0):
             raise InputError(f"{self.source}: its times do not advance: check the layout", "layout")
         return float(np.mean(near))
 
-    def _scaled(self, column: int, raw: FloatArray, interval: float, start: int) -> FloatArray:
-        """In seconds or SI units; ``start`` is the record of the first."""
-        unit = (1.0, *(self.layout.gyro,) * 3, *(self.layout.accel,) * 3)[column]
-        with np.errstate(all="ignore"):
-            values = raw * (unit / interval if column else unit)
-        if not usable(values):
-            row = int(np.flatnonzero(np.abs(values) >= LARGEST)[0])
-            raise InputError(
-                f"{self.source}, {self.where(start + row)}: {values[row]} is not a usable number: "
-                "check the layout"
-            )
-        return values
-
     def where(self, row: int) -> str:
-        """Say which record."""
+        """The record."""
         return f"record {row} (counted from 0)"

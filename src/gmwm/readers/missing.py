@@ -1,14 +1,16 @@
-"""Numbers that stand for no sample: error codes, overflows, the ends of an integer's range."""
+"""Samples that are missing, and numbers that stand for a missing sample."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from gmwm._core.notices import Notice, Severity
 from gmwm._core.spool import scaled
 from gmwm._core.typing import BoolArray, FloatArray, IntArray
+from gmwm.issues import Notice, Severity, notice
 from gmwm.readers import tuning
 
 _CODES = {float(sign * (10**k - 1)) for k in range(3, 8) for sign in (-1, 1)} | {-999.25, -99.99}
@@ -19,29 +21,66 @@ _ENDS = {
 }
 _ODD = np.array([*_CODES, *_ENDS])
 
-_ISOLATED = "far from all others with nothing between"
+
+@dataclass(frozen=True)
+class Missing:
+    """How many samples of a series are missing.
+
+    n: Samples, missing ones included.
+    samples: Missing samples.
+    gaps, longest: Runs of missing samples, and the length of the longest.
+    """
+
+    n: int = 0
+    samples: int = 0
+    gaps: int = 0
+    longest: int = 0
+
+    @classmethod
+    def of(cls, values: FloatArray) -> Missing:
+        """Count NaN."""
+        gone = np.isnan(values)
+        edges = np.flatnonzero(np.diff(gone, prepend=False, append=False))
+        lengths = edges[1::2] - edges[::2]
+        if not lengths.size:
+            return cls(gone.size)
+        return cls(gone.size, int(np.sum(lengths)), lengths.size, int(np.max(lengths)))
+
+
+def missing_notices(found: Mapping[str, Missing]) -> list[Notice]:
+    """One for all channels that miss equally many samples in equally many gaps."""
+    alike: dict[Missing, list[str]] = {}
+    for name, each in found.items():
+        if each.samples:
+            alike.setdefault(each, []).append(name)
+    notices = []
+    for each, names in alike.items():
+        variant = "all" if each.samples == each.n else "many" if each.gaps > 1 else "one"
+        values = {"missing": each.samples, "gaps": each.gaps, "longest": each.longest}
+        where, them = ", ".join(names), "each " if len(names) > 1 else ""
+        notices.append(
+            notice("missing-samples", where, values, variant=variant, n=each.n, each=them)
+        )
+    return notices
 
 
 def without_sentinels(
     name: str, values: FloatArray, largest: float, where: Callable[[int], str]
 ) -> tuple[FloatArray, list[Notice]]:
-    """Make missing what is no sample, and report it.
+    """Mask numbers that are no samples, and report them.
 
-    That is a number beyond the range of any sensor, or far outside all others and an error code
-    (999, -9999, ...) or the smallest or largest integer of 16, 24, 32 or 64 bit, or one that comes
-    again and again, exactly, with nothing between it and the others: what moves passes through.
+    These are numbers beyond the range of any sensor; error codes (999, -9999, ...) and the smallest
+    and largest integers of 16, 24, 32 or 64 bit, if far outside all others; and numbers that come
+    again and again, exactly, with nothing between them and the others: motion passes through.
 
-    name: Of the channel.
+    name: Channel.
     values: (n,), in the unit of the file; NaN where one is missing.
     largest: Magnitude beyond the range of any sensor, in the same unit.
-    where: Row -> where that is in the file.
-    Returns: a copy if any number is made missing, else ``values``; list of Notice, one for each
-        number that occurs, of code "sentinel".
+    where: Row -> its place in the file.
+    Returns: a copy if any number is masked, else ``values``; notices, one for each number.
     """
     some = values[:: -(-values.size // tuning.SAMPLED_FOR_RANGE)]
     some = some[~np.isnan(some)]
-    if not some.size:
-        return values, []
     # The range is that of samples: codes among them would make it as wide as themselves.
     usual = some[(np.abs(some) <= largest) & np.isfinite(some) & ~np.isin(some, _ODD)]
     if not usual.size:
@@ -63,36 +102,34 @@ def without_sentinels(
     gone = far[chosen[which]]
     if not gone.size:
         return values, []
-    severity: Severity = "bad" if gone.size > tuning.MOST_SENTINELS * values.size else "warning"
     clean = scaled(values, 1.0)
     clean[gone] = np.nan
+    is_bad = gone.size > tuning.MOST_SENTINELS * values.size
     notices = []
     beyond = [i for i in np.flatnonzero(chosen).tolist() if abs(numbers[i]) > largest]
     others = [i for i in np.flatnonzero(chosen).tolist() if i not in beyond]
-    for group in (*([i] for i in others), beyond):
-        if not group:
-            continue
+    for group in [[i] for i in others] + ([beyond] if beyond else []):
         rows = far[np.isin(which, group)]
         number = float(numbers[group[int(np.argmax(np.abs(numbers[group])))]])
-        count = rows.size
-        times = f"{count:,} samples are" if count > 1 else "a sample is"
-        also = " and the like" if len(group) > 1 else ""
-        text = (
-            f"{times} {number:.10g}{also}, {_meaning(number, largest) or _ISOLATED}, first at "
-            f"{where(int(rows[0]))}: taken as missing"
-        )
-        data = {"count": int(count), "value": number, "row": int(rows[0])}
-        notices.append(Notice("sentinel", severity, name, text, data, "look at the recorder"))
+        data = {"count": rows.size, "value": number, "row": int(rows[0])}
+        words: dict[str, Any] = {
+            "samples": f"{rows.size:,} samples are" if rows.size > 1 else "a sample is",
+            "alike": " and the like" if len(group) > 1 else "",
+            "meaning": _meaning(number, largest) or "far from all others with nothing between",
+            "place": where(int(rows[0])),
+        }
+        severity: Severity = "bad" if is_bad else "warning"
+        notices.append(notice("sentinel", name, data, severity=severity, **words))
     return clean, notices
 
 
 def _are_isolated(
     values: FloatArray, far: IntArray, numbers: FloatArray, which: IntArray, middle: float
 ) -> BoolArray:
-    """Which of the numbers that are far outside come several times, and from nowhere.
+    """Whether each of the numbers that are far outside comes several times, and from nowhere.
 
-    The samples before and after are none that are far outside, and hardly any other lies within
-    half of the distance to the middle.
+    The samples before and after are not far outside, and hardly any other lies within half of the
+    distance to the middle.
     """
     counts = np.bincount(which, minlength=numbers.size)
     again = counts >= tuning.LEAST_REPEATS
@@ -114,7 +151,7 @@ def _are_isolated(
 
 
 def _meaning(number: float, largest: float) -> str:
-    """What a number stands for; nothing if it is one like others."""
+    """What a number stands for; empty for a number like others."""
     if number in _ENDS:
         end = "largest" if number > 0.0 else "smallest"
         return f"the {end} integer of {_ENDS[number]} bit"

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gmwm._core.notices import Notice
 from gmwm.errors import InputError
+from gmwm.issues import Notice, notice
 from gmwm.readers import tuning
 from gmwm.readers.names import CANONICAL, bare, meaning
 from gmwm.readers.recording import Channel, Recording, notices_of_gaps
@@ -88,18 +88,16 @@ def joined(parts: Sequence[Part]) -> Recording:
         raise InputError(f"{first.source}: two topics have the same channels: choose one", "topic")
     channels = _aligned(channels)
     notices: list[Notice] = []
-    for part in parts:
-        notices += [
-            notice
-            for notice in part.recording.notices
-            if notice.code != "missing-samples" and notice not in notices
-        ]
-    different = len({channel.dt for channel in channels if not channel.is_auxiliary})
-    lost = max(part.recording.duration for part in parts) - (stop - start)
+    for each in (each for part in parts for each in part.recording.notices):
+        if each.code != "missing-samples" and each not in notices:
+            notices.append(each)
+    values = {
+        "duration": stop - start,
+        "lost": max(part.recording.duration for part in parts) - (stop - start),
+        "rates": len({channel.dt for channel in channels if not channel.is_auxiliary}),
+    }
     rates = ", ".join(f"{part.recording.rate:.6g} Hz" for part in parts)
-    text = f"{len(parts)} topics at {rates}: the {stop - start:.6g} s that they share are used"
-    values = {"duration": stop - start, "lost": lost, "rates": different}
-    notices.append(Notice("topics-joined", "note", "", text, values))
+    notices.append(notice("topics-joined", "", values, count=len(parts), listed=rates))
     jitter = [part.recording.jitter for part in parts if part.recording.jitter is not None]
     return replace(
         first,
@@ -144,34 +142,33 @@ def with_temperature(part: Part, table: Table) -> Part:
 
     Between its stamps it is interpolated; before the first and after the last it is missing.
     """
-    columns = range(len(table.names))
+    recording, columns = part.recording, range(len(table.names))
     time = next((i for i in columns if meaning(table.names[i]).role == "time"), None)
+    channels: list[Channel] = []
     try:
         arrays = table.load(columns)
     except InputError as error:
-        left_out = Notice("columns-unreadable", "note", "", f"temperature left out: {error}")
-        return _noted(part, left_out)
-    if time is None:
-        return part
-    stamps = arrays[time] * (meaning(table.names[time]).seconds or 1.0)
-    order = np.argsort(stamps, kind="stable")
-    recording = part.recording
-    grid = part.start + recording.dt * np.arange(recording.n)
-    channels = []
-    for column in columns:
-        if column != time:
-            values = np.interp(
-                grid, stamps[order], arrays[column][order], left=np.nan, right=np.nan
-            )
-            name, unit = bare(table.names[column]), "degC"
-            channels.append(Channel(name, values, recording.dt, "temperature", unit))
-    names = ", ".join(channel.name for channel in channels)
-    text = f"{names}: {stamps.size:,} values, interpolated to the samples of {recording.names[0]}"
-    notice = Notice("temperature-interpolated", "note", "", text, {"count": stamps.size})
-    wider = replace(recording, channels=(*recording.channels, *channels))
-    return _noted(replace(part, recording=wider), notice)
-
-
-def _noted(part: Part, notice: Notice) -> Part:
-    recording = replace(part.recording, notices=(*part.recording.notices, notice))
-    return replace(part, recording=recording)
+        told = notice("columns-unreadable", what=f"temperature ({error})")
+    else:
+        if time is None:
+            return part
+        stamps = arrays[time] * (meaning(table.names[time]).seconds or 1.0)
+        order = np.argsort(stamps, kind="stable")
+        grid = part.start + recording.dt * np.arange(recording.n)
+        for column in columns:
+            if column != time:
+                values = np.interp(
+                    grid, stamps[order], arrays[column][order], left=np.nan, right=np.nan
+                )
+                name = bare(table.names[column])
+                channels.append(Channel(name, values, recording.dt, "temperature", "degC"))
+        names = ", ".join(channel.name for channel in channels)
+        count = {"count": stamps.size}
+        first = recording.names[0]
+        told = notice("temperature-interpolated", "", count, listed=names, first=first)
+    wider = replace(
+        recording,
+        channels=(*recording.channels, *channels),
+        notices=(*recording.notices, told),
+    )
+    return replace(part, recording=wider)

@@ -6,25 +6,21 @@ Read in blocks of messages, so that memory holds no more than the columns that a
 from __future__ import annotations
 
 import weakref
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property, partial
 from itertools import islice
 from operator import itemgetter
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
-from gmwm._core.notices import Notice
-from gmwm._core.typing import FloatArray
 from gmwm._core.units import SI_UNIT
 from gmwm.errors import InputError
-from gmwm.readers.formats.arrays import damage_named
-from gmwm.readers.formats.extras import library
-from gmwm.readers.formats.messages.parts import MessageTable
-from gmwm.readers.formats.messages.ros_messages import (
+from gmwm.issues import notice
+from gmwm.readers.logs.ros_messages import (
     CDR,
     COVARIANCE_OF,
     IMU,
@@ -34,7 +30,9 @@ from gmwm.readers.formats.messages.ros_messages import (
     Serialization,
     decode,
 )
-from gmwm.readers.formats.messages.topics import Topic, Wanted, choose
+from gmwm.readers.logs.topics import MessageTable, Topic, choose
+from gmwm.readers.registry import Wanted
+from gmwm.readers.table import Columns, damage_named, library
 
 _BLOCK = 1024  # messages: 0.3 MB of sensor_msgs/Imu, which stay in the cache
 _SEEN = 64  # messages from which it is judged what a topic holds
@@ -84,58 +82,48 @@ class _Bag:
         )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class BagTable(MessageTable):
-    """A topic of a bag: one message a row, of its stamp and of numbers in it.
+    """A topic of a bag: one message a row, its stamp and numbers in it.
 
-    log: Whether the stamps are the times at which the messages were recorded.
-    origin: Stamp that is written as zero, ns.
+    is_log: Whether the stamps are the times at which the messages were recorded.
+    start: Stamp that is written as zero, ns.
     """
 
     bag: _Bag
     message: Message
-    log: bool
-    origin: int
-    message_type: ClassVar[str] = "sensor_msgs/Imu"
+    is_log: bool
+    start: int
 
-    @property
-    def stamps(self) -> str:
-        """What the time stamps are, for messages."""
-        return "times of recording" if self.log else "header stamps"
+    def parts(self, columns: Sequence[int]) -> Iterator[Columns]:
+        """Columns of one block of messages after another.
 
-    @property
-    def source(self) -> str:
-        """Name of the bag."""
-        return self.bag.path.name
-
-    def parts(self, columns: Sequence[int]) -> Iterator[dict[int, FloatArray]]:
-        """Columns of one block of messages after another."""
+        Raises InputError if every header has the same stamp.
+        """
         wanted = [column for column in columns if column > 0]
         numbers = [self.message.columns[self.names[column]] for column in wanted]
-        row = 0
+        row, first, changes = 0, 0, False
         with self.bag.opened() as reader:
             # Records that are let go at once are cheap; of those held, so are messages alone.
-            records = map(itemgetter(1, 2) if self.log else itemgetter(2),
-                          _messages(reader, self.topic.name))  # fmt: skip
+            parts = itemgetter(1, 2) if self.is_log else itemgetter(2)
+            records = map(parts, _messages(reader, self.topic.name))
             while block := list(islice(records, _BLOCK)):
-                times, raw = zip(*block, strict=True) if self.log else ((), block)
+                times, raw = zip(*block, strict=True) if self.is_log else ((), block)
                 where = partial(self._place, row)
                 stamps, found = decode(raw, self.message, numbers, self.bag.serialization, where)
-                if self.log:
+                if self.is_log:
                     stamps = np.array(times, np.int64)
+                first = first if row else int(stamps[0])
+                changes = changes or bool(np.any(stamps != first))
                 row += len(block)
                 part = dict(zip(wanted, found, strict=True))
-                yield {0: (stamps - self.origin).astype(float)} | part if 0 in columns else part
-
-    def checked(self, found: dict[int, FloatArray], before: int) -> dict[int, FloatArray]:
-        super().checked(found, before)
-        if 0 in found and found[0].size > 1 and not np.any(np.diff(found[0])):
+                yield {0: (stamps - self.start).astype(float)} | part if 0 in columns else part
+        if 0 in columns and row > 1 and not changes:
             raise InputError(
                 f"{self.source}, topic {self.topic.name}: every header has the same stamp",
                 "no-stamps",
                 'use the time of recording, clock="log"',
             )
-        return found
 
     def _place(self, first: int, row: int) -> str:
         return f"{self.source}, {self.where(first + row)}"
@@ -145,7 +133,7 @@ def open_bag(path: Path, wanted: Wanted) -> tuple[BagTable, ...]:
     """Open a bag.
 
     path: A file, or the folder of a bag of ROS 2.
-    Returns: one for each topic, those of thermometers last.
+    Returns: one table for each topic, those of thermometers last.
     Raises InputError if it is damaged, holds no IMU or half of one, or topics have to be chosen.
     """
     is_folder = path.is_dir()
@@ -157,38 +145,51 @@ def open_bag(path: Path, wanted: Wanted) -> tuple[BagTable, ...]:
     bag = _Bag(path, not is_folder and _is_ros1(path))
     with bag.opened() as reader:
         counts, others = _counts(reader)
-        if not counts["sensor_msgs/msg/Imu"]:
+        of_imu, warmth = counts["sensor_msgs/msg/Imu"], counts["sensor_msgs/msg/Temperature"]
+        if not of_imu:
             listed = ", ".join(others[:8]) + (", ..." if len(others) > 8 else "")
             raise InputError(
                 f"{path.name} has no messages of sensor_msgs/Imu: "
                 + (f"it has {listed}; record the topic of the IMU" if others else "it is empty")
             )
-        of_imu = counts["sensor_msgs/msg/Imu"]
         heads = {topic: list(islice(_messages(reader, topic), _SEEN)) for topic in of_imu}
         found = [
             Topic(topic, count, _sensors(reader, topic, bag, heads[topic]))
             for topic, count in of_imu.items()
         ]
         chosen = choose(path.name, found, wanted)
-        warmth = counts["sensor_msgs/msg/Temperature"]
         is_log = wanted.clock == "log"
-        origin = _first_stamp(heads[chosen[0].name], bag, is_log)
-    tables = [_table(bag, topic, is_log, origin) for topic in chosen]
+        _, start, message = heads[chosen[0].name][0]
+        if not is_log:
+            stamps, _ = decode([message], IMU, [], bag.serialization, lambda i: path.name)
+            start = int(stamps[0])
+
+    def table(topic: Topic, message: Message, names: Iterable[str]) -> BagTable:
+        return BagTable(
+            source=path.name,
+            names=(_STAMPS, *names),
+            stamps="times of recording" if is_log else "header stamps",
+            origin="sensor_msgs/Imu",
+            topic=topic,
+            bag=bag,
+            message=message,
+            is_log=is_log,
+            start=start,
+        )
+
+    tables = []
+    for topic in chosen:
+        sensors = topic.sensors or frozenset(SI_UNIT)
+        names = [name for name in IMU.columns if name.partition("_")[0] in sensors]
+        tables.append(table(topic, IMU, names))
+        told = " and ".join(sorted(sensors))
+        tables[-1].notices.append(notice("topic", "", {"topic": topic.name}, sensors=told))
     for name, count in warmth.items():
         # By the topic if there are several.
         prefix = "" if len(warmth) == 1 else name.strip("/").replace("/", "_") + "_"
-        column = f"{prefix}temperature [degC]"
-        message = Message(TEMPERATURE.count, {column: 0})
-        tables.append(BagTable(Topic(name, count), (_STAMPS, column), bag, message, is_log, origin))
+        warm = Message(TEMPERATURE.count, {f"{prefix}temperature [degC]": 0})
+        tables.append(table(Topic(name, count), warm, warm.columns))
     return tuple(tables)
-
-
-def _table(bag: _Bag, topic: Topic, is_log: bool, origin: int) -> BagTable:
-    sensors = topic.sensors or frozenset(SI_UNIT)
-    names = [name for name in IMU.columns if name.partition("_")[0] in sensors]
-    text = f"{' and '.join(sorted(sensors))} of topic {topic.name}"
-    notice = Notice("topic", "note", "", text, {"topic": topic.name})
-    return BagTable(topic, (_STAMPS, *names), bag, IMU, is_log, origin, notices=(notice,))
 
 
 def _check_pages(path: Path) -> None:
@@ -251,11 +252,3 @@ def _sensors(reader: Any, topic: str, bag: _Bag, head: Sequence[_Record]) -> fro
         if len(found) == len(first):
             break
     return frozenset(found)
-
-
-def _first_stamp(head: Sequence[_Record], bag: _Bag, is_log: bool) -> int:
-    _, time, message = next(iter(head))
-    if is_log:
-        return int(time)
-    stamps, _ = decode([message], IMU, [], bag.serialization, lambda i: bag.path.name)
-    return int(stamps[0])

@@ -10,21 +10,19 @@ from __future__ import annotations
 import io
 from collections.abc import Mapping, Sequence
 from contextlib import redirect_stdout
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from gmwm._core.notices import Notice
 from gmwm.errors import InputError
+from gmwm.issues import Notice, notice
 from gmwm.readers import tuning
-from gmwm.readers.formats.arrays import AnyArray, ArrayTable, array_of, damage_named
-from gmwm.readers.formats.extras import library
-from gmwm.readers.formats.messages.endings import cut_off, end_of_content
-from gmwm.readers.formats.messages.topics import Topic, Wanted, choose_first, left_out
+from gmwm.readers.formats.arrays import AnyArray, ArrayTable, array_of
+from gmwm.readers.logs.topics import Topic, choose_first, cut_off, end_of_content, left_out
 from gmwm.readers.names import AXES
-from gmwm.readers.table import damage_notice
+from gmwm.readers.registry import Wanted
+from gmwm.readers.table import damage_named, damage_notice, library
 
 _COMBINED = "sensor_combined"
 _FIELDS = {"gyro": "gyro_rad", "accel": "accelerometer_m_s2"}
@@ -40,10 +38,12 @@ _HEAD = 3
 
 _PADDING = (b"\0" * _HEAD, b"\xff" * _HEAD)
 
-_MEND = (
+_HINT = (
     "log sensor_combined, which the default SDLOG_PROFILE has, or the raw FIFO topics (bits 8 and "
     "9 of SDLOG_PROFILE)"
 )
+
+_DAMAGE = "is no ULog, or is damaged or cut off: get a whole copy"
 
 _Columns = dict[str, AnyArray]
 
@@ -55,47 +55,56 @@ def open_ulog(path: Path, wanted: Wanted) -> tuple[ArrayTable, ...]:
     Raises InputError if it is damaged, holds no IMU at its own rate or half of one, or topics have
         to be chosen.
     """
-    with damage_named(path.name, _damage):  # formats that are damaged lack fields
+    with damage_named(path.name, _DAMAGE):  # formats that are damaged lack fields
         return _tables(path, wanted)
 
 
 def _tables(path: Path, wanted: Wanted) -> tuple[ArrayTable, ...]:
     sets, notices = _data_sets(path, wanted.damaged)
-    ranks = [
-        [_topic(each, _not_zero(each.data)) for each in sets if each.name == _COMBINED],
-        [_topic(each, frozenset((_FIFO[each.name],))) for each in sets if each.name in _FIFO],
-        [_topic(each, frozenset((_SINGLE[each.name],))) for each in sets if each.name in _SINGLE],
+    by_name = {_name(each): each for each in sets}
+    combined = [
+        Topic(_name(each), each.data["timestamp"].size, _not_zero(each.data))
+        for each in sets
+        if each.name == _COMBINED
     ]
+    fifo, single = (
+        [
+            Topic(_name(each), each.data["timestamp"].size, frozenset((kinds[each.name],)))
+            for each in sets
+            if each.name in kinds
+        ]
+        for kinds in (_FIFO, _SINGLE)
+    )
+    ranks = [combined, fifo, single]
     if not any(ranks):
-        raise InputError(f"{path.name} has no samples of an IMU: {_MEND}")
+        raise InputError(f"{path.name} has no samples of an IMU: {_HINT}")
     chosen = choose_first(path.name, ranks, wanted)
     notices += left_out(ranks[:2], chosen)
-    by_name = {_name(each): each for each in sets}
-    tables: list[tuple[str, _Columns]] = []
+    tables: list[ArrayTable] = []
+
+    def add(topic: str, columns: _Columns) -> None:
+        entries = {name: array_of(values) for name, values in columns.items()}
+        told = () if tables else notices
+        about = {"stamps": f"stamps of {topic}", "origin": f"the definition of {topic}"}
+        tables.append(ArrayTable.of_entries(path.name, entries, told, **about))
+
     for topic in chosen:
-        data = by_name[topic.name].data
-        if topic.name.startswith(_COMBINED):
-            found = _combined(data)
-        elif by_name[topic.name].name in _FIFO:
-            found = [_from_fifo(data, _FIFO[by_name[topic.name].name])]
+        kind, data = by_name[topic.name].name, by_name[topic.name].data
+        if kind == _COMBINED:
+            for columns in _combined(data):
+                add(topic.name, columns)
+        elif kind in _FIFO:
+            add(topic.name, _from_fifo(data, _FIFO[kind]))
         else:
-            sensor = _SINGLE[by_name[topic.name].name]
             _check_not_thinned(path.name, topic, data)
-            found = [_columns(data["timestamp"], sensor, [data[axis] for axis in AXES])]
-        tables += [(topic.name, columns) for columns in found]
-    tables += [("thermometers", columns) for columns in _thermometers(sets)]
-    return tuple(
-        replace(
-            ArrayTable.of_entries(
-                path.name,
-                {name: array_of(values) for name, values in columns.items()},
-                notices if i == 0 else (),
-            ),
-            stamps=f"stamps of {topic}",
-            message_type=f"the definition of {topic}",
-        )
-        for i, (topic, columns) in enumerate(tables)
-    )
+            axes = [data[axis] for axis in AXES]
+            add(topic.name, _columns(data["timestamp"], _SINGLE[kind], axes))
+    for each in sets:
+        if each.name in _SINGLE and each.multi_id == 0 and "temperature" in each.data:
+            name = f"{each.name}_temperature [degC]"
+            columns = {_TIME: each.data["timestamp"], name: each.data["temperature"]}
+            add("thermometers", columns)
+    return tuple(tables)
 
 
 class _Stream(io.BufferedReader):
@@ -121,7 +130,7 @@ def _data_sets(path: Path, is_taken: bool) -> tuple[list[Any], tuple[Notice, ...
     reader = library("pyulog", "px4", path.name).ULog
     # pyulog prints what is damaged.
     quiet = redirect_stdout(io.StringIO())
-    with damage_named(path.name, _damage), quiet, _Stream(path) as stream:
+    with damage_named(path.name, _DAMAGE), quiet, _Stream(path) as stream:
         log = reader(stream, wanted)
     sets = [each for each in log.data_list if each.data["timestamp"].size]
     notices = []
@@ -132,23 +141,15 @@ def _data_sets(path: Path, is_taken: bool) -> tuple[list[Any], tuple[Notice, ...
         notices.append(damage_notice(path.name, what, is_taken))
     lost = sum(dropout.duration for dropout in log.dropouts) / 1e3
     if lost > 0.0:
-        text = f"the logger dropped {len(log.dropouts)} stretches, {lost:.3g} s in all"
-        notices.append(Notice("log-dropouts", "note", "", text, {"duration": lost}))
+        count = len(log.dropouts)
+        notices.append(notice("log-dropouts", "", {"duration": lost}, count=count))
     return sets, tuple(notices)
-
-
-def _damage(error: Exception) -> str:
-    return "is no ULog, or is damaged or cut off: get a whole copy"
 
 
 def _name(data_set: Any) -> str:
     if data_set.name == _COMBINED and data_set.multi_id == 0:
         return _COMBINED
     return f"{data_set.name}[{data_set.multi_id}]"
-
-
-def _topic(data_set: Any, sensors: frozenset[str]) -> Topic:
-    return Topic(_name(data_set), int(data_set.data["timestamp"].size), sensors)
 
 
 def _not_zero(data: Mapping[str, AnyArray]) -> frozenset[str]:
@@ -182,7 +183,7 @@ def _combined(data: Mapping[str, AnyArray]) -> list[_Columns]:
 
 
 def _from_fifo(data: Mapping[str, AnyArray], sensor: str) -> _Columns:
-    """Samples of messages of some each, of which the last has the stamp."""
+    """Messages hold several samples; the stamp belongs to the last."""
     count = data["samples"].astype(np.int64)
     most = sum(name.startswith("x[") for name in data)
     index = np.arange(most)
@@ -202,14 +203,5 @@ def _check_not_thinned(source: str, topic: Topic, data: Mapping[str, AnyArray]) 
         rate = 1e6 / step if step > 0.0 else 0.0
         raise InputError(
             f"{source}: {topic.name} is logged at {rate:.3g} Hz, thinned from hundreds, so that "
-            f"its noise is not that of the sensor: {_MEND}"
+            f"its noise is not that of the sensor: {_HINT}"
         )
-
-
-def _thermometers(sets: Sequence[Any]) -> list[_Columns]:
-    found = []
-    for each in sets:
-        if each.name in _SINGLE and each.multi_id == 0 and "temperature" in each.data:
-            name = f"{each.name}_temperature [degC]"
-            found.append({_TIME: each.data["timestamp"], name: each.data["temperature"]})
-    return found

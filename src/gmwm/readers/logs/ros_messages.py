@@ -30,12 +30,8 @@ ANGULAR_VELOCITY, LINEAR_ACCELERATION = 13, 25
 class Message:
     """A type of message: a header, then numbers.
 
-    Attributes
-    ----------
-    count : int
-        Numbers behind the header.
-    columns : mapping of str to int
-        Name of a column, with its unit -> which of the numbers it is.
+    count: Numbers behind the header.
+    columns: Name of a column, with its unit -> index of its number.
     """
 
     count: int
@@ -58,12 +54,8 @@ COVARIANCE_OF = {"gyro": ANGULAR_VELOCITY + 3, "accel": LINEAR_ACCELERATION + 3}
 class Serialization:
     """How the header is written.
 
-    Attributes
-    ----------
-    stamp : int
-        Offset of the stamp, bytes.
-    is_cdr : bool
-        Whether an encapsulation header says the byte order and numbers are aligned.
+    stamp: Offset of the stamp, bytes.
+    is_cdr: Whether an encapsulation header says the byte order and numbers are aligned.
     """
 
     stamp: int
@@ -95,27 +87,13 @@ def decode(
     serialization: Serialization,
     where: Callable[[int], str],
 ) -> tuple[_Integers, list[FloatArray]]:
-    """Stamps and numbers of messages.
+    """Stamps of the headers, ns, and numbers of messages.
 
-    Parameters
-    ----------
-    raw : sequence of bytes
-        Messages as they are stored.
-    wanted : sequence of int
-        Which of the numbers behind the header.
-    where : callable
-        Index of a message -> where it is.
-
-    Returns
-    -------
-    stamps : (n,) ndarray of int
-        Of the headers, ns.
-    numbers : list of (n,) ndarray
-
-    Raises
-    ------
-    InputError
-        At a message that is too short, or of another encoding.
+    raw: Messages as they are stored.
+    wanted: Indices of the numbers behind the header.
+    where: Index of a message -> its place.
+    Returns: (n,) stamps; (n,) of each number that is wanted.
+    Raises InputError at a message that is too short, or of another encoding.
     """
     n = len(raw)
     lengths = list(map(len, raw))

@@ -21,8 +21,8 @@ Rows = npt.NDArray[Any]
 """Messages of a kind, a structured array of their fields."""
 
 _FMT, _BEGIN = 0x80, 3  # number of the kind that states the others, bytes before a body
-_FORM = np.dtype([("type", "u1"), ("length", "u1"), ("name", "S4"), ("letters", "S16"),
-                  ("columns", "S64")])  # fmt: skip
+_FORM = np.dtype("u1, u1, S4, S16, S64")
+_FORM.names = ("type", "length", "name", "letters", "columns")
 _TYPES = {
     "a": "(32,)<i2", "b": "i1", "B": "u1", "g": "<f2", "h": "<i2", "H": "<u2", "i": "<i4",
     "I": "<u4", "f": "<f4", "n": "S4", "N": "S16", "Z": "S64", "c": "<i2", "C": "<u2", "e": "<i4",
@@ -34,9 +34,14 @@ _BLOCK = 1 << 22  # bytes read at a time
 
 @compiled()
 def _walk(
-    data: npt.NDArray[np.uint8], at: int, end: int, lengths: npt.NDArray[np.int64],
-    is_wanted: npt.NDArray[np.bool_], kinds: npt.NDArray[np.int64], places: npt.NDArray[np.int64],
-) -> tuple[int, int, int, int]:  # fmt: skip
+    data: npt.NDArray[np.uint8],
+    at: int,
+    end: int,
+    lengths: npt.NDArray[np.int64],
+    is_wanted: npt.NDArray[np.bool_],
+    kinds: npt.NDArray[np.int64],
+    places: npt.NDArray[np.int64],
+) -> tuple[int, int, int, int]:
     """Kinds and places of wanted messages, up to an FMT or the end of what is there.
 
     end: Of the message before.

@@ -9,12 +9,12 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from statistics import mode
 
-from gmwm._core.notices import Notice
 from gmwm.errors import InputError
+from gmwm.issues import Notice, notice
 from gmwm.readers import tuning
-from gmwm.readers.cells import BLANKS, date_columns, number, split_header, split_line
 from gmwm.readers.names import meaning, of_dates
-from gmwm.readers.table import READABLE
+from gmwm.readers.registry import READABLE
+from gmwm.readers.text.cells import BLANKS, date_columns, number, split_header, split_line
 
 _COMMENT_MARKS = ("#", "%", "//")
 _BLACKBOX = re.compile(rb'"?Product"?\s*,\s*"?Blackbox')
@@ -31,12 +31,12 @@ class Layout:
 
     delimiter: One character; a space stands for runs of spaces and tabs.
     decimal: {".", ","}.
-    names: Of the columns, ``""`` where there is none.
-    tentative: Whether the names, if any, are those of a comment line.
+    names: Names of the columns, ``""`` where there is none.
+    tentative: Whether the names, if any, come from a comment line.
     trailing: Whether every line of data ends with a delimiter.
     offset: Bytes before the first line of data.
     line: Number of that line, counted from 1.
-    scales: Index of a column -> what its numbers are multiplied by.
+    scales: Index of a column -> factor of its numbers.
     dates: Index of a column of dates -> whether they have a zone.
     """
 
@@ -71,7 +71,10 @@ def find_layout(source: str, head: bytes) -> Layout:
     head: The beginning of the file, whole lines.
     Raises InputError if this is not a text, has no data, or its header does not fit the data.
     """
-    _check_is_text(source, head)
+    if head.startswith(_UTF16_MARKS):
+        raise InputError(f"{source} is UTF-16 text: save it as UTF-8 or ASCII")
+    if b"\0" in head:
+        raise InputError(f"{source} is not a text file: {READABLE}, export it as one of these")
     comments, read = _first_lines(source, head)
     lines = _without_preamble(read)
     first, following = lines[0], lines[1:]
@@ -85,8 +88,8 @@ def find_layout(source: str, head: bytes) -> Layout:
     names = _fields(source, first, delimiter, header=True)
     has_header = bool(following) and _are_names(names, decimal)
     # What pandas writes above columns without names.
-    is_numbering = len(names) > 2 and names == [str(i) for i in range(len(names))]
-    data = following if has_header or (is_numbering and following) else lines
+    is_numbering = bool(following) and len(names) > 2 and names == [*map(str, range(len(names)))]
+    data = following if has_header or is_numbering else lines
     rows = [_fields(source, line, delimiter) for line in data]
     trailing = all(len(row) > 1 and not row[-1] for row in rows)
     width = mode(len(row) for row in rows) - trailing
@@ -103,6 +106,11 @@ def find_layout(source: str, head: bytes) -> Layout:
         names = _commented_names(comments, delimiter, decimal, width)
     dates = date_columns(rows)
     named = [of_dates(name) if i in dates else name for i, name in enumerate(names or [""] * width)]
+    notices = [notice("dates", "", {"column": named[i]}) for i in dates]
+    if is_numbering and not has_header:
+        notices.insert(0, notice("column-numbers", "", {"line": first.number}))
+    if lines is not read:
+        notices.append(notice("preamble", "", {"line": first.number}))
     return Layout(
         delimiter=delimiter,
         decimal=decimal,
@@ -111,35 +119,9 @@ def find_layout(source: str, head: bytes) -> Layout:
         trailing=trailing,
         offset=data[0].offset,
         line=data[0].number,
-        notices=(
-            *((_numbering(first.number),) if data is following and not has_header else ()),
-            *(_of_dates(named[i]) for i in dates),
-            *((_preamble(first.number),) if lines is not read else ()),
-        ),
+        notices=tuple(notices),
         dates=dates,
     )
-
-
-def _of_dates(name: str) -> Notice:
-    text = f"column {name!r} holds dates: they count as seconds since 1970-01-01"
-    return Notice("dates", "note", "", text, {"column": name})
-
-
-def _preamble(line: int) -> Notice:
-    text = f"the lines before the header (line {line}) were left out"
-    return Notice("preamble", "note", "", text, {"line": line})
-
-
-def _numbering(line: int) -> Notice:
-    text = f"line {line} was read as column numbers and left out"
-    return Notice("column-numbers", "note", "", text, {"line": line})
-
-
-def _check_is_text(source: str, head: bytes) -> None:
-    if head.startswith(_UTF16_MARKS):
-        raise InputError(f"{source} is UTF-16 text: save it as UTF-8 or ASCII")
-    if b"\0" in head:
-        raise InputError(f"{source} is not a text file: {READABLE}, export it as one of these")
 
 
 def _first_lines(source: str, head: bytes) -> tuple[list[_Line], list[_Line]]:
@@ -164,8 +146,10 @@ def _first_lines(source: str, head: bytes) -> tuple[list[_Line], list[_Line]]:
         if found.start() < preamble:
             continue
         if lines or not text.startswith(_COMMENT_MARKS):
-            if not lines:
-                _check_utf8(source, i, raw)
+            if not lines and "\ufffd" in text and b"\xef\xbf\xbd" not in raw:
+                raise InputError(
+                    f"{source}, line {i}: this is not UTF-8 text: save it as UTF-8; {READABLE}"
+                )
             lines.append(_Line(i, found.start(), text))
             if len(lines) == tuning.LINES_OF_LAYOUT:
                 break
@@ -195,19 +179,16 @@ def _without_preamble(lines: list[_Line]) -> list[_Line]:
     return lines
 
 
-def _check_utf8(source: str, line: int, raw: bytes) -> None:
-    try:
-        raw.decode()
-    except UnicodeDecodeError as error:
-        raise InputError(
-            f"{source}, line {line}: byte {raw[error.start]:#04x} is not UTF-8 text: save the "
-            f"file as UTF-8; {READABLE}"
-        ) from error
-
-
 def _delimiter(texts: Sequence[str]) -> str | None:
     """The delimiter that finds the most numbers, ``None`` if there is no number."""
-    counts = {delimiter: _count_numbers(texts, delimiter) for delimiter in _DELIMITERS}
+    counts = dict.fromkeys(_DELIMITERS, 0)
+    for delimiter in _DELIMITERS:
+        if delimiter == BLANKS or any(delimiter in text for text in texts):
+            decimal = _decimal(texts, delimiter)
+            for text in texts:
+                with suppress(ValueError):  # quotes that do not match
+                    cells = split_line(text, delimiter)
+                    counts[delimiter] += sum(_is_number(cell, decimal) for cell in cells)
     best = max(_DELIMITERS, key=lambda delimiter: counts[delimiter])
     if not counts[best]:
         return None
@@ -215,20 +196,6 @@ def _delimiter(texts: Sequence[str]) -> str | None:
     if best == BLANKS and all(len(text.split()) == 1 for text in texts):
         return ","
     return best
-
-
-def _count_numbers(texts: Sequence[str], delimiter: str) -> int:
-    if delimiter != BLANKS and not any(delimiter in text for text in texts):
-        return 0
-    decimal = _decimal(texts, delimiter)
-    found = 0
-    for text in texts:
-        try:
-            cells = split_line(text, delimiter)
-        except ValueError:
-            continue
-        found += sum(_is_number(cell, decimal) for cell in cells)
-    return found
 
 
 def _decimal(texts: Sequence[str], delimiter: str) -> str:

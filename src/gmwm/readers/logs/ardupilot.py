@@ -9,24 +9,29 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from gmwm._core import memory
-from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
-from gmwm.readers.formats.arrays import AnyArray, ArrayTable, array_of, damage_named
-from gmwm.readers.formats.messages.endings import cut_off, end_of_content
-from gmwm.readers.formats.messages.parts import MessageTable
-from gmwm.readers.formats.messages.topics import Topic, Wanted, choose_first, left_out
+from gmwm.readers.formats.arrays import AnyArray, ArrayTable, array_of
+from gmwm.readers.logs.topics import (
+    MessageTable,
+    Topic,
+    choose_first,
+    cut_off,
+    end_of_content,
+    left_out,
+)
 from gmwm.readers.names import AXES
-from gmwm.readers.table import Table, damage_notice
+from gmwm.readers.registry import Wanted
+from gmwm.readers.table import Columns, Table, damage_named, damage_notice
 
 if TYPE_CHECKING:
-    from gmwm.readers.formats.messages.dataflash import Extent, Messages
+    from gmwm.readers.logs.dataflash import Extent, Messages
 
 _RANKS = {"IMU": 0, "IMU2": 0, "IMU3": 0, "GYR": 1, "ACC": 1}
 _HEADER, _DATA = "ISBH", "ISBD"
@@ -35,6 +40,7 @@ _OF_BATCH = ("accel", "gyro")  # IMU_SENSOR_TYPE_ACCEL, IMU_SENSOR_TYPE_GYRO
 _TIME = "time [us]"
 _SAMPLES = 32  # of a message of a batch
 _MARKS = b"\xa3\x95"
+_DAMAGE = "is no binary log of ArduPilot, or is damaged or cut off: get a whole copy"
 _REMAINS = 528
 """Bytes at the end that may be remains of a page of the memory: pymavlink passes over as many."""
 
@@ -69,33 +75,19 @@ class _Series:
         return found
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class DataflashTable(MessageTable):
     """Messages of one IMU, or of one sensor of it: one a row."""
 
     path: Path
     series: _Series
 
-    @property
-    def source(self) -> str:
-        """Name of the log."""
-        return self.path.name
-
-    @property
-    def stamps(self) -> str:
-        """What the time stamps are, for messages."""
-        return f"{self.series.columns[_TIME]} of {self.series.name}"
-
-    @property
-    def message_type(self) -> str:
-        """What says the units."""
-        return f"messages {self.series.kind}"
-
-    def parts(self, columns: Sequence[int]) -> Iterator[dict[int, FloatArray]]:
-        from gmwm.readers.formats.messages.dataflash import messages  # compiled
+    def parts(self, columns: Sequence[int]) -> Iterator[Columns]:
+        """Columns of one block of messages after another."""
+        from gmwm.readers.logs.dataflash import messages  # compiled
 
         fields = list(self.series.columns.values())
-        with damage_named(self.source, _damage):
+        with damage_named(self.source, _DAMAGE):
             for found in messages(self.path, (self.series.kind,)):
                 part = {column: found[fields[column]].astype(float) for column in columns}
                 if self.series.instance is not None:
@@ -111,7 +103,7 @@ def open_ardupilot(path: Path, wanted: Wanted) -> tuple[Table, ...]:
         those of `GYR` and `ACC`, else the batches, if there is one IMU.
     Raises InputError if it is damaged, holds no IMU or half of one, or topics have to be chosen.
     """
-    with damage_named(path.name, _damage):
+    with damage_named(path.name, _DAMAGE):
         counts, sensors, batches, damage = _contents(path)
     damaged = (damage_notice(path.name, damage, wanted.damaged),) if damage else ()
     ranks: list[list[Topic]] = [[], [], []]
@@ -130,19 +122,25 @@ def open_ardupilot(path: Path, wanted: Wanted) -> tuple[Table, ...]:
         notices = () if tables else (*damaged, *left_out(ranks, chosen))
         if topic.name in by_name:
             series = by_name[topic.name]
-            names = tuple(series.columns)
-            tables.append(DataflashTable(topic, names, path, series, notices=notices))
+            names = series.columns
+            tables.append(
+                DataflashTable(
+                    source=path.name,
+                    names=tuple(names),
+                    notices=list(notices),
+                    topic=topic,
+                    path=path,
+                    series=series,
+                    stamps=f"{names[_TIME]} of {series.name}",
+                    origin=f"messages {series.kind}",
+                )
+            )
         else:
             _, columns = batches[topic.name]
             entries = {name: array_of(values) for name, values in columns.items()}
-            table = ArrayTable.of_entries(path.name, entries, notices)
-            stamps, kinds = f"stamps of {topic.name}", "messages ISBH and ISBD"
-            tables.append(replace(table, stamps=stamps, message_type=kinds))
+            about = {"stamps": f"stamps of {topic.name}", "origin": "messages ISBH and ISBD"}
+            tables.append(ArrayTable.of_entries(path.name, entries, notices, **about))
     return tuple(tables)
-
-
-def _damage(error: Exception) -> str:
-    return "is no binary log of ArduPilot, or is damaged or cut off: get a whole copy"
 
 
 _Batches = dict[str, tuple[str, dict[str, AnyArray]]]
@@ -152,7 +150,7 @@ def _contents(
     path: Path,
 ) -> tuple[dict[_Series, int], dict[_Series, frozenset[str]], _Batches, str]:
     """How many messages there are of each series, its sensors, the batches, and what is damaged."""
-    from gmwm.readers.formats.messages.dataflash import Extent, messages  # compiled
+    from gmwm.readers.logs.dataflash import Extent, messages  # compiled
 
     counts: Counter[_Series] = Counter()
     sensors: dict[_Series, frozenset[str]] = {}
@@ -194,18 +192,16 @@ def _damage_of(path: Path, extent: Extent, seconds: float) -> str:
     return cut_off(seconds) if rest and rest[:2] == _MARKS[: len(rest)] else ""
 
 
-def _field(parts: Sequence[Messages], name: str) -> AnyArray:
-    return np.concatenate([part[name] for part in parts])
-
-
 def _batches(parts_of_header: Sequence[Messages], parts: Sequence[Messages]) -> _Batches:
     """Samples of each sensor from its batches: a header, then messages of 32 samples."""
     found: _Batches = {}
     if not parts_of_header or not parts:
         return found
     names = ("N", "type", "instance", "mul", "smp_cnt", "SampleUS", "smp_rate")
-    headers = {name: _field(parts_of_header, name) for name in names}
-    data = {name: _field(parts, name) for name in ("N", "seqno", *AXES)}
+    headers, data = (
+        {name: np.concatenate([part[name] for part in each]) for name in fields}
+        for each, fields in ((parts_of_header, names), (parts, ("N", "seqno", *AXES)))
+    )
     place, place_of_header = (
         np.concatenate([part.places for part in each]) for each in (parts, parts_of_header)
     )

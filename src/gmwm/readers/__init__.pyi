@@ -1,0 +1,33 @@
+from .missing import Missing as Missing
+from .names import (
+    AXES as AXES,
+    TIME as TIME,
+    bare as bare,
+    meaning as meaning,
+    stated_seconds as stated_seconds,
+)
+from .reader import read as read
+from .recording import (
+    READING as READING,
+    Channel as Channel,
+    Recording as Recording,
+    require_recording as require_recording,
+)
+from .registry import (
+    CLOCKS as CLOCKS,
+    NAMES as NAMES,
+    is_frame as is_frame,
+    is_text as is_text,
+)
+from .table import label as label, load_columns as load_columns
+from .text import (
+    DATE as DATE,
+    CsvTable as CsvTable,
+    content_size as content_size,
+    seconds_of as seconds_of,
+)
+from .turning import (
+    block_means as block_means,
+    steady_turn as steady_turn,
+    turning_gravity as turning_gravity,
+)

@@ -1,0 +1,391 @@
+"""Which column is which channel, and in what unit."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+from gmwm._core import checks
+from gmwm._core.units import AUXILIARY, SI_UNIT, AuxiliaryUnit, auxiliary_unit, factor, quantity_of
+from gmwm.errors import InputError
+from gmwm.issues import Notice, notice
+from gmwm.readers.names import AXES, CANONICAL, TIME, bare, meaning
+from gmwm.readers.table import Table, label
+
+Reference = str | int
+"""A column's name, or its index counted from 0."""
+
+_EXAMPLE = 'channels={"gyro_x": 0, "accel_x": 3}'
+_EXAMPLES = {"gyro": "deg/s", "accel": "g"}
+_SAME_UNIT = 1e-6  # relative; the same unit in two spellings differs by rounding
+
+
+@dataclass(frozen=True)
+class Given:
+    """What the caller of `gmwm.read` says of a table: the arguments of that name."""
+
+    rate: float | None
+    units: Mapping[str, str]
+    channels: Mapping[str, Reference] | Collection[str] | None
+    time: Reference | Literal[False] | None
+
+    def __post_init__(self) -> None:
+        units = self.units
+        if not isinstance(units, Mapping) or not all(
+            isinstance(each, str) for each in units.values()
+        ):
+            raise InputError(
+                f"units = {checks.shown(units)}: give that of each sensor, e.g. "
+                'units={"gyro": "deg/s", "accel": "g"}'
+            )
+
+
+@dataclass(frozen=True)
+class AuxiliaryColumn:
+    """A column of temperatures, voltages or time stamps of another clock.
+
+    name: Name of its channel.
+    quantity: One of `AUXILIARY`.
+    unit: Unit in the file; None if unknown.
+    """
+
+    name: str
+    index: int
+    quantity: str
+    unit: AuxiliaryUnit | None
+
+    def __str__(self) -> str:
+        return f"{self.name!r} ({self.quantity}{'' if self.unit else ', unit unknown'})"
+
+
+@dataclass(frozen=True)
+class Roles:
+    """What the columns are.
+
+    channels: Name of a gyro's or accelerometer's channel -> index of its column.
+    auxiliary: Other channels that are kept.
+    time: Index of the column of time stamps.
+    notices: Auxiliary columns, and columns that are not used.
+    """
+
+    channels: dict[str, int]
+    auxiliary: tuple[AuxiliaryColumn, ...]
+    time: int | None
+    notices: tuple[Notice, ...]
+
+    @property
+    def columns(self) -> tuple[int, ...]:
+        """Indices of the columns that are needed, each once, in the order of the file."""
+        time = () if self.time is None else (self.time,)
+        return tuple(sorted({*self.channels.values(), *time}))
+
+
+def roles_of(table: Table, given: Given) -> Roles:
+    """Decide which column is which channel.
+
+    The caller decides first, then the columns' names, then their number; the units decide what one
+    or three columns without names are.
+
+    Raises InputError if it cannot be decided, or no channel is a gyro's or an accelerometer's.
+    """
+    names, channels = table.names, given.channels
+    time: int | None = None
+    if given.time is not None and given.time is not False:
+        time = find_column(table, given.time, "time")
+    stamps = [i for i, name in enumerate(names) if meaning(name).role == TIME]
+    if isinstance(channels, Mapping):
+        if not channels:
+            raise InputError(f"channels names no channel: give the column of each, e.g. {_EXAMPLE}")
+        chosen = {name: find_column(table, each, name) for name, each in channels.items()}
+        stamps = [i for i in stamps if i not in chosen.values()]
+    else:
+        chosen = _named_channels(table)
+        if not chosen:
+            known = {time, *stamps}
+            rest = [i for i in range(len(names)) if i not in known]
+            if not rest or (any(names[i] for i in rest) and not table.tentative):
+                raise InputError(
+                    f"{table.source}: no column is known as a gyro's or an accelerometer's, "
+                    f"{_listed(table)}: say which is which, e.g. {_EXAMPLE}",
+                    "channel-unknown",
+                )
+            chosen, stamp = _by_number(table, rest, bool(known - {None}), given.units)
+            stamps = [stamp] if stamp is not None else stamps
+        chosen = _only(table, chosen, channels)
+    notices = []
+    if given.time is None and stamps:
+        time = stamps[0]
+        if len(stamps) > 1:
+            others = ", ".join(label(names, i) for i in stamps[1:])
+            this = label(names, time)
+            notices.append(notice("time-column", "", {"column": time}, used=this, others=others))
+    auxiliary = _given_auxiliary(table, chosen, given.units)
+    chosen = {name: i for name, i in chosen.items() if name not in {a.name for a in auxiliary}}
+    if not isinstance(channels, Mapping):
+        left = {*chosen.values(), time, *(() if given.time is not False else stamps)}
+        auxiliary += _found_auxiliary(table, left, chosen, given.units)
+    if auxiliary:
+        values = {column.name: column.quantity for column in auxiliary}
+        listed = ", ".join(map(str, auxiliary))
+        notices.append(notice("columns-auxiliary", "", values, listed=listed))
+    used = {*chosen.values(), time, *(column.index for column in auxiliary)}
+    ignored = [label(names, i) for i in range(len(names)) if i not in used]
+    if ignored:
+        count = {"count": len(ignored)}
+        notices.append(notice("columns-not-used", "", count, listed=", ".join(ignored)))
+    if not chosen:
+        raise InputError(
+            f"{table.source}: every channel is auxiliary: name one of a gyro or an accelerometer, "
+            'e.g. channels={"gyro_x": 1}',
+            "channel-unknown",
+        )
+    return Roles(chosen, tuple(auxiliary), time, tuple(notices))
+
+
+def find_column(table: Table, reference: Reference, what: str) -> int:
+    """Index of a column that the user names.
+
+    what: What it is for, in messages.
+    Raises InputError if there is no such column, or more than one.
+    """
+    if isinstance(reference, bool) or not isinstance(reference, str | int):
+        raise InputError(
+            f"{what} = {reference!r} is not a column: give its name or its index counted from 0"
+        )
+    index = reference if isinstance(reference, int) else None
+    if isinstance(reference, str):
+        for known in (table.names, [bare(name) for name in table.names]):
+            for fold in (str, str.lower):
+                wanted = fold(reference)
+                found = [i for i, name in enumerate(known) if name and fold(name) == wanted]
+                if len(found) == 1:
+                    return found[0]
+                if found:
+                    raise InputError(
+                        f"{table.source} has {len(found)} columns {reference!r}: give the index of "
+                        f"the one for {what}, counted from 0: {', '.join(map(str, found))}"
+                    )
+        if not (reference.isascii() and reference.isdigit()):
+            raise InputError(
+                f"{table.source} has no column {reference!r} for {what}: {_listed(table)}"
+            )
+        index = int(reference)
+    if index is None or not 0 <= index < len(table.names):
+        raise InputError(
+            f"{table.source} has no column {index} for {what}: its {len(table.names)} columns "
+            f"are counted from 0 to {len(table.names) - 1}"
+        )
+    return index
+
+
+def _listed(table: Table, most: int = 12) -> str:
+    """Say which columns there are."""
+    names = [name for name in table.names if name]
+    if not names:
+        return f"its {len(table.names)} columns have no names"
+    more = f" and {len(names) - most} more" if len(names) > most else ""
+    return f"its columns are {', '.join(map(repr, names[:most]))}{more}"
+
+
+def _named_channels(table: Table) -> dict[str, int]:
+    found: dict[str, int] = {}
+    roles = [meaning(name).role for name in table.names]
+    for channel in CANONICAL:
+        indices = [i for i, role in enumerate(roles) if role == channel]
+        if len(indices) > 1:
+            names = " and ".join(label(table.names, i) for i in indices[:2])
+            raise InputError(
+                f"{table.source}: columns {names} may both be {channel}: choose one, "
+                f'e.g. channels={{"{channel}": {indices[0]}}}',
+                "channel-unknown",
+            )
+        if indices:
+            found[channel] = indices[0]
+    return found
+
+
+def _by_number(
+    table: Table, rest: Sequence[int], has_time: bool, units: Mapping[str, str]
+) -> tuple[dict[str, int], int | None]:
+    """Channels by how many columns there are: one or two sensors, or one axis, perhaps time."""
+    stamp = None
+    if not has_time and len(rest) in (4, 7):
+        stamp, rest = rest[0], rest[1:]
+    if len(rest) == len(CANONICAL):
+        return dict(zip(CANONICAL, rest, strict=True)), stamp
+    if len(rest) not in (1, len(AXES)):
+        raise InputError(
+            f"{table.source} has {len(table.names)} columns without names that are known: say "
+            f"which is which, e.g. {_EXAMPLE}",
+            "channel-unknown",
+        )
+    sensors = [sensor for sensor in SI_UNIT if sensor in units]
+    if len(sensors) != 1:
+        raise InputError(
+            f"{table.source}: column names do not show whether this is a gyro or an "
+            f'accelerometer: say it, e.g. channels={{"gyro_x": {rest[0]}}}, or give the unit of '
+            "only one of them",
+            "channel-unknown",
+        )
+    names = [f"{sensors[0]}_{axis}" for axis in AXES]
+    return dict(zip(names, rest, strict=False)), stamp
+
+
+def _only(table: Table, found: dict[str, int], names: Collection[str] | None) -> dict[str, int]:
+    """The channels that the caller names, if any."""
+    if names is None:
+        return found
+    wanted = {names} if isinstance(names, str) else set(names)
+    for name in wanted:
+        if name not in found and not any(name == each.partition("_")[0] for each in found):
+            raise InputError(
+                f"{table.source} has no channel {name!r}: it has {', '.join(found)}",
+                "channel-unknown",
+            )
+    return {
+        name: column
+        for name, column in found.items()
+        if not wanted.isdisjoint((name, name.partition("_")[0]))
+    }
+
+
+def _given_auxiliary(
+    table: Table, chosen: Mapping[str, int], units: Mapping[str, str]
+) -> list[AuxiliaryColumn]:
+    """Chosen channels that are auxiliary by unit, by name, or by the column's name."""
+    found = []
+    for name, index in chosen.items():
+        unit = auxiliary_unit(units.get(name, ""))
+        column = meaning(table.names[index])
+        if unit is not None:
+            found.append(AuxiliaryColumn(name, index, unit.quantity, unit))
+        elif (role := meaning(name).role) in AUXILIARY or (
+            role is None and column.role in AUXILIARY and name not in units
+        ):
+            unit = auxiliary_unit(column.unit or "")
+            found.append(AuxiliaryColumn(name, index, role or str(column.role), unit))
+    return found
+
+
+def _found_auxiliary(
+    table: Table,
+    used: Collection[int | None],
+    chosen: Mapping[str, int],
+    units: Mapping[str, str],
+) -> list[AuxiliaryColumn]:
+    """Columns without another use that are auxiliary by their names."""
+    found: list[AuxiliaryColumn] = []
+    for index, column in enumerate(table.names):
+        role = meaning(column)
+        quantity = "clock" if role.role == TIME else role.role
+        if index in used or quantity not in AUXILIARY:
+            continue
+        name = bare(column)
+        if name in chosen or name in {other.name for other in found}:
+            name = f"{name}_{index}"
+        unit = auxiliary_unit(units.get(name, role.unit or ""))
+        if quantity == "clock" and role.seconds is not None:
+            unit = AuxiliaryUnit("clock", "s", role.seconds)
+        found.append(AuxiliaryColumn(name, index, quantity, unit))
+    return found
+
+
+# -- units ----------------------------------------------------------------------------------------
+
+
+def channel_units(
+    table: Table,
+    roles: Roles,
+    units: Mapping[str, str],
+    unknown_rate: Callable[[], InputError | None],
+) -> tuple[dict[str, str], tuple[Notice, ...]]:
+    """Unit of every channel, as the user gives it, else as the header does.
+
+    units: Units that the user gave, by sensor or by channel; the latter goes first.
+    unknown_rate: Says what is wrong with the sampling rate, which is then asked for at once.
+    Returns: units, by channel; notices of units that the user did not give.
+    Raises InputError if a unit is missing, unknown, or not one of what the channel measures; or the
+        rate is missing.
+    """
+    known = (*roles.channels, *(column.name for column in roles.auxiliary))
+    for key in units:
+        if key not in SI_UNIT and key not in known:
+            raise InputError(
+                f"units has {key!r}, which is neither gyro nor accel nor a channel: the channels "
+                f"are {', '.join(known)}"
+            )
+    found: dict[str, str] = {}
+    from_header: dict[str, str] = {}
+    overruled: dict[str, str] = {}
+    missing: dict[str, str] = {}  # one channel of each sensor stands for the others
+    for channel, column in roles.channels.items():
+        in_header = meaning(table.names[column]).unit
+        sensor = _sensor(channel) or _sensor(meaning(table.names[column]).role or "")
+        given = units.get(channel, units.get(sensor))
+        unit = given if given is not None else in_header
+        if unit is None:
+            missing.setdefault(sensor or channel, channel)
+            continue
+        try:
+            factor(unit, SI_UNIT[sensor]) if sensor else quantity_of(unit)
+        except InputError as error:
+            raise InputError(f"{table.source}, channel {channel}: {error}") from error
+        found[channel] = unit
+        if given is None:
+            from_header[channel] = unit
+        elif in_header is not None and not _same(in_header, given):
+            overruled[channel] = f"{in_header}, not {given}"
+    # Time stamps are looked at after the units, unless these are to be asked for anyway.
+    rate = unknown_rate() if missing or roles.time is None else None
+    if missing or rate is not None:
+        raise _incomplete(table.source, missing, rate)
+    notices = []
+    if from_header:
+        listed = "; ".join(
+            f"{', '.join(name for name, u in from_header.items() if u == unit)} in {unit}"
+            for unit in dict.fromkeys(from_header.values())
+        )
+        notices.append(
+            notice("units-from-names", "", from_header, origin=table.origin, listed=listed)
+        )
+    if overruled:
+        listed = "; ".join(f"{name} in {text}" for name, text in overruled.items())
+        notices.append(
+            notice("units-contradicted", "", overruled, origin=table.origin, listed=listed)
+        )
+    return found, tuple(notices)
+
+
+def _sensor(name: str) -> str:
+    """The sensor whose name a channel's name begins with, or nothing."""
+    return next((sensor for sensor in SI_UNIT if name.lower().startswith(sensor)), "")
+
+
+def _same(unit: str, other: str) -> bool:
+    try:
+        return abs(factor(unit, other) - 1.0) < _SAME_UNIT
+    except InputError:
+        return False
+
+
+def _incomplete(source: str, missing: Mapping[str, str], rate: InputError | None) -> InputError:
+    """One error that asks for everything that the file and the user leave out.
+
+    missing: Sensor, or channel of another name -> channel without a unit.
+    """
+    if rate is not None and not missing:
+        return rate
+    text = f"does not give the unit of {' and '.join(missing.values())}"
+    codes = [f"{key}-unit-missing" if key in SI_UNIT else "unit-missing" for key in missing]
+    examples = [f'"{key}": "{_EXAMPLES.get(key, "deg/s")}"' for key in missing]
+    hint = f"units={{{', '.join(examples)}}}"
+    if rate is None:
+        it = "it" if len(codes) == 1 else "them"
+        code = " ".join(dict.fromkeys(codes))
+        return InputError(f"{source} {text}", code, f"give {it}, e.g. {hint}")
+    # The advice about a time column ends the advice of the command line.
+    codes.insert(len(codes) if rate.code == "time-unit" else 0, rate.code)
+    hint = f"give them, e.g. rate={rate.values['rate']:.6g}, {hint}"
+    code = " ".join(dict.fromkeys(codes))
+    return InputError(f"{rate.problem}, and it {text}", code, hint, rate.values)

@@ -1,0 +1,171 @@
+"""Topics of a log: which to read, and tables of their messages."""
+
+from __future__ import annotations
+
+import mmap
+from abc import abstractmethod
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from gmwm._core.units import SI_UNIT
+from gmwm.errors import InputError
+from gmwm.issues import Notice, notice
+from gmwm.readers.registry import Wanted
+from gmwm.readers.table import Columns, Table
+
+_BLOCK = 1 << 16  # bytes
+_MEASURED = {"gyro": "angular rates", "accel": "accelerations"}
+
+
+@dataclass(frozen=True)
+class Topic:
+    """A series of messages of one IMU, or of one sensor of it.
+
+    count: Number of messages.
+    sensors: "gyro", "accel" or both, if not zeros all the time.
+    """
+
+    name: str
+    count: int
+    sensors: frozenset[str] = frozenset(SI_UNIT)
+
+    def __str__(self) -> str:
+        only = f", {next(iter(self.sensors))} only" if len(self.sensors) == 1 else ""
+        return f"{self.name} ({self.count:,} messages{only})"
+
+
+def choose(source: str, topics: Sequence[Topic], wanted: Wanted) -> tuple[Topic, ...]:
+    """The topics to read: those wanted, else the only one, else one of gyros with one of forces.
+
+    source: Name of the file, for messages.
+    topics: One at least.
+    Raises InputError with the code "topic", if one is not there, or it cannot be decided; with
+        "sensor-absent", if the log has one sensor and not the other, and no channel is named.
+    """
+    chosen = _chosen(source, topics, wanted.topics)
+    there = frozenset[str]().union(*(topic.sensors for topic in chosen))
+    absent = frozenset(SI_UNIT) - there
+    # One topic of two was chosen where the other has the other sensor.
+    is_part = absent in [topic.sensors for topic in topics]
+    if there and absent and not (is_part or wanted.by_channel):
+        (sensor,), (other,) = there, absent
+        raise InputError(
+            f"{source} has no {_MEASURED[other]}, or only zeros, in {chosen[0].name}",
+            "sensor-absent",
+            f'record them too, or read the rest alone, channels="{sensor}"',
+            {"sensor": sensor},
+        )
+    return chosen
+
+
+def _chosen(source: str, topics: Sequence[Topic], wanted: Sequence[str]) -> tuple[Topic, ...]:
+    listed = ", ".join(map(str, topics))
+    if not wanted:
+        if len(topics) == 1 or _are_parts(topics):
+            return tuple(topics)
+        raise InputError(
+            f"{source} has {len(topics)} topics of an IMU: {listed}",
+            "topic",
+            f'choose one, topic="{topics[0].name}"',
+        )
+    by_name = {topic.name.strip("/"): topic for topic in topics}
+    for name in wanted:
+        if name.strip("/") not in by_name:
+            raise InputError(
+                f"{source} has no topic {name!r} of an IMU: it has {listed}", "topic-unknown"
+            )
+    chosen = tuple(by_name[name.strip("/")] for name in dict.fromkeys(wanted))
+    if len(chosen) > 1 and not _are_parts(chosen):
+        raise InputError(
+            f"{source}: {' and '.join(map(str, chosen))} are no pair of gyros and "
+            "accelerometers: choose one, or two such",
+            "topic",
+        )
+    return chosen
+
+
+def _are_parts(topics: Sequence[Topic]) -> bool:
+    """Whether they are one of gyros and one of accelerometers."""
+    return len(topics) == 2 and {frozenset(("gyro",)), frozenset(("accel",))} == {
+        topic.sensors for topic in topics
+    }
+
+
+def choose_first(
+    source: str, ranks: Sequence[Sequence[Topic]], wanted: Wanted
+) -> tuple[Topic, ...]:
+    """As `choose`, of the first rank that has any topic unless others are wanted.
+
+    Raises InputError as `choose` does.
+    """
+    if wanted.topics:
+        return choose(source, [topic for rank in ranks for topic in rank], wanted)
+    return choose(source, next(rank for rank in ranks if rank), wanted)
+
+
+def left_out(ranks: Sequence[Sequence[Topic]], chosen: Sequence[Topic]) -> tuple[Notice, ...]:
+    """A notice of the topics that are read, where there are others."""
+    others = [topic for rank in ranks for topic in rank if topic not in chosen]
+    if not others:
+        return ()
+    values = {"topic": " and ".join(topic.name for topic in chosen), "others": len(others)}
+    listed = ", ".join(map(str, others))
+    return (notice("topic", "", values, variant="others", listed=listed),)
+
+
+def end_of_content(path: Path) -> int:
+    """Byte after the last one that may be something else than padding, zeros or 0xFF."""
+    end = path.stat().st_size
+    if not end:
+        return 0
+    with path.open("rb") as stream, mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ) as data:
+        last = data[end - 1 :]
+        while end and last in (b"\0", b"\xff"):
+            start = max(end - _BLOCK, 0)
+            kept = len(data[start:end].rstrip(last))
+            end = start + kept
+            if kept:
+                break
+    return end
+
+
+def cut_off(seconds: float) -> str:
+    """What is wrong with a log that ends inside a message, some time after its first sample."""
+    return f"is cut off or damaged {seconds:.6g} s after its first sample, inside a message"
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class MessageTable(Table):
+    """A topic of a log, one message a row; memory holds only the columns that are asked for."""
+
+    topic: Topic
+
+    @abstractmethod
+    def parts(self, columns: Sequence[int]) -> Iterator[Columns]:
+        """Columns of one block of messages after another."""
+
+    def expected_rows(self) -> float:
+        """Number of messages."""
+        return float(self.topic.count)
+
+    def segments(self, columns: Sequence[int], rows: int) -> Iterator[Columns]:
+        """Columns of some messages at a time.
+
+        Raises InputError if the log is damaged, or a number is infinite.
+        """
+        row = 0
+        for part in self.parts(columns):
+            for column, values in part.items():
+                self.check_usable(column, values, row)
+            row += next(iter(part.values())).size
+            yield part
+        if not 0 < row <= self.topic.count:
+            raise InputError(
+                f"{self.source}, topic {self.topic.name}: its messages are not as many as its "
+                "index says: get a whole copy, or reindex it"
+            )
+
+    def where(self, row: int) -> str:
+        """The message."""
+        return f"message {row} of {self.topic.name} (counted from 0)"

@@ -1,0 +1,152 @@
+"""The formats that can be read, and which of them a file has, by its first bytes and its name.
+
+A format is one module with a function that opens a file as tables, and one entry of `FORMATS`. The
+help of the command line, the ``format`` of `gmwm.read` and its docstring follow from the entry.
+This module imports no library, so that the command line can ask for the names at once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from pkgutil import resolve_name
+from typing import TYPE_CHECKING, Any
+
+from gmwm.errors import InputError
+
+if TYPE_CHECKING:
+    from gmwm.readers.table import Table
+
+CLOCKS = ("header", "log")
+"""Stamps of messages: those of their headers, or the times at which they were recorded."""
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What the caller asks of a file.
+
+    topics: Topics of a log to read; by default the only one of an IMU, or one of gyros and one of
+        accelerometers.
+    clock: Which of `CLOCKS` counts.
+    by_channel: Whether channels are named, all of which one sensor may have.
+    damaged: Whether the rest of a damaged file is used.
+    """
+
+    topics: Sequence[str] = ()
+    clock: str = "header"
+    by_channel: bool = False
+    damaged: bool = False
+
+
+@dataclass(frozen=True)
+class Format:
+    """A kind of file.
+
+    title: What messages call such files.
+    opener: Function of a path and `Wanted` that gives tables, as "module:name" in this room; it
+        asks for the libraries of an extra that it needs by `gmwm.readers.table.library`.
+    suffixes: Endings of its files.
+    magic: Bytes that its files begin with.
+    is_log: Whether there may be several topics of messages to choose from.
+    has_clocks: Whether messages have the stamp of their header and that of their recording.
+    """
+
+    name: str
+    title: str
+    opener: str
+    suffixes: tuple[str, ...] = ()
+    magic: tuple[bytes, ...] = ()
+    is_log: bool = False
+    has_clocks: bool = False
+
+    def open(self, path: Any, wanted: Wanted) -> Sequence[Table]:
+        """Tables of a file; several if its sensors have rates of their own."""
+        tables: Sequence[Table] = resolve_name(f"gmwm.readers.{self.opener}")(path, wanted)
+        return tables
+
+
+_TEXT = Format("text", "CSV and other delimited text (plain or .gz)", "text.csv_table:open_text")
+_FRAME = Format("a table in memory", "tables in memory", "formats.frame:open_frame")
+
+FORMATS = (
+    _TEXT,
+    Format("numpy", "NPY and NPZ", "formats.numpy_file:open_numpy", (".npy", ".npz")),
+    # By content before by name: a MAT file of version 7.3 is one of HDF5 behind 512 bytes.
+    Format("hdf5", "HDF5", "formats.hdf5:open_hdf5", (".h5", ".hdf5", ".hdf"),
+           (b"\x89HDF\r\n\x1a\n", b"MATLAB 7.3")),
+    Format("mat", "MAT", "formats.hdf5:open_mat", (".mat",), (b"MATLAB 5.0",)),
+    Format("parquet", "Parquet", "formats.frame:open_parquet", (".parquet",), (b"PAR1",)),
+    Format("feather", "Feather", "formats.frame:open_feather", (".feather", ".arrow"),
+           (b"ARROW1", b"FEA1")),
+    Format("rosbag", "bags of ROS 1", "logs.rosbag:open_bag", (".bag",), (b"#ROSBAG",), True, True),
+    Format("rosbag2", "bags of ROS 2", "logs.rosbag:open_bag", (".mcap", ".db3"),
+           (b"\x89MCAP", b"SQLite format 3"), True, True),
+    Format("ulog", "PX4 logs", "logs.ulog:open_ulog", (".ulg",), (b"ULog\x01\x12\x35",), True),
+    # Other binary files have the suffix .bin too.
+    Format("ardupilot", "ArduPilot logs", "logs.ardupilot:open_ardupilot", (), (b"\xa3\x95",),
+           True),
+)  # fmt: skip
+"""All formats of files; a file of no other format is text."""
+
+NAMES = tuple(each.name for each in FORMATS)
+"""Names of the formats, as ``format`` of `gmwm.read` has them."""
+
+READABLE = f"gmwm reads {', '.join(each.title for each in FORMATS)}"
+"""For messages about files of another kind."""
+
+
+def open_tables(data: Any, wanted: Wanted, name: str | None = None) -> Sequence[Table]:
+    """Open a file or a table in memory, whatever it is.
+
+    name: One of `NAMES`, in place of what the first bytes and the name of the file show.
+    Returns: several tables if the sensors have rates of their own.
+    Raises InputError if it cannot be used.
+    """
+    if wanted.clock not in CLOCKS:
+        raise InputError(f"clock = {wanted.clock!r}: give one of {', '.join(CLOCKS)}")
+    if name is not None and name not in NAMES:
+        raise InputError(f"format = {name!r}: give one of {', '.join(NAMES)}")
+    if is_frame(data) and name is not None:
+        raise InputError("a table in memory has no format: format is for files, leave it out")
+    found = _FRAME if is_frame(data) else _format_of(Path(data), name)
+    source = found.name if found is _FRAME else Path(data).name
+    if wanted.topics and not found.is_log:
+        raise InputError(f"{source} has no topics: topic is for bags and flight logs, leave it out")
+    if wanted.clock != CLOCKS[0] and not found.has_clocks:
+        raise InputError(f"{source} has one clock: clock is for bags, leave it out")
+    return found.open(data if found is _FRAME else Path(data), wanted)
+
+
+def is_frame(data: object) -> bool:
+    """Whether it is a table of pandas, polars, Arrow, or gives itself as one."""
+    return not isinstance(data, type) and any(
+        hasattr(data, name) for name in ("iloc", "to_arrow", "__arrow_c_stream__")
+    )
+
+
+def is_text(path: Path) -> bool:
+    """Whether a file is read as delimited text."""
+    return _format_of(path) is _TEXT
+
+
+def _format_of(path: Path, name: str | None = None) -> Format:
+    from gmwm._core.files import existing_file
+
+    if name is not None:
+        if name != "rosbag2":  # a bag of ROS 2 may be a folder, which its reader checks
+            existing_file(path)
+        return next(each for each in FORMATS if each.name == name)
+    with suppress(OSError, ValueError):  # ValueError: a null character in the name
+        if path.is_dir() and any(
+            each.name == "metadata.yaml" or not {".db3", ".mcap"}.isdisjoint(each.suffixes)
+            for each in path.iterdir()
+        ):
+            return next(each for each in FORMATS if each.name == "rosbag2")
+    suffix, head = existing_file(path).suffix.lower(), b""
+    with suppress(OSError), path.open("rb") as stream:
+        head = stream.read(max(len(magic) for each in FORMATS for magic in each.magic))
+    by_content = [each for each in FORMATS if each.magic and head.startswith(each.magic)]
+    by_name = [each for each in FORMATS if suffix in each.suffixes]
+    return next(iter(by_content + by_name), _TEXT)

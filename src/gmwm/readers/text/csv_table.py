@@ -1,0 +1,294 @@
+"""Delimited text (CSV and its relatives), plain or gzip, as a table.
+
+Arrow parses block after block. A block that it cannot parse, or that holds an infinite value, is
+read again by plain Python, field by field: that either finds the line and column to complain about,
+or reads what Arrow is too strict for (``+1.5``, quotes). Both give the same numbers, NaN where a
+field says that there is none.
+"""
+
+from __future__ import annotations
+
+import math
+from array import array
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from gmwm._core.typing import FloatArray
+from gmwm.errors import InputError
+from gmwm.readers.registry import Wanted
+from gmwm.readers.table import Columns, Table, damage_notice, label, usable
+from gmwm.readers.text.cells import (
+    BLANKS,
+    FIELD_OF_DATE,
+    has_zone,
+    number,
+    seconds_of,
+    split_line,
+)
+from gmwm.readers.text.dialects import with_dialect
+from gmwm.readers.text.layout import Layout, find_layout
+from gmwm.readers.text.lines import blocks, content_size, count_lines
+
+if TYPE_CHECKING:
+    import pyarrow
+
+_HEAD = 1 << 18
+_ENOUGH_LINES = 16  # before one whose last field is shorter than that of each
+
+# What `number` takes for missing, as it is commonly written; Arrow knows NaN by itself.
+_NULLS = ["", "NA", "na", "N/A", "n/a", "#N/A", "null", "NULL", "Null", "None", "none"]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class CsvTable(Table):
+    """A text file whose layout is known.
+
+    is_taken: Whether the rest of a damaged file is used; None if that cannot be asked for.
+    """
+
+    path: Path
+    layout: Layout
+    is_taken: bool | None = None
+
+    @classmethod
+    def open(cls, path: Path, is_taken: bool | None = None) -> CsvTable:
+        """Look at the beginning of a file.
+
+        Raises InputError if it cannot be read or is not a table.
+        """
+        damages = list[str]()
+        _, head = next(blocks(path, size=_HEAD, say=damages.append), (1, b""))
+        if damages and not head:
+            damage_notice(path.name, damages[0], is_taken)
+        layout = with_dialect(find_layout(path.name, head), path.name, head)
+        return cls(
+            source=path.name,
+            names=layout.names,
+            tentative=layout.tentative,
+            notices=list(layout.notices),
+            path=path,
+            layout=layout,
+            is_taken=is_taken,
+        )
+
+    def _note_damage(self, what: str) -> None:
+        found = damage_notice(self.source, what, self.is_taken)
+        if found not in self.notices:
+            self.notices.append(found)
+
+    def expected_rows(self) -> float:
+        """Number of rows by the size of the file and its first lines."""
+        if self.is_taken:  # the size that a packed file states is at its end
+            return 0.0
+        _, head = next(blocks(self.path, self.layout.offset, size=_HEAD), (1, b""))
+        lines = max(len(head.splitlines()), 1)
+        return content_size(self.path) / max(len(head) / lines, 1.0)
+
+    def segments(self, columns: Sequence[int], rows: int) -> Iterator[Columns]:
+        """Columns of about ``rows`` rows at a time.
+
+        Raises InputError at the first line with a wrong number of fields or with text for a number;
+        if there is none, at the end, for the first number that is infinite.
+        """
+        import pyarrow
+
+        layout, before = self.layout, b""
+        parts: list[list[FloatArray]] = []
+        infinite: list[str] = []
+        for line, block in blocks(self.path, layout.offset, layout.line, say=self._note_damage):
+            if _is_cut(block, before, layout):
+                self._note_damage(f"is cut off in line {line}")
+                break
+            before = block
+            found = _parse_with_arrow(block, layout, columns)
+            parts.append(found or self._parse_by_field(line, block, columns, infinite))
+            if sum(part[0].size for part in parts) >= rows:
+                yield self._joined(columns, parts)
+                parts = []
+        if infinite:
+            others = f", and {len(infinite) - 1:,} more such" if len(infinite) > 1 else ""
+            raise InputError(
+                f"{self.source}, {infinite[0]} is not a usable number{others}: cut the file before "
+                "that line, or empty the field if the sample is missing"
+            )
+        if parts:
+            yield self._joined(columns, parts)
+        pyarrow.default_memory_pool().release_unused()  # Arrow keeps memory for more columns
+
+    def _joined(self, columns: Sequence[int], parts: Sequence[Sequence[FloatArray]]) -> Columns:
+        return {
+            column: np.concatenate([part[i] for part in parts])
+            * self.layout.scales.get(column, 1.0)
+            for i, column in enumerate(columns)
+        }
+
+    def where(self, row: int) -> str:
+        """The line of a row of data."""
+        for line, block in blocks(self.path, self.layout.offset, self.layout.line):
+            for i, text in enumerate(block.splitlines(), start=line):
+                if text.strip(b" \t"):
+                    row -= 1
+                if row < 0:
+                    return f"line {i}"
+        return "the last line"
+
+    def _parse_by_field(
+        self, first_line: int, block: bytes, columns: Sequence[int], infinite: list[str]
+    ) -> list[FloatArray]:
+        """Read a block the careful way; ``infinite`` gets the places of infinite numbers."""
+        layout = self.layout
+        found = [array("d") for _ in columns]
+        for line, raw in enumerate(block.splitlines(), start=first_line):
+            text = raw.decode(errors="replace")
+            if layout.width > 1 and not text.strip(" \t"):
+                continue
+            cells = self._cells(line, text)
+            for values, column in zip(found, columns, strict=True):
+                value = number(cells[column], layout.decimal)
+                problem = "is not a number"
+                if value is None and column in layout.dates:
+                    value, problem = _date(cells[column], layout.dates[column])
+                cell = cells[column] if len(cells[column]) <= 30 else cells[column][:27] + "..."
+                place = f"line {line}, column {label(self.names, column)}: {cell!r}"
+                if value is None:
+                    raise InputError(
+                        f"{self.source}, {place} {problem}: correct the line, or choose other "
+                        "columns with channels= and time="
+                    )
+                if math.isinf(value):
+                    infinite.append(place)
+                values.append(value)
+        return [np.array(values) for values in found]
+
+    def _cells(self, line: int, text: str) -> list[str]:
+        """Fields of a line; a delimiter after the last one does no harm."""
+        width = self.layout.width
+        try:
+            cells = split_line(text, self.layout.delimiter)
+        except ValueError as error:
+            raise InputError(
+                f"{self.source}, line {line}: quotes that do not match: correct the line"
+            ) from error
+        if len(cells) == width + 1 and not cells[-1]:
+            cells.pop()
+        if len(cells) != width:
+            raise InputError(
+                f"{self.source}, line {line}: {len(cells)} fields where {width} were expected: "
+                "correct the line or remove it"
+            )
+        return cells
+
+
+def _is_cut(block: bytes, before: bytes, layout: Layout) -> bool:
+    """Whether a last line has no end, and lacks fields or digits of its last field.
+
+    block: A block of lines; a line without an end is one by itself.
+    before: The block before it.
+    """
+    if block.endswith((b"\n", b"\r")):
+        return False
+    delimiter = None if layout.delimiter == BLANKS else layout.delimiter.encode()
+    *first, last = block.split(delimiter)
+    if len(first) + 1 < layout.width:
+        return True
+    sizes = [len(line.split(delimiter)[-1]) for line in before.splitlines() if line.strip()]
+    return len(sizes) >= _ENOUGH_LINES and len(last) < min(sizes)
+
+
+def _parse_with_arrow(
+    block: bytes, layout: Layout, columns: Sequence[int]
+) -> list[FloatArray] | None:
+    """Read a block the fast way, or return ``None`` if anything in it is unusual."""
+    import pyarrow
+    from pyarrow import csv
+
+    if b'"' in block or b"(" in block:  # the latter for nan(1), which Arrow takes for NaN
+        return None
+    if layout.delimiter == BLANKS:
+        block = _single_blanks(block)
+    names = [str(i) for i in range(layout.width + layout.trailing)]
+    types = {
+        names[i]: pyarrow.timestamp("ns", tz="UTC" if layout.dates[i] else None)
+        if i in layout.dates
+        else pyarrow.float64()
+        for i in columns
+    }
+    try:
+        table = csv.read_csv(
+            pyarrow.BufferReader(block),
+            # Blocks of this size gain nothing by threads, and are the same every time without.
+            read_options=csv.ReadOptions(column_names=names, use_threads=False),
+            parse_options=csv.ParseOptions(
+                delimiter=layout.delimiter,
+                quote_char=False,
+                # In a single column a blank line is a missing sample.
+                ignore_empty_lines=layout.width > 1,
+            ),
+            convert_options=csv.ConvertOptions(
+                include_columns=list(types),
+                column_types=types,
+                null_values=_NULLS,
+                decimal_point=layout.decimal,
+            ),
+        )
+    except pyarrow.ArrowInvalid:
+        return None
+    found: list[FloatArray] = []
+    for i in columns:
+        column = table.column(names[i])
+        if i in layout.dates:  # seconds since 1970, good to a quarter of a microsecond
+            found.append(column.cast(pyarrow.int64()).to_numpy() * 1e-9)
+        else:
+            found.append(_floats(column))
+    lines = count_lines(block) + (not block.endswith((b"\n", b"\r")))
+    if table.num_rows != lines and layout.width > 1:
+        lines = sum(1 for line in block.splitlines() if line.strip(b" \t"))
+    return found if table.num_rows == lines and all(map(usable, found)) else None
+
+
+def _floats(column: pyarrow.ChunkedArray) -> FloatArray:
+    """A column of floats, NaN where it has none; Arrow's own way imports pandas."""
+    result = np.empty(len(column))
+    at = 0
+    for chunk in column.chunks:
+        known, values = chunk.buffers()
+        part = result[at : at + len(chunk)]
+        part[:] = np.frombuffer(values, float, len(chunk), 8 * chunk.offset)
+        if chunk.null_count:
+            bits = np.unpackbits(np.frombuffer(known, np.uint8), bitorder="little")
+            part[bits[chunk.offset : chunk.offset + len(chunk)] == 0] = np.nan
+        at += len(chunk)
+    return result
+
+
+def _single_blanks(block: bytes) -> bytes:
+    """Turn runs of blanks to single ones, none at the ends of lines."""
+    block = block.replace(b"\t", b" ")
+    while b"  " in block:
+        block = block.replace(b"  ", b" ")
+    for end in (b"\n", b"\r"):
+        block = block.replace(b" " + end, end).replace(end + b" ", end)
+    return block.strip(b" ")
+
+
+def _date(cell: str, zoned: bool) -> tuple[float | None, str]:
+    """Seconds since 1970, or ``None`` and what is wrong with the field."""
+    found = FIELD_OF_DATE.fullmatch(cell)
+    if found is not None and has_zone(found) is not zoned:
+        return None, f"has {'no' if zoned else 'a'} zone, unlike the dates before it"
+    try:
+        return (seconds_of(found), "") if found else (None, "is no date")
+    except ValueError:
+        return None, "is no date that exists"
+
+
+def open_text(path: Path, wanted: Wanted) -> tuple[CsvTable, ...]:
+    """Open a delimited text.
+
+    Raises InputError if it cannot be read or is not a table.
+    """
+    return (CsvTable.open(path, wanted.damaged),)
