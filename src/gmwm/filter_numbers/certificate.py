@@ -141,8 +141,8 @@ class Certificate(Document, Printed):
             note = (
                 f"Each row below the first has N and K for {time:g} s without aiding that are "
                 "never overconfident for the error model together with the row's cause. The "
-                "factors are over those in use, and over those of the error model alone. Use N and K as a "
-                "pair: a factor can be below 1."
+                "factors are over those in use, and over those of the error model alone. Use N "
+                "and K as a pair: a factor can be below 1."
             )
             lines += ["", *wrapped(note)]
         lines += bullets(self.notices)
