@@ -2,6 +2,7 @@
 
 import ast
 import sys
+from importlib import import_module
 from pathlib import Path
 
 DOCS = Path(__file__).resolve().parent
@@ -48,7 +49,10 @@ def public_names(stub: Path) -> dict[str, list[str]]:
     found: dict[str, list[str]] = {}
     for node in ast.parse(stub.read_text(encoding="utf-8")).body:
         if isinstance(node, ast.ImportFrom) and node.module:
-            found.setdefault(node.module.partition(".")[0], []).extend(a.name for a in node.names)
+            names = [alias.name for alias in node.names]
+            if names == ["*"]:
+                names = list(import_module(f"gmwm.{node.module}").__all__)
+            found.setdefault(node.module.partition(".")[0], []).extend(names)
     return found
 
 

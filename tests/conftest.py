@@ -71,7 +71,7 @@ def run(monkeypatch, capsys, tmp_path):
 def no_pages(monkeypatch):
     """Pages take most of the time of a command: tests that do not look at one go without."""
     from gmwm.calibration.calibration import Calibration
-    from gmwm.ins.field.navigated import Navigated
+    from gmwm.ins import Navigated
     from gmwm.ins.simulation.validation import Validation
 
     def empty(self, path, *_, **__):

@@ -43,11 +43,9 @@ from gmwm._core.runs import do_runs
 from gmwm.diagnosis import health
 from gmwm.estimate import bootstrap, cramer_rao
 from gmwm.export import TARGETS, export, read_numbers
-from gmwm.ins.field import Measured
-from gmwm.ins.field.fix_file import read_fix_log
-from gmwm.ins.field.imu_file import read_imu_log
-from gmwm.ins.logs import read_log
+from gmwm.ins.logs import Measured, read_fix_log, read_imu_log
 from gmwm.ins.spec import experiment_from, read_document
+from gmwm.ins.trajectory.trajectory_file import read_log
 from gmwm.readers.formats.trial import one_reader
 from gmwm.report import read_datasheet, write_report
 
@@ -553,7 +551,7 @@ KINDS = {
     ),
     "imu": Kind(
         4, file_of("i.csv", lambda rng: mutated_text(rng, recording(rng))),
-        lambda rng, path: read_imu_log(path, rng.choice((None, 100.0)), SI),
+        lambda rng, path: read_imu_log(path, rate=rng.choice((None, 100.0)), units=SI),
     ),
     "fixes": Kind(
         6, file_of("f.csv", lambda rng: mutated_text(rng, fixes(rng))),

@@ -849,9 +849,7 @@ USES: dict[str, Callable[[Path, int], Any]] = {
         gmwm.health(gmwm.read(path, units=SI)),
         gmwm.calibrate(gmwm.read(path, units=SI), WhiteNoise() + RandomWalk(), jobs=1),
     ],
-    "numbers": lambda path, case: gmwm.export.read_numbers(
-        path, 100.0 if case % 2 else None
-    ),
+    "numbers": lambda path, case: gmwm.export.read_numbers(path, 100.0 if case % 2 else None),
     "datasheet": lambda path, case: gmwm.report.read_datasheet(
         path, {"gyro_x": "gyro", "accel_x": "accel"}
     ),

@@ -8,9 +8,11 @@ seconds; averaging times are 2^(j-1) dt; the Haar wavelet variance is half the A
 Names are loaded when they are first used, so that importing the package costs next to nothing.
 """
 
+import ast
 import copyreg
 import sys
 from importlib import import_module
+from pathlib import Path
 from types import ModuleType
 
 import lazy_loader
@@ -18,7 +20,26 @@ import lazy_loader
 from gmwm._core import __version__ as __version__
 from gmwm._core.pages import provide as _provide
 
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+
+def _public() -> dict[str, list[str]]:
+    """The names that the stub beside this file takes from each room, read without importing any.
+
+    ``from .room import *`` takes what is in the room's ``__all__``.
+    """
+    names: dict[str, list[str]] = {}
+    folder = Path(__file__).parent
+    for line in ast.parse((folder / "__init__.pyi").read_text(encoding="utf-8")).body:
+        if isinstance(line, ast.ImportFrom) and line.module:
+            listed = [alias.name for alias in line.names]
+            if listed == ["*"]:
+                room = folder.joinpath(*line.module.split("."), "__init__.py")
+                table = room.read_text(encoding="utf-8").partition("\n__all__ = ")[2]
+                listed = list(ast.literal_eval(table[: table.index("\n)") + 2]))
+            names.setdefault(line.module, []).extend(listed)
+    return names
+
+
+__getattr__, __dir__, __all__ = lazy_loader.attach(__name__, ["ins"], _public())
 
 
 def _load_pages() -> None:

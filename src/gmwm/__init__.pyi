@@ -54,27 +54,14 @@ from .population import (
     fleet as fleet,
 )
 from .process import (
-    AR as AR,
-    ARIMA as ARIMA,
-    ARMA as ARMA,
-    MA as MA,
-    AveragedNoise as AveragedNoise,
-    BiasInstability as BiasInstability,
-    GaussMarkov as GaussMarkov,
-    LowPassNoise as LowPassNoise,
     Model as Model,
     Parameter as Parameter,
     Process as Process,
-    QuantizationNoise as QuantizationNoise,
-    RandomWalk as RandomWalk,
-    RateRamp as RateRamp,
-    Resonance as Resonance,
-    Sinusoid as Sinusoid,
     StateSpace as StateSpace,
-    WhiteNoise as WhiteNoise,
     parameter as parameter,
     simulate as simulate,
 )
+from .process.kinds import *  # noqa: F403
 from .readers import Channel as Channel, Recording as Recording, read as read
 from .selection import Selection as Selection, select as select
 from .variance import (

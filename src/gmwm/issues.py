@@ -234,7 +234,10 @@ _READERS = (
     Issue("counts", "{text}", severity="bad", topic="recording", lacks="units_agree",
           reason="counts, not in the unit given", spoils=("gyro", "accel")),
     Issue("damaged", "{text}", severity="warning", topic="recording"),
-    Issue("dates", "{text}", topic="recording"),
+    Issue("dates", {
+        "": "{text}",
+        "fixes": "dates ({scale}) are counted in seconds since 1970-01-01, without leap seconds",
+    }, topic="recording"),
     Issue("gravity", "{text}", severity="bad", topic="recording", lacks="units_agree",
           reason="gravity contradicts the unit", spoils=("gyro", "accel")),
     Issue("gravity-absent", "{text}", severity="warning", topic="reading"),
@@ -354,8 +357,12 @@ _DIAGNOSIS = (
     Issue("not-static", "not static: {verb} {times}", severity="warning",
           lacks="recording_static", reason="the sensor moved", spoils=("gyro", "accel")),
     Issue("outliers",
-          "{share:.2g%} of the samples are outliers spread over the record, beyond four standard "
-          "deviations, where noise has {usual:.2g%}",
+          {"": "{share:.2g%} of the samples are outliers spread over the record, beyond four "
+               "standard deviations, where noise has {usual:.2g%}",
+           "fixes": "{fixes} ({share})",
+           "innovations": "The filter's model does not fit: innovations are {sizes} as it expects; "
+                          "most are not, so that some fixes are outliers, or errors without fixes "
+                          "grow faster than the sensor models predict."},
           "gmwm calibrate leaves them out; in Python: Health.masked, or robust=True",
           severity="warning", topic="samples", masks=True),
     Issue("repeated-samples",
@@ -394,7 +401,8 @@ _DIAGNOSIS = (
           {"": "stuck at {shown} for {longest:,.0f} samples from {time:.6g} s on, where rounding "
                "explains {chance:,}",
            "often": "stuck {count:,.0f} times, the longest at {shown} for {longest:,.0f} samples "
-                    "from {time:.6g} s on, where rounding explains {chance:,}"},
+                    "from {time:.6g} s on, where rounding explains {chance:,}",
+           "log": "one value for {length:.4g} s from {start:.10g} s on: the sensor is stuck"},
           "make such samples missing (NaN) before the fit", severity="warning", topic="samples",
           lacks="samples_change", reason="values that stick", spoils=("channel",),
           user_only=True),
@@ -406,8 +414,10 @@ _DIAGNOSIS = (
           severity="warning", lacks="attitude_kept", reason="the sensor tilted",
           spoils=("accel",)),
     Issue("value-repeated",
-          "{samples:,.0f} samples ({share:.2g%}) are {shown}, which comes {times} times as often "
-          "as the values next to it",
+          {"": "{samples:,.0f} samples ({share:.2g%}) are {shown}, which comes {times} times as "
+               "often as the values next to it",
+           "cut": "zero comes twice as often ({share:.2g%}) as the values around it explain: "
+                  "samples were cut towards zero, not rounded"},
           "if it stands for no answer or a dead band, make such samples missing (NaN)",
           severity="warning", topic="samples", lacks="samples_measured",
           reason="one value stands for many", spoils=("channel",)),
@@ -428,25 +438,51 @@ _DIAGNOSIS = (
 )  # fmt: skip
 
 _CALIBRATION = (
-    Issue("all-missing", "{text}", severity="warning", topic="recording"),
-    Issue("constant", "{text}", severity="bad", topic="recording"),
-    Issue("departures-many", "{text}", severity="bad", topic="recording", lacks="stationary",
-          reason="the bias steps to and fro"),
-    Issue("departures-removed", "{text}", severity="warning", topic="recording"),
-    Issue("drift-at-start", "{text}", severity="bad", topic="departure", lacks="stationary",
+    Issue("all-missing", "all samples missing{why}", severity="bad"),
+    Issue("ambiguity", "{models} models fit equally well: {titles}{also}", "the first is used",
+          topic="selection"),
+    Issue("constant", "constant at {value:.6g} {unit}", severity="bad"),
+    Issue("departures-many",
+          "{removed} departures were subtracted: a level that changes so often is noise of the "
+          "sensor",
+          "fit a slow term in place of it, such as a Gauss-Markov process",
+          severity="bad", lacks="stationary", reason="the bias steps to and fro"),
+    Issue("departures-removed",
+          "what was subtracted makes the deviation {times} times as large at tau = {tau:.3g} s: "
+          "the model holds where nothing like it comes again",
+          "find its cause, or let a slow term of the model describe it", severity="warning"),
+    Issue("drift-at-start", "a drift by {height} from the start that ends at {when}{also}",
+          "leave it out{back}", severity="bad", topic="departure", lacks="stationary",
           reason="drift after switching on"),
-    Issue("fit-not-valid", "{text}", topic="recording"),
-    Issue("longest-part", "{text}", topic="recording"),
-    Issue("mostly-missing", "{text}", severity="bad", topic="recording"),
-    Issue("not-estimable", "{text}", severity="bad", topic="recording"),
-    Issue("slow-period", "{text}", severity="bad", topic="departure", lacks="stationary",
-          reason="a slow period stands out"),
-    Issue("step", "{text}", severity="bad", topic="departure", lacks="stationary",
-          reason="the bias stepped"),
-    Issue("transient", "{text}", severity="bad", topic="departure", lacks="stationary",
-          reason="a transient at the start"),
-    Issue("unresolved-walk", "{text}", topic="recording"),
-    Issue("unsteady", "{text}", severity="bad", topic="recording", lacks="noise_steady",
+    Issue("fit-not-valid", {
+        "": "{text}",
+        "compared": "its own fit is not valid ({reasons})",
+    }, topic="recording"),
+    Issue("longest-part",
+          "the longest part without the {count} steps and drifts is {kept:,.0f} s of {of:,.0f} s, "
+          "from {start:.6g} s to {stop:.6g} s",
+          "calibrate that part{also}"),
+    Issue("mostly-missing", "{missing:,} of {n:,} samples missing, more than half{why}",
+          severity="bad"),
+    Issue("not-estimable", "{text}", severity="bad"),
+    Issue("slow-period", "a period of {when} with an amplitude of {height}{also}",
+          "find what varies so, such as the temperature{back}", severity="bad",
+          topic="departure", lacks="stationary", reason="a slow period stands out"),
+    Issue("step", "a step of {height} at {when}{also}",
+          "calibrate the part before it or after it{back}", severity="bad", topic="departure",
+          lacks="stationary", reason="the bias stepped"),
+    Issue("transient",
+          "a transient of {height} at the start with a time constant of {when}{also}",
+          "leave out the first three time constants{back}", severity="bad", topic="departure",
+          lacks="stationary", reason="a transient at the start"),
+    Issue("unresolved-walk",
+          "the record leaves open a random walk of up to K = {shown} (95 %): with it the deviation "
+          "at {tau:.4g} s is {times} times that of the model",
+          "only a longer record can tell"),
+    Issue("unsteady",
+          "the slow noise changes during the recording: {quiet_part} it has {less} times the "
+          "deviation of the whole record, {loud_part} {more} times; the model is an average",
+          "calibrate the part that is like the use", severity="bad", lacks="noise_steady",
           reason="slow noise changes its size"),
 )  # fmt: skip
 
@@ -514,7 +550,10 @@ _ESTIMATE = (
 _SELECTION = (
     Issue("ramp-or-walk", "a rate ramp of {ramp} or slow noise ({slow}): this record cannot tell "
           "them apart, so the model has no ramp", topic="selection"),
-    Issue("tie", "{text}", topic="selection"),
+    Issue("tie", {
+        "": "{text}",
+        "log": "A tie: errors of {names} are equal as far as this log shows{but}. {resolution}",
+    }, topic="selection"),
 )  # fmt: skip
 
 _FILTER_NUMBERS = (
@@ -571,57 +610,128 @@ _FILTER_NUMBERS = (
 )  # fmt: skip
 
 _INS = (
-    Issue("aligned-in-motion", "{text}", topic="navigation"),
-    Issue("attitude-given", "{text}", topic="navigation"),
-    Issue("axis-up", "{text}", severity="warning", topic="navigation"),
-    Issue("barometer-set", "{text}", topic="navigation"),
-    Issue("biases-assumed", "{text}", topic="navigation"),
-    Issue("columns-unused", "{text}", topic="navigation"),
-    Issue("consistent", "{text}", severity="good", topic="navigation"),
+    Issue("aligned-in-motion", "aligned in motion: roll {roll:.2f}, pitch {pitch:.2f}, yaw "
+          "{yaw:.2f} deg, 1 sigma {tilt_deg:.2g} deg of tilt and {heading_deg:.2g} of heading",
+          topic="navigation"),
+    Issue("attitude-given", "roll, pitch and yaw as given: {degrees} deg, 1 sigma {sd_deg:.2g} deg",
+          topic="navigation"),
+    Issue("axis-signs", "the sign of {wrong} is wrong{unseen}", "bring gyros and accelerometers "
+          "to the same axes forward, right, down: reverse {reverse}, and check every gyro by "
+          "hand, for a drive does not show them all: positive while the right side goes down (x), "
+          "the front goes up (y), it turns right (z)", severity="bad", topic="navigation"),
+    Issue("axis-up", "its mean is positive: the axis points up, and roll is near 180 deg", "if it "
+          "is mounted upside down, fine; else reverse gyro_z and accel_z, and gyro_y and accel_y "
+          "too if y points left", severity="warning", topic="navigation"),
+    Issue("barometer-set", "barometric heights are set to the first position fix, by {shift:.3g} m",
+          topic="navigation"),
+    Issue("better", "Take {where}: its errors after the outages are smaller{but}.", severity="good",
+          topic="navigation"),
+    Issue("biases-assumed", "turn-on biases, which a static calibration does not know, are "
+          "assumed to be {sd} (1 sigma)", topic="navigation"),
+    Issue("columns-unused", "columns not used: {columns}", topic="navigation"),
+    Issue("consistent", "The innovations agree with the filter's model: they are as large as it "
+          "expects, and white.", severity="good", topic="navigation"),
     Issue("diverged", {
-        "": "{text}",
+        "": "The filter diverged: the sensor models or the initial state are far off, or a fix is.",
         "runs": "diverged in {diverged} of {runs} runs; figures are those of the other runs",
     }, severity="bad", topic="navigation"),
     Issue("fewer-runs", "{runs} runs in place of {asked}: the recording has no more stretches of "
           "this length that do not overlap", severity="warning", topic="navigation"),
-    Issue("fixes-left-out", "{text}", topic="navigation"),
-    Issue("fixes-rejected", "{text}", severity="warning", topic="navigation"),
-    Issue("heading", "{text}", topic="navigation"),
+    Issue("fixes-left-out", "{count} fixes before or after the IMU's record are left out",
+          topic="navigation"),
+    Issue("fixes-rejected", "{count} of {of} are rejected; the farthest is {size:.3g} sigma off "
+          "at {time:.10g} s", severity="warning", topic="navigation"),
+    Issue("heading", {
+        "": "{source}: {degrees:.2f} deg, 1 sigma {sd_deg:.2g} deg",
+        "wrong": "the heading that the filter started with is wrong by {by:.1f} deg (standard "
+        "error {error_deg:.1g} deg): the IMU is mounted rotated, or drives backwards",
+    }, topic="navigation"),
     Issue("judged-on-loiter", "judged on the loiter of a fixed-wing aircraft",
           "give the motion that it is for, trajectory= or scenario=", topic="navigation"),
-    Issue("levelled", "{text}", topic="navigation"),
-    Issue("lost", "{text}", severity="bad", topic="navigation"),
-    Issue("no-time-stamps", "{text}", topic="navigation"),
-    Issue("not-white", "{text}", severity="bad", topic="navigation"),
+    Issue("levelled", "levelled on {length:.3g} s {how}, from {start:.6g} s on{bias}",
+          topic="navigation"),
+    Issue("lever-arm", "the antenna is off the lever arm by {parts}, standard errors in brackets",
+          severity="bad", topic="navigation"),
+    Issue("lost", "The filter is lost: innovations are {times} times as large as it expects; do "
+          "not use the accuracy that it predicts. Look first at {first}the heading that it "
+          "started with, then at the units of the sensors and the clock of the fixes.",
+          severity="bad", topic="navigation"),
+    Issue("mixed-sizes", "The filter's model does not fit: innovations are {sizes} as it expects; "
+          "the standard deviations of the fixes do not fit each other.", severity="bad",
+          topic="navigation"),
+    Issue("more-honest", "Take {where}: errors are as large, but it predicts them better{but}.",
+          severity="good", topic="navigation"),
+    Issue("no-time-stamps", "the IMU has no time stamps: fixes are timed from its first sample",
+          topic="navigation"),
+    Issue("not-white", "The filter's model does not fit: innovations are as large as it expects, "
+          "but depend on those before; a slow error of the sensors is missing in their models.",
+          severity="bad", topic="navigation"),
     Issue("outside-linearity",
           "at {time:g} s the attitude is off by {tilt_deg:.2g} deg in tilt and {heading_deg:.2g} "
           "deg in heading (1 sigma): products of errors count, and NEES and errors predicted there "
           "are too small",
           "check them by runs, as gmwm navigate does", "warning", "navigation"),
-    Issue("positions-at-zero", "{text}", severity="warning", topic="navigation"),
-    Issue("resolution", "{text}", topic="navigation"),
-    Issue("samples-filled", "{text}", severity="warning", topic="navigation"),
-    Issue("sd-assumed", "{text}", topic="navigation"),
-    Issue("sd-not-used", "{text}", severity="warning", topic="navigation"),
-    Issue("standstills", "{text}", topic="navigation"),
-    Issue("standstills-unknown", "{text}", severity="warning", topic="navigation"),
-    Issue("time-scales", "{text}", severity="warning", topic="navigation"),
+    Issue("positions-at-zero", "{count} position{count:s?} at 0, 0 are left out",
+          severity="warning", topic="navigation"),
+    Issue("resolution", "this motion would show {shown}{missing}", topic="navigation"),
+    Issue("samples-filled", "{count:,} missing sample{count:s?}, at most {longest} in a row, are "
+          "interpolated", severity="warning", topic="navigation"),
+    Issue("sd-assumed", "the fixes have no standard deviations: {sd} to the north, east and down "
+          "are assumed", "give {where}_sd", topic="navigation"),
+    Issue("sd-not-used", "the fixes have standard deviations of their own: the given ones are not "
+          "used", severity="warning", topic="navigation"),
+    Issue("standstills", "{count} standstill{count:s?} of {length:g} s are recognised",
+          topic="navigation"),
+    Issue("standstills-unknown", "no standstill can be recognised: the vehicle does not stand at "
+          "the start", severity="warning", topic="navigation"),
+    Issue("time-offset", "the fixes are stamped {size:.3g} s too {late} (standard error "
+          "{error:.1g} s){scale}", "{change} their times", severity="bad", topic="navigation"),
+    Issue("time-scales", "both have dates, the fixes in {scale}: if the IMU's are in UTC, GPS "
+          "time is ahead of them by the leap seconds, {seconds:g} s since 2017",
+          "shift the fixes by as much", severity="warning", topic="navigation"),
+    Issue("too-large", {
+        "": "The filter's model does not fit: innovations are {sizes} as it expects; the sensors "
+        "are worse than their models, or the fixes than their standard deviations.",
+        "assumed": "Only the standard deviations assumed for the fixes do not fit these data: "
+        "innovations are {sizes} as they allow.",
+    }, severity="bad", topic="navigation"),
+    Issue("too-small", {
+        "": "The filter's model does not fit: innovations are {sizes} as it expects; the sensors "
+        "are better than their models, or the fixes than their standard deviations.",
+        "assumed": "Only the standard deviations assumed for the fixes do not fit these data: "
+        "innovations are {sizes} as they allow.",
+    }, severity="bad", topic="navigation"),
 )  # fmt: skip
 
 _POPULATION = (
-    Issue("channel-missing", "{text}", severity="warning", topic="population"),
-    Issue("channel-skipped", "{text}", severity="warning", topic="population"),
-    Issue("channels-differ", "{text}", severity="warning", topic="population"),
-    Issue("clock-ratio", "{text}", severity="warning", topic="population"),
-    Issue("few-recordings", "{text}", topic="population"),
-    Issue("few-units", "{text}", topic="population"),
-    Issue("left-over", "{text}", topic="population"),
-    Issue("lengths-differ", "{text}", topic="population"),
-    Issue("no-joint-model", "{text}", severity="warning", topic="population"),
-    Issue("no-numbers", "{text}", severity="warning", topic="population"),
-    Issue("not-noise", "{text}", severity="warning", topic="population"),
-    Issue("rates-differ", "{text}", severity="warning", topic="population"),
-    Issue("same-recording", "{text}", severity="warning", topic="population"),
+    Issue("channel-missing", "it has no such channel", severity="warning", topic="population"),
+    Issue("channel-skipped", "{reason}", severity="warning", topic="population"),
+    Issue("channels-differ", "{have} no such channel: {names}", severity="warning",
+          topic="population"),
+    Issue("curves-close", "{sentence}", topic="population"),
+    Issue("curves-differ", "{sentence}", severity="warning", topic="population"),
+    Issue("few-recordings", "{recordings} recordings know the spread within factors of {low:.2g} "
+          "and {factor:.2g} (95 %)", topic="population"),
+    Issue("few-units", "{units} unit{units:s?}: a distribution-free limit needs {needed}",
+          topic="population"),
+    Issue("left-over", "the folder also holds {units} calibration{units:s?} of other recordings: "
+          "{names}", topic="population"),
+    Issue("lengths-differ", "recordings are from {shortest:.6g} s ({name}) to {longest:.6g} s "
+          "long: short ones scatter more", topic="population"),
+    Issue("no-joint-model", "{error}", severity="warning", topic="population"),
+    Issue("no-numbers", "{error}", severity="warning", topic="population"),
+    Issue("not-noise", "{bad}", "not compared: the curve is not noise alone", severity="warning",
+          topic="population"),
+    Issue("rates-differ", {
+        "": "at {rate:.6g} Hz, {others} at {usual:.6g} Hz",
+        "fleet": "{have} another sampling rate than {rate:g} Hz: {names}",
+    }, "not compared level by level", severity="warning", topic="population"),
+    Issue("same-recording", {
+        "": "the same recording as {other}",
+        "fleet": "the same recording: {names}",
+    }, "left out", severity="warning", topic="population"),
+    Issue("units-differ", "in {own}, {others} in {common}", "not compared level by level",
+          severity="warning", topic="population"),
 )  # fmt: skip
 
 _STUDY = (

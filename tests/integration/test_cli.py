@@ -26,7 +26,7 @@ from gmwm.calibration.calibration import Calibration
 from gmwm.cli.calibrate import show
 from gmwm.cli.console import progress_bar
 from gmwm.cli.demo import show_truth
-from gmwm.estimate.result.fit import Fit
+from gmwm.estimate import Fit
 from gmwm.process import as_model
 from gmwm.variance.wavelet import WaveletVariance
 from places import GOLDEN
@@ -639,7 +639,7 @@ def test_channels_and_a_stretch(run, good_file, no_pages):
         (("--start", "-1"), "fewer than 64 samples"),
         (("--stop", "nan"), "fewer than 64 samples"),
         (("--start", "inf"), "fewer than 64 samples"),
-        (("--model", "N + X"), "'X' is no term: write Q, N, B, K, R, GM, Res"),
+        (("--model", "N + X"), "'X' is no term: write N, Q, B, K, R, GM, Res"),
         (("--model", "N - K"), "'N - K' is no term"),
         (("--model", ""), "is no term"),
         (("--model", "N + N"), "two WhiteNoise"),

@@ -13,13 +13,17 @@ import numpy as np
 import pytest
 
 from gmwm import GaussMarkov, RandomWalk, WhiteNoise
-from gmwm.ins.filter.aiding import Outage, gnss
-from gmwm.ins.filter.filter import InitialSd, navigate
+from gmwm.ins import (
+    InitialSd,
+    Outage,
+    SensorModels,
+    Trajectory,
+    emulate,
+    gnss,
+    helicopter_mapping,
+    navigate,
+)
 from gmwm.ins.geometry import ned_difference
-from gmwm.ins.imu.emulation import emulate
-from gmwm.ins.imu.sensors import SensorModels
-from gmwm.ins.trajectory.missions import helicopter_mapping
-from gmwm.ins.trajectory.trajectory import Trajectory
 
 with warnings.catch_warnings():
     warnings.simplefilter("ignore")

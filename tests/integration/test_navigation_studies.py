@@ -10,15 +10,23 @@ import pytest
 from scipy.stats import binom
 
 from gmwm import GaussMarkov, WhiteNoise
+from gmwm.ins import (
+    Outage,
+    Scenario,
+    SensorModels,
+    Simulated,
+    at_epoch,
+    difference,
+    gnss,
+    helicopter_mapping,
+    innovation_test,
+    monte_carlo,
+    over_time,
+    spread,
+)
 from gmwm.ins.covariance.analysis import covariance_analysis
-from gmwm.ins.filter.aiding import Outage, gnss
-from gmwm.ins.imu.sensors import SensorModels
-from gmwm.ins.simulation.consistency import at_epoch, innovation_test, over_time
-from gmwm.ins.simulation.filter_errors import GROUPS
-from gmwm.ins.simulation.outage_errors import difference, sizes, spread
-from gmwm.ins.simulation.scenario import Scenario, Simulated
-from gmwm.ins.simulation.trials import monte_carlo
-from gmwm.ins.trajectory.missions import helicopter_mapping
+from gmwm.ins.simulation import GROUPS
+from gmwm.ins.simulation.outage_errors import sizes
 
 TRUE = SensorModels.of(
     {

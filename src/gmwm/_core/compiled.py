@@ -50,6 +50,16 @@ def _stamped(loop: Any) -> Any:
     kept = getattr(getattr(loop, "_cache", None), "_cache_file", None)
     if kept is not None:
         kept._source_stamp = digest_of(Path(__file__).parents[1])
+        load_index = kept._load_index
+
+        def load_readable_index() -> Any:
+            """What is kept, or nothing if it names a record class that was renamed since."""
+            try:
+                return load_index()
+            except (AttributeError, ImportError):
+                return {}
+
+        kept._load_index = load_readable_index
         compile_now, index = loop.compile, Path(kept._index_path)
 
         def compile_once(signature: Any) -> Any:

@@ -82,8 +82,10 @@ def scaled(array: FloatArray, factor: float, offset: float = 0.0) -> FloatArray:
     """A new array, ``array * factor + offset``, on disk if ``array`` is."""
     result = alike(array, array.size)
     for part in windows(array.size) if is_spooled(array) else (slice(None),):
-        np.multiply(array[part], factor, out=result[part])
-        if offset:
+        if factor == 1.0:  # one pass
+            np.add(array[part], offset, out=result[part])
+        else:
+            np.multiply(array[part], factor, out=result[part])
             result[part] += offset
         release(array)
         release(result)

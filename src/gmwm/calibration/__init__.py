@@ -1,23 +1,22 @@
 """The main job: every channel of a recording, screening, a summary."""
 
+from gmwm.calibration.calibrate import AMBIGUITY as AMBIGUITY, calibrate as calibrate
 from gmwm.calibration.calibration import Calibration as Calibration, load as load
-from gmwm.calibration.channel import AMBIGUITY as AMBIGUITY
 from gmwm.calibration.departures import (
     DEPARTURES as DEPARTURES,
     Departure as Departure,
     departures as departures,
 )
-from gmwm.calibration.entrance import calibrate as calibrate
-from gmwm.calibration.judgement import LONGEST_PART as LONGEST_PART
 from gmwm.calibration.removal import without_departures as without_departures
 from gmwm.calibration.screening import SCREENING as SCREENING
 from gmwm.calibration.stages import Stopwatch as Stopwatch, stage as stage
 from gmwm.calibration.summary import (
     Level as Level,
     floor as floor,
+    left_open as left_open,
     noise_density as noise_density,
     random_walk as random_walk,
     sentence as sentence,
     white_density as white_density,
 )
-from gmwm.calibration.unresolved import left_open as left_open
+from gmwm.calibration.validity import LONGEST_PART as LONGEST_PART

@@ -6,25 +6,28 @@ import os
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Self
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self
 
-from gmwm._core.documents import Document, load_document
-from gmwm._core.frames import frame
+from annotated_types import Ge
+
+from gmwm._core.documents import Document, Rate, Samples, Text, load_document
 from gmwm._core.frozen import freeze
-from gmwm._core.notices import Notice
 from gmwm._core.pages import make
+from gmwm._core.tables import frame
 from gmwm._core.text import wrapped
 from gmwm.calibration.summary import sentence
 from gmwm.errors import InputError, MissingNameError
 from gmwm.estimate import Estimate, Fit
-from gmwm.process import Model, model_from_list
+from gmwm.issues import Notice
+from gmwm.process import Model
 from gmwm.readers import Recording
 
 if TYPE_CHECKING:
     import pandas
     from matplotlib.figure import Figure
 
-    from gmwm._core.forms import Form
+
+Index = Annotated[int, Ge(0)]
 
 
 @dataclass(frozen=True, repr=False)
@@ -61,12 +64,12 @@ class Calibration(Mapping[str, Fit], Document):
 
     fits: Mapping[str, Fit]
     skipped: Mapping[str, Notice]
-    source: str
-    rate: float
-    n: int
+    source: Text
+    rate: Rate
+    n: Samples
     notices: tuple[Notice, ...] = ()
     rivals: Mapping[str, tuple[Model, ...]] = field(default_factory=dict)
-    left_out: Mapping[str, tuple[tuple[int, int], ...]] = field(default_factory=dict)
+    left_out: Mapping[str, tuple[tuple[Index, Index], ...]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         freeze(self, "fits", "skipped", "rivals", "left_out")
@@ -172,44 +175,16 @@ class Calibration(Mapping[str, Fit], Document):
     # -- files ------------------------------------------------------------------------------------
 
     def content(self) -> dict[str, Any]:
-        return {
-            "source": self.source,
-            "rate_hz": self.rate,
-            "n": self.n,
-            "notices": [notice.to_dict() for notice in self.notices],
-            "skipped": {name: notice.to_dict() for name, notice in self.skipped.items()},
-            "channels": {name: fit.to_dict() for name, fit in self.fits.items()},
-            "rivals": {
-                name: [[term.to_dict() for term in model.terms] for model in models]
-                for name, models in self.rivals.items()
-            },
-            "left_out": {name: list(map(list, spans)) for name, spans in self.left_out.items()},
-        }
-
-    @classmethod
-    def document_form(cls) -> type[Form]:
-        from gmwm.calibration.form import CalibrationForm
-
-        return CalibrationForm
+        found = super().content()
+        return found | {"rate_hz": found.pop("rate"), "channels": found.pop("fits")}
 
     @classmethod
     def from_content(cls, content: Mapping[str, Any]) -> Self:
-        return cls(
-            fits={name: Fit.from_dict(item) for name, item in content["channels"].items()},
-            skipped={name: Notice.from_dict(item) for name, item in content["skipped"].items()},
-            source=content["source"],
-            rate=content["rate_hz"],
-            n=content["n"],
-            notices=tuple(map(Notice.from_dict, content["notices"])),
-            rivals={
-                name: tuple(map(model_from_list, models))
-                for name, models in content.get("rivals", {}).items()
-            },
-            left_out={
-                name: tuple((int(start), int(stop)) for start, stop in spans)
-                for name, spans in content.get("left_out", {}).items()
-            },
-        )
+        own = {
+            k: content.get(v)
+            for k, v in (("rate", "rate_hz"), ("fits", "channels"), ("notices", "notices"))
+        }
+        return super().from_content({**content, **own})
 
     def report(
         self,

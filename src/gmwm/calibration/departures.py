@@ -19,12 +19,12 @@ import numpy as np
 from scipy.linalg import cholesky_banded, solve_banded
 
 from gmwm._core.distributions import norm
-from gmwm._core.notices import Notice, Severity
 from gmwm._core.text import brief, readable
 from gmwm._core.typing import FloatArray
 from gmwm.calibration import tuning
 from gmwm.calibration.steadiness import Means
 from gmwm.estimate import Fit
+from gmwm.issues import Notice, Severity, notice
 from gmwm.variance import WaveletVariance
 
 DEPARTURES = ("step", "transient", "drift-at-start", "slow-period")
@@ -364,33 +364,21 @@ def departure_notice(
     size = f"{size} ({low} .. {high})"
     time, first, last = (f"{each:.4g}" for each in found.time)
     when = f"{time} s ({first} .. {last})"
-    text, hint = {
-        "step": (f"a step of {size} at {when}", "calibrate the part before it or after it"),
-        "transient": (
-            f"a transient of {size} at the start with a time constant of {when}",
-            "leave out the first three time constants",
-        ),
-        "drift-at-start": (
-            f"a drift by {size} from the start, which ends at {when}",
-            "leave it out",
-        ),
-        "slow-period": (
-            f"a period of {when} with an amplitude of {size}",
-            "find what varies so, such as the temperature",
-        ),
-    }[found.kind]
-    severity: Severity = "bad" if found.share > tuning.HARMFUL_SHARE else "warning"
-    if removed:
-        severity, hint = "note", "subtracted"
-    else:
+    hint: str | None = "subtracted"
+    severity: Severity = "note"
+    also = ""
+    if not removed:
+        severity = "bad" if found.share > tuning.HARMFUL_SHARE else "warning"
         part = f"up to {100.0 * found.share:.0f} %" if found.share < 1.0 else "all"
-        text += f"; it accounts for {part} of the model's wavelet variance: slow noise is too large"
-        hint = hint if stays else f"{hint}, or take it off (remove_departures=True)"
+        also = f"; it accounts for {part} of the model's wavelet variance: slow noise is too large"
+        hint = None
+    back = "" if stays else ", or take it off (remove_departures=True)"
     names = ("time", "time_lower", "time_upper", "size", "lower", "upper")
     values: dict[str, Any] = dict(zip(names, (*found.time, *found.size), strict=True))
     values |= {"phase": found.phase, "evidence": found.evidence, "share": found.share}
     values |= {"evident": True, "removable": not stays} | ({"removed": True} if removed else {})
-    return Notice(found.kind, severity, "", text, values, hint)
+    words = {"height": size, "when": when, "also": also, "back": back}
+    return notice(found.kind, "", values, severity=severity, hint=hint, **words)
 
 
 def _removal_notices(
@@ -405,18 +393,7 @@ def _removal_notices(
     notices = []
     if lost[most] ** 2 * (1.0 - tuning.HARMFUL_SHARE) > 1.0:
         values = {"tau": float(after.tau[most]), "ratio": float(lost[most])}
-        text = (
-            f"what was subtracted makes the deviation {brief(values['ratio'])} times as large "
-            f"at tau = {values['tau']:.3g} s: the model holds where nothing like it comes again"
-        )
-        hint = "find its cause, or let a slow term of the model describe it"
-        notices.append(Notice("departures-removed", "warning", "", text, values, hint))
+        notices.append(notice("departures-removed", "", values, times=brief(values["ratio"])))
     if len(removed) > tuning.MOST_REMOVED:
-        text = (
-            f"{len(removed)} departures were subtracted: a level that changes so often is noise of "
-            "the sensor"
-        )
-        hint = "fit a slow term in place of it, such as a Gauss-Markov process"
-        values = {"removed": len(removed)}
-        notices.append(Notice("departures-many", "bad", "", text, values, hint))
+        notices.append(notice("departures-many", "", {"removed": len(removed)}))
     return notices

@@ -7,12 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from gmwm._core.notices import Notice
 from gmwm._core.typing import FloatArray
 from gmwm.calibration import tuning
 from gmwm.calibration.departures import DEPARTURES, WIDE, Departure
 from gmwm.errors import InputError
 from gmwm.estimate import Fit
+from gmwm.issues import Notice
 from gmwm.readers import Channel, Recording
 from gmwm.variance import WaveletVariance, wavelet_variance
 

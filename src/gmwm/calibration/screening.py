@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from types import MappingProxyType
-from typing import Any
 
 import numpy as np
 
-from gmwm._core.notices import Notice
 from gmwm.calibration import tuning
 from gmwm.diagnosis import Health, Repetition, health, rest_of
 from gmwm.errors import InputError
+from gmwm.issues import Notice
 from gmwm.process import Model, Process, Resonance, Sinusoid
 from gmwm.readers import Recording
 from gmwm.variance import wavelet_variance
@@ -21,17 +19,6 @@ SCREENING = ("events", "lines", "resonances", "outliers")
 """Samples of shocks, spikes and lost packets are masked; lines and resonances are terms that a
 model may have; the wavelet variances of channels with more outliers than can be left out are
 robust."""
-
-# Codes of advice that only the user can follow.
-_ADVICE = (
-    "stuck",
-    "held",
-    "filled",
-    "saturation",
-    "abrupt-end",
-    "temperature",
-    "variance",
-)
 
 
 @dataclass(frozen=True)
@@ -92,14 +79,6 @@ def stretches_at_rest(recording: Recording) -> tuple[Recording, ...]:
     return (first, *named[1:])
 
 
-def check_screening(chosen: Collection[str]) -> None:
-    """Raise InputError if one of those chosen is unknown."""
-    for name in chosen:
-        if name not in SCREENING:
-            known = ", ".join(SCREENING)
-            raise InputError(f"screening for {name!r} is unknown: there are {known}")
-
-
 def screened(recording: Recording, chosen: Collection[str] = SCREENING) -> Screened:
     """Examine a recording and mask, offer terms or make variances robust as it needs.
 
@@ -109,31 +88,40 @@ def screened(recording: Recording, chosen: Collection[str] = SCREENING) -> Scree
     chosen: Some of `SCREENING`.
     Raises InputError if one of those chosen is unknown.
     """
-    check_screening(chosen)
+    for name in chosen:
+        if name not in SCREENING:
+            known = ", ".join(SCREENING)
+            raise InputError(f"screening for {name!r} is unknown: there are {known}")
     if not chosen:
         return Screened(recording, {}, notices=recording.notices)
     found = health(recording)
-    names = tuple(channel.name for channel in recording.inertial)
+    names = [channel.name for channel in recording.inertial]
     robust = frozenset(
         name for name in names if "outliers" in chosen and found.outliers(name) > 0.0
     )
-    masked = recording
+    masked, left_out, losses = recording, frozenset[str](), dict[str, tuple[float, float]]()
     if "events" in chosen:
-        robust = frozenset(name for name in robust if _is_much(found.events(name), recording.n))
+        most = tuning.MOST_LEFT_OUT * recording.n
+        robust = frozenset(
+            name for name in robust if sum(b - a for a, b in found.events(name)) > most
+        )
         masked = found.masked(recording, but=robust)
-    left_out = frozenset(names) - robust if "events" in chosen else frozenset()
-    taken = _taken(recording, masked, found) if "events" in chosen else {}
-    fresh = [notice for notice in found.notices if notice not in recording.notices]
+        left_out = frozenset(names) - robust
+        losses = _losses(recording, masked, found)
+    fresh = (each for each in found.notices if each not in recording.notices)
     return Screened(
         masked,
-        {name: terms_of(found, name, chosen) for name in names},
+        {name: offered_terms(found, name, chosen) for name in names},
         robust,
         {name: each for name in names if (each := found.repetition(name)) is not None},
-        (*masked.notices, *with_treatment(fresh, found, left_out, robust, taken)),
+        (
+            *masked.notices,
+            *(_treated(each, found, left_out, robust, losses.get(each.where)) for each in fresh),
+        ),
     )
 
 
-def _taken(
+def _losses(
     recording: Recording, masked: Recording, found: Health
 ) -> dict[str, tuple[float, float]]:
     """Channel of many events -> averaging time (s) and factor by which most of the deviation goes.
@@ -157,82 +145,48 @@ def _taken(
     return taken
 
 
-def with_treatment(
-    notices: Iterable[Notice],
-    found: Health,
+def _treated(
+    found: Notice,
+    health_of: Health,
     left_out: Collection[str],
-    robust: Collection[str] = (),
-    taken: Mapping[str, tuple[float, float]] = MappingProxyType({}),
-) -> list[Notice]:
-    """Notices with what is done about each here, which is not what is advised elsewhere.
+    robust: Collection[str],
+    loss: tuple[float, float] | None,
+) -> Notice:
+    """A notice with what is done about it here, which is not what is advised elsewhere.
 
     left_out: Channels of which shocks, spikes, outliers and held samples are left out.
     robust: Channels that have robust wavelet variances.
-    taken: Channels of which that takes much of the deviation; averaging time (s) and factor.
+    loss: Averaging time (s) and factor of the deviation that leaving them out takes.
     """
-    treated = []
-    for notice in notices:
-        is_mended = (
-            notice.code == "held"
-            and notice.where in left_out
-            and found.channels[notice.where].held > 0.0
-        )
-        treated.append(
-            replace(
-                notice,
-                hint="left out" if is_mended else _done(notice, robust, left_out, taken),
-                values=_values(notice, left_out, taken),
-                severity="warning" if is_mended else notice.severity,
-            )
-        )
-    return treated
-
-
-def _is_much(events: Sequence[tuple[int, int]], n: int) -> bool:
-    """Whether events take so many samples that gaps in their place would do harm."""
-    return sum(stop - start for start, stop in events) > tuning.MOST_LEFT_OUT * n
-
-
-def _values(
-    notice: Notice, left_out: Collection[str], taken: Mapping[str, tuple[float, float]]
-) -> Mapping[str, Any]:
-    if notice.code not in ("event", "outliers"):
-        return notice.values
-    found: dict[str, Any] = {**notice.values, "left_out": notice.where in left_out}
-    if notice.code == "event" and notice.where in taken:
-        found["taken_at"], found["taken"] = taken[notice.where]
-    return found
-
-
-def _done(
-    notice: Notice,
-    robust: Collection[str],
-    left_out: Collection[str],
-    taken: Mapping[str, tuple[float, float]],
-) -> str:
-    if notice.code in ("event", "outliers"):
-        samples = f", {notice.values['samples']:,.0f} samples" if notice.code == "event" else ""
-        if notice.where in left_out:
-            if notice.code == "event" and notice.where in taken:
-                tau, factor = taken[notice.where]
-                samples += (
-                    f"; with them the deviation at {tau:.3g} s is {factor:.2g} times as large: if "
-                    "they are the sensor's own noise, leave them in"
+    is_left_out = found.where in left_out
+    if found.code == "held" and is_left_out and health_of.channels[found.where].held > 0.0:
+        return replace(found, hint="left out", severity="warning")
+    if found.code in ("event", "outliers"):
+        values = {**found.values, "left_out": is_left_out}
+        hint = "kept, as requested"
+        if is_left_out:
+            hint = "left out"
+            if found.code == "event":
+                hint += f", {found.values['samples']:,.0f} samples"
+        elif found.where in robust:
+            hint = "kept: robust wavelet variances bound their influence, at 1.3 times the errors"
+        if loss is not None and found.code == "event":
+            values["taken_at"], values["taken"] = loss
+            if is_left_out:
+                hint += (
+                    f"; with them the deviation at {loss[0]:.3g} s is {loss[1]:.2g} times as "
+                    "large: if they are the sensor's own noise, leave them in"
                 )
-            return f"left out{samples}"
-        if notice.where in robust:
-            return "kept: robust wavelet variances bound their influence, at 1.3 times the errors"
-        return "kept, as requested"
-    if notice.code == "rows-copied":
-        return f"left out; {notice.hint}" if left_out else f"kept, as requested; {notice.hint}"
-    if notice.code in ("dead", "infinite") and "stretches" not in notice.values:
-        return "the channel is skipped"
-    if notice.code in _ADVICE:
-        return f"left as it is; {notice.hint}"
-    return notice.hint
+        return replace(found, hint=hint, values=values)
+    if found.code == "rows-copied":
+        done = "left out" if left_out else "kept, as requested"
+        return replace(found, hint=f"{done}; {found.hint}")
+    if found.code in ("dead", "infinite"):
+        return replace(found, hint="the channel is skipped")
+    return replace(found, hint=f"left as it is; {found.hint}") if found.issue.user_only else found
 
 
-def terms_of(found: Health, channel: str, chosen: Collection[str]) -> tuple[Process, ...]:
+def offered_terms(found: Health, channel: str, chosen: Collection[str]) -> tuple[Process, ...]:
     """Terms for the lines and resonances of a channel, those worth most first."""
     terms: list[Process] = []
     if "lines" in chosen:

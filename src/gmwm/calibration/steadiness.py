@@ -16,20 +16,17 @@ import numpy as np
 from scipy.linalg import eigh, toeplitz
 
 from gmwm._core.distributions import chi2
-from gmwm._core.notices import Notice, Severity
 from gmwm._core.text import brief
 from gmwm._core.typing import FloatArray, IntArray
 from gmwm.calibration import tuning
 from gmwm.estimate import Fit
 from gmwm.estimate.problem import Scales, difference_covariance
+from gmwm.issues import Notice, Severity, notice
 from gmwm.process import PSD, Model
 from gmwm.variance import WaveletVariance
 
 if TYPE_CHECKING:
     from gmwm.calibration.departures import Departure
-
-UNSTEADY = "unsteady"
-"""Code of the notice."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -240,12 +237,19 @@ def _gains(part: Means, psd: PSD, floor: float) -> tuple[FloatArray, FloatArray]
 def _notice(test: _Test) -> Notice:
     low, high = int(np.nanargmin(test.deviations)), int(np.nanargmax(test.deviations))
     quiet, loud = (float(test.deviations[i]) for i in (low, high))
-    when = [f"from {i * test.length:.4g} s to {(i + 1) * test.length:.4g} s" for i in (low, high)]
-    text = (
-        f"the slow noise is not of one size: {when[0]} it has {brief(quiet)} times the deviation "
-        f"of the whole record, {when[1]} {brief(loud)} times; the model is an average"
+    quiet_part, loud_part = (
+        f"from {i * test.length:.4g} s to {(i + 1) * test.length:.4g} s" for i in (low, high)
     )
     values = {"excess": test.excess, "p_value": test.p_value, "quiet": quiet, "loud": loud}
     values |= {"start": high * test.length, "stop": (high + 1) * test.length}
     severity: Severity = "bad" if loud > tuning.HARMFUL_UNSTEADY * quiet else "warning"
-    return Notice(UNSTEADY, severity, "", text, values, "calibrate the part that is like the use")
+    return notice(
+        "unsteady",
+        "",
+        values,
+        severity=severity,
+        quiet_part=quiet_part,
+        loud_part=loud_part,
+        less=brief(quiet),
+        more=brief(loud),
+    )

@@ -362,7 +362,7 @@ def _own_data(
 ) -> None:
     """Filter real data, or compare sensor models on them."""
     from gmwm._core.files import folder_to_fill
-    from gmwm.ins.field import Comparison, Measured, Navigated
+    from gmwm.ins.logs import Comparison, Measured, Navigated
 
     with _named_in_messages(place):
         given = (Comparison if "compare" in content else Measured).of(content, base)

@@ -17,11 +17,8 @@ if TYPE_CHECKING:
 
 _TERM = re.compile(r"\s*(?:([1-9])\s*\*?\s*)?([A-Za-z]+)\s*")
 
-TERMS = "Q, N, B, K, R, GM, Resonance, LowPassNoise, AveragedNoise, Sinusoid, AR, MA, ARMA, ARIMA"
-"""What `gmwm.process.CATALOGUE` has, which would take long to import for a line of help."""
-
 CLOCKS = ("header", "log")
-"""As in `gmwm.read`, for the same reason."""
+"""As in `gmwm.read`, which would take long to import for a line of help."""
 
 FORMATS = (
     "text",
@@ -153,7 +150,8 @@ part_options = together(
 estimating_options = together(
     option(
         "--model [NAME=]MODEL",
-        f"Fit this in place of selecting: terms {TERMS}, e.g. 'N + K + 2 GM'; or "
+        "Fit this in place of selecting: terms such as N, B, K, Q, R, GM, Resonance or "
+        "ARMA (all are in docs/processes.md), e.g. 'N + K + 2 GM'; or "
         "'gyro=N + 2 GM' for a sensor or channel; repeat.",
         name="models",
         multiple=True,
@@ -329,19 +327,16 @@ def _model(text: str) -> Model:
 
     Raises InputError if it is none.
     """
-    from gmwm.process import CATALOGUE, GaussMarkov, Model
+    from gmwm.process import CATALOGUE, Model
 
-    kinds: dict[str, type[Process]] = {"GM": GaussMarkov}
-    for kind in CATALOGUE:
-        kinds[kind.__name__] = kind
-        if len(kind.parameters[0].name) == 1 and not kind.prefix:
-            kinds[kind.parameters[0].name] = kind
+    kinds = {name: kind for kind in CATALOGUE for name in (kind.__name__, kind.short_name)}
     terms: list[Process] = []
     for part in text.split("+"):
         found = _TERM.fullmatch(part)
         if found is None or found[2] not in kinds:
             raise InputError(
-                f"--model {text}: {part.strip()!r} is no term: write {TERMS} with +, e.g. "
+                f"--model {text}: {part.strip()!r} is no term: write "
+                f"{', '.join(kind.short_name for kind in CATALOGUE)} with +, e.g. "
                 "--model 'N + K + 2 GM'"
             )
         terms += [kinds[found[2]]() for _ in range(int(found[1] or 1))]

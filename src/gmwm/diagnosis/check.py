@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gmwm._core.jobs import one_blas_thread, shared
-from gmwm._core.spool import release
+from gmwm._core.spool import moved, release, scaled
 from gmwm._core.typing import Progress, known_of
 from gmwm.diagnosis import tuning
 from gmwm.diagnosis.channel import Examined
@@ -58,14 +58,24 @@ def clock(recording: Recording) -> Iterator[Notice]:
 
 
 OF_RECORDING: tuple[Callable[[Recording], Iterator[Notice]], ...] = (
-    length, moves, clock, copied_rows, vibration,
-)  # fmt: skip
+    length,
+    moves,
+    clock,
+    copied_rows,
+    vibration,
+)
 """Checks of a whole recording of one rate."""
 
 CHECKS: tuple[Callable[[Examined], Iterator[Notice]], ...] = (
-    held_or_stuck, cut_off_or_abrupt_end, repeated_value, event, outliers_or_tails, rounding,
-    variance, drift,
-)  # fmt: skip
+    held_or_stuck,
+    cut_off_or_abrupt_end,
+    repeated_value,
+    event,
+    outliers_or_tails,
+    rounding,
+    variance,
+    drift,
+)
 """Checks of a channel; those of its spectrum come last (`spectral_notices`)."""
 
 
@@ -169,7 +179,7 @@ def _without_copies(channel: Channel, copies: Sequence[Copy], motion: Motion) ->
     """Examine a channel without rows that are copies, which are left out like events."""
     if not copies:
         return _at_own_rate(channel, motion)
-    values = np.array(channel.values, dtype=float)
+    values = scaled(channel.values, 1.0)
     for each in copies:
         values[each.start : each.stop] = np.nan
     one = _at_own_rate(replace(channel, values=values), motion)
@@ -217,8 +227,14 @@ def _examined(channel: Channel, motion: Motion) -> _Found:
     del present
     examined = _with_errors(channel, values, step, smallest, motion)
     if examined is None:
-        few = notice("length", channel.name, severity="warning", variant="few",
-                     hint="record longer", fewest=tuning.FEWEST_KNOWN)  # fmt: skip
+        few = notice(
+            "length",
+            channel.name,
+            severity="warning",
+            variant="few",
+            hint="record longer",
+            fewest=tuning.FEWEST_KNOWN,
+        )
         return _Found([few], ChannelHealth(lsb=step))
     notices = [one for check in CHECKS for one in check(examined)]
     held, events, level = examined.held, examined.events, examined.scatter
@@ -269,7 +285,7 @@ def _with_errors(
     elif outliers > 0.0:
         events = with_single_outliers(events, errors, values, step)
     events = motion.joined(events, channel.dt)
-    usable, quiet = errors.known.copy(), values.copy() if events else values
+    usable, quiet = errors.known.copy(), scaled(values, 1.0) if events else values
     for start, stop in events:
         usable[start:stop] = False
         quiet[start:stop] = np.nan
@@ -300,4 +316,4 @@ def _standardized(channel: Examined) -> npt.NDArray[np.float32] | None:
     np.divide(errors.values, result, out=result)
     np.clip(result, -tuning.CLIP, tuning.CLIP, out=result)
     result[~channel.usable] = 0.0
-    return result.astype(np.float32)  # those of all channels are kept
+    return moved(result.astype(np.float32), channel.values)  # those of all channels are kept

@@ -122,9 +122,6 @@ def _change(channel: Examined) -> Notice | None:
     counted = np.arange(tuning.TENTHS) != loudest if is_loud else np.ones(tuning.TENTHS, dtype=bool)
     halves = (counted & ~is_second, counted & is_second)
     first, second = (float(np.mean(means[half])) for half in halves)
-    errors_of_halves = [
-        float(np.sqrt(np.sum(spread[half])) / np.count_nonzero(half)) for half in halves
-    ]
     numbers = {
         "first_half": float(np.sqrt(first)),
         "second_half": float(np.sqrt(second)),
@@ -132,9 +129,8 @@ def _change(channel: Examined) -> Notice | None:
         "loudest": float(np.sqrt(means[loudest])),
     }
     # On the logarithmic scale the ratio of two variances is nearly normal.
-    error = norm.isf(0.5 * tuning.FALSE_ALARM) * np.hypot(
-        errors_of_halves[0] / first, errors_of_halves[1] / second
-    )
+    parts = [np.sqrt(np.sum(spread[h])) / np.count_nonzero(h) for h in halves]
+    error = norm.isf(0.5 * tuning.FALSE_ALARM) * np.hypot(parts[0] / first, parts[1] / second)
     growth = np.sqrt(second / first) - 1.0
     if abs(np.log(second / first)) > error and abs(growth) > tuning.CHANGE:
         severity: Severity = "warning" if abs(growth) > tuning.LARGE_CHANGE else "note"

@@ -14,6 +14,7 @@ from itertools import pairwise
 import numpy as np
 from scipy.linalg import solve_toeplitz
 
+from gmwm._core.spool import moved
 from gmwm._core.typing import BoolArray, FloatArray, inner, known_of
 from gmwm.diagnosis import tuning
 
@@ -75,7 +76,8 @@ def innovations(values: FloatArray, step: float) -> Innovations | None:
     scale = np.full(n, floor)
     scale[present] = running_scale(errors[present], floor)
     on_samples = np.convolve(coefficients, [1.0, -1.0])
-    return Innovations(errors, present, scale, 0.5 * step * float(np.sum(np.abs(on_samples))))
+    rounding = 0.5 * step * float(np.sum(np.abs(on_samples)))
+    return Innovations(moved(errors, values), present, moved(scale, values), rounding)
 
 
 def robust_scale(values: FloatArray, floor: float) -> float:

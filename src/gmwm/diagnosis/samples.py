@@ -271,6 +271,7 @@ def repeated_value(channel: Examined) -> Iterator[Notice]:
     near = np.max(np.delete(counts[max(most - 2, 0) : most + 3], min(most, 2)))
     excess = counts[most] - tuning.BESIDE_REPEATED * near
     if excess < max(tuning.FALSE_ALARM * values.size, tuning.LONG_RUN):
+        yield from _cut_towards_zero(channel)
         return
     value, count = float(levels[most]), int(np.count_nonzero(values == levels[most]))
     share = count / values.size
@@ -281,4 +282,30 @@ def repeated_value(channel: Examined) -> Iterator[Notice]:
         severity="bad" if share > tuning.MUCH_REPEATED else "warning",
         shown=readable(value, channel.unit, digits=5),
         times=brief(counts[most] / near),
+    )
+
+
+def _cut_towards_zero(channel: Examined) -> Iterator[Notice]:
+    """Find twice as many zeros as noise has, as where numbers are cut instead of rounded.
+
+    The fall from zero to one step is larger then than from one to two, where that of noise is
+    smaller, and of a Laplace law the same.
+    """
+    step, values = channel.step, channel.present
+    if step == 0.0:
+        return
+    zeros, one, two = (
+        np.count_nonzero(np.abs(np.abs(values) - k * step) < 0.25 * step) / (1.0 if k == 0 else 2.0)
+        for k in range(3)
+    )
+    if min(zeros, one, two) < tuning.FEWEST_AT_END:
+        return
+    error = np.sqrt(1.0 / zeros + 2.0 / one + 0.5 / two)
+    if np.log(zeros * two / one**2) - 3.0 * error < np.log(tuning.CUT_TO_ZERO):
+        return
+    numbers = {"value": 0.0, "samples": float(zeros), "share": zeros / values.size}
+    hint = "round to the nearest step before the conversion to integers"
+    severity: Severity = "bad" if numbers["share"] > tuning.MUCH_REPEATED else "warning"
+    yield notice(
+        "value-repeated", channel.name, numbers, severity=severity, variant="cut", hint=hint
     )

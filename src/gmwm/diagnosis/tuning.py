@@ -8,10 +8,6 @@ FALSE_ALARM = 1e-3
 LONG_RECORD = 3600.0
 """s: slow errors of inertial sensors have correlation times of minutes."""
 
-SAME_PEAK = 0.02
-"""Relative difference of the frequency of one line or resonance in several stretches: lines of
-engines and fans wander by about as much (docs/real-data.md)."""
-
 JITTER, LARGE_JITTER = 0.1, 0.3
 """Root mean square of the steps of time stamps, in sampling intervals, for a note and a warning."""
 
@@ -94,6 +90,10 @@ BESIDE_REPEATED, MUCH_REPEATED = 4.0, 0.05
 """Times as often as the values next to it comes one that is no sample: noise as small as its step
 has a ratio of 1.6 (Gaussian) to 2.7 (Laplace). Part of the samples that make the white noise 2.5 %
 too small."""
+
+CUT_TO_ZERO = 1.1
+"""Zeros times those two steps off over the square of those one step off: at most one of noise; 2 to
+1.26 of Gaussian noise cut in steps up to 0.7 of it."""
 
 LAST_OF_END, FEWEST_OF_END, FEWEST_OF_PART, PARTS_OF_END = 1.0 / 32.0, 1024, 8, 16
 """Part of the samples, and samples at least, next to an extreme in which the fall of the density is

@@ -1,14 +1,12 @@
 """Parametric bootstrap: how estimates would scatter, and whether one more term is needed.
 
-Wavelet variances are drawn from their distribution under the fitted model rather than computed from
-simulated series: their cube roots are all but normal (Wilson & Hilferty 1931, *PNAS* 17, 684-688),
-with the covariance that the model implies. That takes milliseconds a draw, whatever the length of
-the record.
+Wavelet variances are drawn from their distribution under the fitted model: their cube roots are
+nearly normal (Wilson & Hilferty 1931, *PNAS* 17, 684-688), with the covariance that the model
+implies. A draw takes milliseconds, whatever the length of the record.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -21,7 +19,7 @@ from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.estimate.entrance import estimate
 from gmwm.estimate.moments import GMWM, Design, Profile, Weights, search
-from gmwm.estimate.problem import Scales, drift_key, shape_of
+from gmwm.estimate.problem import FittedMoments, drift_key, shape_of
 from gmwm.estimate.result import Fit
 from gmwm.process import Model, Process, as_model
 from gmwm.variance import PooledVariance
@@ -98,18 +96,29 @@ def bootstrap(fit: Fit, runs: int = 200, seed: int = 0, *, full: bool = False) -
     """
     runs = _check(fit, runs)
     rng = checks.generator(seed)
-    opened = _opened(fit)
+    opened, wv = _opened(fit), fit.wv
+    draws: list[dict[str, float]] = []
     if full:
-        draws = [_from_series(fit, opened, rng) for _ in range(runs)]
+        lengths = [part.n for part in wv.parts] if isinstance(wv, PooledVariance) else [wv.n]
+        method = GMWM(fit.weights, fit.discrepancy)
+        for _ in range(runs):
+            series = [fit.model.simulate(n, wv.dt, rng) for n in lengths]
+            data = series if len(series) > 1 else series[0]
+            draws.append(estimate(opened, data, wv.dt, method).params)
     else:
-        problem = _Problem.of(fit)
-        design = Design(opened, problem.scales)
-        start = _shapes(fit, design)
-        ramp = _ramp_draws(fit, runs, rng)
-        draws = [
-            _refined(Profile(design, target, problem.root), start) | slope
-            for target, slope in zip(problem.targets(runs, rng), ramp, strict=True)
-        ]
+        at, root = fit.moments, _root(fit)
+        design = Design(opened, at.scales)
+        start = [shape_of(fit.model.terms[term.place]) for term in design.terms]
+        ramp = drift_key(fit.model)
+        slopes = np.zeros(runs)
+        if ramp in fit.keys:
+            slopes = fit.params[str(ramp)] + fit.stderr[str(ramp)] * rng.standard_normal(runs)
+        for target, slope in zip(_targets(at, runs, rng), slopes, strict=True):
+            profile = Profile(design, target, root)
+            point = profile.refine(profile.at(start))
+            fitted = Model(tuple(design.fitted_processes(point.x, point.shapes)))
+            found = {key: float(value or 0.0) for key, value in fitted.params.items()}
+            draws.append(found | ({str(ramp): float(slope)} if ramp in fit.keys else {}))
     keys = tuple(key for key in fit.params if key in opened.params and opened.params[key] is None)
     table = np.array([[values.get(key, np.nan) for key in keys] for values in draws])
     return Bootstrap(keys, table)
@@ -142,41 +151,18 @@ def bootstrap_test(fit: Fit, larger: Process | Model, runs: int = 200, seed: int
         If the fit is of another method, or ``runs`` is less than 2.
     """
     runs = _check(fit, runs)
-    problem = _Problem.of(fit)
-    designs = [Design(model, problem.scales) for model in (_opened(fit), as_model(larger))]
+    at, root = fit.moments, _root(fit)
+    designs = [Design(model, at.scales) for model in (_opened(fit), as_model(larger))]
     if designs[1].n_free <= designs[0].n_free:
         raise InputError(f"{larger!r} is not larger than {fit.model.opened()!r}")
-    observed = _gain(designs, problem.target, problem.root)
-    rng = checks.generator(seed)
-    gains = [_gain(designs, target, problem.root) for target in problem.targets(runs, rng)]
-    return float((1 + np.sum(np.array(gains) >= observed)) / (runs + 1))
 
+    def gain(target: FloatArray) -> float:
+        small, large = (search(Profile(design, target, root)).objective for design in designs)
+        return small - large
 
-@dataclass(frozen=True, eq=False)
-class _Problem:
-    """The weighted least-squares problem at a fit."""
-
-    scales: Scales
-    target: FloatArray
-    implied: FloatArray
-    covariance: FloatArray
-    root: FloatArray
-
-    @classmethod
-    def of(cls, fit: Fit) -> _Problem:
-        at = fit.moments
-        root = Weights.of(fit.weights, fit.wv).root(at.covariance)
-        return cls(at.scales, at.target, at.implied, at.covariance, root)
-
-    def targets(self, runs: int, rng: np.random.Generator) -> FloatArray:
-        """Wavelet variances under the fit, (runs, J)."""
-        deviation = np.sqrt(np.diag(self.covariance))
-        share = (deviation / self.implied) ** 2 / 9.0  # 2/(9 dof)
-        values, vectors = np.linalg.eigh(self.covariance / np.outer(deviation, deviation))
-        root = vectors * np.sqrt(np.maximum(values, 0.0))
-        normal = rng.standard_normal((runs, deviation.size)) @ root.T
-        cube_root = 1.0 - share + np.sqrt(share) * normal
-        return np.asarray(self.implied * np.maximum(cube_root, 0.0) ** 3)
+    rng, observed = checks.generator(seed), gain(at.target)
+    gains = np.array([gain(target) for target in _targets(at, runs, rng)])
+    return float((1 + np.sum(gains >= observed)) / (runs + 1))
 
 
 def _check(fit: Fit, runs: int) -> int:
@@ -190,35 +176,17 @@ def _opened(fit: Fit) -> Model:
     return fit.model.with_params(dict.fromkeys((*fit.keys, *fit.upper_bounds)))
 
 
-def _shapes(fit: Fit, design: Design) -> list[tuple[float, ...]]:
-    return [shape_of(fit.model.terms[term.place]) for term in design.terms]
+def _root(fit: Fit) -> FloatArray:
+    """L with L'L the weight matrix at a fit."""
+    return Weights.of(fit.weights, fit.wv).root(fit.moments.covariance)
 
 
-def _refined(profile: Profile, start: Sequence[tuple[float, ...]]) -> dict[str, float]:
-    """Parameters at the minimum reached from the fit's own shapes."""
-    point = profile.refine(profile.at(start))
-    fitted = Model(tuple(profile.design.fitted_processes(point.x, point.shapes)))
-    return {key: float(value or 0.0) for key, value in fitted.params.items()}
-
-
-def _ramp_draws(fit: Fit, runs: int, rng: np.random.Generator) -> list[dict[str, float]]:
-    key = drift_key(fit.model)
-    if key is None or key not in fit.keys:
-        return [{} for _ in range(runs)]
-    slope, error = fit.params[key], fit.stderr[key]
-    return [{key: slope + error * float(rng.standard_normal())} for _ in range(runs)]
-
-
-def _from_series(fit: Fit, opened: Model, rng: np.random.Generator) -> dict[str, float]:
-    """Estimates from a simulated series, or as many as there were recordings."""
-    wv = fit.wv
-    lengths = [part.n for part in wv.parts] if isinstance(wv, PooledVariance) else [wv.n]
-    series = [fit.model.simulate(n, wv.dt, rng) for n in lengths]
-    data = series if len(series) > 1 else series[0]
-    method = GMWM(fit.weights, fit.discrepancy)
-    return estimate(opened, data, wv.dt, method).params
-
-
-def _gain(designs: Sequence[Design], target: FloatArray, root: FloatArray) -> float:
-    small, large = (search(Profile(design, target, root)).objective for design in designs)
-    return small - large
+def _targets(at: FittedMoments, runs: int, rng: np.random.Generator) -> FloatArray:
+    """Wavelet variances drawn under a fit, (runs, J)."""
+    deviation = np.sqrt(np.diag(at.covariance))
+    share = (deviation / at.implied) ** 2 / 9.0  # 2/(9 dof)
+    values, vectors = np.linalg.eigh(at.covariance / np.outer(deviation, deviation))
+    root = vectors * np.sqrt(np.maximum(values, 0.0))
+    normal = rng.standard_normal((runs, deviation.size)) @ root.T
+    cube_root = 1.0 - share + np.sqrt(share) * normal
+    return np.asarray(at.implied * np.maximum(cube_root, 0.0) ** 3)

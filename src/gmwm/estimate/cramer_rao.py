@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Annotated, ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
-from pydantic import Field
 
 from gmwm._core import checks
 from gmwm._core.compiled import compiled
@@ -83,7 +82,7 @@ class CramerRao(Document):
 
     model: Model
     n: Samples
-    dt: Annotated[Interval, Field(validation_alias="dt_s", serialization_alias="dt_s")]
+    dt: Interval
     keys: tuple[Text, ...]
     covariance: Array
     wavelet_covariance: Array
@@ -94,6 +93,15 @@ class CramerRao(Document):
 
     def __repr__(self) -> str:
         return f"<CramerRao of {self.model!r}, n = {self.n:,}, dt = {self.dt:g} s>"
+
+    def content(self) -> dict[str, Any]:
+        content = super().content()
+        content["dt_s"] = content.pop("dt")
+        return content
+
+    @classmethod
+    def from_content(cls, content: Mapping[str, Any]) -> Self:
+        return super().from_content({**content, "dt": content["dt_s"]})
 
     def check_content(self) -> None:
         if not {*self.keys} <= {*self.model.params}:

@@ -31,8 +31,6 @@ METHODS: dict[str, type[Method]] = {
 }
 """Methods by name."""
 
-_SERIES = (WaveletVariance, Channel, np.ndarray)
-
 
 def fit(
     model: Process | Model,
@@ -92,7 +90,7 @@ def fit(
     >>> gmwm.fit(truth.opened(), x, dt=1.0, method=gmwm.GMWM(discrepancy=0.01)).discrepancy
     0.01
     """
-    found = estimate(model, data, dt, _chosen(method, weights, omega))
+    found = estimate(model, data, dt, _with_options(method, weights, omega))
     if not found.valid:
         warnings.warn(f"{found!r}: {found.message}", FitWarning, stacklevel=2)
     return found
@@ -131,18 +129,13 @@ def estimate(
     return method.estimate(model, channel)
 
 
-def _chosen(method: Any, weights: str | None, omega: str | None) -> Method:
+def _with_options(method: Any, weights: str | None, omega: str | None) -> Method:
     """The method with its options."""
     if weights is not None and omega is not None and weights != omega:
         raise InputError(f"weights = {weights!r} and omega = {omega!r} are the same: give one")
     weights = weights or omega
     if isinstance(method, str) and method in METHODS:
-        kind = METHODS[method]
-        if weights is None:
-            return kind()
-        if not issubclass(kind, GMWM):
-            raise InputError(f"method {method!r} has no weights: take gmwm or simulated")
-        return kind(weights=weights)
+        method = METHODS[method]()
     if not isinstance(method, Method):
         raise InputError(
             f"method = {checks.shown(method)}: known are {', '.join(METHODS)}, or an object with "
@@ -156,12 +149,12 @@ def _chosen(method: Any, weights: str | None, omega: str | None) -> Method:
 
 
 def are_several(data: Data | Sequence[Data]) -> bool:
-    """Whether it is a list of recordings; one of numbers is a series."""
+    """Whether the data are a list of recordings; a list of numbers is a series."""
     if not isinstance(data, list | tuple):
         return False
     if not data:
         raise InputError("there is no recording: give one wavelet variance at least")
-    several = [isinstance(part, _SERIES) for part in data]
+    several = [isinstance(part, WaveletVariance | Channel | np.ndarray) for part in data]
     if any(several) and not all(several):
         odd = data[several.index(False)]
         raise InputError(

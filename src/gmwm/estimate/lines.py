@@ -12,7 +12,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise, product
 from numbers import Real
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
@@ -70,16 +70,11 @@ _LINES: dict[type[Process], _Line] = {
 }
 
 
-@dataclass(frozen=True)
-class _Run:
+class _Run(NamedTuple):
     """Levels from ``first`` up to ``last``, which is included."""
 
     first: int
     last: int
-
-    @property
-    def octaves(self) -> int:
-        return self.last - self.first
 
 
 @dataclass(frozen=True)
@@ -225,9 +220,6 @@ def _wanted(model: Model) -> dict[str, _Line]:
     return {line.key: line for line in wanted}
 
 
-# -- regions --------------------------------------------------------------------------------------
-
-
 def _given_runs(
     model: Model,
     wv: WaveletVariance,
@@ -291,15 +283,15 @@ def _found_runs(
             else:
                 usable[: run.last] = False
         candidates.append([None, *_straight_runs(wv, line.slope, usable)])
-    choices = [choice for choice in product(*candidates) if _is_rising(choice)]
-    best = max(choices, key=lambda choice: sum(run.octaves for run in choice if run is not None))
-    return {line.key: run for line, run in zip(ordered, best, strict=True) if run is not None}
-
-
-def _is_rising(choice: Sequence[_Run | None]) -> bool:
-    """Whether runs of rising slopes follow each other; two may share the level between them."""
-    chosen = [run for run in choice if run is not None]
-    return all(a.last <= b.first for a, b in pairwise(chosen))
+    best, most = {}, -1
+    for choice in product(*candidates):
+        chosen = {line.key: run for line, run in zip(ordered, choice, strict=True) if run}
+        octaves = sum(run.last - run.first for run in chosen.values())
+        # Runs of rising slopes follow each other; two may share the level between them.
+        is_rising = all(a.last <= b.first for a, b in pairwise(chosen.values()))
+        if is_rising and octaves > most:
+            best, most = chosen, octaves
+    return best
 
 
 def _straight_runs(wv: WaveletVariance, slope: float, usable: np.ndarray) -> Iterator[_Run]:
@@ -331,9 +323,6 @@ def _allowance(combination: FloatArray, covariance: FloatArray) -> FloatArray:
     )
 
 
-# -- lines ----------------------------------------------------------------------------------------
-
-
 def _coefficients(
     wv: WaveletVariance, parts: Sequence[tuple[_Line, _Run]]
 ) -> tuple[FloatArray, FloatArray]:
@@ -359,9 +348,6 @@ def _fitted(model: Model, values: Mapping[str, float]) -> Model:
         elif key in values:
             terms.append(term.with_values(**{key: values[key]}))
     return Model(tuple(terms))
-
-
-# -- notices --------------------------------------------------------------------------------------
 
 
 def _slope_notices(wv: WaveletVariance, given: Sequence[tuple[_Line, _Run]]) -> list[Notice]:

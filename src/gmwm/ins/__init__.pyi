@@ -4,12 +4,6 @@ from .covariance.reduction import (
     loiter_with_outages as loiter_with_outages,
     reduce as reduce,
 )
-from .field.compare import Comparison as Comparison, compare as compare
-from .field.fix_file import read_fixes as read_fixes
-from .field.imu_file import read_imu as read_imu
-from .field.measured import Measured as Measured
-from .field.navigated import Navigated as Navigated
-from .field.outcome import Outcome as Outcome, Paired as Paired
 from .filter.aiding import (
     Aiding as Aiding,
     Fixes as Fixes,
@@ -25,6 +19,16 @@ from .imu.emulation import Imu as Imu, emulate as emulate
 from .imu.preintegration import Preintegration as Preintegration, preintegrate as preintegrate
 from .imu.recorded import Recorded as Recorded
 from .imu.sensors import SensorErrors as SensorErrors, SensorModels as SensorModels
+from .logs.comparison import (
+    Comparison as Comparison,
+    Outcome as Outcome,
+    Paired as Paired,
+    compare as compare,
+)
+from .logs.fix_log import read_fixes as read_fixes
+from .logs.imu_log import read_imu as read_imu
+from .logs.measured import Measured as Measured
+from .logs.navigated import Navigated as Navigated
 from .simulation.consistency import (
     Consistency as Consistency,
     at_epoch as at_epoch,

@@ -12,22 +12,16 @@ import numpy as np
 
 from gmwm._core import checks
 from gmwm._core.distributions import chi2
-from gmwm._core.notices import Notice, Severity
 from gmwm._core.typing import Progress
-from gmwm.calibration import DEPARTURES, Calibration, calibrate
+from gmwm.calibration import Calibration, calibrate
 from gmwm.errors import InputError, printable
 from gmwm.estimate import Fit, JointFit
+from gmwm.issues import Notice, notice
 from gmwm.population import tuning
 from gmwm.population.comparison import AxisComparison, SensorComparison
 from gmwm.population.curves import Equality
 from gmwm.population.numbers import axis_numbers, curve_inflation, joint_fit, parameter_spreads
 from gmwm.readers import Recording, is_frame
-
-_NOT_NOISE = (
-    "not-static", "tilt", "rate-changes", "rounding", "saturation", "abrupt-end", "stuck",
-    "held", "filled", "value-repeated", "variance", "unsteady", *DEPARTURES,
-)  # fmt: skip
-"""Codes of notices of a fit whose curve is not that of noise."""
 
 _LONGEST_LABEL = 28  # characters
 
@@ -184,8 +178,7 @@ def _different(given: Mapping[str, Calibration]) -> tuple[dict[str, Calibration]
         if same is None:
             kept[label] = each
             continue
-        text, values = f"the same recording as {same}", {"other": same}
-        notices.append(Notice("same-recording", "warning", "", text, values, "left out", label))
+        notices.append(replace(notice("same-recording", values={"other": same}), source=label))
     if len(kept) < 2:
         why = "; ".join(f"{n.source} is {n.text}" for n in notices) or f"there is {len(kept)}"
         raise InputError(f"a comparison needs two recordings or more ({why}): give another one")
@@ -200,20 +193,24 @@ def _members(
     out: dict[str, Notice] = {}
     for label, each in calibrations.items():
         if name in each.skipped:
-            out[label] = Notice("channel-skipped", "warning", "", each.skipped[name].text)
+            out[label] = notice("channel-skipped", reason=each.skipped[name].text)
         elif name not in each:
-            out[label] = Notice("channel-missing", "warning", "", "it has no such channel")
+            out[label] = notice("channel-missing")
         else:
-            bad = [n for n in each[name].notices if n.severity == "bad" and n.code in _NOT_NOISE]
+            bad = [n for n in each[name].notices if _is_not_noise(n)]
             if bad:
-                out[label] = Notice(
-                    "not-noise", "warning", "", bad[0].text, {"reason": bad[0].code},
-                    "not compared: the curve is not that of noise alone",
-                )  # fmt: skip
+                out[label] = notice("not-noise", values={"reason": bad[0].code}, bad=bad[0].text)
             else:
                 fits[label] = each[name]
     unlike = _unlike(fits)
     return {k: fit for k, fit in fits.items() if k not in unlike}, out | unlike
+
+
+def _is_not_noise(reported: Notice) -> bool:
+    """Whether a fit with this notice has a curve that is not noise alone."""
+    issue = reported.issue
+    is_of_the_data = issue.topic != "fit" and issue.lacks not in ("", "units_agree")
+    return reported.severity == "bad" and is_of_the_data
 
 
 def _unlike(fits: Mapping[str, Fit]) -> dict[str, Notice]:
@@ -235,12 +232,11 @@ def _unlike(fits: Mapping[str, Fit]) -> dict[str, Notice]:
     for label, fit in fits.items():
         if label in most:
             continue
-        own, common = 1.0 / fit.wv.dt, 1.0 / usual.wv.dt
-        code, text = "units-differ", f"in {fit.wv.unit}, {others} in {usual.wv.unit}"
-        if fit.wv.unit == usual.wv.unit:
-            code, text = "rates-differ", f"at {own:.6g} Hz, {others} at {common:.6g} Hz"
-        values = {"rate": own, "usual": common}
-        found[label] = Notice(code, "warning", "", text, values, "not compared level by level")
+        code = "rates-differ" if fit.wv.unit == usual.wv.unit else "units-differ"
+        values = {"rate": 1.0 / fit.wv.dt, "usual": 1.0 / usual.wv.dt}
+        found[label] = notice(
+            code, values=values, others=others, own=fit.wv.unit, common=usual.wv.unit
+        )
     return found
 
 
@@ -268,9 +264,14 @@ def _axis(
     for label, fit in fits.items():
         codes = ", ".join(n.code for n in fit.notices if n.severity == "bad")
         if codes:
-            text, hint = f"its own fit is not valid ({codes})", "the curve is compared all the same"
-            values = {"reasons": codes}
-            notices.append(Notice("fit-not-valid", "note", name, text, values, hint, label))
+            invalid = notice(
+                "fit-not-valid",
+                name,
+                {"reasons": codes},
+                variant="compared",
+                hint="the curve is compared all the same",
+            )
+            notices.append(replace(invalid, source=label))
     inflation = float("nan")
     if joint and test and test.tau.size:
         inflation = curve_inflation(list(fits.values()), joint, float(test.tau[-1]))
@@ -292,12 +293,11 @@ def _holm(p_values: Mapping[str, float]) -> dict[str, float]:
 
 
 def _curves_notice(axis: AxisComparison) -> Notice:
-    severity: Severity = "warning" if axis.state == "differ" else "note"
     values = {"p_value": axis.p_value}
     if axis.main:
         worst = axis.main[0]
         values |= {"extent": worst.extent, "sigma": worst.sigma, "tau": worst.longest}
-    return Notice(f"curves-{axis.state}", severity, axis.name, axis.sentence, values)
+    return notice(f"curves-{axis.state}", axis.name, values, sentence=axis.sentence)
 
 
 def _few_recordings(count: int) -> Notice:
@@ -305,5 +305,4 @@ def _few_recordings(count: int) -> Notice:
     dof = count - 1
     tails = 0.5 - 0.5 * tuning.SPREAD, 0.5 + 0.5 * tuning.SPREAD
     high, low = (float(np.sqrt(dof / chi2.ppf(tail, dof))) for tail in tails)
-    text = f"{count} recordings know the spread within factors of {low:.2g} and {high:.2g} (95 %)"
-    return Notice("few-recordings", "note", "", text, {"recordings": count, "factor": high})
+    return notice("few-recordings", values={"recordings": count, "factor": high}, low=low)

@@ -11,16 +11,16 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from gmwm._core.frames import frame
 from gmwm._core.frozen import freeze
-from gmwm._core.notices import Notice, worst_first
 from gmwm._core.pages import make
+from gmwm._core.tables import frame
 from gmwm._core.text import Printed, brief, bullets, per_cent, wrapped
 from gmwm._core.units import field_units, si_parameter_unit
 from gmwm.calibration import Calibration
 from gmwm.errors import MissingNameError
-from gmwm.estimate import Fit, JointFit
+from gmwm.estimate import Estimate, Fit, JointFit
 from gmwm.estimate.result import plain
+from gmwm.issues import Notice, worst_first
 from gmwm.population import tuning
 from gmwm.population.curves import Difference, Equality
 from gmwm.population.numbers import AxisNumbers, ParameterSpread
@@ -45,6 +45,12 @@ _NAMES = {"short": "short times", "R": "drift"}
 def _percent(share: float) -> str:
     """A relative difference; a factor from one on."""
     return per_cent(share) if share < 0.995 else f"a factor of {brief(1.0 + share)}"
+
+
+def _content(estimate: Estimate) -> dict[str, Any]:
+    """An estimate in JSON types; ``None`` for an interval without an end."""
+    content = estimate.to_dict()
+    return {key: plain(v) if isinstance(v, float) else v for key, v in content.items()}
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,18 +152,28 @@ class AxisComparison:
             "recordings": list(self.fits),
             "left_out": {label: notice.to_dict() for label, notice in self.left_out.items()},
             "differences": [
-                {"part": d.part, "shortest_s": d.shortest, "longest_s": d.longest,
-                 "extent": d.extent, "sigma": d.sigma, "resolution": d.resolution,
-                 "ratios": [plain(r) for r in d.ratios.tolist()],
-                 "errors": [plain(r) for r in d.errors.tolist()]}
+                {
+                    "part": d.part,
+                    "shortest_s": d.shortest,
+                    "longest_s": d.longest,
+                    "extent": d.extent,
+                    "sigma": d.sigma,
+                    "resolution": d.resolution,
+                    "ratios": [plain(r) for r in d.ratios.tolist()],
+                    "errors": [plain(r) for r in d.errors.tolist()],
+                }
                 for d in (equality.differences if equality else ())
             ],
             "joint": None if self.joint is None else self.joint.to_dict(),
             "equality_p": plain(self.joint.equality_p) if self.joint else None,
             "parameters": [
-                {"key": each.key, "joint": each.joint.to_dict(), "spread": plain(each.spread),
-                 "p_value": plain(each.p_value),
-                 "each": [None if e is None else e.to_dict() for e in each.each]}
+                {
+                    "key": each.key,
+                    "joint": _content(each.joint),
+                    "spread": plain(each.spread),
+                    "p_value": plain(each.p_value),
+                    "each": [None if e is None else _content(e) for e in each.each],
+                }
                 for each in self.parameters
             ],
             "numbers": {
@@ -169,7 +185,7 @@ class AxisComparison:
                 "inflation": {k: plain(self.numbers.inflation(k)) for k in _UNITS},
             },
             "curve_inflation": plain(self.curve_inflation),
-        }  # fmt: skip
+        }
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -293,21 +309,23 @@ class SensorComparison(Mapping[str, AxisComparison], Printed):
         rows = []
         for name, axis in self.items():
             worst = axis.main[0] if axis.main else None
-            rows.append({
-                "channel": name,
-                "state": axis.state,
-                "p_value": axis.p_value,
-                "part": worst.part if worst else "",
-                "extent": worst.extent if worst else nan,
-                "sigma": worst.sigma if worst else nan,
-                "recordings": len(axis.fits),
-                "model": axis.joint.model.title() if axis.joint else "",
-                "N": axis.numbers.value("N"),
-                "N_inflation": axis.numbers.inflation("N"),
-                "K": axis.numbers.value("K"),
-                "K_inflation": axis.numbers.inflation("K"),
-                "curve_inflation": axis.curve_inflation,
-            })  # fmt: skip
+            rows.append(
+                {
+                    "channel": name,
+                    "state": axis.state,
+                    "p_value": axis.p_value,
+                    "part": worst.part if worst else "",
+                    "extent": worst.extent if worst else nan,
+                    "sigma": worst.sigma if worst else nan,
+                    "recordings": len(axis.fits),
+                    "model": axis.joint.model.title() if axis.joint else "",
+                    "N": axis.numbers.value("N"),
+                    "N_inflation": axis.numbers.inflation("N"),
+                    "K": axis.numbers.value("K"),
+                    "K_inflation": axis.numbers.inflation("K"),
+                    "curve_inflation": axis.curve_inflation,
+                }
+            )
         return frame(rows, tuple(rows[0]) if rows else ("channel",))
 
     def report(
@@ -319,7 +337,10 @@ class SensorComparison(Mapping[str, AxisComparison], Printed):
     ) -> Path:
         """Write two pages of HTML; see `gmwm.report.write_sensor_comparison_report`."""
         written: Path = make(
-            "page", self, path,
-            datasheet=datasheet, provenance=provenance,
-        )  # fmt: skip
+            "page",
+            self,
+            path,
+            datasheet=datasheet,
+            provenance=provenance,
+        )
         return written

@@ -7,7 +7,6 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import closing, nullcontext
 from dataclasses import dataclass
 from functools import cached_property
-from inspect import signature
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,24 +15,23 @@ import pyarrow.parquet as pq
 
 from gmwm._core import checks
 from gmwm._core.files import moved_together, replaceable
-from gmwm._core.frames import frame
 from gmwm._core.frozen import freeze
 from gmwm._core.jobs import results
-from gmwm._core.notices import Notice
 from gmwm._core.pages import make
+from gmwm._core.tables import cell, frame, plain_table
 from gmwm._core.text import bullets, per_cent, wrapped
 from gmwm._core.typing import Progress
-from gmwm.calibration import SCREENING, Calibration
-from gmwm.errors import InputError, MissingNameError
+from gmwm.calibration import Calibration
+from gmwm.errors import InputError, MissingNameError, printable
+from gmwm.issues import Notice, notice
 from gmwm.population import tuning
 from gmwm.population.paths import OUTPUTS, Paths, recordings
 from gmwm.population.spread import Spread, Structures, spreads_of, structures_of
-from gmwm.population.store import Store, opened_store, read_index, write_index
+from gmwm.population.store import Index, Listed, Store, opened_store, read_index
 from gmwm.population.task import Task
 from gmwm.population.tolerance import needed_units
 from gmwm.population.unit import DERIVED, SCHEMA, Row, Unit, rows_of
-from gmwm.process import Model, Process, as_model
-from gmwm.readers import read
+from gmwm.process import Model, Process
 
 if TYPE_CHECKING:
     import pandas
@@ -119,28 +117,35 @@ class Fleet(Mapping[str, Calibration | Notice]):
         ]
         shown = [each for each in self.spreads if each.parameter in DERIVED]
         if shown:
-            head = f"{'channel':<10} {'number':<9} {'units':>5} {'median':>9} {'spread':>7}"
-            lines += ["", f"{head} {'limit':>9}  unit", *map(_line, shown), ""]
+            heads = ("channel", "number", "units", "median", "spread", "limit", "unit")
+            rows = []
+            for each in shown:
+                unit, scale = each.field_unit
+                numbers = (each.n, each.median * scale, each.normal_limit * scale)
+                n, median, limit = map(cell, numbers)
+                sd = per_cent(each.sd, 3) if each.sd >= 0.0 else "-"
+                rows.append((each.channel, each.parameter, n, median, sd, limit, unit))
+            lines += ["", *plain_table(heads, rows).splitlines(), ""]
             lines += wrapped(
                 f"filter: for outages up to {self.horizon:g} s; floor: bias instability. Limit: "
                 "95 % of units are below this (95 % confidence, log-normal)."
             )
+        apart: list[str] = []
         for axis in self.structures:
             if axis.different:
-                usual = next(iter(axis.counts))
-                lines += bullets([
-                    f"{axis.channel}: {axis.counts[usual]} of {sum(axis.counts.values())} units "
-                    f"are {usual}, {axis.different} have another structure"
-                ])  # fmt: skip
+                usual, units = next(iter(axis.counts)), sum(axis.counts.values())
+                number = f"{axis.counts[usual]} of {units}"
+                text = f"{number} units are {usual}, {axis.different} have another structure"
+                apart.append(f"{axis.channel}: {text}")
             if axis.invalid:
-                lines += bullets([f"{axis.channel}: not valid in {_some(axis.invalid)}"])
-        lines += bullets(
+                apart.append(f"{axis.channel}: not valid in {_some(axis.invalid)}")
+        apart += [
             f"{outlier.device} stands apart in {each.parameter} of {each.channel}: "
             f"{outlier.value / each.median:.3g} times the median"
             for each in self.spreads
             for outlier in each.outliers
-        )
-        return "\n".join(lines + bullets(self.notices))
+        ]
+        return "\n".join(lines + bullets([*apart, *self.notices]))
 
     def to_frame(self) -> pandas.DataFrame:
         """A row per unit, channel and parameter, in SI units; needs pandas."""
@@ -185,8 +190,10 @@ class Fleet(Mapping[str, Calibration | Notice]):
         InputError
             If the folder holds no finished fleet, or one of its files is damaged.
         """
-        units, horizon, options, notices = read_index(Path(folder))
-        return cls({unit.path: unit for unit in units}, horizon, options, tuple(notices))
+        index = read_index(Path(folder))
+        store = Store(Path(folder), index.options)
+        units = {each.path: store.load(each) for each in index.units}
+        return cls(units, index.horizon_s, index.options, index.notices)
 
     def _conclude(self, store: Store) -> None:
         """Write the table, the report and the list of units, all or none."""
@@ -194,20 +201,11 @@ class Fleet(Mapping[str, Calibration | Notice]):
         with moved_together(store.folder) as new:
             pq.write_table(pa.Table.from_pylist(list(self.rows), schema=SCHEMA), new / table)
             self.report(new / page)
-            units = self.units.values()
-            write_index(new / index, units, self.horizon, self.options, self.notices)
-
-
-def _line(spread: Spread) -> str:
-    """A line of the printed table."""
-    unit, scale = spread.field_unit
-    known = spread.sd >= 0.0
-    sd = per_cent(spread.sd, 3) if known else "-"
-    limit = f"{spread.normal_limit * scale:.4g}" if known else "-"
-    return (
-        f"{spread.channel:<10} {spread.parameter:<9} {spread.n:>5} {spread.median * scale:>9.4g} "
-        f"{sd:>7} {limit:>9}  {unit}"
-    )
+            listed = tuple(
+                Listed(printable(path), unit.name, self.failed.get(path))
+                for path, unit in self.units.items()
+            )
+            Index(self.horizon, self.options, listed, self.notices).save(new / index)
 
 
 def _some(names: Sequence[str]) -> str:
@@ -219,17 +217,13 @@ def fleet(
     paths: Paths,
     model: Process | Model | Mapping[str, Process | Model] | None = None,
     *,
-    screening: Collection[str] = SCREENING,
-    still: bool = True,
     horizon: float = 60.0,
-    start: float = 0.0,
-    stop: float | None = None,
     folder: str | os.PathLike[str] | None = None,
     resume: bool = False,
     jobs: int = 1,
     cluster: str | None = None,
     progress: Progress | None = None,
-    **reading: Any,
+    **options: Any,
 ) -> Fleet:
     """Calibrate many units of a sensor, one recording of each.
 
@@ -242,12 +236,8 @@ def fleet(
         The recordings; a pattern is as in ``"lot-7/**/*.csv"``.
     model : Process, Model or mapping, optional
         Fitted to every channel, or by channel or sensor ("gyro", "accel"); selected by default.
-    screening, still
-        See `gmwm.calibrate`.
     horizon : float, optional
         Longest outage that N and K of a filter are for, s; see `gmwm.bound`.
-    start, stop : float, optional
-        Part of each recording, s.
     folder : path, optional
         Where each calibration is kept as soon as it is done, and the table (``fleet.parquet``) and
         the report (``fleet.html``) at the end; see `Fleet.load`.
@@ -259,8 +249,9 @@ def fleet(
         Address of a Dask scheduler that does the work instead. Its workers read the recordings.
     progress : callable, optional
         Called as ``progress(done, total, "")``.
-    **reading
-        Arguments of `gmwm.read`: ``rate``, ``units``, ``channels``, ...
+    **options
+        ``screening`` and ``still`` of `gmwm.calibrate`; ``start`` and ``stop``, the part of each
+        recording, s; and arguments of `gmwm.read`: ``rate``, ``units``, ``channels``, ...
 
     Raises
     ------
@@ -271,10 +262,11 @@ def fleet(
     """
     place = None if folder is None else Path(folder)
     items = recordings(paths, place)
-    task = _task(model, screening, still, horizon, (start, stop), reading)
+    task = Task.of(model, horizon, options)
     jobs = jobs if jobs == -1 else checks.whole("jobs", jobs, 1)
-    for name in OUTPUTS[1:] if place is not None else ():
-        replaceable(place / name)
+    if place is not None:
+        for name in OUTPUTS[1:]:
+            replaceable(place / name)
     units: dict[str, Unit] = {}
     with nullcontext() if place is None else opened_store(place, task.options, resume) as store:
         if store is not None:
@@ -294,55 +286,21 @@ def fleet(
         notices = _notices(units.values())
         if store is not None:
             names = {item.name for item in items}
-            notices += _left_over([e.stem for e in store.calibrations if e.stem not in names])
+            others = [each.stem for each in store.calibrations if each.stem not in names]
+            if others:
+                values = {"units": len(others)}
+                notices.append(notice("left-over", values=values, names=_some(others)))
         made = Fleet(units, task.horizon, task.options, tuple(notices))
         if not made.done:
-            first, *others = made.failed.values()
-            text = f"none of {len(others) + 1} recordings can be calibrated; the first: "
-            raise InputError((text if others else "") + first.text, first.code)
+            first, *rest = made.failed.values()
+            text = f"none of {len(rest) + 1} recordings can be calibrated; the first: "
+            raise InputError((text if rest else "") + first.text, first.code)
         if store is not None:
             made._conclude(store)
     return made
 
 
-def _task(
-    model: Any, screening: Collection[str], still: bool, horizon: float,
-    part: tuple[float, float | None], reading: Mapping[str, Any],
-) -> Task:  # fmt: skip
-    """The options, checked before any work."""
-    from gmwm._core import __version__
-
-    _, *parameters = signature(read).parameters.values()
-    usual = {each.name: each.default for each in parameters}
-    for name in reading:
-        checks.choice("argument", name, tuple(usual))
-    models = model if isinstance(model, Mapping) else {} if model is None else {"": model}
-    for name in screening:
-        checks.choice("screening", name, SCREENING)
-    start, stop = part
-    for name, given in (("start", start), ("stop", 0.0 if stop is None else stop)):
-        if not checks.is_number(given):
-            raise InputError(f"{name} = {checks.shown(given)}: give seconds")
-    return Task(
-        # Options that are at their defaults do not tell one fleet from another.
-        reading={k: v for k, v in reading.items() if v != usual[k] and v not in (None, (), {})},
-        start=float(start),
-        stop=None if stop is None else float(stop),
-        models={str(name): as_model(each) for name, each in models.items()},
-        screening=tuple(screening),
-        still=checks.truth("still", still),
-        horizon=checks.positive("horizon", horizon, "give the longest outage in seconds"),
-        version=__version__,
-    )
-
-
 # -- notices --------------------------------------------------------------------------------------
-
-
-def _left_over(names: Sequence[str]) -> list[Notice]:
-    """Calibrations in the folder that are of no recording given."""
-    text = f"the folder also holds {len(names)} calibrations of other recordings: {_some(names)}"
-    return [Notice("left-over", "note", "", text, {"units": len(names)})] if names else []
 
 
 def _notices(units: Collection[Unit]) -> list[Notice]:
@@ -351,10 +309,12 @@ def _notices(units: Collection[Unit]) -> list[Notice]:
     same: dict[str, list[str]] = {}
     for unit in units:
         same.setdefault(unit.digest or unit.path, []).append(unit.name)
+    hint = "each is counted; leave copies out"
     for names in (names for names in same.values() if len(names) > 1):
-        text = f"the same recording: {_some(names)}"
-        notices.append(Notice("same-recording", "warning", "", text, {"units": len(names)},
-                              "each is counted; leave copies out"))  # fmt: skip
+        values, shown = {"units": len(names)}, _some(names)
+        notices.append(
+            notice("same-recording", "", values, variant="fleet", hint=hint, names=shown)
+        )
     done = {unit.name: unit.result for unit in units if isinstance(unit.result, Calibration)}
     return notices + (_differences(done) if done else [])
 
@@ -362,40 +322,35 @@ def _notices(units: Collection[Unit]) -> list[Notice]:
 def _differences(done: Mapping[str, Calibration]) -> list[Notice]:
     """Rates, channels and lengths that are not the same in all units, and too few units."""
 
-    def have(names: Sequence[str]) -> str:
-        return "1 unit has" if len(names) == 1 else f"{len(names)} units have"
+    def about(names: Sequence[str]) -> dict[str, Any]:
+        have = "1 unit has" if len(names) == 1 else f"{len(names)} units have"
+        return {"have": have, "names": _some(names)}
 
     notices = []
     median = sorted(each.rate for each in done.values())[len(done) // 2]
     other = [n for n, each in done.items() if abs(each.rate / median - 1.0) > tuning.SAME_RATE]
     if other:
-        text = f"{have(other)} another sampling rate than {median:g} Hz: {_some(other)}"
         values = {"units": len(other), "rate": median}
         hint = "make sure that they are of one kind"
-        notices.append(Notice("rates-differ", "warning", "", text, values, hint))
+        notices.append(
+            notice("rates-differ", values=values, variant="fleet", hint=hint, **about(other))
+        )
     channels = {name: (*each, *each.skipped) for name, each in done.items()}
     lacking: dict[tuple[str, ...], list[str]] = {}
     for channel in dict.fromkeys(channel for own in channels.values() for channel in own):
         names = tuple(name for name, own in channels.items() if channel not in own)
         lacking.setdefault(names, []).append(channel)
-    for names, missing in lacking.items():
-        if names:
-            text = f"{have(names)} no such channel: {_some(names)}"
-            notices.append(Notice("channels-differ", "warning", ", ".join(missing), text,
-                                  {"units": len(names)}))  # fmt: skip
+    notices += [
+        notice("channels-differ", ", ".join(missing), {"units": len(names)}, **about(names))
+        for names, missing in lacking.items()
+        if names
+    ]
     lengths = {name: each.duration for name, each in done.items()}
     name = min(lengths, key=lengths.__getitem__)
-    shortest, longest = lengths[name], max(lengths.values())
-    if longest > tuning.LENGTHS * shortest:
-        text = (
-            f"recordings are from {shortest:.6g} s ({name}) to {longest:.6g} s long: short ones "
-            "scatter more"
-        )
-        values = {"shortest": shortest, "longest": longest}
-        notices.append(Notice("lengths-differ", "note", "", text, values))
-    needed = needed_units()
-    if len(done) < needed:
-        text = f"{len(done)} units: a distribution-free limit needs {needed}"
-        values = {"units": len(done), "needed": needed}
-        notices.append(Notice("few-units", "note", "", text, values))
+    values = {"shortest": lengths[name], "longest": max(lengths.values())}
+    if values["longest"] > tuning.LENGTHS * values["shortest"]:
+        notices.append(notice("lengths-differ", values=values, name=name))
+    if len(done) < needed_units():
+        values = {"units": len(done), "needed": needed_units()}
+        notices.append(notice("few-units", values=values))
     return notices

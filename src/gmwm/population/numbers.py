@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gmwm._core.notices import Notice
 from gmwm._core.typing import FloatArray
 from gmwm.calibration import noise_density, random_walk
 from gmwm.errors import InputError
@@ -15,6 +14,7 @@ from gmwm.estimate import Estimate, Fit, JointFit
 from gmwm.estimate.problem import Scales
 from gmwm.estimate.result import between
 from gmwm.filter_numbers import FilterNumbers, bound
+from gmwm.issues import Notice, notice
 from gmwm.population import tuning
 from gmwm.process import Process
 from gmwm.selection import select
@@ -94,7 +94,7 @@ def joint_fit(fits: Sequence[Fit]) -> JointFit | Notice:
         extra = tuple(largest[kind][1] for kind in sorted(largest))
         found = select(curves, extra=extra).fit
     except InputError as error:
-        return Notice("no-joint-model", "warning", fits[0].wv.name, str(error))
+        return notice("no-joint-model", fits[0].wv.name, error=error)
     assert isinstance(found, JointFit)
     return found
 
@@ -128,7 +128,7 @@ def axis_numbers(
         try:
             each[label] = bound(fit, horizon=horizon)
         except InputError as error:
-            notices.append(Notice("no-numbers", "warning", name, str(error), source=label))
+            notices.append(replace(notice("no-numbers", name, error=error), source=label))
     if not each:
         return AxisNumbers({}, None, None, {}, {}), tuple(notices)
     whole = covering = None
@@ -142,7 +142,7 @@ def axis_numbers(
         own = (numbers.nees[horizon] for numbers in found.values())
         nees = dict(zip(each, own, strict=True))
     except InputError as error:
-        notices.append(Notice("no-numbers", "warning", name, str(error)))
+        notices.append(notice("no-numbers", name, error=error))
     return AxisNumbers(each, whole, covering, nees, _upper(fits, covering)), tuple(notices)
 
 

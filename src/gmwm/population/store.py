@@ -3,53 +3,53 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, ClassVar
 
-from pydantic import Field
+from pydantic import StringConstraints
 
-from gmwm._core.documents import read_json
+from gmwm._core.documents import Document, Positive, Text, read_json
 from gmwm._core.files import folder_to_fill, one_writer, written
-from gmwm._core.forms import Form, NoticeForm, Notices, NotNegative, Positive, Text
-from gmwm._core.notices import Notice
 from gmwm.calibration import Calibration
 from gmwm.errors import InputError, printable
+from gmwm.issues import Notice
 from gmwm.population.paths import Item
 from gmwm.population.task import digest_of
 from gmwm.population.unit import Number, Unit
 
 
-class _NumberForm(Form):
-    value: NotNegative
-    stderr: NotNegative | None
-    found: bool
-
-
-class _OriginForm(Form):
+@dataclass(frozen=True)
+class _Origin(Document):
     """What a fleet adds to the calibration of a unit."""
 
     path: Text
-    sha256: Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
-    options: dict[str, Any]
-    numbers: dict[Text, dict[Text, _NumberForm]]
+    sha256: Annotated[str, StringConstraints(pattern="^[0-9a-f]{64}$")]
+    options: Mapping[str, Any]
+    numbers: Mapping[str, Mapping[str, Number]]
 
 
-class _UnitForm(Form):
+@dataclass(frozen=True)
+class Listed:
+    """A unit in the index: its calibration is in a file of this name, or why there is none."""
+
     path: Text
-    name: Annotated[Text, Field(pattern=r"^[^/\\]+$")]
-    failed: NoticeForm | None
+    name: Annotated[str, StringConstraints(pattern=r"^[^/\\]+$", max_length=1000)]
+    failed: Notice | None
 
 
-class _IndexForm(Form):
-    """What fleet.json holds: the units, and why some have no calibration."""
+@dataclass(frozen=True)
+class Index(Document):
+    """Content of fleet.json: the units, and why some have no calibration."""
+
+    SCHEMA: ClassVar[str] = "gmwm.fleet-index"
 
     horizon_s: Positive
-    options: dict[str, Any]
-    units: Annotated[list[_UnitForm], Field(min_length=1)]
-    notices: Notices
+    options: Mapping[str, Any]
+    units: tuple[Listed, ...]
+    notices: tuple[Notice, ...]
 
 
 @dataclass(frozen=True)
@@ -78,8 +78,8 @@ class Store:
         path = self.path(item.name)
         if not path.exists():
             return None
-        origin, unit = self.load(item)
-        earlier = origin["options"]
+        origin, unit = self._load(item)
+        earlier = origin.options
         names = sorted({*earlier, *self.options})
         other = [name for name in names if earlier.get(name) != self.options.get(name)]
         if other:
@@ -93,48 +93,42 @@ class Store:
             return None  # reading it reports why
         if digest == unit.digest:
             return unit
-        if origin["path"] != printable(item.path):
+        if origin.path != printable(item.path):
             raise InputError(
-                f"{path} is of {origin['path']}, not of {item.path}: give another folder",
+                f"{path} is of {origin.path}, not of {item.path}: give another folder",
                 "other-runs",
             )
         return None
 
-    def load(self, item: Item) -> tuple[dict[str, Any], Unit]:
-        """The stored origin of a unit, and the unit.
+    def load(self, listed: Listed) -> Unit:
+        """A unit of the index.
 
-        Raises InputError if the file is damaged or missing.
+        Raises InputError if its file is damaged or missing.
         """
+        if listed.failed is not None:
+            return Unit(listed.path, listed.name, listed.failed)
+        return self._load(Item(listed.path, listed.name))[1]
+
+    def _load(self, item: Item) -> tuple[_Origin, Unit]:
+        """The stored origin of a unit, and the unit."""
         path = self.path(item.name)
         content = read_json(path)
         try:
             if not isinstance(content, dict) or "fleet" not in content:
                 raise InputError("was not written by a fleet")
-            origin = _OriginForm.checked(content["fleet"])
+            origin = _Origin.from_content(content["fleet"])
             calibration = Calibration.from_dict(content)
         except (InputError, TypeError) as error:
             hint = "move it away, or give another folder"
             raise InputError(f"{path}: {error}: {hint}") from None
-        numbers = {
-            channel: {name: Number(**each) for name, each in own.items()}
-            for channel, own in origin["numbers"].items()
-        }
-        return origin, Unit(item.path, item.name, calibration, numbers, origin["sha256"])
+        return origin, Unit(item.path, item.name, calibration, origin.numbers, origin.sha256)
 
     def save(self, unit: Unit) -> None:
         """Write the calibration of a unit; if it has none, remove that of an earlier run."""
         if not isinstance(unit.result, Calibration):
             self.path(unit.name).unlink(missing_ok=True)
             return
-        origin = {
-            "path": printable(unit.path),
-            "sha256": unit.digest,
-            "options": self.options,
-            "numbers": {
-                channel: {name: each._asdict() for name, each in own.items()}
-                for channel, own in unit.numbers.items()
-            },
-        }
+        origin = _Origin(printable(unit.path), unit.digest, self.options, unit.numbers).content()
         with written(self.path(unit.name)) as stream:
             json.dump(unit.result.to_dict() | {"fleet": origin}, stream, indent=1, allow_nan=False)
             stream.write("\n")
@@ -158,47 +152,12 @@ def opened_store(folder: Path, options: Mapping[str, Any], resume: bool) -> Iter
         yield store
 
 
-def write_index(
-    path: Path, units: Iterable[Unit], horizon: float, options: Mapping[str, Any],
-    notices: Sequence[Notice],
-) -> None:  # fmt: skip
-    """Write fleet.json."""
-    content = {
-        "schema": "gmwm.fleet-index",
-        "schema_version": 1,
-        "horizon_s": horizon,
-        "options": dict(options),
-        "units": [
-            {
-                "path": printable(each.path),
-                "name": each.name,
-                "failed": each.result.to_dict() if isinstance(each.result, Notice) else None,
-            }
-            for each in units
-        ],
-        "notices": [each.to_dict() for each in notices],
-    }
-    path.write_text(json.dumps(content, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+def read_index(folder: Path) -> Index:
+    """The index in the folder of a finished fleet.
 
-
-def read_index(folder: Path) -> tuple[list[Unit], float, dict[str, Any], list[Notice]]:
-    """Units, horizon, options and notices of a fleet's folder.
-
-    Raises InputError if it holds no finished fleet, or one of its files is damaged.
+    Raises InputError if there is none, or it is damaged.
     """
     path = folder / "fleet.json"
     if not path.exists():
         raise InputError(f"{folder} holds no {path.name}: give the folder of a fleet, or resume it")
-    try:
-        content = _IndexForm.checked(read_json(path))
-    except (InputError, TypeError) as error:
-        raise InputError(f"{path}: {error}: make the fleet again with resume") from None
-    store = Store(folder, content["options"])
-    units = [
-        store.load(Item(each["path"], each["name"]))[1]
-        if each["failed"] is None
-        else Unit(each["path"], each["name"], Notice.from_dict(each["failed"]))
-        for each in content["units"]
-    ]
-    notices = [Notice.from_dict(each) for each in content["notices"]]
-    return units, content["horizon_s"], content["options"], notices
+    return Index.load(path)

@@ -7,6 +7,7 @@ import json
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass
+from inspect import signature
 from pathlib import Path
 from typing import Any
 
@@ -15,13 +16,13 @@ from gmwm._core import checks
 from gmwm._core.files import opened
 from gmwm._core.jobs import ENDED
 from gmwm._core.memory import OUT_OF_MEMORY
-from gmwm._core.notices import Notice
-from gmwm.calibration import calibrate, floor, noise_density, random_walk
+from gmwm.calibration import SCREENING, calibrate, floor, noise_density, random_walk
 from gmwm.errors import InputError
 from gmwm.estimate import Fit
+from gmwm.issues import Notice
 from gmwm.population.paths import Item
 from gmwm.population.unit import DERIVED, Number, Unit
-from gmwm.process import Model
+from gmwm.process import Model, as_model
 from gmwm.readers import Recording, read
 
 
@@ -45,6 +46,36 @@ class Task:
     still: bool
     horizon: float
     version: str
+
+    @classmethod
+    def of(cls, model: Any, horizon: float, options: Mapping[str, Any]) -> Task:
+        """The task of `fleet`, with its options checked before any work."""
+        from gmwm._core import __version__
+
+        reading = dict(options)
+        start, stop = reading.pop("start", 0.0), reading.pop("stop", None)
+        screening, still = reading.pop("screening", SCREENING), reading.pop("still", True)
+        _, *parameters = signature(read).parameters.values()
+        usual = {each.name: each.default for each in parameters}
+        for name in reading:
+            checks.choice("argument", name, tuple(usual))
+        models = model if isinstance(model, Mapping) else {} if model is None else {"": model}
+        for name in screening:
+            checks.choice("screening", name, SCREENING)
+        for name, given in (("start", start), ("stop", 0.0 if stop is None else stop)):
+            if not checks.is_number(given):
+                raise InputError(f"{name} = {checks.shown(given)}: give seconds")
+        return cls(
+            # Options that are at their defaults do not tell one fleet from another.
+            reading={k: v for k, v in reading.items() if v != usual[k] and v not in (None, (), {})},
+            start=float(start),
+            stop=None if stop is None else float(stop),
+            models={str(name): as_model(each) for name, each in models.items()},
+            screening=tuple(screening),
+            still=checks.truth("still", still),
+            horizon=checks.positive("horizon", horizon, "give the longest outage in seconds"),
+            version=__version__,
+        )
 
     @property
     def options(self) -> dict[str, Any]:

@@ -5,27 +5,29 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from math import isfinite
-from typing import Any, NamedTuple
+from typing import Any
 
 import pyarrow as pa
 
+from gmwm._core.documents import NotNegative
 from gmwm._core.frozen import freeze
-from gmwm._core.notices import Notice
 from gmwm._core.units import si_parameter_unit
 from gmwm.calibration import Calibration
 from gmwm.errors import printable
 from gmwm.estimate import Fit
+from gmwm.issues import Notice
 
 DERIVED = {"filter_N": "u/sqrt(Hz)", "filter_K": "u/s/sqrt(Hz)", "floor_B": "u"}
 """Numbers that units of any model structure have, and their units: the N and K of a filter for the
 horizon (`gmwm.bound`), and the bias instability B."""
 
-_TEXT, _NUMBER, _TEXTS = pa.string(), pa.float64(), pa.list_(pa.string())
-SCHEMA = pa.schema({
-    "device": _TEXT, "path": _TEXT, "channel": _TEXT, "quantity": _TEXT, "model": _TEXT,
-    "parameter": _TEXT, "kind": _TEXT, "value": _NUMBER, "stderr": _NUMBER, "lower": _NUMBER,
-    "upper": _NUMBER, "unit": _TEXT, "valid": pa.bool_(), "reasons": _TEXTS, "notices": _TEXTS,
-})  # fmt: skip
+_TYPES = dict.fromkeys(("value", "stderr", "lower", "upper"), pa.float64())
+_TYPES |= {"valid": pa.bool_()} | dict.fromkeys(("reasons", "notices"), pa.list_(pa.string()))
+_NAMES = (
+    "device path channel quantity model parameter kind value stderr lower upper unit valid reasons "
+    "notices"
+)
+SCHEMA = pa.schema([(name, _TYPES.get(name, pa.string())) for name in _NAMES.split()])
 """Columns of the table; null where one does not apply. ``kind`` is that of `gmwm.Estimate`, or
 "derived" for the numbers of `DERIVED`; of an upper limit ("bound") ``value`` is null. ``reasons``
 are the codes of why a fit, a channel or a unit is not valid."""
@@ -33,15 +35,16 @@ are the codes of why a fit, a channel or a unit is not valid."""
 Row = dict[str, Any]
 
 
-class Number(NamedTuple):
+@dataclass(frozen=True)
+class Number:
     """A number derived from a fit.
 
     value: SI.
     found: Else it is an upper limit: the 95 % one, or the end of a curve that is still falling.
     """
 
-    value: float
-    stderr: float | None
+    value: NotNegative
+    stderr: NotNegative | None
     found: bool
 
 
@@ -80,8 +83,10 @@ def rows_of(units: Iterable[Unit]) -> Iterator[Row]:
     """
     for unit in units:
         own = dict.fromkeys(SCHEMA.names) | {
-            "device": unit.name, "path": printable(unit.path), "valid": False
-        }  # fmt: skip
+            "device": unit.name,
+            "path": printable(unit.path),
+            "valid": False,
+        }
         if isinstance(unit.result, Notice):
             yield {**own, "reasons": [unit.result.code], "notices": [unit.result.code]}
             continue
@@ -120,5 +125,8 @@ def _parameters(
         if number.found:
             known = {"kind": "derived", "value": number.value, "stderr": number.stderr}
         yield {
-            **own, "parameter": key, **known, "unit": si_parameter_unit(DERIVED[key], quantity),
-        }  # fmt: skip
+            **own,
+            "parameter": key,
+            **known,
+            "unit": si_parameter_unit(DERIVED[key], quantity),
+        }

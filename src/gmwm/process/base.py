@@ -102,6 +102,7 @@ class Process:
     compiled_kind: ClassVar[int] = 0
     """Number of its curve in `gmwm.process.shaped_curve`, of this very class; 0 if it has none."""
 
+    _examples: ClassVar[tuple[tuple[Any, ...], ...]] = ()  # arguments of those of `examples`
     _constructor: ClassVar[inspect.Signature] = inspect.Signature()
     _accepted: ClassVar[tuple[str, ...]] = ()  # names of its arguments
 
@@ -411,7 +412,7 @@ class Process:
     @classmethod
     def examples(cls) -> tuple[Process, ...]:
         """Instances with given parameters, held to the laws of the test suite."""
-        return ()
+        return tuple(cls(*arguments) for arguments in cls._examples)
 
     def to_dict(self) -> dict[str, Any]:
         """Kind and constructor arguments in JSON types."""

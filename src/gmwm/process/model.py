@@ -102,11 +102,8 @@ class Model:
         for item in self.parameters:
             if item.key in params:
                 changes[item.term][item.parameter.name] = params[item.key]
-        return Model(
-            tuple(
-                term.with_values(**change) for term, change in zip(self.terms, changes, strict=True)
-            )
-        )
+        terms = zip(self.terms, changes, strict=True)
+        return Model(tuple(term.with_values(**change) for term, change in terms))
 
     def opened(self) -> Model:
         """A copy with every parameter open."""
@@ -118,10 +115,7 @@ class Model:
         """Two-sided spectral density (u^2/Hz) at ``f`` (Hz), without lines; see `Process.psd`."""
         self._require_given()
         f = np.asarray(f, dtype=float)
-        total = np.zeros_like(f)
-        for term in self.terms:
-            total += term.psd(f, dt)
-        return total
+        return np.sum([term.psd(f, dt) for term in self.terms], axis=0, dtype=float)
 
     def lines(self) -> tuple[tuple[float, float], ...]:
         """Spectral lines of all terms as (frequency in Hz, amplitude in u)."""
@@ -148,8 +142,7 @@ class Model:
         """Wavelet variance of each term, shape (terms,) + tau.shape, in u^2."""
         self._require_given()
         tau = np.asarray(tau, dtype=float)
-        curves = [term.wavelet_variance(tau, dt, wavelet) for term in self.terms]
-        return np.stack([np.asarray(curve) for curve in curves])
+        return np.stack([term.wavelet_variance(tau, dt, wavelet) for term in self.terms])
 
     def autocovariance(self, lag: FloatArray, dt: float) -> FloatArray:
         """Autocovariance (u^2) at lags in samples, of stationary models."""

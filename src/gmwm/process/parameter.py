@@ -1,4 +1,4 @@
-"""What a parameter of an error process is."""
+"""Parameters of an error process: name, unit, role, range, and the map to the real line."""
 
 from __future__ import annotations
 
@@ -54,9 +54,7 @@ class Parameter:
 
     def admits(self, value: float) -> bool:
         """Whether ``value`` lies in the parameter's range."""
-        if self.linear and value == 0.0:
-            return True
-        return self.lower < value < self.upper
+        return (self.linear and value == 0.0) or self.lower < value < self.upper
 
     def checked(self, value: Any, owner: str) -> float:
         """The value as a number in the parameter's range.
@@ -68,9 +66,7 @@ class Parameter:
         """
         where = f"{owner}: {self.name}"
         try:
-            if isinstance(value, str):
-                raise TypeError
-            number = float(value)
+            number = float("x" if isinstance(value, str) else value)
         except (TypeError, ValueError, OverflowError):
             raise InputError(
                 f"{where} is {checks.shown(value)}: give a number, or None to estimate"
@@ -109,9 +105,9 @@ class Parameter:
 
 
 class _Declared(Parameter):
-    """A parameter in the body of a class: its name is that under which it stands there.
+    """A parameter in the body of a class, which gives it its name.
 
-    Values stand in the dictionary of an instance, which goes before this descriptor.
+    An instance holds its values in its dictionary, which is looked up before this descriptor.
     """
 
     def __set_name__(self, owner: type, name: str) -> None:

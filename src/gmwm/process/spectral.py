@@ -17,6 +17,7 @@ of all levels are one matrix product. Other wavelets have weights of their own
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache, wraps
@@ -33,14 +34,12 @@ from gmwm.process.wavelets import Wavelet, wavelet
 PSD = Callable[[FloatArray, float], FloatArray]
 """``psd(f, dt)``: two-sided density in u^2/Hz at frequencies f in Hz."""
 
-_NODES_PER_PANEL = 8
-_MAX_PANELS = 512
-_MIN_PANELS = 16
-_RESOLVED_LOBES = 256
-_OCTAVES_BELOW = 26  # below the lowest lobe: a 1/f^2 spectrum leaves 2^-26 of its variance there
-
 MEAN_SIN4 = 3.0 / 8.0
 
+_NODES_PER_PANEL = 8
+_MIN_PANELS, _MAX_PANELS = 16, 512  # an octave
+_RESOLVED_LOBES = 256
+_OCTAVES_BELOW = 26  # below the lowest lobe: a 1/f^2 spectrum leaves 2^-26 of its variance there
 _MAX_LEVEL = 62
 _MARGIN = 0.25  # a spectrum f^-a needs a < 2 r + 1 - _MARGIN: the lowest octaves then add up
 
@@ -58,13 +57,10 @@ class Quadrature:
     weight: FloatArray
     gain: FloatArray
 
-    def sampled(self, psd: PSD, dt: float) -> FloatArray:
-        """``psd`` at the nodes per unit of normalised frequency, in u^2, shape (K,)."""
-        return evaluated(psd, self.frequency / dt, dt) / dt
-
     def haar_variance(self, psd: PSD, dt: float) -> FloatArray:
         """Wavelet variance of every averaging time, in u^2, shape (J,)."""
-        return 2.0 * (self.gain @ (self.weight * self.sampled(psd, dt)))
+        density = evaluated(psd, self.frequency / dt, dt) / dt
+        return 2.0 * (self.gain @ (self.weight * density))
 
 
 def evaluated(psd: PSD, f: FloatArray, dt: float) -> FloatArray:
@@ -91,36 +87,21 @@ def haar_gain(m: float, frequency: FloatArray) -> FloatArray:
     return sine**2 / (m * np.sin(np.pi * frequency)) ** 2
 
 
-_OfFrequencies = Callable[[FloatArray, float], FloatArray]
-
-
-@dataclass(frozen=True, eq=False)
-class _Fixed:
-    """An array, the same as another one only if it is that, and a sampling interval."""
-
-    f: FloatArray
-    dt: float
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Fixed) and self.f is other.f and self.dt == other.dt
-
-    def __hash__(self) -> int:
-        return hash((id(self.f), self.dt))
-
-
-def _kept(function: _OfFrequencies) -> _OfFrequencies:
-    """Keep what it gives for arrays that nobody can write to: spectra of a search share them."""
-
-    @lru_cache(maxsize=16)
-    def of_fixed(given: _Fixed) -> FloatArray:
-        found = function(given.f, given.dt)
-        found.flags.writeable = False
-        return found
+def _kept(function: PSD) -> PSD:
+    """Keep results for arrays that nobody can write to: the spectra of a search share them."""
+    known: deque[tuple[FloatArray, float, FloatArray]] = deque(maxlen=16)
 
     @wraps(function)
     def found(f: FloatArray, dt: float) -> FloatArray:
-        is_fixed = isinstance(f, np.ndarray) and f.base is None and not f.flags.writeable
-        return of_fixed(_Fixed(f, dt)) if is_fixed else function(f, dt)
+        if not isinstance(f, np.ndarray) or f.base is not None or f.flags.writeable:
+            return function(f, dt)
+        for array, interval, values in tuple(known):
+            if array is f and interval == dt:
+                return values
+        values = function(f, dt)
+        values.flags.writeable = False
+        known.append((f, dt, values))
+        return values
 
     return found
 
@@ -151,12 +132,6 @@ def legendre(order: int) -> tuple[FloatArray, FloatArray]:
     return x, w
 
 
-def _smooth_cut(u: FloatArray) -> FloatArray:
-    """1 at u <= 0, 0 at u >= 1, infinitely differentiable."""
-    u = np.clip(u, 1e-9, 1.0 - 1e-9)
-    return np.asarray(expit(1.0 / u - 1.0 / (1.0 - u)))
-
-
 def _nodes(m_max: float) -> tuple[FloatArray, FloatArray]:
     """Gauss-Legendre nodes and weights on [0, 1/2], panels graded by octave."""
     x, w = legendre(_NODES_PER_PANEL)
@@ -181,7 +156,8 @@ def resolved_share(m: float, frequency: FloatArray) -> FloatArray:
     share = np.zeros(frequency.size)
     share[:end] = 1.0
     if end < frequency.size:  # the last octave fades out, unless nothing follows
-        share[last:end] = _smooth_cut(frequency[last:end] / octave_low[last:end] - 1.0)
+        u = np.clip(frequency[last:end] / octave_low[last:end] - 1.0, 1e-9, 1.0 - 1e-9)
+        share[last:end] = expit(1.0 / u - 1.0 / (1.0 - u))  # infinitely smooth
     return share
 
 
@@ -219,13 +195,18 @@ _PANEL, _POINTS = 0.125, 12
 through them is as near as rho^-12, rho that of the Bernstein ellipse through the next pole of the
 spectrum (Trefethen 2013, *Approximation Theory and Approximation Practice*, ch. 8)."""
 
-PANEL_POLE = 2.21
+PANEL_POLE, HALF_PANEL = 2.21, 0.5 * _PANEL
 """Distance of that pole in half panels from which the polynomial is good to 1e-8."""
-
-HALF_PANEL = 0.5 * _PANEL
 
 WIDER = 4
 """Panels that are one panel of a spectrum whose poles are as many times as far."""
+
+TOGETHER = 16
+"""Averaging times whose weights at all nodes are in memory at once: 2 MB."""
+
+_ANGLES = np.pi * (np.arange(_POINTS) + 0.5) / _POINTS
+_TAIL = 2.0 / _POINTS * np.cos(np.outer(_ANGLES, np.arange(_POINTS - 3, _POINTS)))
+"""Last three Chebyshev coefficients from the values at the points."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -246,13 +227,12 @@ class Panels:
         """Those of nodes (K,), panel by panel: log tan(pi f) of each, f in cycles per sample."""
         panel = np.floor(nodes / width)
         starts = np.flatnonzero(np.diff(panel, prepend=-np.inf))
-        angles = np.pi * (np.arange(_POINTS) + 0.5) / _POINTS
-        points = np.cos(angles)
+        points = np.cos(_ANGLES)
         within = 2.0 * (nodes / width - panel) - 1.0
         # By the barycentric formula, whose limit at a point is one.
         distance = within[:, None] - points
         distance[distance == 0.0] = np.finfo(float).tiny
-        share = (-1.0) ** np.arange(_POINTS) * np.sin(angles) / distance
+        share = (-1.0) ** np.arange(_POINTS) * np.sin(_ANGLES) / distance
         share /= np.sum(share, axis=1, keepdims=True)
         return cls(width * (panel[starts, None] + 0.5 * (points + 1.0)), starts, share)
 
@@ -268,7 +248,7 @@ class Panels:
     def are_smooth(values: FloatArray) -> npt.NDArray[np.bool_]:
         """Panels on which values at the points, (P, 12), are a polynomial to 1e-10, (P,)."""
         tail = np.max(np.abs(values @ _TAIL), axis=1)
-        return np.asarray(tail <= _SMOOTH * np.max(np.abs(values), axis=1))
+        return np.asarray(tail <= 1e-10 * np.max(np.abs(values), axis=1))
 
 
 @lru_cache(maxsize=8)
@@ -294,20 +274,6 @@ def panel_weights(averaging: tuple[float, ...], times: int = 1) -> tuple[FloatAr
     return panels.points.ravel(), gathered.reshape(len(averaging), -1)
 
 
-TOGETHER = 16
-"""Averaging times of which weights at all nodes are in memory: 2 MB."""
-
-_SMOOTH = 1e-10
-_TAIL = (
-    2.0
-    / _POINTS
-    * np.cos(
-        np.outer(np.pi * (np.arange(_POINTS) + 0.5) / _POINTS, np.arange(_POINTS - 3, _POINTS))
-    )
-)
-"""Last three Chebyshev coefficients from the values at the points."""
-
-
 def haar_variance(psd: PSD, tau: FloatArray, dt: float) -> FloatArray:
     """Haar wavelet variance of a process from its spectrum alone.
 
@@ -330,31 +296,14 @@ def rounded(averaging: tuple[float, ...]) -> tuple[float, ...]:
 def wavelet_variance(
     psd: PSD, lines: Sequence[tuple[float, float]], tau: FloatArray, dt: float, name: str
 ) -> FloatArray:
-    """Wavelet variance by any Daubechies filter, from the spectrum.
+    """Wavelet variance by any Daubechies filter, from the spectrum, same shape as ``tau``, u^2.
 
-    Parameters
-    ----------
-    psd : callable
-        ``psd(f, dt)``, two-sided, u^2/Hz.
-    lines : sequence of (float, float)
-        Spectral lines beside it: frequency (Hz), amplitude (u).
-    tau : array_like
-        Averaging times 2^(j-1) dt in seconds.
-    dt : float
-        Sampling interval in seconds.
-    name : str
-        Wavelet, see `gmwm.process.wavelets.wavelet`.
-
-    Returns
-    -------
-    ndarray
-        Same shape as ``tau``, in u^2.
-
-    Raises
-    ------
-    InputError
-        For averaging times that are not dyadic, an unknown wavelet, or a spectrum that rises so
-        fast towards zero frequency that the coefficients of this wavelet are not stationary.
+    psd: ``psd(f, dt)``, two-sided, u^2/Hz.
+    lines: Spectral lines beside it: frequency (Hz), amplitude (u).
+    tau: Averaging times 2^(j-1) dt in seconds.
+    name: Wavelet, see `gmwm.process.wavelets.wavelet`.
+    Raises InputError for averaging times that are not dyadic, an unknown wavelet, or a spectrum
+        that rises so fast towards zero frequency that the coefficients are not stationary.
     """
     filters = wavelet(name)
     tau = np.asarray(tau, dtype=float)
@@ -365,10 +314,9 @@ def wavelet_variance(
     density = evaluated(psd, weights.frequency / dt, dt) / dt
     _check_stationary(filters, weights, density)
     result = 2.0 * (weights.weight @ density)[level - 1]
-    for row, j in enumerate(level):
-        for frequency, amplitude in lines:
-            alias = frequency * dt - np.rint(frequency * dt)
-            result[row] += 0.5 * amplitude**2 * float(filters.gain(int(j), alias))
+    for frequency, amplitude in lines:
+        alias = np.asarray(frequency * dt - np.rint(frequency * dt))
+        result += 0.5 * amplitude**2 * filters.gains(int(np.max(level)), alias)[level - 1]
     return np.asarray(result.reshape(tau.shape))
 
 

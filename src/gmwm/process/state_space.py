@@ -48,23 +48,38 @@ class StateSpace:
         return len(self.names)
 
     @classmethod
+    def of(
+        cls,
+        names: Sequence[str],
+        transition: FloatArray,
+        noise: FloatArray | None = None,
+        initial: FloatArray | None = None,
+        *,
+        output: Sequence[float] | FloatArray | None = None,
+        mean: Sequence[float] | None = None,
+        measurement_noise: float = 0.0,
+    ) -> StateSpace:
+        """States without noise that start at zero, and whose output is the first, but as given."""
+        p = len(names)
+        return cls(
+            np.reshape(np.asarray(transition, dtype=float), (p, p)),
+            np.zeros((p, p)) if noise is None else np.reshape(noise, (p, p)),
+            np.eye(1, p)[0] if output is None else np.asarray(output, dtype=float),
+            measurement_noise,
+            np.zeros(p) if mean is None else np.asarray(mean, dtype=float),
+            np.zeros((p, p)) if initial is None else np.reshape(initial, (p, p)),
+            tuple(names),
+        )
+
+    @classmethod
     def white(cls, variance: float) -> StateSpace:
         """No states, measurement noise only."""
-        empty = np.zeros((0, 0))
-        return cls(empty, empty, np.zeros(0), variance, np.zeros(0), empty, ())
+        return cls.of((), np.zeros(0), output=(), measurement_noise=variance)
 
     @classmethod
     def scalar(cls, name: str, phi: float, q: float, p0: float) -> StateSpace:
         """One state with transition ``phi``, driving variance ``q``, initial variance ``p0``."""
-        return cls(
-            np.array([[phi]]),
-            np.array([[q]]),
-            np.ones(1),
-            0.0,
-            np.zeros(1),
-            np.array([[p0]]),
-            (name,),
-        )
+        return cls.of((name,), np.array([phi]), np.array([q]), np.array([p0]))
 
     @classmethod
     def stack(cls, parts: Sequence[StateSpace]) -> StateSpace:

@@ -68,22 +68,13 @@ def from_state_space(form: StateSpace, n: int, rng: np.random.Generator) -> Floa
 
 
 def circulant(spectrum: FloatArray, n: int, rng: np.random.Generator) -> FloatArray:
-    """First ``n`` samples of a periodic Gaussian series with the given eigenvalues.
+    """First ``n`` samples of a periodic Gaussian series (Davies & Harte 1987, *Biometrika* 74, 95).
 
-    Parameters
-    ----------
-    spectrum : (N/2 + 1,) ndarray
-        Non-negative eigenvalues of the circulant covariance matrix at frequencies
+    spectrum: (N/2 + 1,), non-negative eigenvalues of its circulant covariance matrix at frequencies
         0, 1/N, ..., 1/2 cycles per sample.
-
-    Notes
-    -----
-    Davies & Harte (1987), *Biometrika* 74, 95-101.
     """
     size = 2 * (spectrum.size - 1)
-    noise = rng.standard_normal(size)
-    transformed = fft.rfft(noise)
-    transformed *= np.sqrt(spectrum)
+    transformed = fft.rfft(rng.standard_normal(size)) * np.sqrt(spectrum)
     return np.asarray(fft.irfft(transformed, size)[:n])
 
 

@@ -30,6 +30,7 @@ positive.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -59,15 +60,6 @@ class GainWeights:
     weight: FloatArray
     lowest: slice
     second: slice
-
-
-@dataclass(frozen=True, eq=False)
-class _Panels:
-    """The panels of one octave, all of width 2^-doublings."""
-
-    doublings: int
-    fine: FloatArray  # (P, _ORDER) frequencies
-    nodes: FloatArray  # (P, _NODES_PER_PANEL) frequencies
 
 
 @lru_cache(maxsize=8)
@@ -100,6 +92,13 @@ def transfer_matrix(factor: FloatArray, other: FloatArray) -> FloatArray:
     return 0.5 * (factor[:, None] * low + other[:, None] * high)
 
 
+def _composite() -> tuple[FloatArray, FloatArray]:
+    """Nodes and weights on [0, 1] that integrate products of gains and Lagrange polynomials."""
+    u, w = unit_legendre(_ORDER)
+    nodes = (np.arange(8)[:, None] + u) / 8
+    return nodes.ravel(), np.tile(w / 8, 8)
+
+
 @lru_cache(maxsize=8)
 def gain_measures(name: str, count: int) -> FloatArray:
     """int_0^1 sin^2r(pi u) |H_j(u)|^2 l_n(u) du, j = 1 .. count, shape (count, _ORDER)."""
@@ -118,41 +117,33 @@ def gain_measures(name: str, count: int) -> FloatArray:
     return result
 
 
-def _composite() -> tuple[FloatArray, FloatArray]:
-    """Nodes and weights on [0, 1] that integrate products of gains and Lagrange polynomials."""
-    u, w = unit_legendre(_ORDER)
-    pieces = 8
-    nodes = (np.arange(pieces)[:, None] + u) / pieces
-    return nodes.ravel(), np.tile(w / pieces, pieces)
+def _octaves(levels: int) -> Iterator[tuple[int, FloatArray, FloatArray]]:
+    """Panels of every octave, from the lowest to the top one.
 
-
-def panels(levels: int) -> list[_Panels]:
-    """The panels of every octave, from the lowest to the top one."""
+    Their width is 2^-s; s, fine frequencies (P, _ORDER), nodes (P, _NODES_PER_PANEL).
+    """
     x, _ = unit_legendre(_NODES_PER_PANEL)
     u, _ = unit_legendre(_ORDER)
-    result = []
     for octave in range(levels + _OCTAVES_BELOW, -1, -1):
         split = _PANELS_LOG2 if octave <= levels + 1 else _PANELS_BELOW_LOG2
         doublings = octave + 2 + split
         start = 2.0**split + np.arange(2**split)[:, None]
-        scale = 0.5**doublings
-        result.append(_Panels(doublings, scale * (start + u), scale * (start + x)))
-    return result
+        yield doublings, 0.5**doublings * (start + u), 0.5**doublings * (start + x)
 
 
-def rest(levels: int) -> tuple[FloatArray, FloatArray]:
+def _rest(levels: int) -> tuple[FloatArray, FloatArray]:
     """Nodes and weights from zero to the lowest octave."""
     x, w = unit_legendre(_NODES_PER_PANEL)
     low = 0.5 ** (levels + _OCTAVES_BELOW + 2)
     return low * x, low * w
 
 
-def unresolved_factor(filters: Wavelet, octave: _Panels) -> FloatArray:
+def _unresolved_factor(filters: Wavelet, doublings: int, fine: FloatArray) -> FloatArray:
     """P_s(f) / sin^2r(pi u) at the fine points of an octave, (P, _ORDER)."""
     power = 2 * filters.vanishing_moments
-    result = (2.0**octave.doublings * np.sin(np.pi * octave.fine)) ** -power
-    for doubling in range(octave.doublings):
-        scaled = np.ldexp(octave.fine, doubling)
+    result = (2.0**doublings * np.sin(np.pi * fine)) ** -power
+    for doubling in range(doublings):
+        scaled = np.ldexp(fine, doubling)
         result *= filters.remainder(scaled - np.rint(scaled))
     return np.asarray(result)
 
@@ -162,31 +153,26 @@ def gain_weights(name: str, levels: int) -> GainWeights:
     """Nodes and weights of the levels 1 to ``levels`` of a wavelet, found once."""
     filters = wavelet(name)
     u, w = unit_legendre(_ORDER)
-    x, _ = unit_legendre(_NODES_PER_PANEL)
-    polynomials = lagrange(x, u)
-    octaves = panels(levels)
+    polynomials = lagrange(unit_legendre(_NODES_PER_PANEL)[0], u)
     measures = gain_measures(name, levels)
-    low_nodes, low_weights = rest(levels)
+    low_nodes, low_weights = _rest(levels)
     # A spectrum may rise to infinity on [0, lowest], but its product with the gain is smooth.
-    pieces = [low_weights * filters.gains(levels, low_nodes)]
-    for octave in octaves:
-        width = 0.5**octave.doublings
-        weight = np.empty((levels, *octave.nodes.shape))
-        direct = min(levels, octave.doublings)
-        weight[:direct] = width * (filters.gains(direct, octave.fine) * w) @ polynomials
+    frequencies, weights = [low_nodes], [low_weights * filters.gains(levels, low_nodes)]
+    for doublings, fine, nodes in _octaves(levels):
+        width, direct = 0.5**doublings, min(levels, doublings)
+        weight = np.empty((levels, *nodes.shape))
+        weight[:direct] = width * (filters.gains(direct, fine) * w) @ polynomials
         if levels > direct:
-            factor = unresolved_factor(filters, octave)
+            factor = _unresolved_factor(filters, doublings, fine)
             for row in range(direct, levels):
                 weight[row] = width * (factor * measures[row - direct]) @ polynomials
-        pieces.append(weight.reshape(levels, -1))
-    frequency = np.concatenate([low_nodes, *(octave.nodes.ravel() for octave in octaves)])
-    weight = np.concatenate(pieces, axis=1)
+        frequencies.append(nodes.ravel())
+        weights.append(weight.reshape(levels, -1))
+    frequency, weight = np.concatenate(frequencies), np.concatenate(weights, axis=1)
     for array in (frequency, weight):
         array.flags.writeable = False
-    first, size = low_nodes.size, octaves[0].nodes.size
-    return GainWeights(
-        frequency, weight, slice(first, first + size), slice(first + size, first + 2 * size)
-    )
+    first, second, third = np.cumsum([each.size for each in frequencies[:3]])
+    return GainWeights(frequency, weight, slice(first, second), slice(second, third))
 
 
 @dataclass(frozen=True, eq=False)
@@ -237,16 +223,16 @@ def pair_weights(name: str, levels: int) -> PairWeights:
     u, w = unit_legendre(_ORDER)
     polynomials = lagrange(unit_legendre(_NODES_PER_PANEL)[0], u)
     first, second = np.triu_indices(levels)
-    low_nodes, low_weights = rest(levels)
+    low_nodes, low_weights = _rest(levels)
     low_gains = filters.gains(levels, low_nodes)
     pieces = [low_weights * low_gains[first] * low_gains[second]]
     single, double = gain_measures(name, levels), _pair_measures(name, levels)
-    for octave in panels(levels):
+    for doublings, fine, nodes in _octaves(levels):
         # The gain of a level is resolved down to the width of a panel, beyond it a measure.
-        direct = min(levels, octave.doublings)
-        gains = filters.gains(direct, octave.fine)
-        factor = unresolved_factor(filters, octave)
-        weight = np.empty((first.size, *octave.nodes.shape))
+        direct = min(levels, doublings)
+        gains = filters.gains(direct, fine)
+        factor = _unresolved_factor(filters, doublings, fine)
+        weight = np.empty((first.size, *nodes.shape))
         for row, (j, k) in enumerate(zip(first, second, strict=True)):
             if k < direct:
                 density = gains[j] * gains[k] * w
@@ -254,7 +240,7 @@ def pair_weights(name: str, levels: int) -> PairWeights:
                 density = gains[j] * factor * single[k - direct]
             else:
                 density = factor**2 * double[j - direct, k - direct]
-            weight[row] = 0.5**octave.doublings * density @ polynomials
+            weight[row] = 0.5**doublings * density @ polynomials
         pieces.append(weight.reshape(first.size, -1))
     weight = np.concatenate(pieces, axis=1)
     weight.flags.writeable = False

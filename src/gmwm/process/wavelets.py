@@ -144,23 +144,23 @@ def _made(name: str) -> Wavelet:
     detail = np.array(source.rec_hi) / np.sqrt(2.0)
     order = int(source.vanishing_moments_psi)
     binomials = np.array([comb(order - 1 + k, k) for k in range(order)], dtype=float)
-    odd = _odd_polynomial(scaling, order)
+    odd = _odd_polynomial(scaling, binomials)
     for array in (scaling, detail, binomials, odd):
         array.flags.writeable = False
     return Wavelet("haar" if name == "db1" else name, scaling, detail, order, binomials, odd)
 
 
-def _odd_polynomial(scaling: FloatArray, order: int) -> FloatArray:
+def _odd_polynomial(scaling: FloatArray, binomials: FloatArray) -> FloatArray:
     """Chebyshev coefficients of R from the gain of a filter longer than 2 r.
 
     |G|^2 - (1 - y)^r sum C(r-1+k, k) y^k = (y (1 - y))^r R(1 - 2y) is linear in R.
     """
+    order = binomials.size
     degree = scaling.size - 1 - 2 * order
     if degree < 1:
         return np.zeros(0)
     f = (np.arange(4 * scaling.size) + 0.5) / (8 * scaling.size)
     y = np.sin(np.pi * f) ** 2
-    binomials = np.array([comb(order - 1 + k, k) for k in range(order)], dtype=float)
     shortest = (1.0 - y) ** order * np.polynomial.polynomial.polyval(y, binomials)
     excess = np.abs(_response(scaling, f)) ** 2 - shortest
     basis = np.polynomial.chebyshev.chebvander(1.0 - 2.0 * y, degree)[:, 1::2]

@@ -24,6 +24,7 @@ from gmwm.readers.recording import (
     Recording as Recording,
     require_recording as require_recording,
 )
+from gmwm.readers.spool import load_columns as load_columns
 from gmwm.readers.table import label as label
 from gmwm.readers.text_file import content_size as content_size
 from gmwm.readers.turning import (

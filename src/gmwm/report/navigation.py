@@ -14,7 +14,7 @@ from gmwm._core.files import writable_file
 from gmwm._core.pages import page_of
 from gmwm._core.text import readable
 from gmwm._core.units import SI_UNIT
-from gmwm.ins.field import Comparison, Navigated, outage_pictures
+from gmwm.ins.logs import Comparison, Navigated
 from gmwm.ins.simulation import QUANTITIES, Consistency, Ratio, Validation
 from gmwm.report.page import write_page
 from gmwm.report.text import duration_text, model_text
@@ -179,7 +179,7 @@ def write_navigated_report(navigated: Navigated, path: str | os.PathLike[str]) -
         n=navigated,
         length=duration_text((imu.n - alignment.epoch) * imu.dt),
         track=svg(navigated.plot_track()),
-        outages=[(title, svg(figure)) for title, figure in outage_pictures(navigated)],
+        outages=[(title, svg(figure)) for title, figure in navigated.plot_outages()],
         innovations=svg(navigated.plot_innovations()),
         tests=[(kind, navigated.test(kind)) for kind in navigated.kinds],
         models=[

@@ -15,7 +15,15 @@ from gmwm._core.distributions import chi2
 from gmwm._core.documents import NotNegative
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
-from gmwm.estimate.moments import Design, Point, Profile, Reference, dictionary_fit, search
+from gmwm.estimate.moments import (
+    TEXTBOOK,
+    Design,
+    Point,
+    Profile,
+    Reference,
+    dictionary_fit,
+    search,
+)
 from gmwm.estimate.problem import (
     Scales,
     Slope,
@@ -26,26 +34,23 @@ from gmwm.estimate.problem import (
     weight_root,
 )
 from gmwm.estimate.result import Fit
-from gmwm.process import (
-    BiasInstability,
-    GaussMarkov,
-    Model,
-    Process,
-    QuantizationNoise,
-    RandomWalk,
-    RateRamp,
-    WhiteNoise,
-)
+from gmwm.process import CATALOGUE, Model, Process
 from gmwm.selection import tuning
 from gmwm.selection.bandwidth import Bandwidth, sensor_bandwidth
 from gmwm.variance import PooledVariance, WaveletVariance
 
 MAX_GAUSS_MARKOV = 5
 
+_RELAXATION = next(kind for kind in TEXTBOOK if kind.ordered_by)
+"""The kind that a model may have several times: Gauss-Markov."""
+
+_FLICKER = next(kind() for kind in CATALOGUE if kind.is_flicker)
+_RAMP = next(kind() for kind in CATALOGUE if kind.is_drift)
+
 
 @dataclass(frozen=True)
 class Choices:
-    """What a model may be made of.
+    """The terms that a model may have.
 
     max_gauss_markov: Largest number of Gauss-Markov terms.
     extra: Further terms of open amplitude and given shape, each of which a candidate may have.
@@ -78,16 +83,16 @@ class Choices:
                 )
 
     def seeing(self, wv: WaveletVariance) -> Choices:
-        """The same with the sensor's low-pass, if these wavelet variances show one."""
+        """The choices with the sensor's low-pass, if these wavelet variances show one."""
         return replace(self, bandwidth=sensor_bandwidth(wv, self.extra, _penalty(wv.n)))
 
     @property
     def given(self) -> tuple[Process, ...]:
-        """All terms of given shape beside the textbook processes."""
+        """All terms of given shape besides the textbook processes."""
         return self.extra if self.bandwidth is None else (*self.extra, self.bandwidth.given)
 
     def opened(self, candidate: Candidate, n: int) -> Candidate:
-        """A candidate with the low-pass as it is to be fitted; its shape has a price."""
+        """A candidate with the low-pass as it is to be fitted; its shape costs parameters."""
         found = self.bandwidth
         if found is None or found.given not in candidate.model.terms:
             return candidate
@@ -102,17 +107,17 @@ class Choices:
 
     @property
     def with_flicker(self) -> Choices | None:
-        """The same with flicker noise; None if that is a choice already."""
-        if any(isinstance(process, BiasInstability) for process in self.extra):
+        """The choices with flicker noise; None if it is one already."""
+        if any(process.is_flicker for process in self.extra):
             return None
-        return replace(self, extra=(*self.extra, BiasInstability()))
+        return replace(self, extra=(*self.extra, _FLICKER))
 
     def bases(self) -> Iterator[tuple[Process, ...]]:
         """All sums of the terms whose shape is given, the empty one first.
 
         A low-pass that was found is in all of them: no sum without it describes the finest levels.
         """
-        kinds: tuple[Process, ...] = (WhiteNoise(), QuantizationNoise(), RandomWalk(), *self.extra)
+        kinds = (*(kind for kind in TEXTBOOK if not kind.ordered_by), *self.extra)
         always = self.given[len(self.extra) :]
         for chosen in product((False, True), repeat=len(kinds)):
             yield (*(kind for kind, on in zip(kinds, chosen, strict=True) if on), *always)
@@ -125,12 +130,11 @@ class Candidate:
     model: With open parameters.
     criterion: Chi-square plus ``3 p ln ln n``; less is better.
     objective: Weighted sum of squares under weights common to all candidates.
-    chi_square: The same on cube roots of the wavelet variances, which are close to normal at coarse
-        levels too: a level of few degrees of freedom that is high by chance asks for a term
-        otherwise.
+    chi_square: Sum of squares on cube roots of the wavelet variances, which are close to normal at
+        coarse levels too: otherwise a level of few degrees of freedom that is high by chance would
+        ask for a term.
     dof: Moments less parameters.
-    compared_only: Whether it is not chosen, however good: flicker noise, which is not among the
-        choices unless it is asked for, describes the data as well as the best of them.
+    compared_only: Whether it is never chosen: flicker noise, unless it is asked for.
     """
 
     model: Model
@@ -154,10 +158,10 @@ def rank(wv: WaveletVariance, choices: Choices) -> tuple[list[Candidate], Slope 
     """
     reference = dictionary_fit(wv, wv.variance, choices.given)
     allowed = reference.discrepancy
-    ground = _Ground.of(wv.variance, reference, allowed)
-    plain = _candidates(wv, ground, choices)
+    common = _CommonWeights.of(wv.variance, reference, allowed)
+    plain = _candidates(wv, common, choices)
     plain.sort(key=lambda item: item[0].criterion)
-    flicker = _flicker(wv, ground, choices)
+    flicker = _flicker(wv, common, choices)
     try:
         slope = None if isinstance(wv, PooledVariance) else _slope_under(plain[0], wv)
     except InputError:  # samples missing all over leave none to be seen
@@ -174,9 +178,9 @@ def rank(wv: WaveletVariance, choices: Choices) -> tuple[list[Candidate], Slope 
             if drift_free.discrepancy < allowed:
                 # Both kinds must be compared under the same allowance.
                 allowed = drift_free.discrepancy
-                ground = _Ground.of(wv.variance, reference, allowed)
-                plain, flicker = _candidates(wv, ground, choices), _flicker(wv, ground, choices)
-            drifting = _candidates(wv, _Ground.of(target, drift_free, allowed), choices)
+                common = _CommonWeights.of(wv.variance, reference, allowed)
+                plain, flicker = _candidates(wv, common, choices), _flicker(wv, common, choices)
+            drifting = _candidates(wv, _CommonWeights.of(target, drift_free, allowed), choices)
             ramped = [_with_ramp(candidate, _penalty(wv.n)) for candidate, _ in drifting]
         elif slope.value**2 / slope.variance > _penalty(wv.n) + tuning.RAMP_MARGIN:
             ambiguous = slope  # a ramp would have won but for the walk
@@ -185,7 +189,7 @@ def rank(wv: WaveletVariance, choices: Choices) -> tuple[list[Candidate], Slope 
 
 
 def _with_rival(ranking: list[Candidate], flicker: Sequence[Candidate]) -> list[Candidate]:
-    """The ranking with what is compared only, where that is as good as the best."""
+    """The ranking with the candidate that is compared only, where it fits equally well."""
     limit = rank_key(ranking[0]) + tuning.TIE
     rivals = [replace(each, compared_only=True) for each in flicker if rank_key(each) <= limit]
     return sorted((*ranking, *rivals), key=rank_key)
@@ -203,8 +207,8 @@ def _drift_free(
 ) -> tuple[FloatArray, Reference, Slope]:
     """Wavelet variances without the drift, the mixture fitted to them, the slope under it.
 
-    Noise fitted with the drift in it makes the slope more uncertain than it is, so the slope is
-    estimated again under the mixture that is left.
+    Noise fitted with the drift in it makes the slope look too uncertain, so the slope is estimated
+    again under the mixture without it.
     """
     for _ in range(tuning.RAMP_ROUNDS):
         target = wv.detrended(slope.value) + bias_of_detrending(wv, slope)
@@ -217,7 +221,7 @@ def _with_ramp(candidate: Candidate, penalty: float) -> Candidate:
     # The slope is a moment of its own: the degrees of freedom stay.
     return replace(
         candidate,
-        model=candidate.model + RateRamp(),
+        model=candidate.model + _RAMP,
         criterion=candidate.criterion + penalty,
         n_parameters=candidate.n_parameters + 1,
     )
@@ -226,7 +230,7 @@ def _with_ramp(candidate: Candidate, penalty: float) -> Candidate:
 def _without_ramp(
     plain: list[tuple[Candidate, Point]], wv: WaveletVariance, squared_slope: float
 ) -> list[Candidate]:
-    """Candidates that pay the squared slope over its variance: under their own noise, if good."""
+    """Candidates that pay the squared slope over its variance, good ones under their own noise."""
     result = []
     for rank, item in enumerate(sorted(plain, key=lambda item: item[0].criterion)):
         price = squared_slope
@@ -267,8 +271,8 @@ def _penalty(n: int) -> float:
 
 
 @dataclass(frozen=True, eq=False)
-class _Ground:
-    """What all candidates are compared on: moments, and their covariance under the mixture."""
+class _CommonWeights:
+    """Moments that all candidates are compared on, and their covariance under the mixture."""
 
     target: FloatArray
     covariance: FloatArray
@@ -276,7 +280,7 @@ class _Ground:
     basis: FloatArray
 
     @classmethod
-    def of(cls, target: FloatArray, reference: Reference, discrepancy: float) -> _Ground:
+    def of(cls, target: FloatArray, reference: Reference, discrepancy: float) -> _CommonWeights:
         covariance = reference.weights(target, discrepancy)
         return cls(target, covariance, weight_root(covariance), reference.curve)
 
@@ -296,46 +300,49 @@ class _Ground:
 
 
 def _candidates(
-    wv: WaveletVariance, ground: _Ground, choices: Choices
+    wv: WaveletVariance, common: _CommonWeights, choices: Choices
 ) -> list[tuple[Candidate, Point]]:
     """All sums whose terms come out positive; white noise where there are none."""
-    found = list(_sums(wv, ground, choices, choices.bases()))
-    return found or [_fallback(wv, ground)]
+    found = list(_sums(wv, common, choices, choices.bases()))
+    return found or [_fallback(wv, common)]
 
 
 def _flicker(
-    wv: WaveletVariance, ground: _Ground, choices: Choices
+    wv: WaveletVariance, common: _CommonWeights, choices: Choices
 ) -> list[tuple[Candidate, Point]]:
     """The best sum with flicker noise, where that is no choice; none if none comes out positive.
 
-    A plateau of many decades is described by several Gauss-Markov processes as far as the data
-    reach; what they are beyond, or where few windows are seen, is another matter.
+    Several Gauss-Markov processes describe a plateau of many decades as far as the data reach, but
+    not beyond.
     """
     more = choices.with_flicker
     if more is None:
         return []
-    bases = (base for base in more.bases() if any(isinstance(p, BiasInstability) for p in base))
-    found = sorted(_sums(wv, ground, more, bases), key=lambda item: item[0].criterion)
+    bases = (base for base in more.bases() if any(p.is_flicker for p in base))
+    found = sorted(_sums(wv, common, more, bases), key=lambda item: item[0].criterion)
     return found[:1]
 
 
 def _sums(
-    wv: WaveletVariance, ground: _Ground, choices: Choices, bases: Iterable[tuple[Process, ...]]
+    wv: WaveletVariance,
+    common: _CommonWeights,
+    choices: Choices,
+    bases: Iterable[tuple[Process, ...]],
 ) -> Iterator[tuple[Candidate, Point]]:
-    """Those on each base, each started from the one with one term less."""
+    """Sums on each base, each started from the one with one term less."""
     for base in bases:
         shapes: list[tuple[float, ...] | None] = [_given_shape(process) for process in base]
         before = np.inf
         for g in range(choices.max_gauss_markov + 1):
             if g == 0 and all(process.is_line for process in base):
                 continue  # lines are no noise
-            model = Model((*base, *(GaussMarkov() for _ in range(g))))
+            model = Model((*base, *(_RELAXATION for _ in range(g))))
             design = Design(model, Scales.of(wv))
             if design.n_free >= wv.tau.size:
                 break
             if g:
                 shapes.append(None)
-            point = search(Profile(design, ground.target, ground.root), shapes)
+            point = search(Profile(design, common.target, common.root), shapes)
             shapes = list(point.shapes)
             if np.any(point.x <= 0.0) or before - point.objective < tuning.USELESS:
                 if g:
@@ -343,14 +350,15 @@ def _sums(
                 before = point.objective
                 continue
             before = point.objective
-            yield choices.opened(ground.candidate(design, point), wv.n), point
+            yield choices.opened(common.candidate(design, point), wv.n), point
 
 
-def _fallback(wv: WaveletVariance, ground: _Ground) -> tuple[Candidate, Point]:
+def _fallback(wv: WaveletVariance, common: _CommonWeights) -> tuple[Candidate, Point]:
     """White noise alone, for records too short for anything else."""
-    design = Design(Model((WhiteNoise(),)), Scales.of(wv))
-    point = search(Profile(design, ground.target, ground.root))
-    return ground.candidate(design, point), point
+    white = next(kind for kind in TEXTBOOK if kind.is_white)
+    design = Design(Model((white,)), Scales.of(wv))
+    point = search(Profile(design, common.target, common.root))
+    return common.candidate(design, point), point
 
 
 def _given_shape(process: Process) -> tuple[float, ...]:

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self, cast
 
 from gmwm._core import checks
 from gmwm._core.documents import Document
-from gmwm._core.frames import frame
 from gmwm._core.jobs import one_blas_thread
+from gmwm._core.tables import frame
 from gmwm._core.text import Printed, wrapped
 from gmwm.errors import InputError
 from gmwm.estimate import Data, Fit, are_several, estimate
@@ -41,6 +41,7 @@ _REDUNDANT = (
     "undetermined",
     "confounded",
 )
+"""Codes of terms that the data do not support."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -68,32 +69,29 @@ class Selection(Document, Printed):
 
     @property
     def ties(self) -> tuple[Candidate, ...]:
-        """Candidates within 2 of the best criterion, which the data hardly distinguish.
+        """Candidates that fit equally well: within 2 of the best criterion.
 
-        Those that are compared only may be better still.
+        Candidates that are compared only may be better still.
         """
         limit = rank_key(self._best) + tuning.TIE
         return tuple(item for item in self.ranking if rank_key(item) <= limit)
 
     @property
     def surpassed_by(self) -> Candidate | None:
-        """What is compared only, where it is better than all choices by more than a tie."""
+        """The candidate that is compared only, where it fits better than all choices."""
         first = self.ranking[0]
         return first if rank_key(first) + tuning.TIE < rank_key(self._best) else None
 
     @property
     def _best(self) -> Candidate:
-        """Of those that may be chosen."""
+        """The best candidate that may be chosen."""
         return next(item for item in self.ranking if not item.compared_only)
 
     @cached_property
     def rivals(self) -> tuple[Fit, ...]:
-        """Fits of the other candidates that tie, but for those with a redundant term.
-
-        These are as good as the model without the term.
-        """
+        """Fits of the other candidates that fit equally well, without redundant terms."""
         others = [item for item in self.ties if item is not self.chosen][: tuning.RIVALS]
-        fits = [(item, _fitted(item.model, self.fit.wv)) for item in others]
+        fits = [(item, estimate(item.model, self.fit.wv)) for item in others]
         return tuple(
             fit
             for item, fit in fits
@@ -102,11 +100,11 @@ class Selection(Document, Printed):
         )
 
     def ranges(self, level: float = 0.95) -> dict[str, tuple[float, float]]:
-        """What is known of each parameter where several models tie: all of their intervals.
+        """Range of each parameter over all models that fit equally well: their intervals joined.
 
-        A parameter of the chosen model is found in another by its name, those of Gauss-Markov
-        terms by the nearest correlation time, one to one. Where the other model does without the
-        term, the range of its amplitude begins at zero. At most five rivals are fitted, the best.
+        A parameter of the chosen model is found in another by its name, those of Gauss-Markov terms
+        by the nearest correlation time, one to one. Where the other model has no such term, the
+        range of its amplitude begins at zero. At most five rivals are fitted, the best.
 
         Parameters
         ----------
@@ -117,7 +115,7 @@ class Selection(Document, Printed):
         -------
         dict
             Key -> (lower, upper) in SI units, for every estimated parameter of the chosen model;
-            `Fit.interval` where nothing ties.
+            `Fit.interval` where no other model fits equally well.
 
         Raises
         ------
@@ -177,17 +175,19 @@ class Selection(Document, Printed):
         if len(self.ranking) > _SHOWN:
             lines.append(f"  and {len(self.ranking) - _SHOWN} more")
         if len(ties) > 1:
-            lines.append("= these tie: the data hardly distinguish them, the simplest is preferred")
+            lines.append("= these fit equally well: the simplest is preferred")
         if any(item.compared_only for item in self.ranking):
             lines += wrapped(
                 "flicker noise is compared only: extra=[BiasInstability()] makes it a choice",
-                first="~ ", indent=2,
-            )  # fmt: skip
+                first="~ ",
+                indent=2,
+            )
         if self.chosen not in ties:
             lines += wrapped(
-                "it is simpler than the first, and as good under weights of its own",
-                first="> ", indent=2,
-            )  # fmt: skip
+                "chosen: simpler, fits equally well under its own weights",
+                first="> ",
+                indent=2,
+            )
         return "\n".join(lines)
 
 
@@ -238,7 +238,7 @@ def select(
     slope must be no accident of a walk that the record does not resolve
     (`gmwm.estimate.problem.ramp.slope_p_value`). Terms that come out as zero
     make a model equal to a smaller one, and it is left out of the ranking. Models within 2 of the
-    best are a tie, in which the smaller one wins. Of the best candidates the first one is chosen
+    best fit equally well, and the smallest of them wins. The first of the best candidates is chosen
     whose own fit finds all of its terms identifiable and misses no averaging time by far
     (`Goodness.is_excluded`). The mixture follows coarse levels that are low by chance and gives
     them small errors, so that a random walk may look worse than a Gauss-Markov process of long
@@ -246,9 +246,9 @@ def select(
     implies itself, is preferred.
 
     The best candidate with flicker noise is in the ranking where it is as good as the best of the
-    others, and among the rivals, but is not chosen unless ``extra`` has a `BiasInstability`: models
-    of it have no few states for a filter. Where it wins by far, what the chosen model says beyond a
-    tenth of the record is doubtful.
+    others, and among the rivals, but is not chosen unless ``extra`` has a `BiasInstability`, which
+    takes a filter many states. Where it wins by far, predictions of the chosen model beyond a tenth
+    of the record are doubtful.
     """
     if not isinstance(extra, Iterable):
         raise InputError(
@@ -265,7 +265,7 @@ def select(
         return _by_merging(wv, choices)
     ranked, slope = rank(wv, choices.seeing(wv))
     ranking = tuple(ranked)
-    chosen, fitted = _chosen([item for item in ranking if not item.compared_only], wv)
+    chosen, fitted = _choose([item for item in ranking if not item.compared_only], wv)
     if chosen not in ranking:
         ranking = tuple(sorted((*ranking, chosen), key=rank_key))
     if slope is not None and not _has_ramp(chosen.model):
@@ -273,7 +273,7 @@ def select(
     return Selection(ranking, chosen, _of_each(chosen, fitted, wv))
 
 
-def _chosen(ranking: Sequence[Candidate], wv: WaveletVariance) -> tuple[Candidate, Fit]:
+def _choose(ranking: Sequence[Candidate], wv: WaveletVariance) -> tuple[Candidate, Fit]:
     """The best of a ranking that the data support, and its fit."""
     limit = rank_key(ranking[0]) + tuning.TIE
     tried: list[tuple[Candidate, Fit]] = []
@@ -281,8 +281,8 @@ def _chosen(ranking: Sequence[Candidate], wv: WaveletVariance) -> tuple[Candidat
     for candidate in _simplest_of_ties(ranking)[: tuning.FITS]:
         if found is not None and rank_key(candidate) > limit:
             break
-        fitted = _fitted(candidate.model, wv)
-        if not _is_acceptable(fitted):
+        fitted = estimate(candidate.model, wv)
+        if not _is_supported(fitted):
             tried.append((candidate, fitted))
         elif found is None or found[1].goodness.loses_to(fitted.goodness):
             found = candidate, fitted
@@ -306,21 +306,21 @@ def _chosen(ranking: Sequence[Candidate], wv: WaveletVariance) -> tuple[Candidat
 def _supported_part(
     ranking: Sequence[Candidate], candidate: Candidate, fitted: Fit, wv: WaveletVariance
 ) -> tuple[Candidate, Fit] | None:
-    """A model less its terms that the data do not support; None if what is left is no better."""
+    """A model without the terms that the data do not support; None if that is no better."""
     while (term := _doubtful_term(fitted)) is not None:
         left = list(candidate.model.terms)
-        left.remove(next(each for each in left if _stands_for(each, term)))
+        left.remove(next(each for each in left if _fills_in(each, term)))
         if all(each.is_drift or each.is_line for each in left):
             return None
         model = Model(tuple(left))
-        fitted = _fitted(model, wv)
+        fitted = estimate(model, wv)
         known = (item for item in ranking if item.model == model)
         candidate = next(known, replace(candidate_of(fitted), model=model))
-    return (candidate, fitted) if _is_acceptable(fitted) else None
+    return (candidate, fitted) if _is_supported(fitted) else None
 
 
 def _doubtful_term(fitted: Fit) -> Process | None:
-    """A term that a fit finds no support for."""
+    """A term that the data do not support."""
     model = fitted.model
     owners = {item.key: model.terms[item.term] for item in model.parameters}
     kinds = {type(term).__name__: term for term in model.terms}
@@ -330,14 +330,14 @@ def _doubtful_term(fitted: Fit) -> Process | None:
     return None
 
 
-def _stands_for(term: Process, fitted: Process) -> bool:
+def _fills_in(term: Process, fitted: Process) -> bool:
     """Whether a term of a candidate is that of the fit."""
     given = {name: value for name, value in term.values.items() if value is not None}
     return type(term) is type(fitted) and given.items() <= fitted.values.items()
 
 
-def _is_acceptable(fitted: Fit) -> bool:
-    """Whether all terms of a fit are supported and no averaging time is missed by far."""
+def _is_supported(fitted: Fit) -> bool:
+    """Whether the data support all terms of a fit and no averaging time is missed by far."""
     return fitted.valid or not (_has_redundant_term(fitted) or fitted.goodness.is_excluded)
 
 
@@ -348,27 +348,22 @@ def _by_merging(wv: WaveletVariance, choices: Choices) -> Selection:
     for g in range(choices.max_gauss_markov, -1, -1):
         if g and len(base) + 2 * g >= wv.tau.size:
             continue
-        fits.append(_fitted(Model((*base, *(GaussMarkov() for _ in range(g)))), wv))
+        fits.append(estimate(Model((*base, *(GaussMarkov() for _ in range(g)))), wv))
         if not _gauss_markov_is_redundant(fits[-1]):
             break
     ranking = tuple(candidate_of(fitted) for fitted in reversed(fits))
     return Selection(ranking, ranking[0], _of_each(ranking[0], fits[-1], wv))
 
 
-def _fitted(model: Model, wv: WaveletVariance) -> Fit:
-    """Of several recordings, to their mean: a choice does not need the fit to each of them."""
-    return estimate(model, wv)
-
-
 def _of_each(chosen: Candidate, fitted: Fit, wv: WaveletVariance) -> Fit:
-    """The fit of the chosen model with those to each recording, where there are several."""
+    """The fit of the chosen model, with the fits to each recording where there are several."""
     if not isinstance(wv, PooledVariance):
         return fitted
     return fit_joint(chosen.model, wv.parts, estimate, fitted)
 
 
 def _simplest_of_ties(ranking: Sequence[Candidate]) -> list[Candidate]:
-    """The ranking with the candidates that tie with the best one ordered by size."""
+    """The ranking with the candidates that fit as well as the best one ordered by size."""
     limit = rank_key(ranking[0]) + tuning.TIE
     tied = [item for item in ranking if rank_key(item) <= limit]
     tied.sort(key=lambda item: item.n_parameters)
@@ -378,7 +373,7 @@ def _simplest_of_ties(ranking: Sequence[Candidate]) -> list[Candidate]:
 def _simplest_by_own_fit(
     ranking: Sequence[Candidate], best: Candidate, fitted: Fit, wv: WaveletVariance
 ) -> tuple[Candidate, Fit]:
-    """A simpler candidate that is as good under the weights that it implies, or the best one."""
+    """A simpler candidate that fits equally well under its own weights, or the best one."""
     limit = rank_key(best) + tuning.CONTEST
     simpler = [
         item
@@ -388,10 +383,10 @@ def _simplest_by_own_fit(
         and _has_ramp(item.model) == _has_ramp(best.model)
     ]
     for candidate in simpler[: tuning.COMPARED]:
-        other = _fitted(candidate.model, wv)
+        other = estimate(candidate.model, wv)
         as_good = _own_criterion(candidate, other) <= _own_criterion(best, fitted) + tuning.TIE
         as_good = as_good and other.discrepancy <= fitted.discrepancy
-        if as_good and _is_acceptable(other) and not other.goodness.loses_to(fitted.goodness):
+        if as_good and _is_supported(other) and not other.goodness.loses_to(fitted.goodness):
             return candidate, other
     return best, fitted
 

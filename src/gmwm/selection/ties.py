@@ -1,7 +1,7 @@
-"""What stays open where several models describe the data equally well.
+"""Ranges of parameters where several models fit equally well.
 
-The interval of a parameter holds if its model is the right one. Where other models are as good, the
-parameter of each of them is as good an answer, and their intervals together are what is known.
+The interval of a parameter holds if its model is the right one. Where other models fit equally
+well, their intervals count too, and the range joins them.
 """
 
 from __future__ import annotations

@@ -1,47 +1,31 @@
 """Constants of the selection that change answers, each with its source or its reason.
 
-``python benchmarks/tuning.py`` halves and doubles every one of them and prints what that
-does.
+``python benchmarks/tuning.py`` halves and doubles every one of them and prints the effect.
 """
 
-STRICTNESS = 1.5
-"""The c of Hannan & Quinn (1979); consistent above 1."""
+STRICTNESS = 1.5  # the c of Hannan & Quinn (1979); consistent above 1
 
 TIE = 2.0
-"""Difference of the criterion within which the data hardly distinguish models (twice the
-log-likelihood: Burnham & Anderson 2002, *Model Selection and Multimodel Inference*, sec. 2.6)."""
+"""Difference of the criterion within which models fit equally well (twice the log-likelihood:
+Burnham & Anderson 2002, *Model Selection and Multimodel Inference*, sec. 2.6)."""
 
 RAMP_MARGIN = 6.0
 """Of the criterion, by which a rate ramp must win: a straight line passes through any slow drift
 that is seen only once."""
 
-RAMP_P = 0.002
-"""Level below which a slope is not an accident of a walk that the record does not resolve."""
-
-RAMP_PLAUSIBLE = 2.0
-"""Squared slope over its variance, below which no ramp is tried."""
-
-RAMP_ROUNDS = 3
-"""Rounds of the slope under the mixture that is left without it."""
-
-USELESS = 1.0
-"""Gain of a Gauss-Markov process in the objective below which the search for more ends."""
+RAMP_P = 0.002  # level below which a slope is no accident of an unresolved random walk
+RAMP_PLAUSIBLE = 2.0  # squared slope over its variance, below which no ramp is tried
+RAMP_ROUNDS = 3  # rounds of the slope under the mixture that is left without it
+USELESS = 1.0  # gain of a Gauss-Markov process in the objective that ends the search for more
 
 FITS = 5
 """Candidates that are fitted in full before the best one is taken as it is, and candidates without
 a ramp whose own noise prices the slope."""
 
-CONTEST = 40.0
-"""Of the criterion, up to which simpler candidates are compared by their own fit ..."""
-
-COMPARED = 3
-"""... and how many of them."""
-
-RIVALS = 5
-"""Models of a tie that are fitted to show what it leaves open."""
-
-WIDER = 1.2
-"""Times the interval, from which on the range of a tie is reported."""
+CONTEST = 40.0  # of the criterion, up to which simpler candidates are compared by their own fit ...
+COMPARED = 3  # ... and how many of them
+RIVALS = 5  # models that fit equally well of which the fits are shown
+WIDER = 1.2  # times the interval, from which on the range over models is reported
 
 BANDWIDTH_GAIN = 2.0
 """Times the price of its parameters: what a low-pass must gain over a mixture of textbook processes

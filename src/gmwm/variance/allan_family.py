@@ -209,7 +209,7 @@ def deviations(
             "these deviations are computed by allantools, which is not installed: install it with "
             "pip install 'gmwm[allan]'"
         ) from None
-    channel = data if isinstance(data, Channel) else as_channel(data, dt)
+    channel = as_channel(data, dt)
     values, runs, _ = checked_samples(channel)
     if not runs.is_complete:
         raise InputError(

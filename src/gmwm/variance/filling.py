@@ -223,10 +223,8 @@ class Filling:
                 for octave in np.unique(gaps.octave[new]):
                     own = new & (gaps.octave == octave)
                     weights = self.weights[gaps.kinds[1][own]]
-                    fill(
-                        values, integral, gaps.edges[own], gaps.block[own], gaps.boxes[own],
-                        weights, slope,
-                    )  # fmt: skip
+                    places = gaps.edges[own], gaps.block[own], gaps.boxes[own]
+                    fill(values, integral, *places, weights, slope)
                     accumulate(values, 0.0, integral)
                 done |= new
             levels.append(j)

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from gmwm._core import checks
-from gmwm._core.spool import scaled
+from gmwm._core.spool import release, scaled
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.process import wavelet as known_wavelet
@@ -21,7 +21,7 @@ from gmwm.variance.levels import Levels
 from gmwm.variance.wavelet import WaveletVariance
 
 MIN_SAMPLES = 8
-"""Fewest samples of which a wavelet variance is made."""
+"""Fewest samples for a wavelet variance."""
 
 
 def wavelet_variance(
@@ -38,9 +38,9 @@ def wavelet_variance(
 
     All levels with at least one coefficient free of end effects are given; the mean of the series
     does not matter. Missing samples are NaN: with the Haar wavelet, gaps of up to a quarter of an
-    averaging time are filled from what is around them, and what that changes in the expected
-    variance is taken off again (`gmwm.variance.filling`). Coefficients that other missing
-    samples take part in are left out.
+    averaging time are filled from the samples around them, and the bias of the filling is
+    subtracted (`gmwm.variance.filling`). Coefficients that contain other missing samples are left
+    out.
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ def wavelet_variance(
     Stebler et al. (2012). The Haar variance of averaging time tau is half the overlapping Allan
     variance.
     """
-    channel = data if isinstance(data, Channel) else as_channel(data, dt)
+    channel = as_channel(data, dt)
     values, runs, mean = checked_samples(channel)
     confidence = checks.share("confidence", confidence, 0.95)
     efficiency = checks.share("efficiency", efficiency, 0.6)
@@ -80,25 +80,22 @@ def wavelet_variance(
     if data_covariance is not None:
         checks.choice("data_covariance", data_covariance, WINDOWS)
     wavelet = "haar" if wavelet == "db1" else wavelet
-    if (width := known_wavelet(wavelet).width(1)) > runs.longest:
-        raise InputError(
-            f"{where_of(channel)} has no {width} samples in a row, which {wavelet} needs: "
-            "take a shorter wavelet, e.g. haar"
-        )
+    _check_width(channel, runs, wavelet)
     values = scaled(values, 1.0, -mean)
     levels = Levels.of(values, runs, wavelet, channel.dt)
     moments, driftless = levels.moments(), None
     if robust:
         moments = _robust_moments(levels.coefficients(), efficiency)
-        driftless = _robust_moments(levels.coefficients(level=True), efficiency)[:, 1]
-        driftless = driftless / (1.0 + levels.change)
+        level = _robust_moments(levels.coefficients(level=True), efficiency)
+        driftless = level[:, 1] / (1.0 + levels.change)
     blocks, block = levels.block_means()
+    release(channel.values)
     found = None
     if data_covariance is not None:
-        # The bias of the filling is subtracted, its error stays.
-        factor = (1.0 + levels.error) / (1.0 + levels.change)
         longest = int(np.max(levels.counts))
         found = covariance_of_data(levels.coefficients(), longest, data_covariance)
+        # The bias of the filling is subtracted, its error stays.
+        factor = (1.0 + levels.error) / (1.0 + levels.change)
         found = found * np.outer(factor, factor)
     variance = levels.unfilled(moments)
     if not np.any(variance > 0.0):
@@ -125,6 +122,15 @@ def wavelet_variance(
         fourth_cumulant=0.0 if robust else fourth_cumulant(values),
         data_covariance=found,
     )
+
+
+def _check_width(channel: Channel, runs: Runs, wavelet: str) -> None:
+    width = known_wavelet(wavelet).width(1)
+    if width > runs.longest:
+        raise InputError(
+            f"{where_of(channel)} has no {width} samples in a row, which {wavelet} needs: "
+            "take a shorter wavelet, e.g. haar"
+        )
 
 
 def _robust_moments(parts: Iterable[FloatArray], efficiency: float) -> FloatArray:
@@ -219,11 +225,13 @@ def as_wavelet_variance(
     return data
 
 
-def as_channel(data: FloatArray | Sequence[float], dt: float | None) -> Channel:
-    """A channel without a name from an array and its sampling interval (s).
+def as_channel(data: Channel | FloatArray | Sequence[float], dt: float | None) -> Channel:
+    """A channel as it is, or one without a name from an array and its sampling interval (s).
 
     Raises InputError if either is not usable.
     """
+    if isinstance(data, Channel):
+        return data
     if dt is None:
         raise InputError("an array has no sampling interval: give it in seconds, e.g. dt=0.01")
     interval = checks.sampling_interval(dt)

@@ -6,15 +6,14 @@ import numpy as np
 import pytest
 
 from gmwm import Channel, Recording, Resonance, Sinusoid, WhiteNoise
-from gmwm._core.notices import Notice
 from gmwm.calibration import tuning
 from gmwm.calibration.screening import (
-    _is_much,
+    offered_terms,
     screened,
     stretches_at_rest,
-    terms_of,
     with_outcomes,
 )
+from gmwm.issues import Notice
 from gmwm.process import as_model
 
 LINES = [(10.0 + k, 1.0 - 0.1 * k) for k in range(tuning.MOST_TERMS + 2)]
@@ -27,7 +26,7 @@ def test_terms_are_offered_for_what_is_chosen(chosen):
     lines = [Sinusoid(frequency=f) for f, _ in LINES] if "lines" in chosen else []
     bumps = [Resonance(frequency=f, damping=d) for f, d in BUMPS] if "resonances" in chosen else []
     expected = [*bumps[:1], *lines, *bumps[1:]][: tuning.MOST_TERMS]
-    assert terms_of(FOUND, "gyro_x", chosen) == tuple(expected)
+    assert offered_terms(FOUND, "gyro_x", chosen) == tuple(expected)
 
 
 @pytest.mark.parametrize(("off", "near"), [(0.99, True), (1.01, False), (-0.99, True)])
@@ -50,12 +49,6 @@ def test_what_became_of_a_line(off, near):
     assert said(plain, {}) == "not tried as a term of the model"
     resonance = {"gyro_x": WhiteNoise(1.0) + Resonance(1.0, 10.0, 0.1)}
     assert said(resonance, {}) == "not tried as a term of the model"
-
-
-def test_events_are_much_beyond_a_share():
-    most = round(tuning.MOST_LEFT_OUT * 1000)
-    assert not _is_much([(0, most - 5), (100, 105)], 1000)
-    assert _is_much([(0, most - 5), (100, 106)], 1000)
 
 
 def test_of_two_rates_each_has_its_stretches_at_rest():

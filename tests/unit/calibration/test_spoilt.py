@@ -66,9 +66,6 @@ SPOILT = {
     "wrapped round at 1.5 sd": (
         "abrupt-end", "within_range", (clean(1) + 1.5 * SD) % (3.0 * SD) - 1.5 * SD
     ),
-    "bit 3 stuck, steps of 0.25 sd": (
-        "abrupt-end", "within_range", 0.25 * SD * (np.rint(4.0 * clean(1) / SD).astype(int) | 8)
-    ),
     "uniform": ("abrupt-end", "within_range", SD * np.random.default_rng(1).random(N)),
     "10 % held, steps of 0.4 sd": ("held", "samples_measured", held(0.1, 0.4)),
     "10 % between their neighbours": ("filled", "samples_measured", filled(0.1)),

@@ -7,6 +7,7 @@ from examining import examined, only
 import gmwm
 from gmwm import RandomWalk, WhiteNoise
 from gmwm.diagnosis.samples import cut_off_or_abrupt_end
+from marks import slow
 
 SEEDS = range(60)
 
@@ -135,3 +136,14 @@ def test_the_ends_at_which_samples_are_cut_are_named(step):
     assert ends(x[x < 1.45]) == ("bad", near(1.45, abs=0.06), near(1.45, abs=0.06))
     # Samples that are sorted out beyond 2.2 deviations make the noise a tenth smaller at most.
     assert ends(x[x < 2.25])[0] == "warning"
+
+
+@pytest.mark.parametrize(("step", "severity"), [(0.1, "bad"), (0.02, "warning"), (0.5, "bad")])
+@pytest.mark.parametrize("law", ["normal", slow("laplace")])
+def test_samples_cut_towards_zero_are_named_and_rounded_ones_are_not(step, severity, law):
+    scale = {"normal": 1.0, "laplace": 0.6}[law]
+    noise = getattr(np.random.default_rng(3), law)(0.0, scale, size=200_000)
+    channels = {"gyro_x": np.trunc(noise / step) * step, "gyro_y": np.rint(noise / step) * step}
+    rec = gmwm.Recording.from_arrays(channels, 100.0, {"gyro": "deg/s"})
+    (notice,) = gmwm.health(rec).of(code="value-repeated")
+    assert (notice.where, notice.severity) == ("gyro_x", severity)

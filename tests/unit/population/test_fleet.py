@@ -4,6 +4,7 @@ import json
 import pickle
 import shutil
 from dataclasses import FrozenInstanceError, replace
+from functools import wraps
 
 import numpy as np
 import pyarrow.parquet as pq
@@ -13,7 +14,7 @@ import gmwm
 from fleets import QUICK
 from gmwm import Calibration, Fleet, InputError, Model, RandomWalk, WhiteNoise
 from gmwm._core.notices import Notice
-from gmwm.population import DERIVED, SCHEMA, Item, Task, task as tasks
+from gmwm.population import DERIVED, SCHEMA, Item, Number, Task, task as tasks
 
 READING = ("rate", "units")
 
@@ -105,7 +106,7 @@ def test_a_fleet_is_a_mapping_of_paths_to_calibrations_or_why_not(lot, outputs):
     assert repr(found) == "<Fleet of 4 units: 3 calibrated, 1 not>"
 
 
-def test_it_prints_what_units_have_in_common(outputs):
+def test_a_fleet_prints_what_units_have_in_common(outputs):
     text = str(outputs[1])
     assert "4 units: 3 calibrated, 3 of them with a valid model" in text
     assert "_b_damaged: <b>damaged.npz is not an NPZ file" in text
@@ -138,7 +139,7 @@ def test_numbers_of_a_filter_are_those_of_bound(lot, outputs):
     found = outputs[1]
     expected = gmwm.bound(found[lot[0]]["gyro_x"], horizon=60.0)
     number = found.units[lot[0]].numbers["gyro_x"]
-    assert number["filter_N"] == (expected.N, expected.stderr["N"], True)
+    assert number["filter_N"] == Number(expected.N, expected.stderr["N"], True)
     # Without a walk in the model, K is an upper bound.
     assert number["filter_K"].value > 0.0
     assert not number["filter_K"].found
@@ -207,13 +208,13 @@ def test_units_of_other_options_are_not_mixed_in(lot, copied, worked, change, ot
     assert worked == []
 
 
-def test_nor_those_of_another_version(lot, copied, monkeypatch):
+def test_units_of_another_version_are_not_mixed_in(lot, copied, monkeypatch):
     monkeypatch.setattr("gmwm._core.__version__", "0.0.0")
     with pytest.raises(InputError, match="other version"):
         gmwm.fleet(lot, folder=copied, resume=True, **QUICK)
 
 
-@pytest.mark.parametrize("damage", ["empty", "cut", "foreign", "plain", "numbers", "list"])
+@pytest.mark.parametrize("damage", ["empty", "cut", "foreign", "plain", "numbers", "list", "null"])
 def test_a_damaged_or_foreign_calibration_is_refused_in_one_sentence(
     lot, outputs, copied, worked, damage
 ):
@@ -226,24 +227,15 @@ def test_a_damaged_or_foreign_calibration_is_refused_in_one_sentence(
         del content["fleet"]
     path.write_text({
         "empty": "", "cut": text[: len(text) // 2], "foreign": '{"schema": "x", "fleet": {}}',
-        "list": "[1]",
+        "list": "[1]", "null": "null",
     }.get(damage, json.dumps(content)))  # fmt: skip
-    with pytest.raises(InputError) as caught:
-        gmwm.fleet(lot, folder=copied, resume=True, **QUICK)
-    assert str(path) in str(caught.value)
-    assert "\n" not in str(caught.value)
-    assert worked == []
-
-
-@pytest.mark.parametrize("text", ["{}", "[]", "null", "3", '"fleet"', '["fleet"]'])
-def test_what_is_no_calibration_is_not_taken_for_one(lot, copied, worked, text):
-    path = copied / "calibrations" / "unit 0.json"
-    path.write_text(text)
     for again in (lambda: gmwm.fleet(lot, folder=copied, resume=True, **QUICK),
-                  lambda: gmwm.Fleet.load(copied)):  # fmt: skip
-        with pytest.raises(InputError, match=r"unit 0\.json: was not written by a fleet: move it"):
+                  lambda: Fleet.load(copied)):  # fmt: skip
+        with pytest.raises(InputError) as caught:
             again()
-    assert (worked, path.read_text()) == ([], text)
+        assert str(path) in str(caught.value)
+        assert "\n" not in str(caught.value)
+    assert worked == []
 
 
 def test_another_recording_of_the_same_name_is_not_taken_for_it(record, tmp_path, worked):
@@ -439,6 +431,7 @@ def test_a_recording_that_changes_meanwhile_is_not_taken_for_the_other(
     given = str(tmp_path / "in") if is_folder else path
     at_rest = gmwm.read(path, 1.0, {"gyro": "rad/s"})
 
+    @wraps(gmwm.read)
     def changed(*_, **__):
         record(tmp_path / "in" / "a.npz", seed=9, n=300)
         return at_rest

@@ -131,7 +131,7 @@ def test_the_reversed_order_gives_the_same_verdicts(three, compared):
         assert back[name].numbers.value("N") == pytest.approx(axis.numbers.value("N"), rel=1e-3)
 
 
-def test_it_shows_itself(compared, tmp_path):
+def test_a_comparison_shows_itself(compared, tmp_path):
     assert repr(compared).startswith("<SensorComparison of 3 recordings, 3 axes: 1 agree")
     assert max(map(len, str(compared).splitlines())) <= 80
     assert list(compared.to_frame()["state"]) == ["differ", "agree", "untested"]

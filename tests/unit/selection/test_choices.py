@@ -7,21 +7,18 @@ import pytest
 
 import gmwm
 from gmwm import (
-    AveragedNoise,
-    GaussMarkov,
     InputError,
     LowPassNoise,
     QuantizationNoise,
     RandomWalk,
+    RateRamp,
     Sinusoid,
     WhiteNoise,
 )
-from gmwm.estimate.moments import dictionary_fit
 from gmwm.process import as_model
-from gmwm.selection import tuning
-from gmwm.selection.bandwidth import Bandwidth, _Beside
-from gmwm.selection.ranking import Candidate, Choices, candidate_of
-from gmwm.selection.select import Selection, _simplest_of_ties
+from gmwm.selection.bandwidth import Bandwidth
+from gmwm.selection.ranking import Candidate, Choices, candidate_of, rank_key
+from gmwm.selection.select import _SHOWN, Selection, _simplest_of_ties
 
 FILTER = Bandwidth(
     LowPassNoise(bandwidth=20.0, order=2.0, damping=0.7), LowPassNoise(order=2.0, damping=0.7), 2
@@ -86,21 +83,19 @@ def test_the_smallest_of_those_within_two_comes_first_and_the_rest_stays():
     lines = str(selection).splitlines()
     assert [line[:2] for line in lines[1:5]] == [" =", " =", ">=", "  "]
     assert [float(line[2:12]) for line in lines[1:5]] == pytest.approx([0.0, 1.0, 1.9, 2.1])
-    assert "these tie" in lines[5] and len(lines) == 6
+    assert "fit equally well" in lines[5] and len(lines) == 6
     other = str(replace(selection, chosen=ranking[3]))
-    assert "simpler than the first" in other and "> " in other
+    assert "chosen: simpler" in other and "> " in other
 
 
 def test_more_candidates_than_are_shown_are_counted():
-    from gmwm.selection.select import _SHOWN
-
     fit = gmwm.fit(WhiteNoise(), WhiteNoise(1.0).simulate(100, 1.0, 1), dt=1.0)
     for extra in (0, 1, 3):
         ranking = tuple(candidate(5.0 * k) for k in range(_SHOWN + extra))
         text = str(Selection(ranking, ranking[0], fit))
         assert (f"and {extra} more" in text) is (extra > 0)
         assert text.count("white noise") == _SHOWN
-        assert "these tie" not in text
+        assert "equally" not in text
 
 
 def test_a_candidate_of_a_fit_has_its_statistic_and_price():
@@ -116,53 +111,21 @@ def test_a_candidate_of_a_fit_has_its_statistic_and_price():
         assert candidate_of(replace(fit, dof=dof)).chi_square == statistic
 
 
-# -- the sensor's low-pass ------------------------------------------------------------------------
-
-DT = 0.01
-
-
-@pytest.fixture(scope="module")
-def averaged():
-    """Wavelet variances of a moving average of 30 samples, and the covariance of their fit."""
-    rng = np.random.default_rng(3)
-    x = np.convolve(rng.normal(size=40_000), np.ones(30) / 30, "valid")
-    wv = gmwm.wavelet_variance(x, dt=DT)
-    return wv, dictionary_fit(wv, wv.variance, ()).covariance
+PLAIN = WhiteNoise() + RandomWalk()
+RAMPED = WhiteNoise() + RateRamp()
 
 
-def test_the_best_window_is_the_best_of_all(averaged):
-    problem = _Beside.of(averaged[0], (), averaged[1], tuning.FILTER_LIKE)
-    found, objective = problem.best(AveragedNoise())
-    curve = problem.scales.unit_curves(AveragedNoise())
-    each = problem.squares(np.stack([curve((m * DT,)) for m in range(2, 60)], axis=1))
-    assert objective == pytest.approx(np.min(each))
-    assert found.given.window == pytest.approx(DT * (2 + int(np.argmin(each))))
-    assert found.given.window == pytest.approx(30 * DT, abs=2 * DT)
-    assert (found.free, found.n_shapes) == (found.given, 1)
+@pytest.mark.parametrize(("lead", "ramp_wins"), [(5.5, False), (6.5, True)])
+def test_a_ramp_wins_by_six_or_not_at_all(lead, ramp_wins):
+    both = [candidate(20.0, model=PLAIN), candidate(20.0 - lead, model=RAMPED)]
+    assert (min(both, key=rank_key).model == RAMPED) is ramp_wins
 
 
-@pytest.mark.parametrize(("start", "first", "last"), [(2, 2, 4), (27, 23, 31), (33, 28, 38)])
-def test_windows_up_to_an_eighth_and_one_away_are_tried(averaged, monkeypatch, start, first, last):
-    problem = _Beside.of(averaged[0], (), averaged[1], tuning.FILTER_LIKE)
-    for sign, expected in ((1.0, first), (-1.0, last)):
-        monkeypatch.setattr(
-            _Beside, "squares", lambda _, curves, sign=sign: sign * np.arange(curves.shape[1])
-        )
-        found, _ = problem._whole_window(AveragedNoise(), (start * DT,))
-        assert found.given.window == pytest.approx(expected * DT)
-
-
-def test_processes_as_fast_as_a_filter_and_a_kind_are_left_out(averaged):
-    whole = _Beside.of(averaged[0], (), averaged[1], fastest=0.0)
-    slow = _Beside.of(averaged[0], (), averaged[1], fastest=5.0)
-    without = _Beside.of(averaged[0], (), averaged[1], 0.0, QuantizationNoise)
-    assert without.curves.shape[1] == whole.curves.shape[1] - 1
-    gone = [c for c in whole.curves.T if not np.any(np.all(c == slow.curves.T, axis=1))]
-    assert gone
-    tau = averaged[0].tau
-    fast = max(t for t in GaussMarkov().shape_grid(DT, averaged[0].n) if t[0] < 5 * DT)
-    next_one = min(t for t in GaussMarkov().shape_grid(DT, averaged[0].n) if t[0] >= 5 * DT)
-    for shape, kept in ((fast, False), (next_one, True)):
-        curve = GaussMarkov().unit_haar_variance(shape, tau, DT)
-        assert np.any(np.all(np.isclose(slow.curves.T, curve, rtol=1e-6), axis=1)) == kept
-    assert whole.objective <= slow.objective
+@pytest.mark.parametrize("n", [1000, 50_000])
+def test_each_parameter_costs_three_times_the_logarithm_of_the_logarithm(n):
+    x = PLAIN.with_params({"N": 1.0, "K": 0.02}).simulate(n, 1.0, 2)
+    selection = gmwm.select(x + np.arange(n) * 30.0 / n, dt=1.0)
+    assert any("ramp" in item.model.title() for item in selection)
+    for item in selection:
+        price = (item.criterion - item.chi_square) / item.n_parameters
+        assert price == pytest.approx(3.0 * np.log(np.log(n)))

@@ -9,7 +9,7 @@ import gmwm
 from gmwm import GaussMarkov, RandomWalk, RateRamp, WhiteNoise
 from gmwm.estimate.problem import Slope
 from gmwm.selection.ranking import candidate_of
-from gmwm.selection.select import _chosen
+from gmwm.selection.select import _choose
 from gmwm.selection.ties import ramp_or_walk
 
 
@@ -63,5 +63,5 @@ def test_where_no_candidate_is_supported_the_part_that_is_takes_its_place():
     )
     too_large = gmwm.fit(WhiteNoise() + GaussMarkov() + RandomWalk(), wv)
     assert not too_large.valid
-    candidate, fit = _chosen((candidate_of(too_large),), wv)
+    candidate, fit = _choose((candidate_of(too_large),), wv)
     assert fit.valid and candidate.model.title() == "white noise + Gauss-Markov"

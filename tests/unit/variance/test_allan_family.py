@@ -16,7 +16,6 @@ from scipy.stats import binom
 
 import gmwm
 from gmwm import BiasInstability, Channel, InputError, RandomWalk, RateRamp, WhiteNoise
-from gmwm.variance.allan_family import _noise_slope
 
 KINDS = ("overlapping", "modified", "hadamard", "total")
 
@@ -293,16 +292,3 @@ def test_without_allantools(monkeypatch):
     monkeypatch.setitem(sys.modules, "allantools", None)
     with pytest.raises(InputError, match=r"install it with pip install 'gmwm\[allan\]'"):
         gmwm.deviations(noise(100), 1.0)
-
-
-@pytest.mark.parametrize(("differences", "power"), [(-1, 2), (0, 0), (1, -2), (2, -4), (3, -4)])
-@pytest.mark.parametrize("seed", range(4))
-def test_the_power_of_a_noise_is_recognised(differences, power, seed):
-    series = np.random.default_rng(seed).normal(size=2000)
-    series = np.diff(series) if differences < 0 else series
-    for _ in range(differences):
-        series = np.cumsum(series)
-    assert _noise_slope(series) == power
-    assert _noise_slope(1e3 * series - np.arange(series.size)) == power
-    assert _noise_slope(series[:3]) == 0
-    assert _noise_slope(np.zeros(10)) == 0

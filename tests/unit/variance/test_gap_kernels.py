@@ -3,9 +3,6 @@
 import numpy as np
 import pytest
 
-from gmwm import RandomWalk, WhiteNoise
-from gmwm.process import haar_gain
-from gmwm.variance.filling import _deviation, _gain, _nodes
 from gmwm.variance.gap_kernels import fill, neighbours
 from gmwm.variance.gaps import Gaps, Runs, window_centres, window_count
 from gmwm.variance.kernels import cumulative
@@ -65,20 +62,6 @@ def test_pairs_of_gaps_are_counted_by_kind_and_distance():
     np.testing.assert_array_equal(found, expected)
 
 
-@pytest.mark.parametrize(("length", "width"), [(1, 1), (5, 8), (30, 64)])
-@pytest.mark.parametrize("block", [1, 4])
-def test_means_on_both_sides_of_a_gap_differ_by_what_the_noise_makes(length, width, block):
-    dt = 0.5
-    white = WhiteNoise(2.0)  # each sample has a variance of 8
-    found = _deviation(white.psd, dt, block, length, width)
-    assert found == pytest.approx(np.sqrt(2.0 * 8.0 / (width * block)), rel=0.02)
-    walk = RandomWalk(3.0)
-    found = _deviation(walk.psd, dt, block, length, width)
-    # Of a walk: what it goes between two means of w steps with a gap of L between them.
-    expected = 9.0 * dt * block * (length + 2.0 * width / 3.0)
-    assert found == pytest.approx(np.sqrt(expected), rel=0.1)
-
-
 def windows_of(values, present, m):
     """Haar coefficients of neighbouring means of what is there, by a loop."""
     for t in range(values.size - 2 * m + 1):
@@ -119,16 +102,6 @@ def test_windows_of_single_samples_with_gaps():
     assert sums[0, MEAN] + sums[0, LOST_MEAN] == pytest.approx(np.sum(w))
     assert sums[0, SQUARE] + sums[0, LOST_SQUARE] == pytest.approx(np.sum(w**2))
     assert totals[FOURTH] + totals[LOST_FOURTH] == pytest.approx(np.sum(w**4))
-
-
-def test_lobes_that_are_not_resolved_are_replaced_by_their_mean():
-    f, _ = _nodes()
-    for m in (2.0, 5000.0):
-        found = _gain(m)
-        for place in np.searchsorted(f, [0.07, 0.2, 0.3]):
-            # Twenty lobes about the node, or the node itself.
-            near = f[place] + np.linspace(-10.0, 10.0, 20_001) / m * (m > 100.0)
-            assert found[place] == pytest.approx(np.mean(haar_gain(m, near)), rel=0.05)
 
 
 def test_only_runs_that_hold_a_window_have_centres():

@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 
 from gmwm import RandomWalk, WhiteNoise, wavelet_variance
-from gmwm.process import quadrature
 from gmwm.process.spectral import haar_variance
-from gmwm.variance import PooledVariance, tuning
-from gmwm.variance.pilot import _limit_slopes, _Places, _points, pilot_psd
+from gmwm.variance import PooledVariance
+from gmwm.variance.pilot import pilot_psd
 
 DT, M = 0.01, 2.0 ** np.arange(14)
 
@@ -21,46 +20,6 @@ def test_its_variances_are_those_given_and_its_level_that_of_the_process(process
     np.testing.assert_allclose(haar_variance(psd, DT * M, DT), variance, rtol=0.03)
     f = np.geomspace(0.3 / (DT * M[-1]), 0.2 / DT, 20)
     np.testing.assert_allclose(psd(f, DT), process.psd(f, DT), rtol=0.3)
-
-
-def test_below_its_knots_it_goes_on_with_the_slope_of_the_lowest_three():
-    knots = np.array([0.0, 1.0, 3.0, 4.0, 5.0])
-    level = np.array([5.0, 4.0, 2.0, 2.0, 7.0])
-    x = np.array([-3.0, 0.5, 3.5, 9.0])
-    np.testing.assert_allclose(
-        _Places(x, knots).interpolated(level), [5.0 + 3.0 * 3.0 / 4.0, 4.5, 2.0, 7.0]
-    )
-    np.testing.assert_allclose(
-        _Places(x[:1], knots).interpolated(-level), [-5.0]
-    )  # it does not rise
-    np.testing.assert_allclose(
-        _Places(x[:1], knots).interpolated(100.0 * level), [506.0]
-    )  # nor faster
-    np.testing.assert_allclose(_Places(x, knots[:1]).interpolated(level[:1]), 5.0)
-    np.testing.assert_allclose(_Places(x[:1], knots[:2]).interpolated(level[:2]), [8.0])
-
-
-@pytest.mark.parametrize("first, levels", [(0, 1), (0, 2), (0, 13), (3, 5), (1, 20)])
-def test_few_points_of_an_octave_give_the_variances_of_all_nodes(first, levels):
-    averaging = 2.0 ** np.arange(first, first + levels)
-    grid, (x, weight) = quadrature(tuple(averaging)), _points(tuple(averaging))
-    knots = np.log(tuning.HAAR_PEAK / averaging)[::-1]
-    steepest = tuning.PILOT_STEEPEST * np.log(2.0)
-    step = np.random.default_rng(levels).uniform(-steepest, steepest, levels)
-    step[levels // 2 :] = steepest * (-1.0) ** np.arange(levels - levels // 2)
-    level = np.cumsum(step)
-    density = np.exp(_Places(np.log(grid.frequency), knots).interpolated(level))
-    expected = 2.0 * (grid.gain @ (grid.weight * density))
-    found = weight @ np.exp(_Places(x, knots).interpolated(level))
-    np.testing.assert_allclose(found, expected, rtol=1e-11)
-
-
-def test_from_octave_to_octave_a_power_of_two_and_a_half_is_the_most():
-    most = tuning.PILOT_STEEPEST * np.log(2.0)
-    found = _limit_slopes(np.array([0.0, 10.0, 10.1, 0.0]))
-    np.testing.assert_allclose(found, [0.0, most, 2.0 * most, most])
-    gentle = np.array([1.0, 1.0 + 0.99 * most, 1.0])
-    np.testing.assert_allclose(_limit_slopes(gentle), gentle)
 
 
 def test_several_recordings_count_by_their_degrees_of_freedom():

@@ -13,7 +13,6 @@ import gmwm
 from gmwm.errors import InputError
 from gmwm.variance.covariance.haar import dyadic_levels, haar_counts, haar_covariance
 from gmwm.variance.covariance.robust import (
-    _semidefinite,
     excess_series,
     pair_shares,
     robust_covariance,
@@ -443,9 +442,3 @@ def test_clean_data_agree_with_the_classical_estimates():
         # The classical estimate is efficient: the difference has the difference of variances.
         more = np.diag(robust_covariance(process.psd, n, 1.0, 0.6, classical) - classical)[:12]
         assert np.all(np.abs(both[:, 1] - both[:, 0]) < 4.0 * np.sqrt(more))
-
-
-def test_a_matrix_with_a_negative_eigenvalue_loses_it():
-    np.testing.assert_allclose(_semidefinite(np.array([[1.0, 2.0], [2.0, 1.0]])), 1.5)
-    definite = np.array([[2.0, 1.0], [1.0, 2.0]])
-    assert _semidefinite(definite) is definite

@@ -4,20 +4,10 @@ import numpy as np
 import pytest
 
 from gmwm.variance import tuning
-from gmwm.variance.stream_result import _spread, effects, unmasked
+from gmwm.variance.stream_result import effects, unmasked
 
 J = 12
 M = 2.0 ** np.arange(J)
-
-
-@pytest.mark.parametrize(
-    ("length", "expected"),
-    [(1.0, 14.0), (1.5, 12.0 + 2.0 / 3.0), (2.0, 12.0), (3.0, 28.0 / 3.0), (4.0, 8.0),
-     (7.0, 8.0 / 7.0), (8.0, 0.0)],
-)  # fmt: skip
-def test_means_vary_by_the_variances_between_two_averaging_times(length, expected):
-    # Of 1, 2, 4 samples: 2, 4 and 8.
-    assert _spread(np.array([2.0, 4.0, 8.0]), length) == pytest.approx(expected)
 
 
 @pytest.mark.parametrize("length", [1, 4])

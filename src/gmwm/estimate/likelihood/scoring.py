@@ -60,8 +60,12 @@ def maximise(
         if promised < close:
             return Maximum(z, value, True)
         step /= max(float(np.max(np.abs(step))) / _LARGEST_STEP, 1.0)
-        found = _along(objective, z, value, step)
-        if found is None:
+        for _ in range(_HALVINGS):
+            moved, there = z + step, objective(z + step)
+            if np.isfinite(there) and there > value:
+                break
+            step = 0.5 * step
+        else:
             # Rounding errors of the objective are all that is left, or the matrix is bad.
             if promised < 100.0 * close:
                 return Maximum(z, value, True)
@@ -69,8 +73,8 @@ def maximise(
                 return Maximum(z, value, False)
             inverse = np.diag(scale**2)
             continue
-        moved, value = found
-        previous, slope = slope, gradient(objective, moved, scale)
+        value, previous = there, slope
+        slope = gradient(objective, moved, scale)
         inverse = _updated(inverse, moved - z, previous - slope)
         z = moved
     return Maximum(z, value, False)
@@ -123,19 +127,6 @@ def gradient(objective: Objective, z: FloatArray, scale: FloatArray) -> FloatArr
         step[i] = _GRADIENT_STEP * min(scale[i], 1.0)
         result[i] = (objective(z + step) - objective(z - step)) / (2.0 * step[i])
     return result
-
-
-def _along(
-    objective: Objective, z: FloatArray, value: float, step: FloatArray
-) -> tuple[FloatArray, float] | None:
-    """The first of ever shorter steps that is higher; ``None`` if none is."""
-    for _ in range(_HALVINGS):
-        moved = z + step
-        there = objective(moved)
-        if np.isfinite(there) and there > value:
-            return moved, there
-        step = 0.5 * step
-    return None
 
 
 def _updated(inverse: FloatArray, moved: FloatArray, change: FloatArray) -> FloatArray:

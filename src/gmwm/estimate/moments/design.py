@@ -137,10 +137,8 @@ class Design:
         """A value that depends on a term and the levels only, shared by designs of these levels."""
         term = self.terms[i]
         plain = is_plain(term.process) and not self.scales.is_simulated(term.process)
-        kept, key = (
-            self.scales.shared if plain and term.n_shapes else self._own,
-            (name, term.process),
-        )
+        kept = self.scales.shared if plain and term.n_shapes else self._own
+        key = name, term.process
         if key not in kept:
             kept[key] = make()
         return kept[key]

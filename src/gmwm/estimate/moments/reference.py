@@ -24,8 +24,10 @@ from gmwm.variance import WaveletVariance
 
 _BISECTIONS = 14
 
-TEXTBOOK = tuple(kind() for kind in CATALOGUE if kind.is_candidate)
-"""Processes of which the mixture is made, with open parameters."""
+TEXTBOOK = tuple(
+    kind() for kind in sorted(CATALOGUE, key=lambda kind: not kind.is_white) if kind.is_candidate
+)
+"""Processes of which the mixture is made, with open parameters, white noise first."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -67,9 +67,16 @@ def _append(
 
 @compiled()
 def _passive_solution(
-    unit: FloatArray, order: IntArray, first: int, size: int, basis: FloatArray,
-    upper: FloatArray, rest: FloatArray, along: FloatArray, solution: FloatArray,
-) -> None:  # fmt: skip
+    unit: FloatArray,
+    order: IntArray,
+    first: int,
+    size: int,
+    basis: FloatArray,
+    upper: FloatArray,
+    rest: FloatArray,
+    along: FloatArray,
+    solution: FloatArray,
+) -> None:
     """Least squares of the first ``size`` columns of ``order``; new are those from ``first`` on.
 
     Row p of ``rest`` is what the first p directions leave of the right side.

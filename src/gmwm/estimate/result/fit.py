@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self
 
 import numpy as np
 from annotated_types import Ge, Gt, Le, MaxLen
-from pydantic import Field
 
 from gmwm._core import checks
 from gmwm._core.distributions import chi2, norm
@@ -21,8 +20,8 @@ from gmwm._core.documents import (
     Text,
     check_covariance,
 )
-from gmwm._core.frames import frame
 from gmwm._core.frozen import freeze, frozen
+from gmwm._core.tables import frame
 from gmwm._core.text import Printed, bullets, per_cent, wrapped
 from gmwm._core.typing import FloatArray
 from gmwm._core.units import shown_unit
@@ -101,10 +100,7 @@ class Fit(Document, Printed):
     SCHEMA: ClassVar[str] = "gmwm.fit"
 
     model: Model
-    wv: Annotated[
-        WaveletVariance,
-        Field(validation_alias="wavelet_variance", serialization_alias="wavelet_variance"),
-    ]
+    wv: WaveletVariance
     keys: tuple[Text, ...]
     covariance: Array
     upper_bounds: Mapping[Text, Annotated[OrInfinity, Ge(0.0)]]
@@ -405,6 +401,11 @@ class Fit(Document, Printed):
         """A table of the parameters, one a row, in SI units; needs pandas."""
         return frame((estimate.to_dict() for estimate in self.estimates), Estimate.COLUMNS)
 
+    def content(self) -> dict[str, Any]:
+        content = super().content()
+        content["wavelet_variance"] = content.pop("wv")
+        return content
+
     def derived(self) -> dict[str, Any]:
         return {
             "params": self.params,
@@ -424,7 +425,7 @@ class Fit(Document, Printed):
 
     @classmethod
     def from_content(cls, content: Mapping[str, Any]) -> Self:
-        found = super().from_content(content)
+        found = super().from_content({**content, "wv": content["wavelet_variance"]})
         if content["params"] != found.params:
             raise InputError(f"its model {found.model!r} and its parameters do not belong together")
         return found

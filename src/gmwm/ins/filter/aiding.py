@@ -193,10 +193,7 @@ class Aiding:
     def events(self, dt: float, n: int) -> Events:
         """Fixes in order of time, beside the epochs of an IMU with ``n`` intervals of ``dt``.
 
-        Raises
-        ------
-        InputError
-            If a fix lies outside the record.
+        Raises InputError if a fix lies outside the record.
         """
         for each in self.fixes:
             outside = (each.time < -0.5 * dt) | (each.time > (n + 0.5) * dt)
@@ -240,6 +237,9 @@ def gnss(
 ) -> Aiding:
     """Error-free GNSS fixes along a trajectory; see `Aiding.noisy`.
 
+    Raises InputError if the interval is not a multiple of the trajectory's, or a standard deviation
+    not positive.
+
     Parameters
     ----------
     trajectory : Trajectory
@@ -253,11 +253,6 @@ def gnss(
         See `Aiding`.
     imu : Imu, optional
         Error-free, for the antenna's velocity about the IMU; needed with a lever arm and velocity.
-
-    Raises
-    ------
-    InputError
-        If the interval is not a multiple of the trajectory's, or a standard deviation not positive.
     """
     arm = _three("lever_arm", lever_arm)
     given = {"position": position_sd, "velocity": velocity_sd}

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, field
+from typing import Any, TypedDict, Unpack
 
 import numpy as np
 
@@ -19,12 +19,12 @@ from gmwm.ins.filter.covariance_kernels import ATTITUDE, NAVIGATION, VELOCITY
 from gmwm.ins.filter.filter_kernels import PAUSED, run
 from gmwm.ins.filter.measurements import KINDS, MEASUREMENTS
 from gmwm.ins.filter.records import (
-    Estimate,
     Events,
+    FilterState,
     Innovated,
     Kept,
     Kinematics,
-    Progress,
+    RunPlace,
     Samples,
     Settings,
 )
@@ -49,10 +49,10 @@ class InitialSd:
         rad.
     """
 
-    position: float = 1.0
-    velocity: float = 0.1
-    tilt: float = np.radians(0.1)
-    heading: float = np.radians(0.5)
+    position: float = field(default=1.0, metadata={"unit": "m"})
+    velocity: float = field(default=0.1, metadata={"unit": "m/s"})
+    tilt: float = field(default=np.radians(0.1), metadata={"unit": "rad"})
+    heading: float = field(default=np.radians(0.5), metadata={"unit": "rad"})
 
     def __post_init__(self) -> None:
         for name in ("position", "velocity", "tilt", "heading"):
@@ -146,7 +146,7 @@ class Filter:
         """Filter a record.
 
         imu: Of the filter's sampling interval.
-        initial: Estimate at the first epoch.
+        initial: FilterState at the first epoch.
         events: Measurements.
         outputs: Epochs to be kept.
         Raises InputError if it starts closer than 1 deg to a pole.
@@ -154,7 +154,7 @@ class Filter:
         check_latitudes(initial.lla[None, :], "initial")
         C, v, lla = matrix_from_rpy(initial.rpy), initial.velocity.copy(), initial.lla.copy()
         P, x = self.covariance(initial, initial_sd), self.states.mean.copy()
-        estimate = Estimate(Kinematics(C, v, lla), P, x)
+        estimate = FilterState(Kinematics(C, v, lla), P, x)
         shape, count = events.value.shape, outputs.epoch.size
         found = Innovated(
             np.full(shape, np.nan), np.full(shape, np.nan), np.ones(shape[0], dtype=np.bool_)
@@ -163,11 +163,11 @@ class Filter:
         kept = Kept(outputs.epoch, outputs.before, *(np.zeros((count, *each)) for each in sizes))
         samples = Samples(imu.rotation, imu.velocity, imu.dt)
         place, rejected = np.zeros(4, dtype=np.int64), np.zeros(len(KINDS), dtype=np.int64)
-        progress = Progress(place, rejected, np.zeros(7))
+        where = RunPlace(place, rejected, np.zeros(7))
         stopped, settings = PAUSED, self.settings
         for part in (*windows(imu.n), slice(imu.n, imu.n)):
             if stopped == PAUSED:
-                stopped = run(samples, settings, estimate, events, found, kept, progress, part.stop)
+                stopped = run(samples, settings, estimate, events, found, kept, where, part.stop)
             release(imu.rotation)
             release(imu.velocity)
         done = count if stopped < 0 else int(np.searchsorted(outputs.epoch, stopped))
@@ -250,6 +250,13 @@ def _with_turned_velocity(covariance: FloatArray, velocity: FloatArray, sign: fl
     return T @ covariance @ np.swapaxes(T, -1, -2)
 
 
+class FilterOptions(TypedDict, total=False):
+    """Step of the covariance, s, and whether products of errors are allowed for; see `Filter`."""
+
+    step: float
+    second_order: bool
+
+
 def navigate(
     imu: Imu,
     initial: NavState,
@@ -257,37 +264,35 @@ def navigate(
     aiding: Aiding,
     *,
     initial_sd: InitialSd | None = None,
-    step: float = tuning.COVARIANCE_STEP,
     interval: float = 1.0,
     before: Sequence[float] = (),
-    second_order: bool = True,
+    **options: Unpack[FilterOptions],
 ) -> Solution:
     """Integrated navigation: filter IMU increments with sensor models and aiding.
+
+    Raises InputError if sensor models or measurements cannot be used.
 
     Parameters
     ----------
     imu : Imu
     initial : NavState
-        Estimate at the first epoch.
+        FilterState at the first epoch.
     sensors : SensorModels, Calibration or mapping
         See `SensorModels.of`.
     aiding : Aiding
         Measurements, with their noise.
     initial_sd : InitialSd, optional
-    step, interval : float, optional
-        Of the covariance and of the solution, s.
+    interval : float, optional
+        Of the solution, s.
     before : sequence of float, optional
         Times (s) at which the solution before the measurements is wanted too, such as the end of an
         outage.
+    step : float, optional
+        Of the covariance, s.
     second_order : bool, optional
-        See `Filter`.
-
-    Raises
-    ------
-    InputError
-        If sensor models or measurements cannot be used.
+        Whether products of errors are allowed for; see `Filter`.
     """
-    ready = Filter.of(SensorModels.of(sensors), aiding, imu.dt, step, second_order)
+    ready = Filter.of(SensorModels.of(sensors), aiding, imu.dt, **options)
     events = aiding.events(imu.dt, imu.n)
     position = KINDS["position"]
     slow = np.any(ready.noise_states[position] >= 0)

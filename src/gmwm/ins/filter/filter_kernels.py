@@ -19,13 +19,13 @@ from gmwm.ins.filter.covariance_kernels import (
 from gmwm.ins.filter.measurements import IS_GNSS, IS_INFERRED, observe
 from gmwm.ins.filter.mechanization import step
 from gmwm.ins.filter.records import (
-    Estimate,
     Events,
+    FilterState,
     Increments,
     Innovated,
     Kept,
     Kinematics,
-    Progress,
+    RunPlace,
     Samples,
     SensorTable,
     Settings,
@@ -65,31 +65,6 @@ def correct(at: Kinematics, x: FloatArray) -> None:
 
 
 @compiled()
-def sample_error(table: SensorTable, x: FloatArray, held: FloatArray, error: FloatArray) -> None:
-    """Sensor errors (6,) that the states x (m,) predict for a sample; then propagate the states.
-
-    Gauss-Markov estimates decay between measurements; without it, they would be kept for ever.
-    """
-    first, output, phi, phi_off = table.first, table.output, table.phi, table.phi_off
-    for a in range(6):
-        total = 0.0
-        for i in range(first[a], first[a + 1]):
-            total += output[i] * x[i]
-        error[a] = total
-    if not table.paired:
-        for i in range(x.size):
-            x[i] *= phi[1, i]
-        return
-    partner = table.partner
-    for i in range(x.size):
-        held[i] = x[i]
-    for i in range(x.size):
-        x[i] = phi[1, i] * held[i]
-        if partner[i] != i:
-            x[i] += phi_off[1, i] * held[partner[i]]
-
-
-@compiled()
 def axis_sums(
     P: FloatArray, table: SensorTable, x: FloatArray, mean: FloatArray, covariance: FloatArray
 ) -> None:
@@ -111,11 +86,11 @@ def axis_sums(
 def run(
     samples: Samples,
     settings: Settings,
-    estimate: Estimate,
+    estimate: FilterState,
     events: Events,
     innovated: Innovated,
     kept: Kept,
-    progress: Progress,
+    where: RunPlace,
     last: int,
 ) -> int:
     """Filter a record; returns the epoch at which it diverged, -1 at its end, or `PAUSED`.
@@ -128,7 +103,7 @@ def run(
     lla = at.lla
     n, dt = samples.rotation.shape[0], samples.dt
     work = new_workspace(P.shape[0])
-    place, carry = progress.place, progress.carry
+    place, carry = where.place, where.carry
     epoch, event, out, steps = place[0], place[1], place[2], place[3]
     while True:
         # What is asked for at this epoch: results before, measurements, results after.
@@ -142,7 +117,7 @@ def run(
                 work.rate[i] = turned / dt
             while event < events.epoch.size and events.epoch[event] == epoch:
                 _measure(
-                    event, samples, settings, estimate, events, innovated, progress, attitude, work
+                    event, samples, settings, estimate, events, innovated, where, attitude, work
                 )
                 event += 1
             for i in range(x.size):
@@ -186,10 +161,10 @@ def _measure(
     event: int,
     samples: Samples,
     settings: Settings,
-    estimate: Estimate,
+    estimate: FilterState,
     events: Events,
     innovated: Innovated,
-    progress: Progress,
+    where: RunPlace,
     attitude: float,
     work: Workspace,
 ) -> None:
@@ -205,7 +180,7 @@ def _measure(
     if moved:
         _look(samples, settings.table, estimate, events.epoch[event], events.offset[event], work)
         at, rate = work.there, work.rate_there
-    rejected = progress.rejected
+    rejected = where.rejected
     gated = gate < np.inf and (IS_INFERRED[kind] or rejected[kind] < _PATIENCE)
     if gated:
         _copy(P, work.estimated, work.P_held, work.estimated_held)
@@ -235,14 +210,14 @@ def _measure(
         innovated.used[event] = False
         _copy(work.P_held, work.estimated_held, P, work.estimated)
     elif IS_GNSS[kind]:
-        progress.carry[6] = 0.0
+        where.carry[6] = 0.0
 
 
 @compiled()
 def _look(
     samples: Samples,
     table: SensorTable,
-    estimate: Estimate,
+    estimate: FilterState,
     epoch: int,
     offset: float,
     work: Workspace,
@@ -311,18 +286,35 @@ def _advance(
 ) -> None:
     """Mechanize the samples of a step of the covariance; fills the solution in its middle.
 
+    Each sample is corrected for the sensor errors that the states x (m,) predict. Then the states
+    are propagated: without it, estimates of Gauss-Markov processes would not decay.
+
     carry: Corrected increments of the sample before; then those of the last one.
     """
     rotation, velocity, dt = samples
-    middle, error, count = work.middle, work.error, stop - epoch
+    C_mid, v_mid, lla_mid = work.middle
+    error, held, count = work.error, work.x_held, stop - epoch
+    first, output, partner, paired = table.first, table.output, table.partner, table.paired
+    decay, decay_off = table.phi[1], table.phi_off[1]
+    C, v, lla = at
     now = Increments(carry[0], carry[1], carry[2], carry[3], carry[4], carry[5])
     for i in range(epoch, stop):
         if i - epoch == count // 2:
             for a in range(3):
-                middle.v[a], middle.lla[a] = at.v[a], at.lla[a]
+                v_mid[a], lla_mid[a] = v[a], lla[a]
                 for b in range(3):
-                    middle.C[a, b] = at.C[a, b]
-        sample_error(table, x, work.x_held, error)
+                    C_mid[a, b] = C[a, b]
+        for a in range(6):
+            error[a] = 0.0
+            for k in range(first[a], first[a + 1]):
+                error[a] += output[k] * x[k]
+        for k in range(x.size):
+            held[k] = x[k]
+            x[k] *= decay[k]
+        if paired:
+            for k in range(x.size):
+                if partner[k] != k:
+                    x[k] += decay_off[k] * held[partner[k]]
         before = now
         ax, ay = rotation[i, 0] - error[0] * dt, rotation[i, 1] - error[1] * dt
         az, fx = rotation[i, 2] - error[2] * dt, velocity[i, 0] - error[3] * dt
@@ -332,16 +324,16 @@ def _advance(
         if 2 * (i - epoch) + 1 == count:
             # The middle of the step lies within this sample.
             for a in range(3):
-                middle.v[a] = 0.5 * (middle.v[a] + at.v[a])
-                middle.lla[a] = 0.5 * (middle.lla[a] + at.lla[a])
+                v_mid[a] = 0.5 * (v_mid[a] + v[a])
+                lla_mid[a] = 0.5 * (lla_mid[a] + lla[a])
                 for b in range(3):
-                    middle.C[a, b] = 0.5 * (middle.C[a, b] + at.C[a, b])
+                    C_mid[a, b] = 0.5 * (C_mid[a, b] + C[a, b])
     for a in range(6):
         carry[a] = now[a]
 
 
 @compiled()
-def _keep(k: int, estimate: Estimate, table: SensorTable, kept: Kept) -> None:
+def _keep(k: int, estimate: FilterState, table: SensorTable, kept: Kept) -> None:
     at, P, x = estimate
     for i in range(3):
         kept.nav[k, i], kept.nav[k, 3 + i] = at.lla[i], at.v[i]

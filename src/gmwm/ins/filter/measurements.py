@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from gmwm._core.compiled import compiled
-from gmwm._core.typing import FloatArray
+from gmwm._core.typing import FloatArray, IntArray
 from gmwm.errors import InputError
 from gmwm.ins.filter.records import Kinematics
 from gmwm.ins.geometry import matrix_from_rpy, offset, radii_at
@@ -54,7 +54,7 @@ class Measurement:
 
     @staticmethod
     def along(
-        trajectory: Trajectory, index: FloatArray, arm: FloatArray, imu: Imu | None
+        trajectory: Trajectory, index: IntArray, arm: FloatArray, imu: Imu | None
     ) -> FloatArray:
         """Error-free values (E, 3) at some epochs of a trajectory, with an antenna on an arm."""
         raise NotImplementedError
@@ -100,7 +100,7 @@ class Position(Measurement):
 
     @staticmethod
     def along(
-        trajectory: Trajectory, index: FloatArray, arm: FloatArray, imu: Imu | None
+        trajectory: Trajectory, index: IntArray, arm: FloatArray, imu: Imu | None
     ) -> FloatArray:
         """Positions of the antenna."""
         return offset(trajectory.lla[index], matrix_from_rpy(trajectory.rpy[index]) @ arm)
@@ -137,7 +137,7 @@ class Velocity(Measurement):
 
     @staticmethod
     def along(
-        trajectory: Trajectory, index: FloatArray, arm: FloatArray, imu: Imu | None
+        trajectory: Trajectory, index: IntArray, arm: FloatArray, imu: Imu | None
     ) -> FloatArray:
         """Velocities of the antenna; with a lever arm, the error-free IMU is needed."""
         velocity = trajectory.velocity[index]
@@ -175,7 +175,7 @@ class Height(Measurement):
 
     @staticmethod
     def along(
-        trajectory: Trajectory, index: FloatArray, arm: FloatArray, imu: Imu | None
+        trajectory: Trajectory, index: IntArray, arm: FloatArray, imu: Imu | None
     ) -> FloatArray:
         """Heights of the IMU."""
         return np.where(np.arange(3) == 0, trajectory.lla[index, 2:], 0.0)
@@ -197,7 +197,7 @@ class Standstill(Measurement):
 
     @staticmethod
     def along(
-        trajectory: Trajectory, index: FloatArray, arm: FloatArray, imu: Imu | None
+        trajectory: Trajectory, index: IntArray, arm: FloatArray, imu: Imu | None
     ) -> FloatArray:
         """Zeros."""
         return np.zeros((index.size, 3))

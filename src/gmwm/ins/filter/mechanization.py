@@ -28,11 +28,18 @@ _CLEAN_EVERY = 1000  # samples: rounding errors of the attitude matrix stay belo
 
 
 @compiled()
-def step(at: Kinematics, now: Increments, before: Increments, dt: float) -> None:
+def step(
+    at: Kinematics, now: Increments, before: Increments, dt: float
+) -> tuple[float, float, float]:
     """Propagate attitude, velocity and position over one sampling interval, in place.
 
     Coning and sculling are corrected with the increments of the interval before, as if rate and
     specific force changed linearly; on the first interval, give its own increments as those before.
+
+    Returns
+    -------
+    north, east, down : float
+        Integral of the specific force over the interval in the navigation frame, m/s.
 
     Notes
     -----
@@ -94,6 +101,7 @@ def step(at: Kinematics, now: Increments, before: Increments, dt: float) -> None
     v[0], v[1], v[2] = end_n, end_e, end_d
     rotate(C, rx, ry, rz, sine, half)
     turn_navigation(C, zn, ze, zd)
+    return fn, fe, fd
 
 
 @compiled()
@@ -120,6 +128,8 @@ def integrate(imu: Imu, initial: NavState) -> Trajectory:
 
     The height of an unaided navigator is unstable: an error grows by a factor e in about 570 s.
 
+    Raises InputError if it starts closer than 1 deg to a pole, where north cannot be steered by.
+
     Parameters
     ----------
     imu : Imu
@@ -131,11 +141,6 @@ def integrate(imu: Imu, initial: NavState) -> Trajectory:
     -------
     Trajectory
         n + 1 epochs; roll and yaw within [-pi, pi], the longitude runs on past 180 deg.
-
-    Raises
-    ------
-    InputError
-        If it starts closer than 1 deg to a pole, where north cannot be steered by.
     """
     check_latitudes(initial.lla[None, :], "initial")
     lla, velocity, rpy = (np.empty((imu.n + 1, 3)) for _ in range(3))

@@ -90,7 +90,7 @@ class Scratch(NamedTuple):
     row: FloatArray
 
 
-class Estimate(NamedTuple):
+class FilterState(NamedTuple):
     """Solution, covariance (9 + m, 9 + m) and sensor states (m,) of a filter at one epoch."""
 
     at: Kinematics
@@ -164,7 +164,7 @@ class Kept(NamedTuple):
     sensor_covariance: FloatArray
 
 
-class Progress(NamedTuple):
+class RunPlace(NamedTuple):
     """Where a run is, so that it can pause and go on; zeros at first.
 
     place: (4,), epoch, event, kept epoch, steps of the covariance.

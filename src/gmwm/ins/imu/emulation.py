@@ -68,28 +68,23 @@ class Imu:
     def with_errors(self, gyro_errors: FloatArray, accel_errors: FloatArray) -> Imu:
         """The same IMU with errors added.
 
+        Raises InputError if a shape differs from that of the increments.
+
         Parameters
         ----------
         gyro_errors : (n, 3) ndarray
             rad/s, mean over each interval, body axes.
         accel_errors : (n, 3) ndarray
             m/s^2.
-
-        Raises
-        ------
-        InputError
-            If a shape differs from that of the increments.
         """
-        found = []
-        for name, errors in (("gyro_errors", gyro_errors), ("accel_errors", accel_errors)):
-            values = finite_numbers(errors, name)
+        gyro = finite_numbers(gyro_errors, "gyro_errors")
+        accel = finite_numbers(accel_errors, "accel_errors")
+        for name, values in (("gyro_errors", gyro), ("accel_errors", accel)):
             if values.shape != self.rotation.shape:
                 raise InputError(
                     f"{name} has shape {values.shape}: give one row of 3 numbers for each of the "
                     f"{self.n:,} intervals"
                 )
-            found.append(values)
-        gyro, accel = found
         return Imu(self.dt, self.rotation + self.dt * gyro, self.velocity + self.dt * accel)
 
 
@@ -100,21 +95,8 @@ def emulate(trajectory: Trajectory) -> Imu:
     and specific force follow from their derivatives, without any mechanization, and are integrated
     over each interval in the axes of the turning body. The trajectory's velocity is not used.
 
-    Parameters
-    ----------
-    trajectory : Trajectory
-        n + 1 epochs.
-
-    Returns
-    -------
-    Imu
-        n increments; those of an ideal strapdown IMU, with Earth rate, Coriolis and gravity.
-
-    Raises
-    ------
-    InputError
-        If it comes closer than 1 deg to a pole, or if its angles turn by more than 90 deg from
-        epoch to epoch.
+    Raises InputError if it comes closer than 1 deg to a pole, or if its angles turn by more than 90
+    deg from epoch to epoch.
 
     Notes
     -----

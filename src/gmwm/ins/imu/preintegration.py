@@ -68,40 +68,15 @@ class Preintegration:
     states: tuple[str, ...]
 
 
-@dataclass(frozen=True, eq=False)
-class _Steps:
-    """What each step of the integration does, all steps at once.
-
-    With the rotation vector r of a step and its velocity increment u: turn exp(r), mean turn G1,
-    half of its mean G2 for the position, and the derivatives D1 and D2 of G1 u and G2 u to r.
-    """
-
-    turn: FloatArray
-    G1: FloatArray
-    G2: FloatArray
-    D1: FloatArray
-    D2: FloatArray
-
-    @classmethod
-    def of(cls, rotation: FloatArray, velocity: FloatArray) -> _Steps:
-        part = matrix_from_rotation_vector(_NODES[:, None, None] * rotation)  # exp(s r)
-        G1 = np.einsum("s,snij->nij", _WEIGHTS, part)
-        G2 = np.einsum("s,snij->nij", _WEIGHTS * (1.0 - _NODES), part)
-        # Integral of exp(-q r) over q from 0 to s: the right Jacobian of s r, times s.
-        products = np.multiply.outer(_NODES, _NODES)[:, :, None, None] * rotation
-        right = np.einsum("q,sqnij->snij", _WEIGHTS, matrix_from_rotation_vector(-products))
-        inner = part @ skew(velocity) @ (_NODES[:, None, None, None] * right)
-        D1 = -np.einsum("s,snij->nij", _WEIGHTS, inner)
-        D2 = -np.einsum("s,snij->nij", _WEIGHTS * (1.0 - _NODES), inner)
-        return cls(matrix_from_rotation_vector(rotation), G1, G2, D1, D2)
-
-
 def preintegrate(
     imu: Imu,
     models: SensorModels | Calibration | Mapping[str, Any],
     start: Start | FloatArray = "known",
 ) -> Preintegration:
     """Preintegrate increments, with the exact covariance of a composite error model.
+
+    Raises InputError if an axis has no model, a term has no state space, or ``start`` has another
+    shape.
 
     Parameters
     ----------
@@ -114,11 +89,6 @@ def preintegrate(
         variables of the factor graph, as the biases of a combined IMU factor are. "stationary":
         that which the models have by themselves, zero for random walks; the increments alone then
         make a factor that knows of no states.
-
-    Raises
-    ------
-    InputError
-        If an axis has no model, a term has no state space, or ``start`` has another shape.
 
     Notes
     -----
@@ -136,7 +106,7 @@ def preintegrate(
         block_diagonal([getattr(part, name) for part in parts])
         for name in ("process_noise", "transition", "initial_covariance")
     )
-    steps, dt = _Steps.of(imu.rotation, imu.velocity), imu.dt
+    dt, (turns, mean, half, by_mean, by_half) = imu.dt, _steps(imu)
     rotation, velocity, position = np.eye(3), np.zeros(3), np.zeros(3)
     covariance = np.zeros((9 + m, 9 + m))
     covariance[9:, 9:] = _start(start, stationary)
@@ -144,26 +114,43 @@ def preintegrate(
     A, B, Q = np.eye(9 + m), np.zeros((9, 6)), np.zeros((9 + m, 9 + m))
     A[9:, 9:], A[6:9, 3:6], Q[9:, 9:] = transition, dt * np.eye(3), drive
     for k in range(imu.n):
-        G1, G2, u = steps.G1[k], steps.G2[k], imu.velocity[k]
-        A[:3, :3] = steps.turn[k].T
+        G1, G2, u = mean[k], half[k], imu.velocity[k]
+        A[:3, :3] = turns[k].T
         A[3:6, :3] = -rotation @ skew(G1 @ u)
         A[6:9, :3] = -rotation @ skew(G2 @ u) * dt
         B[:3, :3] = G1.T * dt
-        B[3:6, :3], B[3:6, 3:] = rotation @ steps.D1[k] * dt, rotation @ G1 * dt
-        B[6:, :3], B[6:, 3:] = rotation @ steps.D2[k] * dt**2, rotation @ G2 * dt**2
+        B[3:6, :3], B[3:6, 3:] = rotation @ by_mean[k] * dt, rotation @ G1 * dt
+        B[6:, :3], B[6:, 3:] = rotation @ by_half[k] * dt**2, rotation @ G2 * dt**2
         A[:9, 9:] = B @ output
         covariance = A @ covariance @ A.T + Q
         covariance[:9, :9] += B @ white @ B.T
         jacobian = A @ jacobian
         position = position + velocity * dt + rotation @ G2 @ u * dt
         velocity = velocity + rotation @ G1 @ u
-        rotation = rotation @ steps.turn[k]
-    names = [f"{axis} {name}" for axis, part in zip(AXES, parts, strict=True)
-             for name in part.names]  # fmt: skip
-    return Preintegration(
-        imu.n * dt, rotation, velocity, position, 0.5 * (covariance + covariance.T), jacobian,
-        (*_NAMES, *names),
-    )  # fmt: skip
+        rotation = rotation @ turns[k]
+    pairs = zip(AXES, parts, strict=True)
+    names = (*_NAMES, *(f"{axis} {name}" for axis, part in pairs for name in part.names))
+    covariance = 0.5 * (covariance + covariance.T)
+    increments = (rotation, velocity, position)
+    return Preintegration(imu.n * dt, *increments, covariance, jacobian, names)
+
+
+def _steps(imu: Imu) -> tuple[FloatArray, ...]:
+    """What the samples of an IMU do: each an array of n matrices, (n, 3, 3).
+
+    With the rotation vector r of a sample and its velocity increment u: turn exp(r), mean turn G1,
+    half of its mean G2 for the position, and the derivatives of G1 u and G2 u to r.
+    """
+    part = matrix_from_rotation_vector(_NODES[:, None, None] * imu.rotation)  # exp(s r)
+    mean = np.einsum("s,snij->nij", _WEIGHTS, part)
+    half = np.einsum("s,snij->nij", _WEIGHTS * (1.0 - _NODES), part)
+    # Integral of exp(-q r) over q from 0 to s: the right Jacobian of s r, times s.
+    products = np.multiply.outer(_NODES, _NODES)[:, :, None, None] * imu.rotation
+    right = np.einsum("q,sqnij->snij", _WEIGHTS, matrix_from_rotation_vector(-products))
+    inner = part @ skew(imu.velocity) @ (_NODES[:, None, None, None] * right)
+    by_mean = -np.einsum("s,snij->nij", _WEIGHTS, inner)
+    by_half = -np.einsum("s,snij->nij", _WEIGHTS * (1.0 - _NODES), inner)
+    return matrix_from_rotation_vector(imu.rotation), mean, half, by_mean, by_half
 
 
 def _start(start: Start | FloatArray, stationary: FloatArray) -> FloatArray:

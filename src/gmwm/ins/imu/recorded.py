@@ -43,13 +43,10 @@ class Recorded:
     def of(cls, recordings: Recording | Sequence[Recording], duration: float) -> Recorded:
         """Cut recordings into stretches of ``duration`` (s).
 
-        Samples that are missing are taken over from the one before, and before the first one from
-        that.
+        Missing samples take the value before them; those before the first sample take its value.
 
-        Raises
-        ------
-        InputError
-            If there is no recording, an axis is missing, the rates differ, or none is long enough.
+        Raises InputError if there is no recording, an axis is missing, the rates differ, or none is
+        long enough.
         """
         given = [recordings] if isinstance(recordings, Recording) else list(recordings)
         if not given:
@@ -65,7 +62,9 @@ class Recorded:
                     f"{given[0].rate:g} Hz: give recordings of one rate"
                 )
             errors = _errors(recording)
-            slow.append(_averaged(errors, recording.dt))
+            window = max(min(round(tuning.BIAS_WINDOW / recording.dt), len(errors)), 1)
+            whole = len(errors) // window * window
+            slow.append(errors[:whole].reshape(-1, window, 6).mean(axis=1))
             n = max(round(duration / recording.dt), 1)
             stretches += [errors[i : i + n] for i in range(0, len(errors) - n + 1, n)]
         source = ", ".join(each.source for each in given)
@@ -97,10 +96,8 @@ class Recorded:
     def draw(self, run: int, n: int, dt: float, rng: np.random.Generator) -> SensorErrors:
         """The stretch of a run.
 
-        Raises
-        ------
-        InputError
-            If the trajectory has another sampling interval, or is longer than a stretch.
+        Raises InputError if the trajectory has another sampling interval, or is longer than a
+        stretch.
         """
         if abs(dt / self.dt - 1.0) > _RATE_TOLERANCE or n > len(self.stretches[run]):
             raise InputError(
@@ -130,10 +127,3 @@ def _errors(recording: Recording) -> FloatArray:
             values = values[last]
         columns.append(values - np.mean(values))
     return np.column_stack(columns)
-
-
-def _averaged(errors: FloatArray, dt: float) -> FloatArray:
-    """Means over a minute, (windows, 6)."""
-    window = max(min(round(tuning.BIAS_WINDOW / dt), len(errors)), 1)
-    whole = len(errors) // window * window
-    return np.asarray(errors[:whole].reshape(-1, window, 6).mean(axis=1))

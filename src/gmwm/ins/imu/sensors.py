@@ -47,6 +47,8 @@ class SensorModels:
     ) -> SensorModels:
         """Models of all six axes from what there is.
 
+        Raises InputError if an axis has no model, a parameter is open, or a name is unknown.
+
         Parameters
         ----------
         source : SensorModels, Calibration or mapping
@@ -54,35 +56,26 @@ class SensorModels:
             same for its three axes); an axis goes before its kind.
         bias_sd : mapping of str to float, optional
             By axis or kind, in rad/s and m/s^2.
-
-        Raises
-        ------
-        InputError
-            If an axis has no model, a parameter is open, or a name is unknown.
         """
         if isinstance(source, SensorModels):
-            return (
-                source if bias_sd is None else
-                replace(source, bias_sd=_by_axis(bias_sd, "bias_sd"))
-            )  # fmt: skip
+            if bias_sd is None:
+                return source
+            return replace(source, bias_sd=_standard_deviations(bias_sd))
         not_valid: tuple[str, ...] = ()
         if isinstance(source, Calibration):
             not_valid = tuple(axis for axis in AXES if axis in source and not source[axis].valid)
-            given: Mapping[str, Any] = {name: fit.model for name, fit in source.fits.items()}
-            given = {name: model for name, model in given.items() if name in AXES}
-        elif isinstance(source, Mapping):
-            given = source
-        else:
+            source = {name: fit.model for name, fit in source.fits.items() if name in AXES}
+        if not isinstance(source, Mapping):
             raise InputError(
                 f"sensor models: {checks.shown(source)}: give a calibration, or models as in "
                 '{"gyro": WhiteNoise(1e-4), "accel": WhiteNoise(1e-3)}'
             )
-        models = {axis: _model(axis, each) for axis, each in _spread(given, "models").items()}
-        missing = [axis for axis in AXES if axis not in models]
-        if missing:
-            raise InputError(f"sensor models: {missing[0]} has none: give one to each axis")
-        ordered = {axis: models[axis] for axis in AXES}
-        return cls(ordered, _by_axis(bias_sd or {}, "bias_sd"), not_valid)
+        given = _by_axis(source, "models")
+        for axis in AXES:
+            if axis not in given:
+                raise InputError(f"sensor models: {axis} has none: give one to each axis")
+        models = {axis: _model(axis, given[axis]) for axis in AXES}
+        return cls(models, _standard_deviations(bias_sd or {}), not_valid)
 
     @property
     def notices(self) -> tuple[Notice, ...]:
@@ -138,7 +131,7 @@ class SensorErrors:
     slow: FloatArray | None = None
 
 
-def _spread(given: Mapping[str, Any], what: str) -> dict[str, Any]:
+def _by_axis(given: Mapping[str, Any], what: str) -> dict[str, Any]:
     """Values by axis, from values by axis or kind."""
     for name in given:
         if name not in AXES and name not in _KINDS:
@@ -146,12 +139,8 @@ def _spread(given: Mapping[str, Any], what: str) -> dict[str, Any]:
                 f"{what}: {checks.shown(name)} is not a sensor: write gyro, accel, or one of "
                 f"{', '.join(AXES)}"
             )
-    kinds = {axis: axis.partition("_")[0] for axis in AXES}
-    return {
-        axis: given.get(axis, given.get(kind))
-        for axis, kind in kinds.items()
-        if axis in given or kind in given
-    }
+    names = {axis: axis if axis in given else axis.partition("_")[0] for axis in AXES}
+    return {axis: given[name] for axis, name in names.items() if name in given}
 
 
 def _model(axis: str, given: Any) -> Model:
@@ -167,9 +156,9 @@ def _model(axis: str, given: Any) -> Model:
     return model
 
 
-def _by_axis(given: Mapping[str, float], what: str) -> dict[str, float]:
+def _standard_deviations(given: Mapping[str, float]) -> dict[str, float]:
     values = dict.fromkeys(AXES, 0.0)
-    for axis, value in _spread(given, what).items():
+    for axis, value in _by_axis(given, "bias_sd").items():
         if value != 0.0:
-            values[axis] = checks.positive(f"{what} of {axis}", value)
+            values[axis] = checks.positive(f"bias_sd of {axis}", value)
     return values

@@ -1,17 +1,23 @@
-"""Logs of trajectories, IMUs and receivers, column by column."""
+"""Own logs: an IMU's record and GNSS fixes, aligned, filtered, examined and compared."""
 
-from gmwm.ins.logs.log_columns import (
-    POSITION_WORDS as POSITION_WORDS,
-    angle_factor as angle_factor,
-    angle_unit as angle_unit,
-    check_angles as check_angles,
-    check_rising as check_rising,
-    find_columns as find_columns,
-    is_time as is_time,
-    length_factor as length_factor,
-    open_log as open_log,
-    place as place,
-    unit_of as unit_of,
-    words_of as words_of,
+from gmwm.ins.logs.alignment import Alignment as Alignment, align as align
+from gmwm.ins.logs.comparison import (
+    Comparison as Comparison,
+    Outcome as Outcome,
+    Paired as Paired,
+    compare as compare,
+    paired as paired,
 )
-from gmwm.ins.logs.trajectory_file import read_log as read_log
+from gmwm.ins.logs.faults import Faults as Faults, fault_notice as fault_notice
+from gmwm.ins.logs.fix_log import (
+    read_fix_log as read_fix_log,
+    read_fixes as read_fixes,
+    read_heights as read_heights,
+)
+from gmwm.ins.logs.hypotheses import LEVEL as LEVEL, TESTS as TESTS, Fault as Fault
+from gmwm.ins.logs.imu_log import read_imu as read_imu, read_imu_log as read_imu_log
+from gmwm.ins.logs.measured import LogSpec as LogSpec, Measured as Measured
+from gmwm.ins.logs.navigated import Navigated as Navigated
+from gmwm.ins.logs.replay import Replay as Replay
+from gmwm.ins.logs.smoother import Smoothed as Smoothed, smooth as smooth
+from gmwm.ins.logs.steadiness import standstills as standstills, steady as steady

@@ -104,7 +104,7 @@ def at_epoch(runs: FilterErrors, index: int) -> Consistency:
         Of the epoch; see `FilterErrors.index`.
     """
     alive = np.isfinite(runs.error[:, index, 0])
-    return _consistency(runs, alive, np.array([index]), chi_square_ratio, _coverage_at_epoch)
+    return _consistency(runs, alive, np.array([index]), chi_square_ratio, coverage_at_epoch)
 
 
 def over_time(runs: FilterErrors, start: float = 0.0, end: float = np.inf) -> Consistency:
@@ -112,16 +112,13 @@ def over_time(runs: FilterErrors, start: float = 0.0, end: float = np.inf) -> Co
 
     The errors of one run are correlated, so that a run counts as one draw; Student's t.
 
+    Raises InputError if no errors were kept in that time.
+
     Parameters
     ----------
     runs : FilterErrors
     start, end : float, optional
         s.
-
-    Raises
-    ------
-    InputError
-        If no errors were kept in that time.
     """
     epochs = np.flatnonzero((runs.time >= start) & (runs.time <= end) & ~runs.before)
     if not epochs.size:
@@ -134,7 +131,7 @@ def over_time(runs: FilterErrors, start: float = 0.0, end: float = np.inf) -> Co
     def mean_of_runs(squares: FloatArray, size: int) -> Ratio:
         return mean_ratio(np.mean(squares, axis=1) / size)
 
-    return _consistency(runs, alive, epochs, mean_of_runs, _coverage_over_time)
+    return _consistency(runs, alive, epochs, mean_of_runs, coverage_over_time)
 
 
 def _consistency(
@@ -221,7 +218,7 @@ def mean_ratio(values: FloatArray) -> Ratio:
     return Ratio(mean, max(1.0 - width, 0.0), 1.0 + width, p_value)
 
 
-def _coverage_at_epoch(standard: FloatArray) -> tuple[Coverage, ...]:
+def coverage_at_epoch(standard: FloatArray) -> tuple[Coverage, ...]:
     """Coverage of standardised errors (R, 1, d); components are correlated: one draw a run."""
     fractions = _fractions(standard)
     return tuple(
@@ -230,7 +227,7 @@ def _coverage_at_epoch(standard: FloatArray) -> tuple[Coverage, ...]:
     )
 
 
-def _coverage_over_time(standard: FloatArray) -> tuple[Coverage, ...]:
+def coverage_over_time(standard: FloatArray) -> tuple[Coverage, ...]:
     """Coverage of standardised errors (R, K, d), with the scatter between runs as its error."""
     runs, result = len(standard), []
     for level, each in zip(LEVELS, _fractions(standard), strict=True):

@@ -81,10 +81,7 @@ class FilterErrors:
     def index(self, time: float, *, before: bool = True) -> int:
         """Place of an epoch.
 
-        Raises
-        ------
-        InputError
-            If it was not kept.
+        Raises InputError if it was not kept.
         """
         found = np.flatnonzero((np.abs(self.time - time) < _SAME_TIME) & (self.before == before))
         if found.size == 0:

@@ -19,7 +19,7 @@ QUANTITIES = {"horizontal": "m", "vertical": "m", "velocity": "m/s", "attitude":
 
 
 @dataclass(frozen=True)
-class Spread:
+class ErrorSizes:
     """Sizes of an error over the runs.
 
     predicted: Root mean square that the filter predicted.
@@ -33,7 +33,7 @@ class Spread:
 
 
 @dataclass(frozen=True)
-class Difference:
+class ErrorDifference:
     """A filter's mean error less that of another, in the same runs.
 
     lower, upper: Bootstrap interval of 95 % over the runs.
@@ -78,19 +78,16 @@ def pooled_sizes(study: MonteCarlo, name: str) -> dict[str, FloatArray]:
     }
 
 
-def spread(runs: FilterErrors, time: float) -> dict[str, Spread]:
+def spread(runs: FilterErrors, time: float) -> dict[str, ErrorSizes]:
     """Errors before the first fix after an outage.
+
+    Raises InputError if the filter diverged in every run.
 
     Parameters
     ----------
     runs : FilterErrors
     time : float
         End of the outage, s.
-
-    Raises
-    ------
-    InputError
-        If the filter diverged in every run.
     """
     predicted = _sizes(runs.sd[:, runs.index(time)])
     result = {}
@@ -99,7 +96,7 @@ def spread(runs: FilterErrors, time: float) -> dict[str, Spread]:
         if not np.any(alive):
             raise InputError("the filter diverged in every run: check its sensor models")
         values = values[alive]
-        result[name] = Spread(
+        result[name] = ErrorSizes(
             mean=float(np.mean(values)),
             rms=float(np.sqrt(np.mean(values**2))),
             median=float(np.median(values)),
@@ -111,8 +108,10 @@ def spread(runs: FilterErrors, time: float) -> dict[str, Spread]:
 
 def difference(
     first: Mapping[str, FloatArray], second: Mapping[str, FloatArray], quantity: str, seed: int = 0
-) -> Difference:
+) -> ErrorDifference:
     """Paired difference of two filters, with its bootstrap interval over the runs.
+
+    Raises InputError if the runs are not the same, or in none of them both filters reached the end.
 
     Parameters
     ----------
@@ -121,11 +120,6 @@ def difference(
     quantity : str
         One of `QUANTITIES`.
     seed : int, optional
-
-    Raises
-    ------
-    InputError
-        If the runs are not the same, or in none of them both filters reached the end.
     """
     checks.choice("quantity", quantity, list(QUANTITIES))
     a, b = first[quantity], second[quantity]
@@ -142,4 +136,4 @@ def difference(
     ratio = float(np.sqrt(np.mean(a**2) / np.mean(b**2)))
     lower, upper = map(float, np.quantile(drawn, ends))
     ratio_lower, ratio_upper = map(float, np.quantile(ratios, ends))
-    return Difference(float(np.mean(a - b)), lower, upper, ratio, ratio_lower, ratio_upper)
+    return ErrorDifference(float(np.mean(a - b)), lower, upper, ratio, ratio_lower, ratio_upper)

@@ -50,7 +50,7 @@ class MonteCarlo:
         return self.filters[name]
 
 
-class Work(TypedDict, total=False):
+class RunOptions(TypedDict, total=False):
     """How runs are done, and where they are kept.
 
     jobs : int
@@ -78,12 +78,15 @@ def monte_carlo(
     filters: Mapping[str, SensorModels],
     runs: int = 100,
     seed: int = 0,
-    **work: Unpack[Work],
+    **options: Unpack[RunOptions],
 ) -> MonteCarlo:
     """Run filters with different sensor models on the same simulated flights.
 
     Every run draws sensor errors, noise of the fixes and an initial error; all filters get the
     same, so that their differences are those of the models.
+
+    Raises InputError if there is no filter, no run, the seed is negative, or the folder holds
+    another study.
 
     Parameters
     ----------
@@ -93,13 +96,8 @@ def monte_carlo(
     filters : mapping of str to SensorModels
         Name -> models of a filter.
     runs, seed : int, optional
-    **work
-        jobs, cluster, folder, earlier, progress: see `gmwm.ins.simulation.trials.Work`.
-
-    Raises
-    ------
-    InputError
-        If there is no filter, no run, the seed is negative, or the folder holds another study.
+    **options
+        jobs, cluster, folder, earlier, progress: see `gmwm.ins.simulation.trials.RunOptions`.
     """
     if not filters:
         raise InputError("there is no filter: give one at least")
@@ -109,7 +107,7 @@ def monte_carlo(
         notices = (notice("fewer-runs", "", {"runs": source.available, "asked": runs}),)
         runs = source.available
     task = _Task(scenario, source, dict(filters), emulate(scenario.trajectory), seed)
-    found = do_runs(task, runs, task.study(), **work)
+    found = do_runs(task, runs, task.study(), **options)
     outputs = scenario.outputs()
     time, before = outputs.time(scenario.trajectory.dt), outputs.before == 1
     errors = {

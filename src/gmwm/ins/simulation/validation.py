@@ -28,14 +28,14 @@ from gmwm.ins.simulation.consistency import (
 from gmwm.ins.simulation.filter_errors import FilterErrors
 from gmwm.ins.simulation.outage_errors import (
     QUANTITIES,
-    Difference,
-    Spread,
+    ErrorDifference,
+    ErrorSizes,
     difference,
     pooled_sizes,
     spread,
 )
 from gmwm.ins.simulation.scenario import Experiment
-from gmwm.ins.simulation.trials import MonteCarlo, Work, monte_carlo
+from gmwm.ins.simulation.trials import MonteCarlo, RunOptions, monte_carlo
 from gmwm.issues import Notice, notice
 
 if TYPE_CHECKING:
@@ -60,12 +60,12 @@ class Validation:
     study: MonteCarlo
 
     @classmethod
-    def of(cls, experiment: Experiment, **work: Unpack[Work]) -> Validation:
+    def of(cls, experiment: Experiment, **options: Unpack[RunOptions]) -> Validation:
         """Do the runs of an experiment; see `gmwm.ins.monte_carlo`."""
         filters, runs, seed = experiment.filters, experiment.runs, experiment.seed
         return cls(
             experiment,
-            monte_carlo(experiment.scenario, experiment.source, filters, runs, seed, **work),
+            monte_carlo(experiment.scenario, experiment.source, filters, runs, seed, **options),
         )
 
     # -- numbers ----------------------------------------------------------------------------------
@@ -101,7 +101,7 @@ class Validation:
         )
         return (*models, *self.study.notices, *diverged)
 
-    def spreads(self, name: str) -> list[dict[str, Spread]]:
+    def spreads(self, name: str) -> list[dict[str, ErrorSizes]]:
         """Errors of a filter before the first fix after each outage."""
         return [spread(self.study[name], outage.end) for outage in self.study.outages]
 
@@ -121,7 +121,7 @@ class Validation:
         """Innovations of a filter over the whole record."""
         return innovation_test(self.study[name])
 
-    def against_first(self, name: str, quantity: str) -> Difference:
+    def against_first(self, name: str, quantity: str) -> ErrorDifference:
         """A filter's errors after all outages against those of the first one, run by run."""
         first, other = (pooled_sizes(self.study, each) for each in (self.names[0], name))
         return difference(other, first, quantity, self.experiment.seed)
@@ -240,10 +240,7 @@ class Validation:
     def plot_errors(self, outage: int = 0) -> Figure:
         """True errors of the first run about an outage, with what was predicted (Figure 8).
 
-        Raises
-        ------
-        InputError
-            If there is no such outage.
+        Raises InputError if there is no such outage.
         """
         from gmwm import plotting
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
@@ -21,11 +21,11 @@ from gmwm.ins.simulation import ErrorSource, Experiment, Scenario, Simulated
 from gmwm.ins.spec.fields import (
     RECORDINGS,
     REDUCED,
+    Declared,
     FileName,
     Meters,
     PositiveHertz,
     PositiveMeters,
-    PositiveRadians,
     PositiveSeconds,
     PositiveSpeed,
     Seconds,
@@ -47,7 +47,6 @@ MISSIONS: dict[str, Callable[..., Trajectory]] = {
 _LONGEST_NAME = 40
 _SAME_TIME = 1e-6  # s
 _SAME_RATE = 1e-3
-
 
 _NONE = BeforeValidator(lambda given: None if given == "none" else given)
 
@@ -95,15 +94,6 @@ class GnssSpec(Spec):
     lever_arm: Three[Meters] = (0.0, 0.0, 0.0)
     coloured_sd: Three[Meters] | None = None
     coloured_tau: PositiveSeconds | None = None
-
-
-class InitialSdSpec(Spec):
-    """What initial errors are drawn from."""
-
-    position: PositiveMeters | None = None
-    velocity: PositiveSpeed | None = None
-    tilt: PositiveRadians | None = None
-    heading: PositiveRadians | None = None
 
 
 def _named(given: Any) -> dict[str, Any]:
@@ -154,7 +144,7 @@ class ExperimentSpec(Spec):
     filters: Annotated[dict[str, _Filter], BeforeValidator(_named)]
     outages: Annotated[tuple[_Span, ...], written("[[start, length], ...] in seconds")] = ()
     gnss: GnssSpec = GnssSpec()
-    initial_sd: InitialSdSpec = InitialSdSpec()
+    initial_sd: Annotated[InitialSd, Declared()] = InitialSd()
     runs: Annotated[StrictInt, Field(ge=1)] = 100
     seed: Annotated[StrictInt, Field(ge=0)] = 0
 
@@ -162,37 +152,26 @@ class ExperimentSpec(Spec):
 def experiment_from(content: Mapping[str, Any], folder: Path = Path()) -> Experiment:
     """An experiment from the content of a file.
 
+    Raises InputError if something is missing, unknown or cannot be used.
+
     Parameters
     ----------
     content : mapping
         trajectory, truth and filters, and what else is not as usual; see the documentation.
     folder : Path, optional
         That paths are relative to.
-
-    Raises
-    ------
-    InputError
-        If something is missing, unknown or cannot be used.
     """
     spec = ExperimentSpec.parse(content)
-    trajectory = _trajectory(spec, folder)
-    outages = _apart(spec.outages)
-    aiding = _aiding(spec.gnss, trajectory)
-    scenario = Scenario(trajectory, aiding, outages, InitialSd(**spec.initial_sd.given))
-    _check_fixes(aiding, outages)
-    source, truth = _source(spec.truth, trajectory, folder)
-    believed = _Believed(truth, source, _about_outages(spec, scenario), folder)
-    return Experiment(
-        scenario=scenario,
-        source=source,
-        filters={
-            name: believed.models(f"filters, {name}", each) for name, each in spec.filters.items()
-        },
-        truth=truth,
-        runs=spec.runs,
-        seed=spec.seed,
-        title=Path(spec.trajectory).name,
-    )
+    trajectory, outages = _trajectory(spec, folder), _outages(spec)
+    scenario = Scenario(trajectory, _aiding(spec.gnss, trajectory), outages, spec.initial_sd)
+    _check_fixes(scenario)
+    truth, source = _source(spec.truth, trajectory, folder)
+    known = _Known(truth, source, _about_outages(spec, scenario), folder)
+    filters = {
+        name: _models(f"filters, {name}", each, known) for name, each in spec.filters.items()
+    }
+    title = Path(spec.trajectory).name
+    return Experiment(scenario, source, filters, truth, spec.runs, spec.seed, title)
 
 
 def _trajectory(spec: ExperimentSpec, folder: Path) -> Trajectory:
@@ -219,9 +198,9 @@ def _trajectory(spec: ExperimentSpec, folder: Path) -> Trajectory:
     return trajectory.segment(0.0, duration)
 
 
-def _apart(given: tuple[tuple[float, float], ...]) -> tuple[Outage, ...]:
-    """Outages in order that do not overlap."""
-    outages = sorted((Outage(*each) for each in given), key=lambda outage: outage.start)
+def _outages(spec: ExperimentSpec) -> tuple[Outage, ...]:
+    """Outages in order of time; rejected if two overlap."""
+    outages = sorted((Outage(*each) for each in spec.outages), key=lambda outage: outage.start)
     for first, second in pairwise(outages):
         if second.start < first.end - _SAME_TIME:
             raise InputError(
@@ -235,15 +214,16 @@ def _aiding(spec: GnssSpec, trajectory: Trajectory) -> Aiding:
     return gnss(trajectory, **spec.given, imu=emulate(trajectory) if any(spec.lever_arm) else None)
 
 
-def _check_fixes(aiding: Aiding, outages: Sequence[Outage]) -> None:
-    """Refuse a study of integrated navigation without fixes, or an outage that takes none away."""
+def _check_fixes(scenario: Scenario) -> None:
+    """Reject a study without fixes, and an outage that takes none away."""
+    aiding = scenario.aiding
     total = sum(each.time.size for each in aiding.fixes)
     if not total:
         raise InputError(
             "gnss: there is no fix: give position_sd or velocity_sd, and an interval below the "
             "duration"
         )
-    for outage in outages:
+    for outage in scenario.outages:
         if sum(each.time.size for each in aiding.without([outage]).fixes) == total:
             raise InputError(
                 f"outages: no fix falls into that from {outage.start:g} s to {outage.end:g} s: "
@@ -252,32 +232,24 @@ def _check_fixes(aiding: Aiding, outages: Sequence[Outage]) -> None:
 
 
 def _about_outages(spec: ExperimentSpec, scenario: Scenario) -> Scenario:
-    """The outages of a scenario and two minutes before the first: what a reduced model is for."""
+    """The outages of a scenario and two minutes before the first, which a reduced model is for."""
     outages, whole = scenario.outages, scenario.trajectory
     if not outages:
         return scenario
     start = round(int(max(outages[0].start - tuning.SETTLING, 0.0)) / whole.dt) * whole.dt
     part = whole.segment(start, outages[-1].end)
-    return Scenario(
-        part,
-        _aiding(spec.gnss, part),
-        tuple(Outage(outage.start - start, outage.duration) for outage in outages),
-        scenario.initial_sd,
-        interval=tuning.SETTLING,
-    )
+    moved = tuple(Outage(outage.start - start, outage.duration) for outage in outages)
+    aiding = _aiding(spec.gnss, part)
+    return Scenario(part, aiding, moved, scenario.initial_sd, interval=tuning.SETTLING)
 
 
 def _source(
     given: str | RecordingsSpec | ModelsSpec, trajectory: Trajectory, folder: Path
-) -> tuple[ErrorSource, SensorModels | None]:
-    """Where errors come from, and their models if they are simulated."""
-    if isinstance(given, RecordingsSpec):
-        return _recorded(given, trajectory, folder), None
-    models = read_models("truth", given, folder)
-    return Simulated(models), models
-
-
-def _recorded(given: RecordingsSpec, trajectory: Trajectory, folder: Path) -> Recorded:
+) -> tuple[SensorModels | None, ErrorSource]:
+    """Models that errors are drawn from, ``None`` for real ones, and where errors come from."""
+    if not isinstance(given, RecordingsSpec):
+        models = read_models("truth", given, folder)
+        return models, Simulated(models)
     recordings = [read(folder / name, **given.options()) for name in given.recordings]
     source = Recorded.of(recordings, trajectory.duration)
     if abs(trajectory.dt / source.dt - 1.0) > _SAME_RATE:
@@ -285,52 +257,45 @@ def _recorded(given: RecordingsSpec, trajectory: Trajectory, folder: Path) -> Re
             f"truth: {source.source} has {1.0 / source.dt:g} Hz and the trajectory "
             f"{1.0 / trajectory.dt:g} Hz: give a trajectory of the recordings' rate"
         )
-    return source
+    return None, source
 
 
 @dataclass(frozen=True, eq=False)
-class _Believed:
-    """What the filters' models may refer to."""
+class _Known:
+    """What the models of filters may refer to; the scenario is that of reduced models."""
 
     truth: SensorModels | None
     source: ErrorSource
-    judged: Scenario
+    scenario: Scenario
     folder: Path
 
-    def models(self, where: str, given: str | ReducedSpec | ModelsSpec) -> SensorModels:
-        models = self._given(where, given)
-        try:
-            SensorStates.of(models, self.judged.trajectory.dt, 1)
-        except InputError as error:
-            raise InputError(f"{where}, {error}") from None
-        return models
 
-    def _given(self, where: str, given: str | ReducedSpec | ModelsSpec) -> SensorModels:
-        if given == "truth":
-            if self.truth is None:
-                raise InputError(f"{where}: real errors have no true model: give a calibration")
-            return self.truth
-        if isinstance(given, ReducedSpec):
-            return self._reduced(where, given)
-        models = read_models(where, given, self.folder)
-        return _with_bias(models, self.source) if isinstance(self.source, Recorded) else models
-
-    def _reduced(self, where: str, given: ReducedSpec) -> SensorModels:
-        full = self.truth if given.of == "truth" else read_models(where, given.of, self.folder)
-        if full is None:
+def _models(where: str, given: str | ReducedSpec | ModelsSpec, known: _Known) -> SensorModels:
+    """Models of a filter, written at ``where``."""
+    models, dt = known.truth, known.scenario.trajectory.dt
+    if given == "truth" and models is None:
+        raise InputError(f"{where}: real errors have no true model: give a calibration")
+    if isinstance(given, ReducedSpec):
+        if given.of != "truth":
+            models = read_models(where, given.of, known.folder)
+        if models is None:
             raise InputError(f"{where}: name what is reduced, as in of: calibration.json")
-        judged = self.judged if self.judged.outages else None
-        try:
-            return reduce(full, given.reduce, scenario=judged, dt=self.judged.trajectory.dt).models
-        except InputError as error:
-            raise InputError(f"{where}, {error}") from None
-
-
-def _with_bias(models: SensorModels, source: Recorded) -> SensorModels:
-    """Models for real errors: a random walk does not start at zero in the middle of a recording."""
-    walks = {
-        axis: source.bias_sd[axis]
-        for axis, model in models.models.items()
-        if models.bias_sd[axis] == 0.0 and any(t.is_walk for t in model.terms)
-    }
-    return replace(models, bias_sd={**models.bias_sd, **walks})
+    elif given != "truth":
+        models = read_models(where, given, known.folder)
+        if isinstance(known.source, Recorded):
+            # A random walk does not start at zero in the middle of a recording.
+            walks = {
+                axis: known.source.bias_sd[axis]
+                for axis, model in models.models.items()
+                if models.bias_sd[axis] == 0.0 and any(term.is_walk for term in model.terms)
+            }
+            models = replace(models, bias_sd={**models.bias_sd, **walks})
+    assert models is not None
+    try:
+        if isinstance(given, ReducedSpec):
+            scenario = known.scenario if known.scenario.outages else None
+            models = reduce(models, given.reduce, scenario=scenario, dt=dt).models
+        SensorStates.of(models, dt, 1)
+    except InputError as error:
+        raise InputError(f"{where}, {error}") from None
+    return models

@@ -6,6 +6,7 @@ field; pydantic says where it stood.
 
 from __future__ import annotations
 
+import dataclasses
 import re
 from collections.abc import Mapping
 from typing import Annotated, Any, ClassVar, Self, TypeVar
@@ -15,12 +16,15 @@ from pydantic import (
     BeforeValidator,
     ConfigDict,
     Field,
+    GetCoreSchemaHandler,
     StringConstraints,
     ValidationError,
     ValidatorFunctionWrapHandler,
     WrapValidator,
+    create_model,
     model_validator,
 )
+from pydantic_core import CoreSchema, core_schema
 
 from gmwm._core import checks
 from gmwm._core.units import factor
@@ -69,6 +73,23 @@ class Spec(BaseModel):
         return {name: getattr(self, name) for name in self.model_fields_set}
 
 
+class Declared:
+    """Marks a key that makes a dataclass at once, whose fields have their ``unit`` as metadata."""
+
+    def __get_pydantic_core_schema__(
+        self, source: Any, handler: GetCoreSchemaHandler
+    ) -> CoreSchema:
+        """Schema of the keys with their units, and then of the dataclass."""
+        fields: dict[str, Any] = {
+            each.name: (Annotated[float, number(each.metadata["unit"])], each.default)
+            for each in dataclasses.fields(source)
+        }
+        form = create_model(source.__name__, __base__=Spec, **fields)
+        return core_schema.no_info_after_validator_function(
+            lambda found: source(**found.given), handler.generate_schema(form)
+        )
+
+
 def _sentence(error: ValidationError, where: str, needs: str) -> tuple[str, str]:
     """Text and code."""
     errors = error.errors(include_url=False)
@@ -98,19 +119,16 @@ def value(given: Any, si_unit: str) -> float:
     Raises InputError if it is not a finite number, or its unit is of another dimension.
     """
     if checks.is_number(given):
-        return _plausible(float(given), given)
-    match = _NUMBER.fullmatch(given) if isinstance(given, str) else None
-    if match is None:
-        raise InputError(
-            f"{checks.shown(given)} is not a number: write one, with a unit like {si_unit} or "
-            "without for SI"
-        )
-    number, unit = match.groups()
-    found = float(number) * (factor(unit, si_unit) if unit else 1.0)
-    return _plausible(found, given)
-
-
-def _plausible(found: float, given: Any) -> float:
+        found = float(given)
+    else:
+        match = _NUMBER.fullmatch(given) if isinstance(given, str) else None
+        if match is None:
+            raise InputError(
+                f"{checks.shown(given)} is not a number: write one, with a unit like {si_unit} or "
+                "without for SI"
+            )
+        number, unit = match.groups()
+        found = float(number) * (factor(unit, si_unit) if unit else 1.0)
     if found != 0.0 and not tuning.LEAST_NUMBER < abs(found) < tuning.LARGEST_NUMBER:
         raise InputError(f"{checks.shown(given)} is beyond what sensors and drives have: check it")
     return found
@@ -121,14 +139,6 @@ def number(si_unit: str) -> BeforeValidator:
     return BeforeValidator(lambda given: value(given, si_unit))
 
 
-def _says_it_better(error: Any) -> bool:
-    """Whether a part has the form and another fault, or lacks a key."""
-    kind, loc = error["type"], error["loc"]
-    return kind in ("value_error", "greater_than") or (
-        kind == "missing" and isinstance(loc[-1], str)
-    )
-
-
 def written(form: str) -> WrapValidator:
     """Something of a form, which the message shows where another was written."""
 
@@ -136,19 +146,22 @@ def written(form: str) -> WrapValidator:
         try:
             return handler(given)
         except ValidationError as error:
-            if any(_says_it_better(each) for each in error.errors()):
-                raise
+            # A part that has the form and another fault, or lacks a key, says it better.
+            for each in error.errors():
+                lacks = each["type"] == "missing" and isinstance(each["loc"][-1], str)
+                if lacks or each["type"] in ("value_error", "greater_than"):
+                    raise
             raise ValueError(f"{checks.shown(given)}: write {form}") from None
 
     return WrapValidator(check)
 
 
-def _spread(given: Any) -> Any:
-    return given if isinstance(given, list | tuple) else (given,) * 3
-
-
 T = TypeVar("T")
-Three = Annotated[tuple[T, T, T], written("three values, or one for all"), BeforeValidator(_spread)]
+Three = Annotated[
+    tuple[T, T, T],
+    written("three values, or one for all"),
+    BeforeValidator(lambda given: given if isinstance(given, list | tuple) else (given,) * 3),
+]
 Seconds = Annotated[float, number("s")]
 Meters = Annotated[float, number("m")]
 Radians = Annotated[float, number("rad")]

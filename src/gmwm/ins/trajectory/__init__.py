@@ -1,5 +1,11 @@
 """Error-free motion: from files, manoeuvres and missions."""
 
+from gmwm.ins.trajectory.columns import (
+    POSITION_WORDS as POSITION_WORDS,
+    LogColumns as LogColumns,
+    is_time as is_time,
+    words_of as words_of,
+)
 from gmwm.ins.trajectory.missions import (
     car_drive as car_drive,
     fixed_wing_loiter as fixed_wing_loiter,

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, Protocol, TypedDict, Unpack
 
 import numpy as np
 
@@ -28,8 +28,65 @@ _LONGEST = 10_000_000  # steps: 2 GB while the trajectory is built
 
 
 @dataclass(frozen=True)
+class Pulse:
+    """A change of a quantity.
+
+    change: By how much, signed.
+    limit: Largest rate, unit of the quantity per second; a change too small for it has a lower one.
+    ramp: Time in which the rate comes up, and goes down, s. It follows 10 x^3 - 15 x^4 + 6 x^5, of
+        which two derivatives vanish at both ends.
+    """
+
+    change: float
+    limit: float
+    ramp: float
+
+    @property
+    def rate(self) -> float:
+        """Rate between the ramps, signed."""
+        return float(np.clip(self.change / self.ramp, -self.limit, self.limit))
+
+    @property
+    def hold(self) -> float:
+        """Time between the ramps, s."""
+        return max(abs(self.change) / self.limit - self.ramp, 0.0) if self.change else 0.0
+
+    @property
+    def duration(self) -> float:
+        """From the begin of the first ramp to the end of the last one, s; 0 without a change."""
+        return 2.0 * self.ramp + self.hold if self.change else 0.0
+
+    def value(self, time: FloatArray) -> FloatArray:
+        """What has changed some time after the begin, s."""
+        up, down = self._ramps(time)
+        area = up**4 * (2.5 + up * (-3.0 + up)) - down**4 * (2.5 + down * (-3.0 + down))
+        # After a ramp its step goes on at 1.
+        past_up = np.maximum(time - self.ramp, 0.0)
+        past_down = np.maximum(time - 2.0 * self.ramp - self.hold, 0.0)
+        found = self.rate * self.ramp * area + self.rate * (past_up - past_down)
+        return np.where(time >= self.duration, self.change, found)
+
+    def slope(self, time: FloatArray) -> FloatArray:
+        """Its rate some time after the begin, s."""
+        up, down = self._ramps(time)
+        step_up = up**3 * (10.0 + up * (-15.0 + 6.0 * up))
+        return self.rate * (step_up - down**3 * (10.0 + down * (-15.0 + 6.0 * down)))
+
+    def curvature(self, time: FloatArray) -> FloatArray:
+        """Derivative of the rate some time after the begin, s."""
+        up, down = self._ramps(time)
+        bell = 30.0 * up**2 * (1.0 - up) ** 2
+        return self.rate / self.ramp * (bell - 30.0 * down**2 * (1.0 - down) ** 2)
+
+    def _ramps(self, time: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """How far the two ramps are, 0 to 1."""
+        up = np.clip(time / self.ramp, 0.0, 1.0)
+        return up, np.clip((time - self.ramp - self.hold) / self.ramp, 0.0, 1.0)
+
+
+@dataclass(frozen=True)
 class Plan:
-    """What a manoeuvre does, its duration included; ``None`` where nothing changes.
+    """What a manoeuvre does; ``None`` where nothing changes.
 
     duration: s.
     speed, heading, height: Changes that begin with the manoeuvre: m/s, rad, m.
@@ -70,8 +127,7 @@ class Accelerate:
     acceleration: float = 1.0
 
     def __post_init__(self) -> None:
-        if not is_number(self.to_speed) or self.to_speed < 0.0:
-            raise InputError(f"to_speed = {shown(self.to_speed)}: give a speed, zero or more")
+        _check_speed("to_speed", self.to_speed)
         positive("acceleration", self.acceleration)
 
     def plan(self, speed: float, ramp: float) -> Plan:
@@ -105,8 +161,7 @@ class Turn:
     rate: float
 
     def __post_init__(self) -> None:
-        if not is_number(self.angle):
-            raise InputError(f"angle = {shown(self.angle)}: give a number in rad")
+        _check_number("angle", self.angle, "rad")
         positive("rate", self.rate)
 
     def plan(self, speed: float, ramp: float) -> Plan:
@@ -123,14 +178,36 @@ class Climb:
     rate: float
 
     def __post_init__(self) -> None:
-        if not is_number(self.height_change):
-            raise InputError(f"height_change = {shown(self.height_change)}: give a number in m")
+        _check_number("height_change", self.height_change, "m")
         positive("rate", self.rate)
 
     def plan(self, speed: float, ramp: float) -> Plan:
         """The height changes."""
         pulse = Pulse(self.height_change, self.rate, ramp)
         return Plan(pulse.duration, height=pulse)
+
+
+def _check_speed(name: str, value: float) -> None:
+    if not is_number(value) or value < 0.0:
+        raise InputError(f"{name} = {shown(value)}: give a speed, zero or more")
+
+
+def _check_number(name: str, value: float, unit: str) -> None:
+    if not is_number(value):
+        raise InputError(f"{name} = {shown(value)}: give a number in {unit}")
+
+
+class Body(TypedDict, total=False):
+    """How the body is turned.
+
+    flat: False: turns are banked so that the specific force stays in the body's plane of symmetry.
+        True: roll is zero, as of a car.
+    level: False: the body points where it goes, up and down slopes. True: pitch is zero, as of a
+        helicopter that climbs vertically.
+    """
+
+    flat: bool
+    level: bool
 
 
 def perform(
@@ -141,11 +218,13 @@ def perform(
     speed: float = 0.0,
     dt: float = 0.01,
     ramp: float = 2.0,
-    flat: bool = False,
-    level: bool = False,
     duration: float | None = None,
+    **body: Unpack[Body],
 ) -> Trajectory:
-    """The trajectory of a vehicle that does one manoeuvre after the other.
+    """The trajectory of a vehicle that does one manoeuvre after the other; its yaw is not wrapped.
+
+    Raises InputError if nothing is to be done, a body that is not level climbs at no speed, or the
+    way leads to a pole.
 
     Parameters
     ----------
@@ -159,34 +238,33 @@ def perform(
         Sampling interval, s.
     ramp : float, optional
         Time in which a rate or an acceleration comes up, s.
-    flat : bool, optional
-        False: turns are banked so that the specific force stays in the body's plane of symmetry.
-        True: roll is zero, as of a car.
-    level : bool, optional
-        False: the body points where it goes, up and down slopes. True: pitch is zero, as of a
-        helicopter that climbs vertically.
     duration : float, optional
-        Length of the trajectory, s; manoeuvres are cut there, or followed by more of what comes
-        last. By default, as long as they take.
-
-    Returns
-    -------
-    Trajectory
-        The yaw runs on past 180 deg.
-
-    Raises
-    ------
-    InputError
-        If nothing is to be done, a body that is not level climbs at no speed, or the way leads to
-        a pole.
+        Length of the trajectory, s; manoeuvres are cut there, or the last state goes on. By
+        default, as long as they take.
+    flat : bool, optional
+        True for a body that does not bank, as a car; by default turns are banked so that the
+        specific force stays in the body's plane of symmetry.
+    level : bool, optional
+        True for a body that does not pitch, as a helicopter that climbs vertically; by default it
+        points where it goes.
     """
     dt, ramp = sampling_interval(dt), positive("ramp", ramp)
-    origin = _origin(start)
+    origin = finite_numbers(start, "start")
+    if origin.shape != (3,):
+        raise InputError(f"start = {shown(start)}: give latitude, longitude in rad, height in m")
+    check_latitudes(origin[None, :], "start")
+    _check_speed("speed", speed)
+    _check_number("heading", heading, "rad")
     limit = dt * _LONGEST if duration is None else positive("duration", duration)
-    plans = _plans(manoeuvres, speed, ramp, min(limit, dt * _LONGEST))
-    n = math.floor(
-        (sum(plan.duration for plan in plans) if duration is None else limit) / dt + 1e-6
-    )
+    plans, elapsed, now = [], 0.0, speed
+    for manoeuvre in manoeuvres:
+        plan = manoeuvre.plan(now, ramp)
+        plans.append(plan)
+        elapsed += plan.duration
+        now = max(now + plan.speed.change, 0.0) if plan.speed is not None else now
+        if elapsed > min(limit, dt * _LONGEST):
+            break
+    n = math.floor((elapsed if duration is None else limit) / dt + 1e-6)
     if not 1 <= n <= _LONGEST:
         raise InputError(
             f"a trajectory of {n:,} steps of {dt:g} s: let it have one to {_LONGEST:,} steps"
@@ -195,8 +273,7 @@ def perform(
     lla = np.empty((n + 1, 3))
     _walk(course.speed, course.heading, course.climb, dt, origin, lla)
     check_latitudes(lla, "manoeuvres")
-    rpy = _attitude(course, lla, flat=flat, level=level)
-    return Trajectory.from_arrays(dt, lla, rpy)
+    return Trajectory.from_arrays(dt, lla, _attitude(course, lla, **body))
 
 
 @dataclass(frozen=True, eq=False)
@@ -211,34 +288,7 @@ class _Course:
     climb_rate: FloatArray
 
 
-def _origin(start: Lla) -> FloatArray:
-    origin = finite_numbers(start, "start")
-    if origin.shape != (3,):
-        raise InputError(f"start = {shown(start)}: give latitude, longitude in rad, height in m")
-    check_latitudes(origin[None, :], "start")
-    return origin
-
-
-def _plans(manoeuvres: Iterable[Manoeuvre], speed: float, ramp: float, limit: float) -> list[Plan]:
-    """What is done until some time, s, or until nothing more is to be done."""
-    if not is_number(speed) or speed < 0.0:
-        raise InputError(f"speed = {shown(speed)}: give a speed, zero or more")
-    plans: list[Plan] = []
-    elapsed = 0.0
-    for manoeuvre in manoeuvres:
-        plan = manoeuvre.plan(speed, ramp)
-        plans.append(plan)
-        elapsed += plan.duration
-        if plan.speed is not None:
-            speed = max(speed + plan.speed.change, 0.0)
-        if elapsed > limit:
-            break
-    return plans
-
-
 def _course(plans: Sequence[Plan], time: FloatArray, speed: float, heading: float) -> _Course:
-    if not is_number(heading):
-        raise InputError(f"heading = {shown(heading)}: give a number in rad")
     course = _Course(*(np.zeros(time.size) for _ in range(6)))
     course.speed[:] = speed
     course.heading[:] = heading
@@ -261,10 +311,16 @@ def _course(plans: Sequence[Plan], time: FloatArray, speed: float, heading: floa
     return course
 
 
-def _attitude(course: _Course, lla: FloatArray, *, flat: bool, level: bool) -> FloatArray:
-    """Roll, pitch and yaw at the epochs."""
+def _attitude(
+    course: _Course, lla: FloatArray, *, flat: bool = False, level: bool = False
+) -> FloatArray:
+    """Roll, pitch and yaw at the epochs.
+
+    The specific force that is banked for has the Coriolis acceleration of the Earth's rotation, but
+    not that of the curved way, which is 1e-5 of gravity at 30 m/s.
+    """
     speed, heading, climb = course.speed[::2], course.heading[::2], course.climb[::2]
-    pitch = np.zeros(speed.size)
+    pitch, roll = np.zeros(speed.size), np.zeros(speed.size)
     if not level:
         if np.any((np.abs(climb) > 0.0) & ~(speed > 0.0)):
             raise InputError(
@@ -272,27 +328,16 @@ def _attitude(course: _Course, lla: FloatArray, *, flat: bool, level: bool) -> F
                 "that stays level"
             )
         pitch = np.arctan2(climb, speed)
-    roll = np.zeros(speed.size)
     if not flat:
-        forward, right, down = _specific_force(course, lla)
+        # The Earth's axis, and the specific force, in a level frame with the body's heading.
+        ahead, across = np.cos(lla[:, 0]) * np.cos(heading), -np.cos(lla[:, 0]) * np.sin(heading)
+        below = -np.sin(lla[:, 0])
+        gravity: Any = gravity_at.py_func
+        forward = course.acceleration[::2] - 2.0 * RATE * across * climb
+        right = speed * course.turn_rate[::2] + 2.0 * RATE * (below * speed + ahead * climb)
+        down = -course.climb_rate[::2] - 2.0 * RATE * across * speed - gravity(-below, lla[:, 2])
         roll = np.arctan2(right, -(forward * np.sin(pitch) + down * np.cos(pitch)))
     return np.stack([roll, pitch, heading], axis=-1)
-
-
-def _specific_force(course: _Course, lla: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Forward, to the right and down, in a level frame with the body's heading, m/s^2.
-
-    With the Coriolis acceleration of the Earth's rotation, not with that of the curved way, which
-    is 1e-5 of gravity at 30 m/s.
-    """
-    speed, heading, climb = course.speed[::2], course.heading[::2], course.climb[::2]
-    ahead, across = np.cos(lla[:, 0]) * np.cos(heading), -np.cos(lla[:, 0]) * np.sin(heading)
-    below = -np.sin(lla[:, 0])
-    forward = course.acceleration[::2] - 2.0 * RATE * across * climb
-    right = speed * course.turn_rate[::2] + 2.0 * RATE * (below * speed + ahead * climb)
-    gravity: Any = gravity_at.py_func
-    down = -course.climb_rate[::2] - 2.0 * RATE * across * speed - gravity(-below, lla[:, 2])
-    return forward, right, down
 
 
 @compiled()
@@ -328,74 +373,5 @@ def _walk(
 def _angular_speed(lat: float, h: float, speed: float, heading: float) -> tuple[float, float]:
     """Rates of latitude and longitude, rad/s."""
     meridian, transverse = radii(lat)
-    return (
-        speed * math.cos(heading) / (meridian + h),
-        speed * math.sin(heading) / ((transverse + h) * math.cos(lat)),
-    )
-
-
-@dataclass(frozen=True)
-class Pulse:
-    """A change of a quantity.
-
-    change: By how much, signed.
-    limit: Largest rate, unit of the quantity per second; a change too small for it has a lower one.
-    ramp: Time in which the rate comes up, and goes down, s. It follows 10 x^3 - 15 x^4 + 6 x^5, of
-        which two derivatives vanish at both ends.
-    """
-
-    change: float
-    limit: float
-    ramp: float
-
-    @property
-    def rate(self) -> float:
-        """Rate between the ramps, signed."""
-        return float(np.clip(self.change / self.ramp, -self.limit, self.limit))
-
-    @property
-    def hold(self) -> float:
-        """Time between the ramps, s."""
-        return max(abs(self.change) / self.limit - self.ramp, 0.0) if self.change else 0.0
-
-    @property
-    def duration(self) -> float:
-        """From the begin of the first ramp to the end of the last one, s; 0 without a change."""
-        return 2.0 * self.ramp + self.hold if self.change else 0.0
-
-    def value(self, time: FloatArray) -> FloatArray:
-        """What has changed some time after the begin, s."""
-        up, down = self._ramps(time)
-        area = self.rate * self.ramp * (_integral(up) - _integral(down))
-        # After a ramp its step goes on at 1.
-        past_up = np.maximum(time - self.ramp, 0.0)
-        past_down = np.maximum(time - 2.0 * self.ramp - self.hold, 0.0)
-        found = area + self.rate * (past_up - past_down)
-        return np.where(time >= self.duration, self.change, found)
-
-    def slope(self, time: FloatArray) -> FloatArray:
-        """Its rate some time after the begin, s."""
-        up, down = self._ramps(time)
-        return self.rate * (_step(up) - _step(down))
-
-    def curvature(self, time: FloatArray) -> FloatArray:
-        """Derivative of the rate some time after the begin, s."""
-        up, down = self._ramps(time)
-        return self.rate / self.ramp * (_bell(up) - _bell(down))
-
-    def _ramps(self, time: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """How far the two ramps are, 0 to 1."""
-        up = np.clip(time / self.ramp, 0.0, 1.0)
-        return up, np.clip((time - self.ramp - self.hold) / self.ramp, 0.0, 1.0)
-
-
-def _integral(x: FloatArray) -> FloatArray:
-    return x**4 * (2.5 + x * (-3.0 + x))
-
-
-def _step(x: FloatArray) -> FloatArray:
-    return x**3 * (10.0 + x * (-15.0 + 6.0 * x))
-
-
-def _bell(x: FloatArray) -> FloatArray:
-    return 30.0 * x**2 * (1.0 - x) ** 2
+    north, east = speed * math.cos(heading), speed * math.sin(heading)
+    return north / (meridian + h), east / ((transverse + h) * math.cos(lat))

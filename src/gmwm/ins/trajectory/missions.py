@@ -24,8 +24,14 @@ from gmwm.ins.trajectory.manoeuvres import (
 from gmwm.ins.trajectory.routes import displacement
 from gmwm.ins.trajectory.trajectory import Trajectory
 
-_RAMP = 2.0  # s, of the helicopter's turns
 _START = (math.radians(46.52), math.radians(6.57), 400.0)
+_RAMP = 2.0  # s, of the helicopter's turns
+_CORNER, _CORNER_RATE = 0.5 * math.pi, math.radians(22.0)  # of streets
+_BLOCKS = ((12.0, 15.0, 1.0), (20.0, 0.0, 1.0), (8.0, 35.0, -1.0), (15.0, 5.0, 1.0))
+"""Streets of a town: s straight on, s at a light, side of the corner."""
+_BENDS = ((35.0, 30.0), (-60.0, -12.0), (25.0, 15.0), (-15.0, -33.0))
+"""An open road: deg of a bend, m of a rise after it."""
+_BEND_RATE = math.radians(4.0)
 
 
 def helicopter_mapping(
@@ -40,33 +46,42 @@ def helicopter_mapping(
 ) -> Trajectory:
     """Airborne laser scanning: a vertical climb, then parallel strips flown to and fro.
 
+    Raises InputError if an argument is not positive, or the spacing is wider than the diameter of a
+    turn.
+
     Parameters
     ----------
     duration, dt : float, optional
         s.
     start : (3,) sequence, optional
         Latitude, longitude, rad, and height, m.
-    heading : float, optional
-        Of the first strip, rad.
-    speed : float, optional
-        m/s.
+    heading, speed : float, optional
+        Of the first strip, rad, and m/s.
     strip : float, optional
         Length that each strip and the next have beside each other, m.
     spacing : float, optional
         Distance of one strip from the next, m. If it is less than the diameter of a turn at
         6 deg/s, the turn begins to the other side.
-
-    Raises
-    ------
-    InputError
-        If an argument is not positive, or the spacing is wider than the diameter of a turn.
     """
     rate = math.radians(6.0)
     strip, spacing = positive("strip", strip), positive("spacing", spacing)
     speed = positive("speed", speed)
-    away, overshoot = _turn_to_next_strip(speed, spacing, rate)
+
+    def end_of_turn(away: float) -> tuple[float, float]:
+        """How far out and aside a turn ends that first turns away, m."""
+        ahead, aside = displacement(Pulse(-away, rate, _RAMP), 0.0, speed)
+        more, back = displacement(Pulse(math.pi + away, rate, _RAMP), -away, speed)
+        return ahead + more, aside + back
+
+    widest = end_of_turn(0.0)[1]
+    if spacing > widest:
+        raise InputError(
+            f"spacing = {spacing:g}: at {speed:g} m/s turns are {widest:.0f} m wide, give at most "
+            "that"
+        )
+    away = float(brentq(lambda angle: end_of_turn(angle)[1] - spacing, 0.0, 0.75 * math.pi))
     # A turn ends farther out than it began by the overshoot, and so does every other strip.
-    length = strip + max(overshoot, 0.0)
+    length = strip + max(end_of_turn(away)[0], 0.0)
 
     def manoeuvres() -> Iterator[Manoeuvre]:
         yield from (Straight(30.0), Climb(150.0, 4.0), Accelerate(speed, 1.5))
@@ -78,24 +93,6 @@ def helicopter_mapping(
     return perform(
         manoeuvres(), start=start, heading=heading, dt=dt, ramp=_RAMP, level=True, duration=duration
     )
-
-
-def _turn_to_next_strip(speed: float, spacing: float, rate: float) -> tuple[float, float]:
-    """How far to turn away before turning back, rad, and how far out that ends, m."""
-
-    def displaced(away: float) -> tuple[float, float]:
-        ahead, aside = displacement(Pulse(-away, rate, _RAMP), 0.0, speed)
-        more, back = displacement(Pulse(math.pi + away, rate, _RAMP), -away, speed)
-        return ahead + more, aside + back
-
-    widest = displaced(0.0)[1]
-    if spacing > widest:
-        raise InputError(
-            f"spacing = {spacing:g}: at {speed:g} m/s turns are {widest:.0f} m wide, give at most "
-            "that"
-        )
-    away = float(brentq(lambda angle: displaced(angle)[1] - spacing, 0.0, 0.75 * math.pi))
-    return away, displaced(away)[0]
 
 
 def car_drive(
@@ -116,34 +113,19 @@ def car_drive(
     def manoeuvres() -> Iterator[Manoeuvre]:
         yield Stop(20.0)
         for side in cycle((1.0, -1.0)):
-            yield from _streets(side)
-            yield from _open_road(side)
+            for block, wait, turn in _BLOCKS:
+                yield from (Accelerate(13.0, 1.8), Straight(block))
+                if wait:
+                    yield Stop(wait, 2.0)
+                yield from (Accelerate(5.5, 1.5), Turn(side * turn * _CORNER, _CORNER_RATE))
+            yield Accelerate(24.0, 1.2)
+            for bend, rise in _BENDS:
+                yield from (Straight(9.0), Turn(side * math.radians(bend), _BEND_RATE))
+                yield Climb(rise, 1.2)
 
     return perform(
         manoeuvres(), start=start, heading=heading, dt=dt, ramp=1.0, flat=True, duration=duration
     )
-
-
-def _streets(side: float) -> list[Manoeuvre]:
-    """Some 3 minutes in a town; ``side`` 1 or -1 mirrors them."""
-    corner, rate = 0.5 * math.pi, math.radians(22.0)
-    found: list[Manoeuvre] = []
-    blocks = ((12.0, 15.0, 1.0), (20.0, 0.0, 1.0), (8.0, 35.0, -1.0), (15.0, 5.0, 1.0))
-    for block, wait, turn in blocks:
-        found += [Accelerate(13.0, 1.8), Straight(block)]
-        if wait:
-            found.append(Stop(wait, 2.0))
-        found += [Accelerate(5.5, 1.5), Turn(side * turn * corner, rate)]
-    return found
-
-
-def _open_road(side: float) -> list[Manoeuvre]:
-    """Some 3 minutes between towns; ``side`` 1 or -1 mirrors the bends."""
-    rate = math.radians(4.0)
-    found: list[Manoeuvre] = [Accelerate(24.0, 1.2)]
-    for bend, rise in ((35.0, 30.0), (-60.0, -12.0), (25.0, 15.0), (-15.0, -33.0)):
-        found += [Straight(9.0), Turn(side * math.radians(bend), rate), Climb(rise, 1.2)]
-    return found
 
 
 def fixed_wing_loiter(
@@ -157,6 +139,8 @@ def fixed_wing_loiter(
 ) -> Trajectory:
     """A small fixed-wing aircraft that circles, now right, now left, with climbs between.
 
+    Raises InputError if an argument is not positive.
+
     Parameters
     ----------
     duration, dt : float, optional
@@ -167,20 +151,13 @@ def fixed_wing_loiter(
         At the start, rad.
     speed, radius : float, optional
         Speed, m/s, and radius of the circles, m.
-
-    Raises
-    ------
-    InputError
-        If an argument is not positive.
     """
     rate = positive("speed", speed) / positive("radius", radius)
 
     def manoeuvres() -> Iterator[Manoeuvre]:
         yield from (Straight(20.0), Climb(60.0, 2.0))
         for side in cycle((1.0, -1.0)):
-            yield Turn(side * 6.5 * math.pi, rate)
-            yield Straight(15.0)
-            yield Climb(side * 20.0, 1.5)
+            yield from (Turn(side * 6.5 * math.pi, rate), Straight(15.0), Climb(side * 20.0, 1.5))
 
     return perform(
         manoeuvres(), start=start, heading=heading, speed=speed, dt=dt, duration=duration

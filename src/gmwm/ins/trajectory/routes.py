@@ -12,7 +12,16 @@ from gmwm._core.checks import positive
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.ins.geometry import ned_difference
-from gmwm.ins.trajectory.manoeuvres import Climb, Lla, Manoeuvre, Pulse, Straight, Turn, perform
+from gmwm.ins.trajectory.manoeuvres import (
+    Body,
+    Climb,
+    Lla,
+    Manoeuvre,
+    Pulse,
+    Straight,
+    Turn,
+    perform,
+)
 from gmwm.ins.trajectory.trajectory import Trajectory, finite_numbers
 
 _SHORTEST = 1e-6  # m
@@ -35,6 +44,9 @@ def through(
     It starts at the first waypoint in the direction of the second and ends at the last one. Legs
     have a constant heading. Heights change on the straight parts; corners are level.
 
+    Raises InputError if legs are too short for the turns at their ends or for the climb, or one
+    turns back.
+
     Parameters
     ----------
     waypoints : (k, 3) array_like
@@ -44,19 +56,7 @@ def through(
     turn_rate : float
         Highest rate of turn, rad/s.
     dt, ramp, flat, level : optional
-        As for `perform`.
-
-    Returns
-    -------
-    Trajectory
-        On the straight parts it keeps to the legs within some centimetres over 10 km at middle
-        latitudes.
-
-    Raises
-    ------
-    InputError
-        If there are less than two waypoints, or two that follow each other are too close for the
-        turns, or for the climb, between them.
+        See `perform`.
     """
     points = finite_numbers(waypoints, "waypoints")
     if points.ndim != 2 or points.shape[1] != 3 or len(points) < 2:
@@ -77,25 +77,26 @@ def through(
     cuts = [0.0, *(_cut(corner, speed, i) for i, corner in enumerate(corners, start=1)), 0.0]
     manoeuvres: list[Manoeuvre] = []
     for i, length in enumerate(lengths):
-        rest = float(length) - cuts[i] - cuts[i + 1]
-        if rest < 0.0:
+        time, rise = (float(length) - cuts[i] - cuts[i + 1]) / speed, -float(legs[i, 2])
+        if time < 0.0:
             raise InputError(
                 f"waypoints {i} and {i + 1} are {length:.4g} m apart where turns take "
                 f"{cuts[i] + cuts[i + 1]:.4g} m: set them farther apart, turn faster or go slower"
             )
-        manoeuvres += _leg(rest / speed, -float(legs[i, 2]), ramp, i)
+        if rise and time < 2.0 * ramp:
+            raise InputError(
+                f"waypoints {i} and {i + 1} leave {time:.4g} s to climb {rise:.4g} m: set them "
+                "farther apart, or at one height"
+            )
+        if rise:
+            manoeuvres.append(Climb(rise, abs(rise) / (time - ramp)))
+        elif time > 0.0:
+            manoeuvres.append(Straight(time))
         if i < len(corners) and corners[i].change:
             manoeuvres.append(Turn(corners[i].change, turn_rate))
-    return perform(
-        manoeuvres,
-        start=points[0],
-        heading=float(headings[0]),
-        speed=speed,
-        dt=dt,
-        ramp=ramp,
-        flat=flat,
-        level=level,
-    )
+    body: Body = {"flat": flat, "level": level}
+    motion = {"heading": float(headings[0]), "speed": speed}
+    return perform(manoeuvres, start=points[0], dt=dt, ramp=ramp, **motion, **body)
 
 
 def _cut(corner: Pulse, speed: float, waypoint: int) -> float:
@@ -123,19 +124,5 @@ def displacement(turn: Pulse, heading: float, speed: float) -> tuple[float, floa
     """
     time = np.linspace(0.0, turn.duration, _TURN_POINTS)
     along = heading + turn.value(time)
-    return (
-        speed * float(simpson(np.cos(along), x=time)),
-        speed * float(simpson(np.sin(along), x=time)),
-    )
-
-
-def _leg(time: float, rise: float, ramp: float, leg: int) -> list[Manoeuvre]:
-    """Straight on for some time, with an even climb if the height changes."""
-    if not rise:
-        return [Straight(time)] if time > 0.0 else []
-    if time < 2.0 * ramp:
-        raise InputError(
-            f"waypoints {leg} and {leg + 1} leave {time:.4g} s to climb {rise:.4g} m: set them "
-            "farther apart, or at one height"
-        )
-    return [Climb(rise, abs(rise) / (time - ramp))]
+    north, east = (float(simpson(each, x=time)) for each in (np.cos(along), np.sin(along)))
+    return speed * north, speed * east

@@ -13,13 +13,13 @@ from gmwm._core.checks import is_number, positive, real_numbers, sampling_interv
 from gmwm._core.spool import release, windows
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
-from gmwm.ins.logs import read_log
 from gmwm.ins.trajectory.splines import (
     smoothed,
     track_velocity,
     unwrapped_angles,
     unwrapped_longitudes,
 )
+from gmwm.ins.trajectory.trajectory_file import read_log
 
 _ATTITUDE_CUTOFF = 5.0  # of that of the track
 HIGHEST_LATITUDE = math.radians(89.0)
@@ -90,6 +90,8 @@ class Trajectory:
     def from_arrays(cls, dt: float, lla: FloatArray, rpy: FloatArray) -> Trajectory:
         """Build a trajectory from positions and attitudes; the velocity is that of the splines.
 
+        Raises InputError if a number is not finite or a latitude is beyond 89 deg.
+
         Parameters
         ----------
         dt : float
@@ -98,18 +100,17 @@ class Trajectory:
             Latitude, longitude, rad, and height, m; smooth enough to be differentiated twice.
         rpy : (n + 1, 3) array_like
             Roll, pitch and yaw, rad; jumps by a full turn do no harm.
-
-        Raises
-        ------
-        InputError
-            If a number is not finite or a latitude is beyond 89 deg.
         """
         dt = sampling_interval(dt)
-        position = _rows_of_three(lla, "lla")
+        position, attitude = finite_numbers(lla, "lla"), finite_numbers(rpy, "rpy")
+        for name, values in (("lla", position), ("rpy", attitude)):
+            if values.ndim != 2 or values.shape[1] != 3 or len(values) < 2:
+                raise InputError(
+                    f"{name} has shape {values.shape}: give two or more epochs, 3 numbers each"
+                )
         check_latitudes(position, "lla")
         position = unwrapped_longitudes(position)
-        velocity = track_velocity(position, dt)
-        return cls(dt, position, velocity, _rows_of_three(rpy, "rpy"))
+        return cls(dt, position, track_velocity(position, dt), attitude)
 
     @classmethod
     def read(cls, path: str | os.PathLike[str], *, smooth: float | None = 1.0) -> Trajectory:
@@ -117,6 +118,8 @@ class Trajectory:
 
         Logs come in coarse steps and hold the jumps of the filter that made them; differentiated
         twice, a step of 1 mm at 100 Hz is a specific force of 10 m/s^2.
+
+        Raises InputError if the file cannot be used; the message names the line.
 
         Parameters
         ----------
@@ -129,11 +132,6 @@ class Trajectory:
             What the track does faster than this is left out, Hz; for the attitude, which is
             differentiated only once, five times this. It has no effect from a quarter of the
             sampling rate on. ``None``: leave all as it is.
-
-        Raises
-        ------
-        InputError
-            If the file cannot be used; the message names the line.
         """
         log = read_log(Path(path))
         lla, rpy = log.lla, unwrapped_angles(log.rpy)
@@ -167,15 +165,12 @@ class Trajectory:
     def segment(self, start: float, end: float) -> Trajectory:
         """The part between two times.
 
+        Raises InputError if they are not in order or outside the trajectory.
+
         Parameters
         ----------
         start, end : float
             s since the first epoch; the nearest epochs are taken, both included.
-
-        Raises
-        ------
-        InputError
-            If they are not in order or outside the trajectory.
         """
         inside = is_number(start) and is_number(end)
         first, last = (round(start / self.dt), round(end / self.dt)) if inside else (0, 0)
@@ -189,23 +184,13 @@ class Trajectory:
 
 
 def check_latitudes(lla: FloatArray, name: str) -> None:
-    """Refuse positions near the poles, where north and east turn too fast.
-
-    Raises InputError.
-    """
+    """Raise InputError for positions near the poles, where north and east turn too fast."""
     bad = np.flatnonzero(~(np.abs(lla[:, 0]) <= HIGHEST_LATITUDE))
     if bad.size:
         raise InputError(
             f"{name}: latitude {math.degrees(lla[bad[0], 0]):.6g} deg at index {bad[0]} is too "
             "near a pole for north-east-down axes: stay within 89 deg of the equator"
         )
-
-
-def _rows_of_three(values: object, name: str) -> FloatArray:
-    array = finite_numbers(values, name)
-    if array.ndim != 2 or array.shape[1] != 3 or len(array) < 2:
-        raise InputError(f"{name} has shape {array.shape}: give two or more epochs, 3 numbers each")
-    return array
 
 
 def finite_numbers(values: object, name: str) -> FloatArray:

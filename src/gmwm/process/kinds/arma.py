@@ -56,6 +56,7 @@ class ARIMA(Process):
     separable_shape = False
     d: int
     orders: tuple[int, int]
+    _examples = (([0.5], 1, [0.3], 0.7), ([0.9, -0.5], 0, [0.4, 0.1], 2.0))
 
     def __init__(
         self,
@@ -181,8 +182,7 @@ class ARIMA(Process):
             noise = np.pad(noise, (0, 1))
             stationary = np.pad(stationary, (0, 1))
             names.append(f"{self.title()} integral {order + 1}")
-        mean = np.zeros(len(names))
-        return StateSpace(transition, noise, output, 0.0, mean, stationary, tuple(names))
+        return StateSpace.of(names, transition, noise, stationary, output=output)
 
     def draw(self, n: int, dt: float, rng: np.random.Generator) -> FloatArray:
         if not self.ar:
@@ -216,51 +216,41 @@ class ARIMA(Process):
         )
         return [self.shape_from_free(point) for point in points]
 
-    @classmethod
-    def examples(cls) -> tuple[Process, ...]:
-        return (cls([0.5], 1, [0.3], 0.7), cls([0.9, -0.5], 0, [0.4, 0.1], 2.0))
-
 
 class ARMA(ARIMA):
     """Autoregressive moving average; see `ARIMA` for the parameters."""
 
     label: ClassVar[str] = "ARMA"
+    _examples = (
+        ([0.6, 0.2], [0.5], 0.3),
+        ([-0.8], [-0.4, 0.2], 1.0),
+        ([1.98, -0.9801], [0.2], 1.0),
+    )
 
     def __init__(
         self, ar: Coefficients = 0, ma: Coefficients = 0, sigma2: float | None = None
     ) -> None:
         super().__init__(ar, 0, ma, sigma2)
 
-    @classmethod
-    def examples(cls) -> tuple[Process, ...]:
-        near_unit_root = cls([1.98, -0.9801], [0.2], 1.0)
-        return (cls([0.6, 0.2], [0.5], 0.3), cls([-0.8], [-0.4, 0.2], 1.0), near_unit_root)
-
 
 class AR(ARIMA):
     """Autoregressive; see `ARIMA` for the parameters."""
 
     label: ClassVar[str] = "AR"
+    _examples = (([-0.7], 1.0), ([0.9], 0.1), ([1.2, -0.6], 2.0), ([0.9999], 1e-4))
 
     def __init__(self, ar: Coefficients = 1, sigma2: float | None = None) -> None:
         super().__init__(ar, 0, 0, sigma2)
-
-    @classmethod
-    def examples(cls) -> tuple[Process, ...]:
-        return (cls([-0.7], 1.0), cls([0.9], 0.1), cls([1.2, -0.6], 2.0), cls([0.9999], 1e-4))
 
 
 class MA(ARIMA):
     """Moving average; see `ARIMA` for the parameters."""
 
     label: ClassVar[str] = "MA"
+    _examples = (([0.5], 1.0), ([-0.9, 0.3], 0.2))
 
     def __init__(self, ma: Coefficients = 1, sigma2: float | None = None) -> None:
         super().__init__(0, 0, ma, sigma2)
-
-    @classmethod
-    def examples(cls) -> tuple[Process, ...]:
-        return (cls([0.5], 1.0), cls([-0.9, 0.3], 0.2))
 
 
 def _coefficients(given: Any, name: str) -> tuple[float | None, ...]:

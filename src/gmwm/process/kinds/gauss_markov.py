@@ -57,6 +57,15 @@ class GaussMarkov(Process):
     compiled_kind: ClassVar[int] = 1
     ordered_by: ClassVar[str] = "tau"
     is_exponential: ClassVar[bool] = True
+    _examples = (
+        (0.5, 125.0),
+        (1.5811388e-3, 125.0),
+        (1.0, 0.5),
+        (1.0, 20.0),
+        (1.0, 1e5),
+        (1.0, 1e7),
+        (1.0, 1e9),
+    )
 
     def __init__(self, sigma: float | None = None, tau: float | None = None) -> None:
         super().__init__(sigma, tau)
@@ -79,7 +88,6 @@ class GaussMarkov(Process):
         return self.sigma**2 * np.exp(-np.asarray(lag) * dt / self.tau)
 
     def state_space(self, dt: float) -> StateSpace:
-        self._require_given()
         variance = self.sigma**2
         q = -variance * np.expm1(-2.0 * dt / self.tau)
         return StateSpace.scalar("Gauss-Markov", float(np.exp(-dt / self.tau)), float(q), variance)
@@ -95,12 +103,6 @@ class GaussMarkov(Process):
         low, high = np.log10(0.3 * dt), np.log10(max(n * dt / 3.0, dt))
         points = max(int(np.ceil((high - low) * _GRID_PER_DECADE)), 2)
         return [(float(tau),) for tau in np.logspace(low, high, points)]
-
-    @classmethod
-    def examples(cls) -> tuple[Process, ...]:
-        pairs = ((0.5, 125.0), (1.5811388e-3, 125.0), (1.0, 0.5), (1.0, 20.0))
-        slow = ((1.0, 1e5), (1.0, 1e7), (1.0, 1e9))
-        return tuple(cls(sigma, tau) for sigma, tau in pairs + slow)
 
 
 class Resonance(Process):
@@ -128,6 +130,7 @@ class Resonance(Process):
     label: ClassVar[str] = "resonance"
     compiled_kind: ClassVar[int] = 2
     prefix: ClassVar[str] = "resonance_"
+    _examples = ((0.4, 0.2, 0.05), (2e-3, 0.01, 0.5), (1.0, 1e-4, 0.3), (1.0, 0.45, 0.9))
 
     def __init__(
         self,
@@ -150,7 +153,6 @@ class Resonance(Process):
 
     def state_space(self, dt: float) -> StateSpace:
         """States are the output and its derivative divided by 2 pi f0."""
-        self._require_given()
         zeta, w0 = self.damping, 2.0 * np.pi * self.frequency
         wd = w0 * np.sqrt(1.0 - zeta**2)
         sine = np.sin(wd * dt) * w0 / wd
@@ -159,15 +161,8 @@ class Resonance(Process):
         transition = decay * np.array([[cosine + zeta * sine, sine], [-sine, cosine - zeta * sine]])
         stationary = self.sigma**2 * np.eye(2)
         noise = stationary - transition @ stationary @ transition.T
-        return StateSpace(
-            transition=transition,
-            process_noise=0.5 * (noise + noise.T),
-            output=np.array([1.0, 0.0]),
-            measurement_noise=0.0,
-            initial_mean=np.zeros(2),
-            initial_covariance=stationary,
-            names=("resonance", "resonance rate"),
-        )
+        names = ("resonance", "resonance rate")
+        return StateSpace.of(names, transition, 0.5 * (noise + noise.T), stationary)
 
     def draw(self, n: int, dt: float, rng: np.random.Generator) -> FloatArray:
         return synthesis.from_state_space(self.state_space(dt), n, rng)
@@ -180,10 +175,6 @@ class Resonance(Process):
             for frequency in np.logspace(low, high, points)
             for damping in (0.01, 0.1, 0.5)
         ]
-
-    @classmethod
-    def examples(cls) -> tuple[Process, ...]:
-        return (cls(0.4, 0.2, 0.05), cls(2e-3, 0.01, 0.5), cls(1.0, 1e-4, 0.3), cls(1.0, 0.45, 0.9))
 
 
 def _exponential_psd(rate: complex, f: FloatArray, dt: float) -> Any:
@@ -204,6 +195,28 @@ def _exponential(frequency: float, damping: float, dt: float) -> tuple[complex, 
 
 
 @compiled()
+def _sinh_excess(rate: Any) -> Any:
+    """sinh(a) - a, real or complex."""
+    if abs(rate) >= _SERIES_BELOW:
+        return np.sinh(rate) - rate
+    total = 0.0 * rate
+    for k in range(_SINH_ARRAY.size - 1, -1, -1):
+        total = total * rate * rate + _SINH_ARRAY[k]
+    return total * (rate * rate * rate)
+
+
+@compiled()
+def _h(x: Any) -> Any:
+    """2 x - 3 + 4 exp(-x) - exp(-2 x), real or complex."""
+    if abs(x) >= _SERIES_BELOW:
+        return 2.0 * x - 3.0 + 4.0 * np.exp(-x) - np.exp(-2.0 * x)
+    total = 0.0 * x
+    for k in range(_H_ARRAY.size - 1, -1, -1):
+        total = total * x + _H_ARRAY[k]
+    return total * (x * x * x)
+
+
+@compiled()
 def real_haar(rate: float, m: FloatArray) -> FloatArray:
     """Haar wavelet variance of the process of unit variance and a real rate, for inner loops.
 
@@ -215,24 +228,9 @@ def real_haar(rate: float, m: FloatArray) -> FloatArray:
         for i in range(m.size):
             result[i] = 0.5 / m[i]
         return result
-    if rate < _SERIES_BELOW:
-        excess = 0.0
-        for k in range(_SINH_ARRAY.size - 1, -1, -1):
-            excess = excess * rate * rate + _SINH_ARRAY[k]
-        excess *= rate * rate * rate
-    else:
-        excess = math.sinh(rate) - rate
-    scale = 8.0 * math.sinh(0.5 * rate) ** 2
+    excess, scale = _sinh_excess(rate), 8.0 * math.sinh(0.5 * rate) ** 2
     for i in range(m.size):
-        x = m[i] * rate
-        if x < _SERIES_BELOW:
-            h = 0.0
-            for k in range(_H_ARRAY.size - 1, -1, -1):
-                h = h * x + _H_ARRAY[k]
-            h *= x * x * x
-        else:
-            h = 2.0 * x - 3.0 + 4.0 * math.exp(-x) - math.exp(-2.0 * x)
-        result[i] = (2.0 * m[i] * excess + h) / (m[i] * m[i] * scale)
+        result[i] = (2.0 * m[i] * excess + _h(m[i] * rate)) / (m[i] * m[i] * scale)
     return result
 
 
@@ -254,31 +252,18 @@ def real_slope(rate: float, m: FloatArray) -> FloatArray:
 
 @compiled()
 def resonance_haar(frequency: float, damping: float, dt: float, m: FloatArray) -> FloatArray:
-    """Haar wavelet variance of a resonance of unit variance."""
-    rate, weight = _exponential(frequency, damping, dt)
-    return _complex_haar(rate, weight, m)
+    """Haar wavelet variance of a resonance of unit variance: of its conjugate exponentials.
 
-
-@compiled()
-def _complex_haar(rate: complex, weight: complex, m: FloatArray) -> FloatArray:
-    """The real part of ``weight`` times the same for a rate of positive real part.
-
-    One of a conjugate pair. For m |rate| << 1, where their linear terms cancel, it is a polynomial
-    in m by Faulhaber's sums, with the variogram v2 k^2 + v3 k^3 + v4 k^4 at lag k.
+    For m |rate| << 1, where their linear terms cancel, it is a polynomial in m by Faulhaber's sums,
+    with the variogram v2 k^2 + v3 k^3 + v4 k^4 at lag k.
     """
+    rate, weight = _exponential(frequency, damping, dt)
     result = np.empty(m.size)
     if rate.real > _WHITE_ABOVE:
         for i in range(m.size):
             result[i] = 0.5 * weight.real / m[i]
         return result
-    if abs(rate) < _SERIES_BELOW:
-        excess = 0.0 + 0.0j
-        for k in range(_SINH_ARRAY.size - 1, -1, -1):
-            excess = excess * rate * rate + _SINH_ARRAY[k]
-        excess *= rate * rate * rate
-    else:
-        excess = cmath.sinh(rate) - rate
-    scale = 8.0 * cmath.sinh(0.5 * rate) ** 2
+    excess, scale = _sinh_excess(rate), 8.0 * cmath.sinh(0.5 * rate) ** 2
     v2 = -(weight * rate**2).real
     v3 = (weight * rate**3).real / 3.0
     v4 = -(weight * rate**4).real / 12.0
@@ -287,14 +272,7 @@ def _complex_haar(rate: complex, weight: complex, m: FloatArray) -> FloatArray:
             cubic = 2.8 * m[i] ** 3 - 2.0 / 3.0 * m[i] - 2.0 / (15.0 * m[i])
             quartic = 4.0 * m[i] ** 4 - 2.0 * m[i] ** 2
             result[i] = v2 * m[i] ** 2 / 4.0 + (v3 * cubic + v4 * quartic) / 8.0
-            continue
-        x = m[i] * rate
-        if abs(x) < _SERIES_BELOW:
-            h = 0.0 + 0.0j
-            for k in range(_H_ARRAY.size - 1, -1, -1):
-                h = h * x + _H_ARRAY[k]
-            h *= x * x * x
         else:
-            h = 2.0 * x - 3.0 + 4.0 * cmath.exp(-x) - cmath.exp(-2.0 * x)
-        result[i] = (weight * (2.0 * m[i] * excess + h) / (m[i] * m[i] * scale)).real
+            whole = weight * (2.0 * m[i] * excess + _h(m[i] * rate))
+            result[i] = (whole / (m[i] * m[i] * scale)).real
     return result

@@ -51,7 +51,6 @@ class _Filtered(Process):
 
     def state_space(self, dt: float) -> StateSpace:
         """White noise of density N^2, which it acts as beyond the memory of the filter."""
-        self._require_given()
         return StateSpace.white(self.N**2 / dt)
 
 
@@ -87,6 +86,11 @@ class LowPassNoise(_Filtered):
     label: ClassVar[str] = "low-pass noise"
     compiled_kind: ClassVar[int] = 3
     prefix: ClassVar[str] = "lowpass_"
+    _examples = (
+        (0.3, 0.1, 2.0, BUTTERWORTH),
+        (1.0, 0.31, 1.0, 0.6),
+        (2e-3, 0.02, 3.3, 1.0),
+    )
 
     def __init__(
         self,
@@ -122,14 +126,6 @@ class LowPassNoise(_Filtered):
             for damping in (0.5, BUTTERWORTH, 1.0)
         ]
 
-    @classmethod
-    def examples(cls) -> tuple[Process, ...]:
-        return (
-            cls(0.3, 0.1, 2.0, BUTTERWORTH),
-            cls(1.0, 0.31, 1.0, 0.6),
-            cls(2e-3, 0.02, 3.3, 1.0),
-        )
-
 
 class AveragedNoise(_Filtered):
     """White noise of which each sample is the mean over a window: a moving average.
@@ -147,6 +143,7 @@ class AveragedNoise(_Filtered):
     window: float = parameter("s", meaning="window of the sensor's moving average")
     label: ClassVar[str] = "averaged noise"
     prefix: ClassVar[str] = "averaged_"
+    _examples = ((0.3, 4.0), (2.0, 21.6))
 
     def __init__(self, N: float | None = None, window: float | None = None) -> None:
         super().__init__(N, window)
@@ -180,10 +177,6 @@ class AveragedNoise(_Filtered):
     def shape_grid(self, dt: float, n: int) -> list[Shape]:
         longest = int(min(0.5 / _LOWEST, max(n / 8, 2)))
         return [(float(m) * dt,) for m in np.unique(np.geomspace(2, max(longest, 2), 40).round())]
-
-    @classmethod
-    def examples(cls) -> tuple[Process, ...]:
-        return (cls(0.3, 4.0), cls(2.0, 21.6))
 
 
 @compiled()

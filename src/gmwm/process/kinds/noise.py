@@ -37,6 +37,7 @@ class WhiteNoise(Process):
     short_name: ClassVar[str] = "N"
     is_candidate: ClassVar[bool] = True
     is_white: ClassVar[bool] = True
+    _examples = ((0.2,), (1e-4,))
 
     def __init__(self, N: float | None = None) -> None:
         super().__init__(N)
@@ -51,17 +52,12 @@ class WhiteNoise(Process):
         return np.where(np.asarray(lag) == 0, self.N**2 / dt, 0.0)
 
     def state_space(self, dt: float) -> StateSpace:
-        self._require_given()
         return StateSpace.white(self.N**2 / dt)
 
     def draw(self, n: int, dt: float, rng: np.random.Generator) -> FloatArray:
         series = rng.standard_normal(n)
         series *= self.N / np.sqrt(dt)
         return series
-
-    @classmethod
-    def examples(cls) -> tuple[Process, ...]:
-        return (cls(0.2), cls(1e-4))
 
 
 class QuantizationNoise(Process):
@@ -78,6 +74,7 @@ class QuantizationNoise(Process):
     label: ClassVar[str] = "quantization noise"
     short_name: ClassVar[str] = "Q"
     is_candidate: ClassVar[bool] = True
+    _examples = ((0.7,), (3e-5,))
 
     def __init__(self, Q: float | None = None) -> None:
         super().__init__(Q)
@@ -93,23 +90,13 @@ class QuantizationNoise(Process):
         return (self.Q / dt) ** 2 * np.where(lag == 0, 2.0, np.where(lag == 1, -1.0, 0.0))
 
     def state_space(self, dt: float) -> StateSpace:
-        self._require_given()
-        return StateSpace(
-            transition=np.array([[0.0, 0.0], [1.0, 0.0]]),
-            process_noise=np.diag([1.0, 0.0]),
-            output=np.array([1.0, -1.0]) * self.Q / dt,
-            measurement_noise=0.0,
-            initial_mean=np.zeros(2),
-            initial_covariance=np.eye(2),
-            names=("quantization", "quantization, previous"),
-        )
+        names = ("quantization", "quantization, previous")
+        shift, noise = np.array([[0.0, 0.0], [1.0, 0.0]]), np.diag([1.0, 0.0])
+        output = np.array([1.0, -1.0]) * self.Q / dt
+        return StateSpace.of(names, shift, noise, np.eye(2), output=output)
 
     def draw(self, n: int, dt: float, rng: np.random.Generator) -> FloatArray:
         return np.sqrt(12.0) * self.Q / dt * np.diff(rng.random(n + 1))
-
-    @classmethod
-    def examples(cls) -> tuple[Process, ...]:
-        return (cls(0.7), cls(3e-5))
 
 
 class RandomWalk(Process):
@@ -126,6 +113,7 @@ class RandomWalk(Process):
     short_name: ClassVar[str] = "K"
     is_candidate: ClassVar[bool] = True
     is_walk: ClassVar[bool] = True
+    _examples = ((0.02,), (5e-7,))
 
     def __init__(self, K: float | None = None) -> None:
         super().__init__(K)
@@ -138,17 +126,12 @@ class RandomWalk(Process):
         return self.K**2 * (tau / 6.0 + dt * (dt / tau) / 12.0)
 
     def state_space(self, dt: float) -> StateSpace:
-        self._require_given()
         return StateSpace.scalar("random walk", 1.0, self.K**2 * dt, 0.0)
 
     def draw(self, n: int, dt: float, rng: np.random.Generator) -> FloatArray:
         steps = rng.standard_normal(n)
         steps[0] = 0.0
         return self.K * np.sqrt(dt) * np.cumsum(steps)
-
-    @classmethod
-    def examples(cls) -> tuple[Process, ...]:
-        return (cls(0.02), cls(5e-7))
 
 
 class RateRamp(Process):
@@ -164,6 +147,7 @@ class RateRamp(Process):
     label: ClassVar[str] = "rate ramp"
     short_name: ClassVar[str] = "R"
     is_drift: ClassVar[bool] = True
+    _examples = ((0.003,), (-1e-8,))
 
     def __init__(self, R: float | None = None) -> None:
         super().__init__(R)
@@ -183,23 +167,11 @@ class RateRamp(Process):
         return np.zeros(np.shape(tau))
 
     def state_space(self, dt: float) -> StateSpace:
-        self._require_given()
-        return StateSpace(
-            transition=np.array([[1.0, dt], [0.0, 1.0]]),
-            process_noise=np.zeros((2, 2)),
-            output=np.array([1.0, 0.0]),
-            measurement_noise=0.0,
-            initial_mean=np.array([0.0, self.R]),
-            initial_covariance=np.zeros((2, 2)),
-            names=("ramp", "ramp rate"),
-        )
+        transition = np.array([[1.0, dt], [0.0, 1.0]])
+        return StateSpace.of(("ramp", "ramp rate"), transition, mean=[0.0, self.R])
 
     def draw(self, n: int, dt: float, rng: np.random.Generator) -> FloatArray:
         return self.R * dt * np.arange(n, dtype=float)
-
-    @classmethod
-    def examples(cls) -> tuple[Process, ...]:
-        return (cls(0.003), cls(-1e-8))
 
 
 class BiasInstability(Process):
@@ -227,6 +199,7 @@ class BiasInstability(Process):
 
     states_per_decade: ClassVar[int] = 2
     """Density of the Gauss-Markov bank in the state-space form."""
+    _examples = ((0.3,), (2e-5,))
 
     def __init__(self, B: float | None = None) -> None:
         super().__init__(B)
@@ -247,35 +220,23 @@ class BiasInstability(Process):
         variance B^2/pi per unit of ln(tau) has exactly its low-frequency spectrum; here it is
         sampled at ``states_per_decade`` correlation times per decade.
         """
-        self._require_given()
         n_states = int(np.ceil(np.log10(span) * self.states_per_decade)) + 1
         tau = dt * np.logspace(-0.5, np.log10(span), n_states)
         variance = self.B**2 / np.pi * np.log(tau[1] / tau[0])
-        return StateSpace.stack(
-            [
-                StateSpace.scalar(
-                    f"flicker {value:.3g} s",
-                    float(np.exp(-dt / value)),
-                    float(-variance * np.expm1(-2.0 * dt / value)),
-                    float(variance),
-                )
-                for value in tau
-            ]
-        )
+        phi, noise = np.exp(-dt / tau), -variance * np.expm1(-2.0 * dt / tau)
+        names = [f"flicker {value:.3g} s" for value in tau]
+        initial, output = variance * np.eye(n_states), np.ones(n_states)
+        return StateSpace.of(names, np.diag(phi), np.diag(noise), initial, output=output)
 
     def draw(self, n: int, dt: float, rng: np.random.Generator) -> FloatArray:
         # Exact: the increments are stationary with autocovariance -(4 B^2/pi)/(4 k^2 - 1).
+        if n == 1:
+            return np.zeros(1)
         lag = np.arange(n + 1)
         covariance = -4.0 / np.pi / (4.0 * lag**2 - 1.0)
         eigenvalues = np.fft.rfft(np.concatenate([covariance, covariance[-2:0:-1]])).real
-        if n == 1:
-            return np.zeros(1)
         path = np.cumsum(synthesis.circulant(np.maximum(eigenvalues, 0.0), n, rng))
         return self.B * (path - path[0])
-
-    @classmethod
-    def examples(cls) -> tuple[Process, ...]:
-        return (cls(0.3), cls(2e-5))
 
 
 class Sinusoid(Process):
@@ -294,6 +255,7 @@ class Sinusoid(Process):
     label: ClassVar[str] = "sinusoid"
     prefix: ClassVar[str] = "sinusoid_"
     is_line: ClassVar[bool] = True
+    _examples = ((1.0, 0.00565), (0.1, 0.203))
 
     def __init__(self, amplitude: float | None = None, frequency: float | None = None) -> None:
         super().__init__(amplitude, frequency)
@@ -314,18 +276,10 @@ class Sinusoid(Process):
         return 0.5 * self.amplitude**2 * np.cos(phase)
 
     def state_space(self, dt: float) -> StateSpace:
-        self._require_given()
         angle = 2.0 * np.pi * self.frequency * dt
         rotation = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
-        return StateSpace(
-            transition=rotation,
-            process_noise=np.zeros((2, 2)),
-            output=np.array([1.0, 0.0]),
-            measurement_noise=0.0,
-            initial_mean=np.zeros(2),
-            initial_covariance=0.5 * self.amplitude**2 * np.eye(2),
-            names=("line, in phase", "line, in quadrature"),
-        )
+        names = ("line, in phase", "line, in quadrature")
+        return StateSpace.of(names, rotation, initial=0.5 * self.amplitude**2 * np.eye(2))
 
     def draw(self, n: int, dt: float, rng: np.random.Generator) -> FloatArray:
         cycles = self.frequency * dt * np.arange(n) + rng.random()
@@ -337,10 +291,6 @@ class Sinusoid(Process):
         low, high = np.log10(2.0 / (n * dt)), np.log10(0.5 / dt)
         points = max(int(np.ceil((high - low) * _LINES_PER_DECADE)), 2)
         return [(float(frequency),) for frequency in np.logspace(low, high, points)]
-
-    @classmethod
-    def examples(cls) -> tuple[Process, ...]:
-        return (cls(1.0, 0.00565), cls(0.1, 0.203))
 
 
 def _odd_harmonic(k: FloatArray) -> FloatArray:

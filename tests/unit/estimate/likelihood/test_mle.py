@@ -23,11 +23,8 @@ from gmwm import (
 from gmwm.errors import InputError
 from gmwm.estimate import METHODS, Fit
 from gmwm.estimate.likelihood.likelihood import Columns, KalmanLikelihood, defined
-from gmwm.estimate.likelihood.mle import _rescaled, candidates
-from gmwm.estimate.likelihood.series import Series
 from gmwm.process import as_model
 from gmwm.readers import Channel
-from gmwm.variance import as_channel
 from marks import slow
 
 OF_SAMPLES = ("mle", "whittle", "em")
@@ -455,25 +452,6 @@ def test_it_is_never_below_any_grid_point(model):
     assert fit.log_likelihood > best - 1e-3
 
 
-def test_candidates_are_few_positive_and_spread():
-    x = ramped()
-    for model in (WhiteNoise() + 2 * GaussMarkov(), WhiteNoise() + RandomWalk() + RateRamp()):
-        series = Series.of(model, as_channel(x, 1.0), None, gaps=True)
-        found = candidates(series)
-        assert 1 <= len(found) <= 8
-        for processes in found:
-            assert [type(p) for p in processes] == [type(p) for p in series.coordinates.noise]
-            assert np.all(np.isfinite(series.coordinates.pack(processes)))
-        times = [p.tau for processes in found for p in processes if isinstance(p, GaussMarkov)]
-        assert not times or max(times) > 100.0 * min(times)
-
-
-def test_candidates_have_the_amplitudes_of_the_data():
-    x = WhiteNoise(2.0).simulate(5000, 1.0, 1)
-    ((found,),) = candidates(Series.of(as_model(WhiteNoise()), as_channel(x, 1.0), None, gaps=True))
-    assert 1.0 < found.N < 4.0  # coarse levels count as much as fine ones
-
-
 @pytest.mark.parametrize(
     ("kept", "method"),
     [(lambda k: k % 2 == 1, "mle"), slow(lambda k: k % 2 == 1, "em"),
@@ -511,13 +489,3 @@ def test_hardly_any_sample_is_refused():
         with pytest.raises(InputError, match="infinite samples, the first at index 1"):
             gmwm.fit(WhiteNoise(), x, 1.0, method=method)
         x[1] = np.nan
-
-
-@pytest.mark.parametrize("given", [0.5, None], ids=["given", "open"])
-def test_a_start_has_the_likelihood_that_it_is_chosen_by(given):
-    """All variances are scaled together, but not where one of them is given."""
-    x = (WhiteNoise(0.5) + GaussMarkov(1.0, 20.0)).simulate(500, 1.0, 1)
-    model = as_model(WhiteNoise(given) + GaussMarkov(tau=20.0))
-    series = Series.of(model, as_channel(x, 1.0), None, gaps=True)
-    height, moved = _rescaled(series.start, series)
-    assert height == pytest.approx(defined(KalmanLikelihood(series.columns), moved), rel=1e-9)

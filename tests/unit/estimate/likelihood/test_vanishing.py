@@ -6,10 +6,8 @@ from scipy.integrate import cumulative_trapezoid
 from scipy.optimize import minimize_scalar
 
 import gmwm
-from gmwm import GaussMarkov, RandomWalk, RateRamp, WhiteNoise
+from gmwm import RandomWalk, WhiteNoise
 from gmwm.estimate.likelihood import Columns, KalmanLikelihood
-from gmwm.estimate.likelihood.conclusion import redundant_term
-from gmwm.estimate.problem import Coordinates
 
 
 @pytest.fixture(scope="module")
@@ -45,16 +43,3 @@ def test_a_bound_has_the_unit_of_its_parameter():
     plain = gmwm.fit(WhiteNoise() + RandomWalk(), x, dt=1.0, method="mle")
     scaled = gmwm.fit(WhiteNoise() + RandomWalk(), 1e-5 * x, dt=0.01, method="mle")
     assert scaled.upper_bounds["K"] == pytest.approx(1e-4 * plain.upper_bounds["K"], rel=1e-2)
-
-
-def test_a_term_is_redundant_where_the_likelihood_does_not_miss_it():
-    truth = WhiteNoise(0.5) + GaussMarkov(1.0, 20.0)
-    x = truth.simulate(2000, 1.0, seed=1)
-    likelihood = KalmanLikelihood(Columns(x, 1.0, None, False))
-    coordinates = Coordinates(truth.opened() + RandomWalk() + RateRamp())
-    present = (*truth.terms, RandomWalk(1e-9))
-    assert redundant_term(coordinates, present, likelihood) == 2
-    assert redundant_term(coordinates.without([2]), truth.terms, likelihood) is None
-    # A given amplitude is not for the likelihood to drop.
-    given = Coordinates(truth.opened() + RandomWalk(1e-9))
-    assert redundant_term(given, present, likelihood) is None

@@ -5,11 +5,9 @@ import pytest
 
 from gmwm._core.distributions import chi2
 from gmwm.errors import InputError
-from gmwm.ins import tuning
-from gmwm.ins.filter.aiding import KINDS, Aiding, Fixes, Outage, barometer, gnss, standstills
+from gmwm.ins import Aiding, Fixes, Outage, barometer, car_drive, emulate, gnss, standstills, tuning
+from gmwm.ins.filter import KINDS
 from gmwm.ins.geometry import matrix_from_rpy, ned_difference
-from gmwm.ins.imu.emulation import emulate
-from gmwm.ins.trajectory.missions import car_drive
 
 
 @pytest.fixture(scope="module")
@@ -93,12 +91,6 @@ def test_an_outage_keeps_the_fixes_at_both_ends(interval, start, duration):
             np.isclose(after.time, start + duration)
         )
     assert kept.fixes[2].time.size == whole.fixes[2].time.size
-
-
-def test_outages_may_overlap_and_take_all(car):
-    aiding = gnss(car).without([Outage(0.0, 40.0), Outage(20.0, 100.0)])
-    assert aiding.fixes[0].time.size == 0
-    assert aiding.events(car.dt, car.n).epoch.size == 0
 
 
 def test_standstills_are_where_the_car_stands(car):
@@ -203,22 +195,3 @@ def test_a_gate_has_the_degrees_of_freedom_of_its_fix():
     found = Aiding(given).events(1.0, 10).gate
     np.testing.assert_allclose(found[[0, 1, 2]], np.inf)
     assert found[3] == pytest.approx(float(chi2.isf(tuning.GATE, 3)))
-
-
-def test_the_first_fixes_of_a_kind_and_both_barometers():
-    none, some = fixes([]), fixes([1.0])
-    assert Aiding((none, some)).of("position") is some
-    assert Aiding((none,)).of("position") is None and Aiding((some,)).of("velocity") is None
-    one, other = Aiding((some,), barometer_sd=3.0, barometer_tau=7.0), Aiding((none,))
-    for both in (one + other, other + one):
-        assert (both.barometer_sd, both.barometer_tau) == (3.0, 7.0)
-        assert len(both.fixes) == 2
-
-
-def test_fixes_of_a_kind_are_moved_in_their_own_units():
-    by = np.array([[1.0, -2.0, 3.0]])
-    start = np.array([[0.8, 0.2, 100.0]])
-    moved = fixes([1.0], value=start).moved(by)
-    np.testing.assert_allclose(ned_difference(moved, start), by, atol=1e-6)
-    np.testing.assert_allclose(fixes([1.0], "velocity", start).moved(by), start + by)
-    np.testing.assert_allclose(fixes([1.0], "height", start).moved(by), [[1.8, 0.2, 100.0]])

@@ -15,15 +15,18 @@ from gmwm import (
     Sinusoid,
     WhiteNoise,
 )
-from gmwm.ins.filter.covariance_kernels import (
-    error_rates,
+from gmwm.ins import Imu, NavState, SensorModels, integrate
+from gmwm.ins.filter import (
+    Kinematics,
+    SensorStates,
     measurement_update,
+    new_scratch,
+    new_transition,
     propagate,
     tilt_squared,
     transition,
 )
-from gmwm.ins.filter.mechanization import integrate
-from gmwm.ins.filter.states import SensorStates
+from gmwm.ins.filter.covariance_kernels import error_rates
 from gmwm.ins.geometry import (
     matrix_from_rotation_vector,
     matrix_from_rpy,
@@ -31,10 +34,7 @@ from gmwm.ins.geometry import (
     offset,
     rpy_from_matrix,
 )
-from gmwm.ins.imu.emulation import Imu, emulate
-from gmwm.ins.imu.sensors import AXES, SensorModels
-from gmwm.ins.trajectory.manoeuvres import Stop, perform
-from gmwm.ins.trajectory.trajectory import NavState
+from gmwm.ins.imu import AXES
 
 DT = 0.01
 # Latitude, longitude (deg), height, velocity, roll, pitch, yaw (deg).
@@ -92,9 +92,9 @@ def manoeuvring(state, n, rate=(0.05, -0.08, 0.1), extra=(1.0, -2.0, 0.5)):
 
 
 def kernel_matrices(state, step):
-    F, A, B = np.empty((9, 9)), np.empty((9, 9)), np.empty((9, 6))
-    transition(state.velocity, state.lla, matrix_from_rpy(state.rpy), step, F, A, B)
-    return F, A, B
+    change = new_transition()
+    transition(Kinematics(matrix_from_rpy(state.rpy), state.velocity, state.lla), step, change)
+    return change
 
 
 @pytest.mark.parametrize("case", STATES)
@@ -225,15 +225,11 @@ def random_covariance(n, rng, scale):
     return root @ root.T
 
 
-def propagated(P, A, B, states, k):
+def propagated(P, change, states, k):
     """P after `propagate`, in a copy."""
-    P, m, n = P.copy(), states.m, len(P)
-    propagate(
-        P, A, B, states.axis, states.partner, states.phi[k], states.phi_off[k], states.gain[k],
-        states.noise[k], states.noise_off[k], states.cross[k], states.integral[k],
-        np.zeros((6, n)), np.zeros((9, n)), np.zeros((9, 6)), np.zeros(n),
-    )  # fmt: skip
-    assert m + 9 == n
+    assert states.m + 9 == len(P)
+    P = P.copy()
+    propagate(P, change, states.table, k, new_scratch(len(P)))
     return P
 
 
@@ -245,7 +241,7 @@ def test_carry_is_dense_propagation_sample_by_sample(k, seed, extra):
     states = SensorStates.of(SENSORS, DT, 10)
     Phi, Q, H, white = dense(SENSORS, DT)
     if extra:
-        states = states.with_markov(["a", "b", "c"], np.array([1.0, 2.0, 0.5]), 0.3, DT)
+        states = states.with_markov(["a", "b", "c"], np.array([1.0, 2.0, 0.5]), np.full(3, 0.3), DT)
         decay = np.exp(-DT / 0.3)
         Phi = block_diag(Phi, decay * np.eye(3))
         Q = block_diag(Q, np.diag([1.0, 4.0, 0.25]) * (1.0 - decay**2))
@@ -254,7 +250,8 @@ def test_carry_is_dense_propagation_sample_by_sample(k, seed, extra):
     assert Phi.shape == (m, m)
     scale = np.hstack([np.repeat([5.0, 0.3, 1e-3], 3), np.sqrt(np.diag(Q)) + 1e-4])
     P = random_covariance(9 + m, rng, scale)
-    _, A, B = kernel_matrices(nav_state(STATES[0]), k * DT)
+    change = kernel_matrices(nav_state(STATES[0]), k * DT)
+    _, A, B = change
     # Navigation errors wait for the integrals (6) of the sensor errors, then take all at once.
     one = np.eye(9 + m + 6)
     one[9 : 9 + m, 9 : 9 + m] = Phi
@@ -266,7 +263,7 @@ def test_carry_is_dense_propagation_sample_by_sample(k, seed, extra):
     last = np.eye(9 + m, 9 + m + 6)
     last[:9, :9], last[:9, 9 + m :] = A, B
     expected = last @ whole @ last.T
-    found = propagated(P, A, B, states, k)
+    found = propagated(P, change, states, k)
     unit = np.sqrt(np.diag(expected))
     unit[unit == 0.0] = 1.0
     np.testing.assert_allclose(found / unit / unit[:, None], expected / unit / unit[:, None],
@@ -274,33 +271,15 @@ def test_carry_is_dense_propagation_sample_by_sample(k, seed, extra):
     np.testing.assert_array_equal(found, found.T)
 
 
-def test_a_step_of_ten_samples_is_near_ten_steps_of_one():
-    rng = np.random.default_rng(3)
-    states = SensorStates.of(SENSORS, DT, 10)
-    scale = np.hstack([np.repeat([1.0, 0.1, 1e-3], 3), np.full(states.m, 1e-4)])
-    P = random_covariance(9 + states.m, rng, scale)
-    state = nav_state(STATES[0])
-    _, A, B = kernel_matrices(state, 10 * DT)
-    coarse = propagated(P, A, B, states, 10)
-    fine = P
-    _, A, B = kernel_matrices(state, DT)
-    for _ in range(10):
-        fine = propagated(fine, A, B, states, 1)
-    unit = np.sqrt(np.diag(fine))
-    unit[unit == 0.0] = 1.0
-    np.testing.assert_allclose(coarse / unit / unit[:, None], fine / unit / unit[:, None],
-                               rtol=0.0, atol=1e-5)  # fmt: skip
-
-
 def test_noise_over_many_steps_needs_no_start():
     """From P = 0: the variances of white noise and what it is integrated to."""
     sensors = SensorModels.of({"gyro": WhiteNoise(1e-4), "accel": WhiteNoise(2e-3)})
     states = SensorStates.of(sensors, DT, 10)
     still = nav_state(STATES[-1])
-    _, A, B = kernel_matrices(still, 10 * DT)
+    change = kernel_matrices(still, 10 * DT)
     P = np.zeros((9, 9))
     for _ in range(100):
-        P = propagated(P, A, B, states, 10)
+        P = propagated(P, change, states, 10)
     t = 10.0
     angle, speed = 1e-4**2 * t, 2e-3**2 * t
     np.testing.assert_allclose(np.diag(P)[6:], angle, rtol=1e-4)
@@ -364,18 +343,3 @@ def test_the_square_of_a_tilt_has_the_mean_square_that_is_allowed_for():
     assert P[5, 5] == pytest.approx(np.mean(errors**2), rel=0.03)
     assert gathered == pytest.approx(np.sqrt(P[5, 5]), rel=1e-12)
     assert np.count_nonzero(P) == 5  # nothing else is touched
-
-
-def test_a_tilted_navigator_falls_as_is_allowed_for():
-    """Two seconds of an error-free IMU at rest, navigated with a tilt of 2 deg."""
-    tilt = np.radians(2.0)
-    stand = perform([Stop(2.0)], start=(0.8, 0.1, 300.0), heading=0.0, dt=DT)
-    imu, start = emulate(stand), stand.state(0)
-    wrong = integrate(
-        imu, NavState(start.lla, start.velocity, start.rpy + np.array([tilt, 0.0, 0.0]))
-    )
-    fall = (wrong.velocity[-1, 2] - stand.velocity[-1, 2]) / stand.duration
-    P = np.zeros((9, 9))
-    P[6, 6] = tilt**2
-    # The fourth moment of one normal tilt is three times that of a fixed one.
-    assert np.sqrt(3.0) * fall == pytest.approx(tilt_squared(P, 9.81, 1.0, 0.0), rel=0.01)

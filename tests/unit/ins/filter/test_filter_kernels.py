@@ -2,20 +2,14 @@
 
 import numpy as np
 import pytest
-from gmwm.ins.filter.measurement_kernels import (
-    IS_HEIGHT,
-    IS_POSITION,
-    IS_STANDSTILL,
-    IS_VELOCITY,
-    measurement_row,
-    residual,
-)
 
 from gmwm import AR, GaussMarkov, RandomWalk, RateRamp, Resonance, WhiteNoise
-from gmwm.ins.filter.filter_kernels import axis_sums, correct, sample_error
-from gmwm.ins.filter.states import SensorStates
+from gmwm.ins import SensorModels
+from gmwm.ins.filter import KINDS, Kinematics, SensorStates, observe
+from gmwm.ins.filter.filter_kernels import _advance, axis_sums, correct
+from gmwm.ins.filter.measurements import MEASUREMENTS
+from gmwm.ins.filter.records import Samples, new_workspace
 from gmwm.ins.geometry import matrix_from_rotation_vector, matrix_from_rpy, ned_difference, offset
-from gmwm.ins.imu.sensors import SensorModels
 
 DT = 0.01
 ATTITUDE = np.array([0.3, -0.4, 2.1])
@@ -27,13 +21,12 @@ PLACES = [(0.8, 0.1, 300.0), (-0.6, np.pi - 1e-8, 20.0), (1.38, -np.pi, 5000.0)]
 
 def measured(kind, C, v, lla):
     """What an instrument without errors reads."""
-    if kind == IS_POSITION:
-        return offset(lla, C @ LEVER)
-    if kind == IS_VELOCITY:
-        return v + C @ np.cross(RATE, LEVER)
-    if kind == IS_STANDSTILL:
-        return v
-    return np.array([lla[2], 0.0, 0.0])
+    return {
+        "position": lambda: offset(lla, C @ LEVER),
+        "velocity": lambda: v + C @ np.cross(RATE, LEVER),
+        "standstill": lambda: v,
+        "height": lambda: np.array([lla[2], 0.0, 0.0]),
+    }[kind]()
 
 
 def estimated(C, v, lla, x):
@@ -42,19 +35,20 @@ def estimated(C, v, lla, x):
     return turned @ C, turned @ v + x[3:6], offset(lla, x[:3])
 
 
-def difference(kind, component, value, C, v, lla):
-    return residual(kind, component, value, C, v, lla, RATE, LEVER)
+def difference(kind, component, value, C, v, lla, h=None):
+    h = np.full(9, np.nan) if h is None else h
+    return observe(KINDS[kind], component, value, Kinematics(C, v, lla), RATE, LEVER, h)
 
 
 @pytest.mark.parametrize("lla", PLACES)
-@pytest.mark.parametrize("kind", [IS_POSITION, IS_VELOCITY, IS_HEIGHT, IS_STANDSTILL])
+@pytest.mark.parametrize("kind", KINDS)
 def test_rows_are_the_derivatives_of_the_residuals(kind, lla):
     C, v, lla = matrix_from_rpy(ATTITUDE), VELOCITY, np.array(lla)
     value = measured(kind, C, v, lla)
-    for component in range(1 if kind == IS_HEIGHT else 3):
-        h = np.full(9, np.nan)
-        measurement_row(kind, component, C, v, RATE, LEVER, h)
-        found = np.zeros(9)
+    for component in range(MEASUREMENTS[KINDS[kind]].components):
+        h, found = np.full(9, np.nan), np.zeros(9)
+        # The way to the antenna is straight in the residual and half-way on the Earth in `offset`.
+        assert difference(kind, component, value, C, v, lla, h) == pytest.approx(0.0, abs=3e-6)
         for i in range(9):
             x = np.zeros(9)
             x[i] = 1.0 if i < 3 else 1e-4
@@ -65,22 +59,12 @@ def test_rows_are_the_derivatives_of_the_residuals(kind, lla):
         np.testing.assert_allclose(found, h, atol=3e-6)
 
 
-@pytest.mark.parametrize("lla", PLACES)
-@pytest.mark.parametrize("kind", [IS_POSITION, IS_VELOCITY, IS_HEIGHT, IS_STANDSTILL])
-def test_the_residual_of_the_truth_is_zero(kind, lla):
-    C, lla = matrix_from_rpy(ATTITUDE), np.array(lla)
-    value = measured(kind, C, VELOCITY, lla)
-    for component in range(1 if kind == IS_HEIGHT else 3):
-        # The way to the antenna is straight in the residual and half-way on the Earth in `offset`.
-        assert difference(kind, component, value, C, VELOCITY, lla) == pytest.approx(0.0, abs=3e-6)
-
-
 @pytest.mark.parametrize("turns", [-2, -1, 1, 3])
 def test_full_turns_of_longitude_do_not_count(turns):
     C, lla = matrix_from_rpy(ATTITUDE), np.array(PLACES[1])
-    value = measured(IS_POSITION, C, VELOCITY, lla)
+    value = measured("position", C, VELOCITY, lla)
     value[1] += 2.0 * np.pi * turns
-    assert difference(IS_POSITION, 1, value, C, VELOCITY, lla) == pytest.approx(0.0, abs=2e-5)
+    assert difference("position", 1, value, C, VELOCITY, lla) == pytest.approx(0.0, abs=2e-5)
 
 
 @pytest.mark.parametrize("lla", PLACES)
@@ -90,7 +74,7 @@ def test_a_correction_takes_the_errors_off(lla, scale):
     truth = matrix_from_rpy(ATTITUDE), VELOCITY, np.array(lla)
     C, v, position = (each.copy() for each in estimated(*truth, x))
     taken = x.copy()
-    correct(C, v, position, taken)
+    correct(Kinematics(C, v, position), taken)
     assert not np.any(taken)
     # What is left is of third order in the angle.
     angle = np.linalg.norm(x[6:])
@@ -108,14 +92,13 @@ def tables(term):
 
 def predicted(states, x, n):
     """Errors of gyro_y that the states predict over n samples."""
-    first = np.searchsorted(states.axis, np.arange(7)).astype(np.int64)
-    paired = bool(np.any(states.partner != np.arange(states.m)))
-    x, held, error, found = x.copy(), np.zeros(states.m), np.zeros(6), []
-    for _ in range(n):
-        sample_error(first, states.output, states.phi[1], states.phi_off[1], states.partner,
-                     paired, x, held, error)  # fmt: skip
-        found.append(error[1])
-        assert not np.any(error[[0, 2, 3, 4, 5]])
+    at = Kinematics(np.eye(3), np.zeros(3), np.array(PLACES[0]))
+    samples, work = Samples(np.zeros((n, 3)), np.zeros((n, 3)), DT), new_workspace(9 + states.m)
+    x, carry, found = x.copy(), np.zeros(7), []
+    for i in range(n):
+        _advance(i, i + 1, samples, states.table, at, x, carry, work)
+        found.append(work.error[1])
+        assert not np.any(work.error[[0, 2, 3, 4, 5]])
     return np.array(found)
 
 
@@ -141,12 +124,11 @@ def test_sums_of_the_states_of_an_axis():
     }
     states = SensorStates.of(SensorModels.of(models), DT, 1)
     m = states.m
-    first = np.searchsorted(states.axis, np.arange(7)).astype(np.int64)
     root, x = rng.standard_normal((9 + m, 9 + m)), rng.standard_normal(m)
     P, mean, covariance = root @ root.T, np.empty(6), np.empty((6, 6))
-    axis_sums(P, first, states.output, mean, x, covariance)
+    axis_sums(P, states.table, x, mean, covariance)
     H = np.zeros((6, m))
-    H[states.axis, np.arange(m)] = states.output
+    H[states.table.axis, np.arange(m)] = states.table.output
     np.testing.assert_allclose(mean, H @ x, atol=1e-12)
     np.testing.assert_allclose(covariance, H @ P[9:, 9:] @ H.T, atol=1e-12)
     assert mean[4] == 0.0 and not np.any(covariance[4])

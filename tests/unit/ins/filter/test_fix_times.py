@@ -7,12 +7,8 @@ import pytest
 from scipy import stats
 
 from gmwm import GaussMarkov, WhiteNoise
-from gmwm.ins.filter.aiding import gnss
-from gmwm.ins.filter.filter import navigate
+from gmwm.ins import Imu, SensorModels, car_drive, emulate, gnss, navigate
 from gmwm.ins.geometry import ned_difference
-from gmwm.ins.imu.emulation import Imu, emulate
-from gmwm.ins.imu.sensors import SensorModels
-from gmwm.ins.trajectory.missions import car_drive
 
 FINE, EVERY = 0.005, 4
 COARSE = FINE * EVERY

@@ -7,14 +7,19 @@ import pytest
 from scipy.stats import chi2
 
 from gmwm import GaussMarkov, WhiteNoise
-from gmwm.errors import InputError
-from gmwm.ins import tuning
-from gmwm.ins.filter import filter_kernels
-from gmwm.ins.filter.aiding import KINDS, Aiding, Fixes, Outage, barometer, gnss
-from gmwm.ins.filter.filter import navigate
-from gmwm.ins.imu.emulation import emulate
-from gmwm.ins.imu.sensors import SensorModels
-from gmwm.ins.trajectory.missions import car_drive
+from gmwm.ins import (
+    Aiding,
+    Fixes,
+    Outage,
+    SensorModels,
+    barometer,
+    car_drive,
+    emulate,
+    gnss,
+    navigate,
+    tuning,
+)
+from gmwm.ins.filter import KINDS, filter_kernels
 
 DT = 0.05
 SENSORS = SensorModels.of(
@@ -91,15 +96,6 @@ def test_an_outlier_is_rejected_and_leaves_the_solution_as_without_it(drive, fix
     assert np.abs(ungated.errors(truth)[61, :2]).max() > 20.0
 
 
-def test_without_outliers_the_gate_changes_nothing(drive, fixes):
-    truth, imu = drive
-    open_gate = navigate(imu, truth.state(0), SENSORS, fixes)
-    gated = navigate(imu, truth.state(0), SENSORS, replace(fixes, gate=1e-6))
-    assert np.all(gated.innovations.used)
-    np.testing.assert_array_equal(gated.lla, open_gate.lla)
-    np.testing.assert_array_equal(gated.covariance, open_gate.covariance)
-
-
 def test_outliers_among_all_fixes_hardly_matter(drive, fixes):
     truth, imu = drive
     rng = np.random.default_rng(8)
@@ -122,12 +118,6 @@ def test_a_filter_that_is_wrong_does_not_refuse_fixes_for_ever(drive, fixes):
     # It is still a little wrong when the gate is closed again, and then some more are rejected.
     assert rejected.size <= 3 * tuning.GATE_PATIENCE
     assert np.abs(found.errors(truth)[-1, :2]).max() < 3.0
-
-
-@pytest.mark.parametrize("gate", [0.0, 1.0, -1.0, "a"])
-def test_a_gate_is_a_probability(gate):
-    with pytest.raises(InputError, match="give a probability"):
-        Aiding(gate=gate)
 
 
 def test_a_standstill_that_is_none_is_never_used(drive, fixes):

@@ -4,11 +4,7 @@ import numpy as np
 import pytest
 
 from gmwm import GaussMarkov, WhiteNoise
-from gmwm.ins.filter.aiding import Outage, gnss
-from gmwm.ins.filter.filter import navigate
-from gmwm.ins.imu.emulation import emulate
-from gmwm.ins.imu.sensors import SensorModels
-from gmwm.ins.trajectory.missions import fixed_wing_loiter
+from gmwm.ins import Outage, SensorModels, emulate, fixed_wing_loiter, gnss, navigate
 
 DT, START, AFTER = 0.1, 300.0, 60.0
 DEGREE = np.pi / 180.0

@@ -4,12 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from gmwm.ins.geometry import (
-    gravity,
-    ned_difference,
-    offset,
-    radii,
-)
+from gmwm.ins.geometry import gravity, ned_difference, offset, radii
 
 LATITUDES = st.floats(-math.radians(88), math.radians(88))
 
@@ -95,17 +90,3 @@ def test_the_date_line_is_crossed_the_shorter_way(turns: int) -> None:
     expected = 2e-6 * transverse * math.cos(0.3)
     assert ned_difference(east, west)[1] == pytest.approx(expected, rel=1e-6)
     assert ned_difference(west, east)[1] == pytest.approx(-expected, rel=1e-6)
-
-
-def test_shapes_are_kept() -> None:
-    one, many = np.array([0.5, 0.1, 3.0]), np.tile([0.5, 0.1, 3.0], (4, 1))
-    assert ned_difference(one, one).shape == (3,)
-    assert ned_difference(many, one).shape == (4, 3)
-    assert offset(one, np.zeros((4, 3))).shape == (4, 3)
-    assert offset(many, np.zeros(3)).shape == (4, 3)
-    np.testing.assert_array_equal(offset(many, np.zeros(3)), many)
-
-
-def test_the_way_to_a_place_far_below_is_that_at_half_of_the_height() -> None:
-    here, ned = np.array([0.7, 0.2, 12_000.0]), np.array([20_000.0, -30_000.0, 11_000.0])
-    np.testing.assert_allclose(ned_difference(offset(here, ned), here), ned, rtol=1e-6)

@@ -37,15 +37,6 @@ def test_angles_give_the_matrix_back_even_straight_up(
     np.testing.assert_allclose(matrix_from_rpy(rpy), C, atol=1e-11)
 
 
-@given(ANGLES, st.floats(-1.5, 1.5), ANGLES)
-def test_angles_come_back(roll: float, pitch: float, yaw: float) -> None:
-    rpy = np.array([roll, pitch, yaw])
-    found = rpy_from_matrix(matrix_from_rpy(rpy))
-    turns = (found - rpy) / (2 * math.pi)
-    np.testing.assert_allclose(turns, np.round(turns), atol=1e-13)
-    assert abs(found[1] - pitch) < 1e-12
-
-
 def test_axes_are_forward_right_down() -> None:
     # Heading east, nose up by 30 deg: forward points east and up, right points south.
     C = matrix_from_rpy(np.radians([0.0, 30.0, 90.0]))
@@ -99,10 +90,3 @@ def test_orthonormalise_squares_the_error() -> None:
         orthonormalise(off)
         assert np.max(np.abs(off.T @ off - np.eye(3))) < 30 * error**2 + 1e-15
         assert np.max(np.abs(off - nearest)) < 30 * error**2 + 1e-15
-
-
-def test_leading_axes_are_kept() -> None:
-    rpy = np.zeros((2, 5, 3))
-    assert matrix_from_rpy(rpy).shape == (2, 5, 3, 3)
-    assert rpy_from_matrix(matrix_from_rpy(rpy)).shape == (2, 5, 3)
-    assert matrix_from_rotation_vector(np.zeros((0, 3))).shape == (0, 3, 3)

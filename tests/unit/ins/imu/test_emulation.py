@@ -5,9 +5,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from gmwm.errors import InputError
+from gmwm.ins import Imu, Trajectory, emulate
 from gmwm.ins.geometry import RATE, gravity, matrix_from_rpy, offset
-from gmwm.ins.imu.emulation import Imu, emulate
-from gmwm.ins.trajectory.trajectory import Trajectory
 
 PLACE = np.array([math.radians(46.0), 0.1, 250.0])
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from gmwm import InputError
-from gmwm.ins.imu import Imu
+from gmwm.ins import Imu
 
 RIGHT = np.zeros((5, 3))
 

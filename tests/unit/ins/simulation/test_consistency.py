@@ -9,21 +9,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
-from scipy.stats import binom, chi2, multivariate_normal, norm, t as stats_t
+from scipy.stats import binom, chi2, multivariate_normal, norm
 from statsmodels.stats.proportion import proportion_confint
 
-from gmwm.errors import InputError
-from gmwm.ins.simulation.consistency import (
-    LEVELS,
-    Consistency,
-    at_epoch,
-    chi_square_ratio,
-    covered,
-    innovation_test,
-    mean_ratio,
-    over_time,
-)
-from gmwm.ins.simulation.filter_errors import GROUPS, FilterErrors
+from gmwm.ins import Consistency, FilterErrors, at_epoch, innovation_test, over_time
+from gmwm.ins.simulation import GROUPS, chi_square_ratio, mean_ratio
+from gmwm.ins.simulation.consistency import LEVELS, coverage_at_epoch
 from marks import slow
 
 SIZES = {name: part.stop - part.start for name, part in GROUPS.items()} | {"sensors": 6}
@@ -132,7 +123,7 @@ def test_interval_of_coverage_is_honest_whatever_the_correlation_of_components(s
     standard = np.sqrt(correlation) * common + np.sqrt(1.0 - correlation) * rng.standard_normal(
         (draws, runs, size)
     )
-    found = [covered(each) for each in standard]
+    found = [coverage_at_epoch(each[:, None]) for each in standard]
     for i in range(len(LEVELS)):
         assert np.mean([each[i].within for each in found]) >= least(draws, 0.95)
 
@@ -156,18 +147,6 @@ def test_interval_of_coverage_over_time_tightens_with_what_the_runs_are_worth():
         interval = over_time(synthetic(rng, 60, 40, memory=memory)).coverage["position"][2]
         widths[memory] = interval.upper - interval.lower
     assert widths[0.0] < 0.5 * widths[0.999]
-
-
-def test_interval_of_coverage_over_time_of_few_runs_is_that_of_student():
-    """Where the fraction is near one half and the draws are many, the binomial law is normal."""
-    runs = synthetic(np.random.default_rng(21), 6, 300, memory=0.9)
-    fractions = np.mean(
-        np.abs(runs.error[..., :3] / runs.sd[..., :3]) < norm.ppf(0.75), axis=(1, 2)
-    )
-    expected = stats_t.interval(0.95, 5, fractions.mean(), fractions.std(ddof=1) / np.sqrt(6.0))
-    found = over_time(runs).coverage["position"][0]
-    assert found.fraction == pytest.approx(fractions.mean())
-    assert (found.lower, found.upper) == pytest.approx(expected, abs=0.1 * np.ptp(expected))
 
 
 # ---- An inconsistent one ----
@@ -230,7 +209,7 @@ def test_interval_of_coverage_is_that_of_clopper_and_pearson(runs, data):
     inside = data.draw(st.integers(0, runs))
     standard = np.where(np.arange(runs) < inside, 0.0, 99.0)[:, None]
     expected = proportion_confint(inside, runs, 0.05, "beta")
-    for coverage in covered(standard):
+    for coverage in coverage_at_epoch(standard[:, None]):
         assert coverage.fraction == pytest.approx(inside / runs)
         np.testing.assert_allclose([coverage.lower, coverage.upper], expected, atol=1e-12)
 
@@ -274,11 +253,6 @@ def test_nothing_is_claimed_where_every_run_diverged(judge):
     runs = diverged(synthetic(np.random.default_rng(11), 4, 3), slice(None))
     assert runs.diverged == 4
     assert_unknown(judge(runs))
-
-
-@pytest.mark.parametrize("judge", [lambda runs: at_epoch(runs, 1), over_time])
-def test_no_run_at_all(judge):
-    assert_unknown(judge(synthetic(np.random.default_rng(12), 0, 3)))
 
 
 def test_runs_that_diverged_are_left_out():
@@ -332,44 +306,6 @@ def test_sensors_without_states_do_not_count():
     for found in (at_epoch(half, 1), over_time(half)):
         assert found.nees["sensors"].value == pytest.approx(1.0, abs=4.0 * np.sqrt(2.0 / 600))
         assert found.coverage["sensors"][2].fraction == pytest.approx(0.95, abs=0.04)
-
-
-def test_epochs_at_which_a_sensor_is_known_exactly_are_left_out():
-    """A random walk that starts at zero has no variance yet at the first epoch."""
-    runs = synthetic(np.random.default_rng(17), 50, 4)
-    sd, nees = runs.sensor_sd.copy(), runs.sensor_nees.copy()
-    sd[:, 0, 2] = 0.0
-    nees[:, 0] = np.nan
-    early = replace(runs, sensor_sd=sd, sensor_nees=nees)
-    assert over_time(early).nees["sensors"] == over_time(runs, 1.0).nees["sensors"]
-    assert over_time(early).coverage["sensors"] == over_time(runs, 1.0).coverage["sensors"]
-    assert "sensors" not in at_epoch(early, 0).nees
-
-
-def test_a_time_without_epochs_is_refused():
-    runs = synthetic(np.random.default_rng(18), 3, 4)
-    with pytest.raises(InputError, match="from 7 s to 9 s"):
-        over_time(runs, 7.0, 9.0)
-
-
-def test_epochs_before_the_fixes_are_no_part_of_a_time():
-    runs = synthetic(np.random.default_rng(19), 20, 4)
-    before = np.array([False, False, True, False])
-    wild = runs.error.copy()
-    wild[:, 2] *= 1e3
-    marked = replace(runs, before=before, error=wild)
-    assert over_time(marked).rms["position"] < 2.0
-    with pytest.raises(InputError, match="no errors were kept at 1 s"):
-        marked.index(1.0)
-    assert marked.index(2.0) == 2
-    assert marked.index(1.0, before=False) == 1
-
-
-def test_innovations_of_no_run():
-    runs = synthetic(np.random.default_rng(20), 0)
-    found = innovation_test(runs)
-    assert np.isnan(found.nis.value)
-    assert np.isnan(found.whiteness)
 
 
 def test_mean_ratio_of_few_values():

@@ -4,13 +4,17 @@ import numpy as np
 import pytest
 
 from gmwm import WhiteNoise
-from gmwm.ins.filter.aiding import Outage, gnss
-from gmwm.ins.filter.filter import InitialSd
-from gmwm.ins.imu.sensors import SensorModels
-from gmwm.ins.simulation.consistency import at_epoch
-from gmwm.ins.simulation.scenario import Scenario, Simulated
-from gmwm.ins.simulation.trials import monte_carlo
-from gmwm.ins.trajectory.missions import helicopter_mapping
+from gmwm.ins import (
+    InitialSd,
+    Outage,
+    Scenario,
+    SensorModels,
+    Simulated,
+    at_epoch,
+    gnss,
+    helicopter_mapping,
+    monte_carlo,
+)
 
 SENSORS = SensorModels.of({"gyro": WhiteNoise(1e-6), "accel": WhiteNoise(1e-5)})
 

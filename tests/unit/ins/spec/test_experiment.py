@@ -6,17 +6,13 @@ import numpy as np
 import pytest
 
 from gmwm.errors import InputError
-from gmwm.ins.field import measured
-from gmwm.ins.field.measured import MeasuredSpec
-from gmwm.ins.imu.sensors import AXES, SensorModels
-from gmwm.ins.simulation.scenario import Scenario
-from gmwm.ins.spec import experiment
-from gmwm.ins.spec.document import read_document
-from gmwm.ins.spec.experiment import MISSIONS, ExperimentSpec, experiment_from
-from gmwm.ins.spec.fields import Spec
+from gmwm.ins import Scenario, SensorModels, experiment_from
+from gmwm.ins.imu import AXES
+from gmwm.ins.logs import LogSpec
+from gmwm.ins.spec import experiment, read_document
+from gmwm.ins.spec.experiment import ExperimentSpec
 from gmwm.process import RandomWalk
 from places import REPOSITORY
-from recorded import assert_as_recorded
 
 MODELS = {"gyro": {"N": 1e-4}, "accel": {"N": 1e-2}}
 LEAST = {
@@ -66,18 +62,6 @@ def test_every_key_reaches_the_scenario() -> None:
     sd = scenario.initial_sd
     np.testing.assert_allclose([sd.position, sd.velocity, sd.tilt, sd.heading], expected)
     assert (found.runs, found.seed) == (7, 3)
-
-
-def test_gnss_of_velocity_alone() -> None:
-    gnss = {"position_sd": "none", "velocity_sd": 0.1}
-    (only,) = experiment_from(LEAST | {"gnss": gnss}).scenario.aiding.fixes
-    assert only.kind == "velocity"
-
-
-@pytest.mark.parametrize("name", MISSIONS)
-def test_missions(name: str) -> None:
-    found = experiment_from(LEAST | {"trajectory": name})
-    assert found.scenario.trajectory.duration == pytest.approx(30.0)
 
 
 def test_outages_may_touch_and_end_with_the_trajectory() -> None:
@@ -159,7 +143,7 @@ def test_every_key_is_documented() -> None:
         assert f"`{name}`" in table
     page = (REPOSITORY / "docs/own-log.md").read_text()
     example = page.split("As a file:")[1].split("```")[1]
-    for name in MeasuredSpec.model_fields:
+    for name in LogSpec.model_fields:
         assert f"\n{name}:" in example
 
 
@@ -204,17 +188,3 @@ def test_recordings_have_the_rate_of_the_trajectory(tmp_path: Path) -> None:
     assert found.truth is None
     with pytest.raises(InputError, match="20 Hz and the trajectory 25 Hz"):
         experiment_from(given | {"rate": 25}, tmp_path)
-
-
-def test_what_is_not_given_is_as_documented() -> None:
-    defaults = {
-        f"{kind.__name__}.{name}": repr(field.default)
-        for kind in (
-            ExperimentSpec, MeasuredSpec, *(
-                each for module in (experiment, measured) for each in vars(module).values()
-                if isinstance(each, type) and issubclass(each, Spec)
-            ),
-        )
-        for name, field in kind.model_fields.items() if not field.is_required()
-    }  # fmt: skip
-    assert_as_recorded("ins/spec_defaults", defaults)

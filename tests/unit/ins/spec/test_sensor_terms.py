@@ -6,8 +6,8 @@ from hypothesis import given, settings, strategies as st
 
 from gmwm import BiasInstability, GaussMarkov, QuantizationNoise, RandomWalk, RateRamp, WhiteNoise
 from gmwm.errors import InputError
+from gmwm.ins.spec import sensor_models
 from gmwm.ins.spec.fields import value
-from gmwm.ins.spec.sensor_terms import sensor_models
 
 ACCEL = {"N": 1e-2}
 

@@ -6,18 +6,9 @@ import numpy as np
 import pytest
 
 from gmwm.errors import InputError
+from gmwm.ins import Accelerate, Climb, Stop, Straight, Trajectory, Turn, emulate, perform
 from gmwm.ins.geometry import ned_difference
-from gmwm.ins.imu.emulation import emulate
-from gmwm.ins.trajectory.manoeuvres import (
-    Accelerate,
-    Climb,
-    Manoeuvre,
-    Stop,
-    Straight,
-    Turn,
-    perform,
-)
-from gmwm.ins.trajectory.trajectory import Trajectory
+from gmwm.ins.trajectory.manoeuvres import Manoeuvre
 
 START = (math.radians(-40.0), math.pi - 1e-5, 100.0)
 

@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from gmwm.errors import InputError
+from gmwm.ins import car_drive, emulate, fixed_wing_loiter, helicopter_mapping
 from gmwm.ins.geometry import ned_difference
-from gmwm.ins.imu.emulation import emulate
-from gmwm.ins.trajectory.missions import car_drive, fixed_wing_loiter, helicopter_mapping
 
 
 @pytest.mark.parametrize("spacing", [150.0, 300.0, 570.0])
@@ -25,15 +24,6 @@ def test_strips_lie_side_by_side(spacing: float, speed: float) -> None:
     begin = max(np.min(strip[:, 0]) for strip in strips)
     end = min(np.max(strip[:, 0]) for strip in strips)
     assert end - begin == pytest.approx(1500.0, abs=2.0 * speed * 2.0)
-
-
-def test_the_helicopter_climbs_first_and_keeps_its_height() -> None:
-    found = helicopter_mapping(dt=0.1)
-    assert (found.n, found.duration) == (18_000, pytest.approx(1800.0))
-    moving = np.hypot(*found.velocity[:, :2].T) > 0.1
-    np.testing.assert_allclose(found.lla[moving, 2], 550.0, atol=1e-6)
-    assert np.max(np.abs(found.rpy[:, 0])) < math.radians(25.0)
-    assert np.ptp(found.rpy[:, 2]) > math.pi
 
 
 def test_the_car_stops_turns_and_climbs() -> None:

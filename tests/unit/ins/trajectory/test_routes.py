@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from gmwm.errors import InputError
+from gmwm.ins import Trajectory, through
 from gmwm.ins.geometry import ned_difference, offset
-from gmwm.ins.trajectory.routes import through
-from gmwm.ins.trajectory.trajectory import Trajectory
 
 START = np.array([math.radians(47.0), math.pi - 1e-4, 300.0])
 CORNERS = np.array(
@@ -44,12 +43,6 @@ def test_the_track_follows_the_legs() -> None:
     np.testing.assert_allclose(ned_difference(found.lla[-1], waypoints[-1]), 0.0, atol=2.0)
     np.testing.assert_allclose(found.lla[[0, -1], 2], waypoints[[0, -1], 2], atol=1e-3)
     assert np.hypot(*found.velocity[:, :2].T) == pytest.approx(30.0, abs=1e-3)
-
-
-def test_a_straight_route_has_no_corner() -> None:
-    found, _ = fly(np.array([[0, 0, 0], [600, 0, 0], [900, 0, 0.0]]))
-    np.testing.assert_allclose(found.rpy[:, 2], 0.0, atol=1e-9)
-    assert found.duration == pytest.approx(30.0, abs=0.05)
 
 
 def test_heights_change_between_corners() -> None:

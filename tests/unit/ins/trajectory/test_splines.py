@@ -2,17 +2,8 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
-from gmwm.ins.trajectory.splines import coefficients, smoothed, unwrapped_angles
-
-
-@pytest.mark.parametrize("n", [1, 2, 3, 10])
-def test_pieces_meet_the_values(n: int) -> None:
-    rng = np.random.default_rng(n)
-    values, dt = rng.normal(size=(n + 1, 3)), 0.3
-    c = coefficients(values, dt)
-    assert c.shape == (n, 3, 4)
-    np.testing.assert_allclose(c @ [1, 0, 0, 0], values[:-1], atol=1e-14)
-    np.testing.assert_allclose(c @ dt ** np.arange(4), values[1:], atol=1e-12)
+from gmwm.ins.trajectory import unwrapped_angles
+from gmwm.ins.trajectory.splines import smoothed
 
 
 def test_smoothing_keeps_cubics_and_slow_waves() -> None:
@@ -39,11 +30,6 @@ def test_smoothing_solves_least_squares(n: int, dt: float) -> None:
     other = CubicSpline(knots, rng.normal(size=spans + 1))(x) if spans > 3 else x**3
     product = (values - found).T @ other
     assert np.max(np.abs(product)) < 1e-9 * np.linalg.norm(other) * np.linalg.norm(values)
-
-
-def test_too_short_for_the_cutoff_is_left_alone() -> None:
-    values = np.random.default_rng(0).normal(size=(50, 3))
-    np.testing.assert_array_equal(smoothed(values, 0.1, 3.0), values)
 
 
 def test_pitch_is_never_unwrapped() -> None:

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from gmwm.errors import InputError
+from gmwm.ins import NavState, Trajectory
 from gmwm.ins.geometry import offset
-from gmwm.ins.trajectory.trajectory import NavState, Trajectory
 
 PLACE = np.array([-0.6, math.pi - 1e-6, 40.0])
 

@@ -1,0 +1,242 @@
+"""Heading and attitude at the start: from GNSS, the Earth's rotation, or changes of velocity."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from gmwm._core.compiled import compiled
+from gmwm._core.typing import FloatArray
+from gmwm.errors import InputError
+from gmwm.ins.filter import Aiding, Fixes
+from gmwm.ins.geometry import (
+    RATE,
+    STANDARD_GRAVITY,
+    gravity,
+    matrix_from_rotation_vector,
+    matrix_from_rpy,
+    ned_difference,
+    rpy_from_matrix,
+    turn_body,
+)
+from gmwm.ins.imu import Imu
+from gmwm.ins.logs import tuning
+from gmwm.ins.logs.steadiness import positions_of
+
+
+class Heading(NamedTuple):
+    """A heading at the first epoch of the filter.
+
+    yaw, sd: rad.
+    source: How it was found, in words.
+    """
+
+    yaw: float
+    sd: float
+    source: str
+
+
+class _Course(NamedTuple):
+    """A course of GNSS from one time to another (rad, s)."""
+
+    angle: float
+    sd: float
+    begin: float
+    end: float
+
+
+def turned(imu: Imu, bias: FloatArray, C: FloatArray, levelled: int, epoch: int) -> FloatArray:
+    """Attitude at an epoch, from the attitude at the epoch of levelling, by the gyros."""
+    begin, end = min(epoch, levelled), max(epoch, levelled)
+    turn = np.eye(3)
+    _carry(turn, imu.rotation[begin:end] - bias * imu.dt, np.empty((0, 3, 3)))
+    return np.ascontiguousarray(C, dtype=float) @ (turn.T if epoch < levelled else turn)
+
+
+@compiled()
+def _carry(C: FloatArray, rotation: FloatArray, kept: FloatArray) -> None:
+    """Turn a body by increments; ``kept`` gets the matrix after each if it has room."""
+    for i in range(rotation.shape[0]):
+        turn_body(C, rotation[i, 0], rotation[i, 1], rotation[i, 2])
+        if i < kept.shape[0]:
+            kept[i] = C
+
+
+def heading_from_course(
+    imu: Imu, aiding: Aiding, bias: FloatArray, C: FloatArray, epoch: int, drift: float
+) -> Heading | None:
+    """Heading at an epoch from the first course of GNSS, turned back by the gyros.
+
+    C: Attitude at the epoch without its heading.
+    drift: Standard deviation of the gyros' error, rad/s.
+    """
+    found = _from_velocity(aiding, epoch * imu.dt) or _from_chord(aiding, epoch * imu.dt)
+    if found is None:
+        return None
+    last = min(round(found.end / imu.dt), imu.n)
+    since = np.zeros(1)
+    if last > epoch:
+        kept = np.empty((last - epoch, 3, 3))
+        _carry(C.copy(), imu.rotation[epoch:last] - bias * imu.dt, kept)
+        part = kept[max(round(found.begin / imu.dt) - epoch - 1, 0) :]
+        since = rpy_from_matrix(part)[:, 2] - rpy_from_matrix(C)[2]
+    mean_turn = float(np.angle(np.mean(np.exp(1j * since))))
+    back = 0.5 * (found.begin + found.end) - epoch * imu.dt
+    sd = float(np.sqrt(found.sd**2 + tuning.CRAB_SD**2 + (drift * back) ** 2))
+    source = f"heading from GNSS, {found.begin:.6g} s after the start"
+    return Heading(found.angle - mean_turn, sd, source)
+
+
+def _from_velocity(aiding: Aiding, start: float) -> _Course | None:
+    velocity = aiding.of("velocity")
+    if velocity is None:
+        return None
+    speed = np.hypot(velocity.value[:, 0], velocity.value[:, 1])
+    sd = np.sqrt(np.mean(velocity.sd[:, :2] ** 2, axis=1))
+    fast = (speed > tuning.COURSE_RATIO * sd) & (velocity.time >= start)
+    fast &= velocity.time <= start + tuning.SEARCHED
+    if not np.any(fast):
+        return None
+    i = int(np.argmax(fast))
+    time = float(velocity.time[i])
+    angle = float(np.arctan2(velocity.value[i, 1], velocity.value[i, 0]))
+    return _Course(angle, float(sd[i] / speed[i]), time, time)
+
+
+def _from_chord(aiding: Aiding, start: float) -> _Course | None:
+    """Course between two fixes that are near in time and far apart.
+
+    Fixes between them and the next one lie on the line, or one of the two is an outlier; if no
+    other fixes are far apart, the first two are taken all the same.
+    """
+    positions = positions_of(aiding)
+    time, sd = positions.time, np.sqrt(np.mean(positions.sd[:, :2] ** 2, axis=1))
+    first = None
+    for i in np.flatnonzero((time >= start - 1e-6) & (time <= start + tuning.SEARCHED)):
+        for j in range(i + 1, time.size):
+            if time[j] - time[i] > tuning.CHORD:
+                break
+            way = ned_difference(positions.value[i : j + 2], positions.value[i])[:, :2]
+            (north, east), error = way[j - i], np.hypot(sd[i], sd[j])
+            length = float(np.hypot(north, east))
+            if length <= tuning.COURSE_RATIO * error:
+                continue
+            angle = float(np.arctan2(east, north))
+            found = _Course(angle, float(error / length), float(time[i]), float(time[j]))
+            share = (time[i : j + 2] - time[i]) / (time[j] - time[i])
+            aside = np.hypot(*(way - share[:, None] * way[j - i]).T)
+            if j + 1 < time.size and np.max(aside) < tuning.CHORD_ASIDE * length:
+                return found
+            first = first or found
+    return first
+
+
+def gyrocompass(
+    mean_rate: FloatArray, level: FloatArray, lat: float, gyro_sd: float
+) -> Heading | None:
+    """Heading from the Earth's rotation, if the gyros show it. Groves (2013), eq. 5.105."""
+    north, east, _ = matrix_from_rpy(level) @ mean_rate
+    sd = float(gyro_sd / (RATE * np.cos(lat)))
+    if sd > tuning.COMPASS_SD:
+        return None
+    return Heading(float(np.arctan2(-east, north)), sd, "heading from the Earth's rotation")
+
+
+# -- in motion ------------------------------------------------------------------------------------
+
+
+def attitude_in_motion(
+    imu: Imu, aiding: Aiding, epoch: int, place: FloatArray, constant_sd: tuple[float, float]
+) -> tuple[FloatArray, FloatArray]:
+    """Attitude at an epoch, C_bn, and its standard deviations about north, east and down.
+
+    The specific force, turned into the body's axes of the start by the gyros, and the change of the
+    velocity less the one by gravity are one vector in two frames, interval by interval. The
+    rotation between them that fits best is Wahba's problem, solved by singular values (Markley
+    1988, *J. Astronaut. Sci.* 36, 245-258; Wu & Pan 2013, *IEEE Trans. Aerosp. Electron. Syst.* 49,
+    1006-1025).
+
+    place: (3,), latitude, longitude, height.
+    constant_sd: Standard deviations of constant errors of gyros and accelerometers, rad/s, m/s^2.
+    Raises InputError if no stretch of up to `gmwm.ins.logs.tuning.MOTION_MOST` s shows the heading.
+    """
+    start, velocity = epoch * imu.dt, _velocities(aiding)
+    lever = np.asarray(aiding.lever_arm, dtype=float)
+    best: tuple[FloatArray, FloatArray] | None = None
+    for length in np.arange(tuning.MOTION_LEAST, tuning.MOTION_MOST + 1.0, tuning.MOTION_LEAST):
+        inside = (velocity.time >= start) & (velocity.time <= start + length)
+        last = round((start + length) / imu.dt)
+        if last > imu.n or np.count_nonzero(inside) < 3:
+            break
+        part = velocity.part(inside)
+        body = _velocity_in_body_axes(imu, epoch, last, part.time, lever)
+        found = _rotation(part, body, place, constant_sd)
+        if best is None or found[1][2] < best[1][2]:
+            best = found
+    if best is None or best[1][2] > tuning.MOTION_SD:
+        raise InputError(
+            "the attitude cannot be known: the IMU is steady nowhere in the first "
+            f"{tuning.SEARCHED:g} s, and GNSS shows too little acceleration to find it from: give "
+            "the attitude, or begin the record where the vehicle stands still",
+            "attitude-unknown",
+        )
+    return best
+
+
+def _velocities(aiding: Aiding) -> Fixes:
+    """Velocity fixes, or differences of positions at the times between them."""
+    velocity, position = aiding.of("velocity"), positions_of(aiding)
+    if velocity is not None:
+        return velocity
+    step = np.diff(position.time)
+    near = np.flatnonzero(step <= tuning.CHORD)
+    way = np.array([ned_difference(position.value[i + 1], position.value[i]) for i in near])
+    sd = np.hypot(position.sd[1:], position.sd[:-1])[near]
+    between = 0.5 * (position.time[1:] + position.time[:-1])[near]
+    each = step[near, None]
+    return Fixes("velocity", between, way.reshape(-1, 3) / each, sd / each)
+
+
+def _velocity_in_body_axes(
+    imu: Imu, epoch: int, last: int, times: FloatArray, lever: FloatArray
+) -> FloatArray:
+    """Velocity of the antenna that the IMU measures since an epoch, in the body's axes there."""
+    turns = np.empty((last - epoch + 1, 3, 3))
+    turns[0] = np.eye(3)
+    for i, turn in enumerate(matrix_from_rotation_vector(imu.rotation[epoch:last])):
+        turns[i + 1] = turns[i] @ turn
+    # Half of a sample's turn has happened when its force is resolved.
+    middle = 0.5 * (turns[1:] + turns[:-1])
+    force = np.einsum("kij,kj->ki", middle, imu.velocity[epoch:last])
+    summed = np.vstack([np.zeros(3), np.cumsum(force, axis=0)])
+    rates = imu.rotation[np.clip(np.arange(epoch, last + 1), 0, imu.n - 1)] / imu.dt
+    # The antenna swings about the IMU.
+    swing = np.einsum("kij,kj->ki", turns, np.cross(rates, lever))
+    samples, at = (times - epoch * imu.dt) / imu.dt, np.arange(len(summed))
+    columns = [
+        np.interp(samples, at, summed[:, j]) + np.interp(samples, at, swing[:, j]) for j in range(3)
+    ]
+    return np.stack(columns, axis=1)
+
+
+def _rotation(
+    velocity: Fixes, body: FloatArray, place: FloatArray, constant_sd: tuple[float, float]
+) -> tuple[FloatArray, FloatArray]:
+    """The rotation from velocities in body axes to those of the fixes, and its deviations."""
+    time = velocity.time - velocity.time[0]
+    level = velocity.value - np.outer(time, [0.0, 0.0, float(gravity(place[0], place[2]))])
+    a, b = level - level.mean(axis=0), body - body.mean(axis=0)
+    left, _, right = np.linalg.svd(a.T @ b)
+    C = left @ np.diag([1.0, 1.0, np.linalg.det(left) * np.linalg.det(right)]) @ right
+    # Scatter about the fit: noise of the fixes, and the bend by the gyros' drift.
+    rest = a - b @ C.T
+    noise = max(float(np.mean(velocity.sd**2)), float(np.sum(rest**2)) / (3.0 * len(a) - 6.0))
+    information = (np.sum(a**2) * np.eye(3) - a.T @ a) / noise
+    gyro_sd, accel_sd = constant_sd
+    drift = gyro_sd * 0.5 * float(time[-1])
+    variances = np.diag(np.linalg.inv(information)) + drift**2
+    # A constant error of the accelerometers tilts, and turns by its share of the acceleration.
+    turning = np.sqrt(np.mean(np.gradient(velocity.value, time, axis=0)[:, :2] ** 2))
+    ratio = accel_sd / np.array([STANDARD_GRAVITY, STANDARD_GRAVITY, max(turning, 1e-3)])
+    return C, np.sqrt(variances + ratio**2)

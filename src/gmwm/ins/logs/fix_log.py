@@ -1,0 +1,344 @@
+"""GNSS logs: positions and velocities in a delimited text, one row an epoch."""
+
+from __future__ import annotations
+
+import os
+import re
+import tempfile
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from gmwm._core.files import existing_file
+from gmwm._core.typing import FloatArray
+from gmwm.errors import InputError
+from gmwm.ins.filter import Aiding, Fixes
+from gmwm.ins.geometry import ned_difference
+from gmwm.ins.logs import tuning
+from gmwm.ins.trajectory import POSITION_WORDS, LogColumns, is_time, words_of
+from gmwm.issues import Notice, notice
+from gmwm.readers import DATE, TIME
+
+_POSITION = ("latitude", "longitude", "height")
+_NED = ("north", "east", "down")
+_VELOCITY = tuple(f"velocity {axis}" for axis in _NED)
+_LIMITS = {"latitude": 0.5 * np.pi, "longitude": 2.0 * np.pi}
+_DIRECTIONS = {short: name for name in (*_NED, "up") for short in (name, name[0])}
+_AXIS_OF_POSITION = dict(zip(_POSITION, _NED, strict=True))
+_AXES_OF_ACCURACY = {"horizontal": ("north", "east"), "vertical": ("down",)}
+_VELOCITY_WORDS = frozenset({"velocity", "vel", "v", "speed"})
+_SHORT_VELOCITIES = ("vn", "ve", "vd", "vu")
+_SD_WORDS = frozenset({"sd", "std", "stdev", "sigma", "accuracy", "acc"})
+_SPEED_UNIT = frozenset({"m", "s", "mps", "ms", "per", "sec"})
+_OTHER_WORDS = frozenset({"gps", "gnss", "fix", "position", "pos", "ned", "enu"})
+_SPEEDS = {"km/h": 1.0 / 3.6, "knots": 1852.0 / 3600.0, "ft/s": 0.3048, "cm/s": 0.01, "mm/s": 0.001}
+
+_HEAD = 1 << 16  # bytes that are searched for dates
+_RTKLIB = re.compile(r"^%\s*(GPST|UTC|JST)\s")
+_WEEK = re.compile(r"^\s*(\d{4})\s+(\d{1,6}\.\d+)(?=\s)")
+_GPS_EPOCH = 315964800  # s from 1970-01-01 to 1980-01-06, on one calendar
+_WEEK_LENGTH = 604800
+_RTKLIB_COLUMNS = """
+sdn(m):sd_north sde(m):sd_east sdu(m):sd_up vn(m/s):velocity_north ve(m/s):velocity_east
+vu(m/s):velocity_up sdvn:sd_velocity_north sdve:sd_velocity_east sdvu:sd_velocity_up
+latitude(deg):latitude_deg longitude(deg):longitude_deg height(m):height_m ns:satellites
+"""
+_RTKLIB_NAMES = dict(each.split(":") for each in _RTKLIB_COLUMNS.split())
+
+
+@dataclass(frozen=True, eq=False)
+class FixLog:
+    """GNSS fixes on the receiver's own clock.
+
+    time: (E,), s.
+    position, velocity: (E, 3) or None, latitude, longitude (rad), height (m); to the north, east
+        and down (m/s); NaN where there is none.
+    position_sd, velocity_sd: (E, 3), to the north, east and down, or ``None`` where the file has
+        none.
+    """
+
+    time: FloatArray
+    position: FloatArray
+    velocity: FloatArray | None
+    position_sd: FloatArray | None
+    velocity_sd: FloatArray | None
+    source: str
+    notices: tuple[Notice, ...] = ()
+
+    def aiding(
+        self,
+        start: float = 0.0,
+        position_sd: Sequence[float] = tuning.POSITION_SD,
+        velocity_sd: Sequence[float] = tuning.VELOCITY_SD,
+        lever_arm: Sequence[float] = (0.0, 0.0, 0.0),
+    ) -> Aiding:
+        """The fixes on the clock of an IMU; see `read_fixes`."""
+        fixes = []
+        for kind, value, own, usual in (
+            ("position", self.position, self.position_sd, position_sd),
+            ("velocity", self.velocity, self.velocity_sd, velocity_sd),
+        ):
+            if value is None:
+                continue
+            there = np.all(np.isfinite(value), axis=1)
+            sd = np.tile(np.asarray(usual, dtype=float), (len(value), 1)) if own is None else own
+            fixes.append(Fixes(kind, self.time[there] - start, value[there], sd[there]))
+        return Aiding(tuple(fixes), lever_arm)
+
+
+def read_fixes(
+    path: str | os.PathLike[str],
+    *,
+    start: float = 0.0,
+    position_sd: Sequence[float] = tuning.POSITION_SD,
+    velocity_sd: Sequence[float] = tuning.VELOCITY_SD,
+    lever_arm: Sequence[float] = (0.0, 0.0, 0.0),
+) -> Aiding:
+    """Read GNSS fixes.
+
+    Parameters
+    ----------
+    path : str or path
+        Delimited text, plain or gzip, or a solution of RTKLIB (.pos), with columns time (seconds,
+        or dates in ISO 8601), latitude, longitude and height, and where there are any
+        ``velocity_north``, ``velocity_east``, ``velocity_down`` (or ``_up``), and standard
+        deviations: ``sd_north``, ``sd_east``, ``sd_down`` (m; or ``latitude_sd`` ...) and
+        ``sd_velocity_north`` ... (m/s). Units stand at the end (``latitude_deg``); without one,
+        angles are in degrees if a latitude is beyond pi/2. Empty fields are epochs without a fix.
+    start : float, optional
+        Time of the IMU's first epoch on the same clock, s.
+    position_sd, velocity_sd : three floats, optional
+        To the north, east and down, where the file has none, m and m/s.
+    lever_arm : three floats, optional
+        From the IMU to the antenna, body axes, m.
+
+    Returns
+    -------
+    Aiding
+
+    Raises
+    ------
+    InputError
+        If the file cannot be used; the message names the line.
+        If positions and velocities agree only with two columns exchanged, a sign or another unit.
+    """
+    return read_fix_log(path).aiding(start, position_sd, velocity_sd, lever_arm)
+
+
+def read_fix_log(path: str | os.PathLike[str]) -> FixLog:
+    """Read GNSS fixes on the receiver's own clock; see `read_fixes`."""
+    with _as_table(Path(path)) as (file, scale):
+        header = "time_s,latitude_deg,longitude_deg,height_m"
+        log = LogColumns.find(file, _quantities, (TIME, *_POSITION), header)
+        source = log.table.source
+        _check_triples(log)
+        values = log.load()
+    time = _times(log, values[TIME])
+    found = log.radians(values, _LIMITS) | {"height": log.metres("height", values["height"])}
+    position = np.stack([found[name] for name in _POSITION], axis=1)
+    if "velocity up" in values:
+        values["velocity down"] = -values["velocity up"]
+    velocity = None
+    if all(name in values for name in _VELOCITY):
+        velocity = np.stack([values[name] for name in _VELOCITY], axis=1)
+    notices = []
+    if scale:
+        notices.append(notice("dates", values={"scale": scale}, variant="fixes"))
+    if log.unused:
+        names = ", ".join(log.unused)
+        notices.append(notice("columns-unused", values={"columns": names}))
+    no_fix = (position[:, 0] == 0.0) & (position[:, 1] == 0.0)
+    if np.any(no_fix):
+        position[no_fix] = np.nan
+        values_at_zero = {"count": int(np.count_nonzero(no_fix))}
+        notices.append(notice("positions-at-zero", values=values_at_zero))
+    if velocity is not None:
+        _check_axes(source, time, position, velocity)
+    position_sd = _deviations(log, values, "sd ", position)
+    velocity_sd = None if velocity is None else _deviations(log, values, "sd velocity ", velocity)
+    return FixLog(time, position, velocity, position_sd, velocity_sd, source, tuple(notices))
+
+
+def read_heights(path: str | os.PathLike[str]) -> tuple[str, FloatArray, FloatArray]:
+    """Read heights of a barometer from columns time and height.
+
+    Returns: source; time, height (E,), s and m; NaN where there is none.
+    Raises InputError if the file cannot be used.
+    """
+    log = LogColumns.find(Path(path), _quantities, (TIME, "height"), "time_s,height_m")
+    values = log.load()
+    return log.table.source, _times(log, values[TIME]), log.metres("height", values["height"])
+
+
+@contextmanager
+def _as_table(path: Path) -> Iterator[tuple[Path, str]]:
+    """A file with a header, and the time scale of its dates; "" without dates.
+
+    A solution of RTKLIB (dates or GPS weeks) becomes a table of the same line numbers in seconds
+    since 1970-01-01 on its own calendar: GPS time is ahead of UTC by the leap seconds.
+    """
+    existing_file(path)
+    with path.open("rb") as stream:
+        head = stream.read(_HEAD).decode(errors="replace")
+    scale = next((found[1] for line in head.splitlines() if (found := _RTKLIB.match(line))), "")
+    if not scale:
+        yield path, "UTC" if DATE.search(head) else ""
+        return
+    lines = []
+    for text in path.read_text(errors="replace").splitlines():
+        if _RTKLIB.match(text):
+            names = ["time_s", *text[1:].split()[1:]]
+            lines.append(",".join(_RTKLIB_NAMES.get(n, n.partition("(")[0]) for n in names))
+        elif text.startswith("%"):
+            lines.append("#")
+        else:
+            if week := _WEEK.match(text):
+                seconds = _GPS_EPOCH + int(week[1]) * _WEEK_LENGTH + float(week[2])
+                text = f"{seconds:.6f} {text[week.end() :]}"
+            else:  # a date and a time of day in one field
+                text = re.sub(r"^\s*(\d{4})/(\d\d)/(\d\d)\s+", r"\1-\2-\3T", text)
+            lines.append(",".join(text.split()))
+    with tempfile.TemporaryDirectory() as folder:
+        table = Path(folder) / path.name
+        table.write_text("\n".join(lines) + "\n")
+        yield table, scale
+
+
+def _quantities(name: str) -> tuple[str, ...]:
+    """Quantities of a column; two for a horizontal standard deviation."""
+    if is_time(name):
+        return (TIME,)
+    words = words_of(name)
+    if not _VELOCITY_WORDS.isdisjoint(words) or (words and words[0] in _SHORT_VELOCITIES):
+        while len(words) > 1 and words[-1] in _SPEED_UNIT:
+            words.pop()
+    is_sd = not _SD_WORDS.isdisjoint(words)
+    words = [word for word in words if word not in _SD_WORDS | _OTHER_WORDS]
+    if len(words) == 1 and words[0] in _SHORT_VELOCITIES:
+        words = ["v", words[0][1]]
+    is_velocity = not _VELOCITY_WORDS.isdisjoint(words)
+    words = [word for word in words if word not in _VELOCITY_WORDS]
+    if len(words) != 1:
+        return ()
+    prefix = ("sd " if is_sd else "") + ("velocity " if is_velocity else "")
+    if words[0] in _AXES_OF_ACCURACY and is_sd:
+        return tuple(prefix + each for each in _AXES_OF_ACCURACY[words[0]])
+    position = POSITION_WORDS.get(words[0])
+    if position is not None and not is_velocity:
+        return (prefix + _AXIS_OF_POSITION[position],) if is_sd else (position,)
+    direction = _DIRECTIONS.get(words[0])
+    if direction is None or not prefix:
+        return ()
+    return (prefix + ("down" if is_sd and direction == "up" else direction),)
+
+
+def _check_triples(log: LogColumns) -> None:
+    """Reject a part of three components."""
+    for prefix in ("velocity ", "sd ", "sd velocity "):
+        group = [prefix + axis for axis in _NED]
+        there = [n for n in group if {n, n.replace("down", "up")} & log.columns.keys()]
+        if there and len(there) < len(group):
+            lacking = next(name for name in group if name not in there)
+            raise InputError(
+                f"{log.table.source} has a column for {there[0]} and none for {lacking}: add it, "
+                "or leave out all three"
+            )
+
+
+def _times(log: LogColumns, stamps: FloatArray) -> FloatArray:
+    """Time stamps in s; rejects missing ones, and ones that do not rise."""
+    bad = np.flatnonzero(np.isnan(stamps))
+    if bad.size:
+        raise InputError(f"{log.place(TIME, int(bad[0]))}: no time: take the row out")
+    if not stamps.size:
+        raise InputError(f"{log.table.source} has no fixes: check the file")
+    log.check_rising(stamps)
+    return stamps * log.seconds_per_stamp()
+
+
+def _deviations(
+    log: LogColumns, values: Mapping[str, FloatArray], prefix: str, measured: FloatArray
+) -> FloatArray | None:
+    """Standard deviations of three components, or ``None`` if the file has none."""
+    names = [prefix + axis for axis in _NED]
+    if names[0] not in values:
+        return None
+    there = np.all(np.isfinite(measured), axis=1)
+    for name in names:
+        if log.unit(name) in ("deg", "rad", "ft"):
+            raise InputError(f"{log.place(name)}: give standard deviations in metres")
+        bad = np.flatnonzero(there & ~(values[name] > 0.0))
+        if bad.size:
+            raise InputError(
+                f"{log.place(name, int(bad[0]))}: a standard deviation of "
+                f"{values[name][bad[0]]:g}: give a number above zero for each fix"
+            )
+    return np.stack([values[name] for name in names], axis=1)
+
+
+# -- axes and units -------------------------------------------------------------------------------
+
+
+def _check_axes(source: str, time: FloatArray, position: FloatArray, velocity: FloatArray) -> None:
+    """Reject positions and velocities that agree only with another column, sign or unit.
+
+    A filter would blame the sensors. The ways between positions are compared with the integral of
+    the velocities.
+
+    time: (E,), s.
+    position, velocity: (E, 3), latitude, longitude (rad), height (m); north, east, down (m/s); NaN
+        where there is none.
+    """
+    there = np.all(np.isfinite(position) & np.isfinite(velocity), axis=1)
+    time, position, velocity = time[there], position[there], velocity[there]
+    if time.size < 2:
+        return
+    step = np.diff(time)[:, None]
+    gone = np.cumsum(0.5 * (velocity[1:] + velocity[:-1]) * step, axis=0)
+    gone = np.concatenate([np.zeros((1, 3)), gone])
+    gaps = np.concatenate([[0], np.cumsum(step[:, 0] > tuning.CHORD)])
+    marks = np.searchsorted(time, np.arange(time[0], time[-1], 0.5 * tuning.WAY))
+    first, last = marks[:-2], marks[2:]
+    whole = gaps[first] == gaps[last]
+    first, last = first[whole], last[whole]
+    if first.size < tuning.FEWEST_WAYS:
+        return
+    by_velocity = gone[last] - gone[first]
+
+    def mismatch(here: FloatArray, way: FloatArray, part: slice) -> float:
+        """Median square of the difference over that of the way, which has the same unit."""
+        off = (ned_difference(here[last], here[first]) - way)[:, part]
+        size = max(float(np.median(np.sum(way[:, part] ** 2, axis=1))), np.finfo(float).tiny)
+        return float(np.median(np.sum(off**2, axis=1))) / size
+
+    better: dict[str, float] = {}
+    for what, part, here, way in _misreadings(position, by_velocity):
+        if np.all(np.abs(here[:, 0]) < 0.5 * np.pi):
+            left, now = mismatch(here, way, part), mismatch(position, by_velocity, part)
+            if now > tuning.MIXED_UP**2 * left:
+                better[what] = left / now
+    if better:
+        what = min(better, key=better.__getitem__)
+        raise InputError(f"{source}: positions agree with velocities only if {what}")
+
+
+def _misreadings(
+    position: FloatArray, way: FloatArray
+) -> Iterator[tuple[str, slice, FloatArray, FloatArray]]:
+    """Each possible mistake with its hint, the axes that show it, and what is right then."""
+    level, vertical = slice(0, 2), slice(2, 3)
+    which = "check which column is which"
+    swap, degrees = [1, 0, 2], np.array([np.degrees(1.0), np.degrees(1.0), 1.0])
+    yield f"velocity north and east are exchanged: {which}", level, position, way[:, swap]
+    yield f"velocity down and up are exchanged: {which}", vertical, position, -way
+    yield f"latitude and longitude are exchanged: {which}", level, position[:, swap], way
+    for i, name, axis in ((0, "latitude", "north"), (1, "longitude", "east")):
+        sign = np.where(np.arange(3) == i, -1.0, 1.0)
+        text = f"the sign of {name}, or of velocity {axis}, is reversed: check it"
+        yield text, level, position, way * sign
+    yield "latitude and longitude are in rad: give that unit", level, position * degrees, way
+    for unit, factor in _SPEEDS.items():
+        yield f"velocities are in {unit}: convert them to m/s", level, position, way * factor

@@ -1,0 +1,245 @@
+"""IMU logs: any recording of angular rates and specific forces, as increments on its clock."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gmwm._core.files import existing_file
+from gmwm._core.spool import Spool, is_spooled, release, windows
+from gmwm._core.typing import FloatArray
+from gmwm.errors import InputError
+from gmwm.ins.geometry import STANDARD_GRAVITY
+from gmwm.ins.imu import AXES, Imu
+from gmwm.ins.logs import tuning
+from gmwm.ins.trajectory import is_time
+from gmwm.issues import Notice, notice
+from gmwm.readers import CsvTable, Recording, bare, is_text, load_columns, read
+
+Columns = Mapping[str, str | int] | None
+
+_UNITS_OF_CLOCKS = (1.0, 1e-3, 1e-6, 1e-9)  # s
+
+
+@dataclass(frozen=True, eq=False)
+class ImuLog:
+    """An IMU record with the clock of its time stamps.
+
+    start: Time of the first epoch on that clock, s; 0 without time stamps.
+    """
+
+    imu: Imu
+    start: float
+    source: str
+    notices: tuple[Notice, ...] = ()
+
+
+def read_imu(
+    path: str | os.PathLike[str],
+    rate: float | None = None,
+    units: Mapping[str, str] | None = None,
+    channels: Mapping[str, str | int] | None = None,
+    time: str | int | bool | None = None,
+    start: float | None = None,
+    **reading: Any,
+) -> Imu:
+    """Read an IMU record as increments.
+
+    A sample is the mean over the sampling interval that ends at its time stamp, so that the first
+    epoch is one interval before the first stamp.
+
+    Parameters
+    ----------
+    path : str or path
+        Any file that `gmwm.read` reads: angular rates and specific forces about and along the
+        body's forward, right and down axes (at rest ``accel_z`` is -9.8 m/s^2).
+    rate, units, channels, time : optional
+        See `gmwm.read`. A minus sign before the name or number of a column of ``channels``, as in
+        ``{"accel_z": "-az"}``, reverses its sign.
+    start : float, optional
+        Time of the first sample, s, of a record without time stamps.
+    **reading
+        ``format``, ``layout`` and ``damaged``; see `gmwm.read`.
+
+    Returns
+    -------
+    Imu
+
+    Raises
+    ------
+    InputError
+        If the file cannot be used, an axis or more than `gmwm.ins.logs.tuning.LONGEST_FILLED` of
+        samples is missing, or the specific force is far from gravity: most often a wrong unit.
+    """
+    return read_imu_log(path, channels, time, start, rate=rate, units=units, **reading).imu
+
+
+def read_imu_log(
+    path: str | os.PathLike[str],
+    channels: Columns = None,
+    time: str | int | bool | None = None,
+    start: float | None = None,
+    **reading: Any,
+) -> ImuLog:
+    """Read an IMU record with its clock; see `read_imu`."""
+    columns, reversed_axes = _signs(channels)
+    recording = read(path, channels=columns, time=time, **reading).of_one_rate("navigation")
+    missing = [axis for axis in AXES if axis not in recording.names]
+    if missing:
+        raise InputError(
+            f"{recording.source}: there is no channel {missing[0]}: an IMU has {', '.join(AXES)}"
+        )
+    dt, source = recording.dt, recording.source
+    rotation = _joined(recording, AXES[:3], reversed_axes)
+    velocity = _joined(recording, AXES[3:], reversed_axes)
+    first, notices = _first_stamp(Path(path), recording, time, start, reading)
+    notices += _fill(source, dt, rotation, velocity)
+    mean = np.sum([np.sum(velocity[part], axis=0) for part in windows(len(velocity))], axis=0)
+    mean /= len(velocity)
+    force = float(np.linalg.norm(mean))
+    least, most = tuning.SPECIFIC_FORCE
+    if not least * STANDARD_GRAVITY < force < most * STANDARD_GRAVITY:
+        raise InputError(
+            f"{source}: the mean specific force is {force:.4g} m/s^2, far from gravity: check the "
+            "unit of the accelerometers, and that gravity is not subtracted"
+        )
+    notices += _stuck(rotation, velocity, dt, first)
+    if mean[2] > 0.0:
+        notices.append(notice("axis-up", "accel_z"))
+    for each in (rotation, velocity):
+        for part in windows(len(each)):
+            each[part] *= dt
+            release(each)
+    imu = Imu(dt, rotation, velocity)
+    return ImuLog(imu, first - dt, source, (*recording.notices, *notices))
+
+
+def _signs(channels: Columns) -> tuple[Columns, frozenset[str]]:
+    """The columns without their minus signs, and the channels that had one."""
+    if channels is None:
+        return None, frozenset()
+    columns: dict[str, str | int] = {}
+    reversed_axes = set()
+    for name, column in channels.items():
+        if isinstance(column, str) and column.startswith("-") and len(column) > 1:
+            reversed_axes.add(name)
+            column = column[1:]
+            if column.isascii() and column.isdigit():
+                column = int(column)
+        columns[name] = column
+    return columns, frozenset(reversed_axes)
+
+
+def _joined(
+    recording: Recording, axes: tuple[str, ...], reversed_axes: frozenset[str]
+) -> FloatArray:
+    """Samples of three axes, (n, 3); on disk if the recording is."""
+    series = [recording[axis].values for axis in axes]
+    sign = np.array([-1.0 if axis in reversed_axes else 1.0 for axis in axes])
+    if not is_spooled(series[0]):
+        return np.column_stack(series) * sign
+    spool = Spool(3)
+    for part in windows(series[0].size):
+        spool.append(np.column_stack([each[part] for each in series]) * sign)
+        for each in series:
+            release(each)
+    return spool.array()
+
+
+def _fill(source: str, dt: float, *triads: FloatArray) -> list[Notice]:
+    """Fill short gaps along straight lines, in place.
+
+    Raises InputError if a gap is too long, or at an end.
+    """
+    most = max(round(tuning.LONGEST_FILLED / dt), 1)
+    longest, filled = 0, set[int]()
+    for name, samples in zip(AXES, (each[:, i] for each in triads for i in range(3)), strict=True):
+        n = samples.size
+        missing = np.concatenate(
+            [p.start + np.flatnonzero(np.isnan(samples[p])) for p in windows(n)]
+        )
+        for gap in np.split(missing, np.flatnonzero(np.diff(missing) > 1) + 1):
+            if not gap.size:
+                continue
+            begin, end = int(gap[0]), int(gap[-1]) + 1
+            if end - begin > most or begin == 0 or end == n:
+                raise InputError(
+                    f"{source}: sample {begin + 1:,} of {name}, {begin * dt:.6g} s after the "
+                    f"first, is missing, {end - begin:,} in a row: up to {most} between others are "
+                    "filled; use the part before or after, or take the step out of the times if a "
+                    "clock was set there"
+                )
+            longest = max(longest, end - begin)
+            samples[begin:end] = np.interp(gap, [begin - 1, end], samples[[begin - 1, end]])
+        filled.update(missing.tolist())
+    if not filled:
+        return []
+    return [notice("samples-filled", values={"count": len(filled), "longest": longest})]
+
+
+def _stuck(rotation: FloatArray, velocity: FloatArray, dt: float, start: float) -> list[Notice]:
+    """Channels that hold one value for long; ``start`` is the time of the first sample."""
+    notices = []
+    for axis, name in enumerate(AXES):
+        first, count = longest_run((rotation if axis < 3 else velocity)[:, axis % 3])
+        length = count * dt
+        if length <= tuning.LONGEST_HELD or count == 1:
+            continue
+        begin = start + first * dt
+        values = {"start": begin, "length": length}
+        hint = "leave that part of the log out, or check what is in the column"
+        notices.append(notice("stuck", name, values, variant="log", hint=hint))
+    return notices
+
+
+def longest_run(samples: FloatArray) -> tuple[int, int]:
+    """First sample, and number, of the most equal values in a row."""
+    first, most, begin, last = 0, 0, 0, np.nan
+    for part in windows(samples.size):
+        own = samples[part]
+        changes = part.start + np.flatnonzero(np.diff(own, prepend=last) != 0.0)
+        starts = np.concatenate([[begin], changes])
+        lengths = np.diff(np.append(starts, part.stop))
+        longest = int(np.argmax(lengths))
+        if lengths[longest] > most:
+            first, most = int(starts[longest]), int(lengths[longest])
+        begin, last = int(starts[-1]), own[-1]
+        release(samples)
+    return first, most
+
+
+def _first_stamp(
+    path: Path,
+    recording: Recording,
+    time: str | int | bool | None,
+    start: float | None,
+    reading: Mapping[str, Any],
+) -> tuple[float, list[Notice]]:
+    """Time of the first sample on the clock of the time stamps, or ``start`` without any, s."""
+    given = reading.get("format")
+    is_log = reading.get("layout") is None and (given == "text" if given else is_text(path))
+    table, found = None, list[int]()
+    if is_log and time is not False:
+        table = CsvTable.open(existing_file(path))
+        found = [i for i, name in enumerate(table.names) if is_time(name)]
+        if isinstance(time, int):
+            found = [time]
+        elif time is not None:
+            found = [i for i, name in enumerate(table.names) if time in (name, bare(name))]
+    if table is None or not found:
+        return (start, []) if start is not None else (recording.dt, [notice("no-time-stamps")])
+    if start is not None:
+        raise InputError(f"{recording.source} has time stamps: leave its start out")
+    stamps, dt = load_columns(table, found[:1])[found[0]], recording.dt
+    elapsed = stamps - stamps[0]
+    ratios = np.array(_UNITS_OF_CLOCKS) * elapsed[-1] / ((recording.n - 1) * dt)
+    unit = _UNITS_OF_CLOCKS[int(np.argmin(np.abs(np.log(ratios))))]
+    elapsed *= unit
+    # One stamp may come late: the grid is where most of them are.
+    late = float(np.median(elapsed - dt * np.rint(elapsed / dt)))
+    return float(stamps[0]) * unit + late, []

@@ -1,0 +1,283 @@
+"""Real data to be filtered: an IMU's record, GNSS fixes, and sensor models."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Annotated, Any, ClassVar
+
+import numpy as np
+from pydantic import BeforeValidator, Field
+
+from gmwm._core.units import SI_UNIT
+from gmwm.errors import InputError
+from gmwm.ins.filter import Aiding, Fixes
+from gmwm.ins.imu import AXES, Imu, SensorModels
+from gmwm.ins.logs import tuning
+from gmwm.ins.logs.fix_log import read_fix_log, read_heights
+from gmwm.ins.logs.imu_log import ImuLog, read_imu_log
+from gmwm.ins.logs.steadiness import standstills
+from gmwm.ins.spec import (
+    FileName,
+    Meters,
+    Models,
+    PositiveMeters,
+    PositiveRadians,
+    PositiveSeconds,
+    PositiveSpeed,
+    Radians,
+    ReadingSpec,
+    Seconds,
+    Spec,
+    Three,
+    number,
+    read_models,
+    written,
+)
+from gmwm.issues import Notice, notice
+
+_UNITS = {"position": "m", "velocity": "m/s"}
+
+
+class ImuSpec(ReadingSpec):
+    """The record of an IMU."""
+
+    file: FileName
+    start: Seconds | None = None
+
+    def options(self) -> dict[str, Any]:
+        """Arguments of `gmwm.ins.read_imu`."""
+        return super().options() | {"start": self.start}
+
+
+class BiasSpec(Spec):
+    """Standard deviations of the turn-on bias."""
+
+    gyro: Annotated[float, number(SI_UNIT["gyro"]), Field(ge=0.0)] | None = None
+    accel: Annotated[float, number(SI_UNIT["accel"]), Field(ge=0.0)] | None = None
+
+
+class BarometerSpec(Spec):
+    """Heights of a barometer, set to the first fix."""
+
+    file: FileName
+    sd: PositiveMeters = tuning.BAROMETER_SD
+    drift_sd: PositiveMeters = tuning.BAROMETER[0]
+    drift_tau: PositiveSeconds = tuning.BAROMETER[1]
+
+
+def _of_file(given: Any) -> Any:
+    return given if isinstance(given, Mapping) else {"file": given}
+
+
+class LogSpec(Spec):
+    """Content of a study file on an own log."""
+
+    NEEDS: ClassVar[str] = (
+        "filtering needs the IMU's record (imu), GNSS fixes (gnss_fixes) and sensor models "
+        "(sensors)"
+    )
+
+    imu: Annotated[ImuSpec, BeforeValidator(_of_file)]
+    gnss_fixes: FileName
+    sensors: Models
+    lever_arm: Three[Meters] = (0.0, 0.0, 0.0)
+    heading: Radians | None = None
+    heading_sd: PositiveRadians = tuning.HEADING_SD
+    attitude: Annotated[tuple[Radians, Radians, Radians], written("[roll, pitch, yaw]")] | None = (
+        None
+    )
+    attitude_sd: PositiveRadians = tuning.ATTITUDE_SD
+    position_sd: Three[PositiveMeters] = tuning.POSITION_SD
+    velocity_sd: Three[PositiveSpeed] = tuning.VELOCITY_SD
+    coloured_sd: Three[Meters] = (0.0, 0.0, 0.0)
+    coloured_tau: PositiveSeconds = 100.0
+    gate: float | None = None
+    gnss_shift: Seconds = 0.0
+    barometer: Annotated[BarometerSpec, BeforeValidator(_of_file)] | None = None
+    zero_velocity: PositiveSpeed | None = None
+    bias: BiasSpec = BiasSpec()
+
+
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """Real data for a filter.
+
+    Attributes
+    ----------
+    imu : Imu
+    aiding : Aiding
+        On the IMU's time, s since its first epoch.
+    sensors : SensorModels
+    start : float
+        Time of the first epoch on the clock of the files, s.
+    heading : float or None
+        Heading of the forward axis at the first fix, rad; ``None`` to find it in the data.
+    heading_sd : float
+        rad.
+    attitude : tuple of three floats or None
+        Roll, pitch and yaw at the first fix, rad; ``None`` to find them in the data.
+    attitude_sd : float
+        rad.
+    title : str
+    notices : tuple of Notice
+    """
+
+    imu: Imu
+    aiding: Aiding
+    sensors: SensorModels
+    start: float = 0.0
+    heading: float | None = None
+    heading_sd: float = tuning.HEADING_SD
+    attitude: tuple[float, float, float] | None = None
+    attitude_sd: float = tuning.ATTITUDE_SD
+    title: str = ""
+    notices: tuple[Notice, ...] = ()
+
+    @classmethod
+    def of(cls, content: Mapping[str, Any], folder: Path = Path()) -> Measured:
+        """Read what a file or options describe.
+
+        Parameters
+        ----------
+        content : mapping
+            imu, gnss_fixes and sensors, and what else is known; see the documentation.
+        folder : Path, optional
+            Folder that paths are relative to.
+
+        Raises
+        ------
+        InputError
+            If something is missing, unknown or cannot be used.
+        """
+        spec = LogSpec.parse(content)
+        if spec.attitude is not None and spec.heading is not None:
+            raise InputError("heading and attitude: the attitude has a yaw; leave the heading out")
+        sensors, assumed = with_turn_on_bias(
+            read_models("sensors", spec.sensors, folder), spec.bias.given
+        )
+        log = read_imu_log(folder / spec.imu.file, **spec.imu.options())
+        found = read_fix_log(folder / spec.gnss_fixes)
+        aiding = found.aiding(
+            log.start - spec.gnss_shift, spec.position_sd, spec.velocity_sd, spec.lever_arm
+        )
+        aiding = replace(
+            aiding, coloured_sd=spec.coloured_sd, coloured_tau=spec.coloured_tau, gate=spec.gate
+        )
+        aiding, noticed = _within(aiding, log, found.source)
+        notices = [*log.notices, *found.notices]
+        scale = next((n.values["scale"] for n in found.notices if n.code == "dates"), "UTC")
+        if scale != "UTC" and any(n.code == "dates" for n in log.notices):
+            seconds = tuning.LEAP_SECONDS
+            notices.append(notice("time-scales", values={"scale": scale}, seconds=seconds))
+        notices += noticed
+        if spec.barometer is not None:
+            aiding, noticed = _with_barometer(aiding, spec.barometer, folder, log)
+            notices += noticed
+        if spec.zero_velocity is not None:
+            aiding, noticed = _with_standstills(aiding, log.imu, spec.zero_velocity)
+            notices += noticed
+        notices += assumed
+        for kind, own, usual in (
+            ("position", found.position_sd, spec.position_sd),
+            ("velocity", found.velocity_sd, spec.velocity_sd),
+        ):
+            name = f"{kind}_sd"
+            if own is not None and name in spec.given:
+                notices.append(notice("sd-not-used", kind))
+            if own is None and name not in spec.given and aiding.of(kind) is not None:
+                sizes = ", ".join(f"{each:g}" for each in usual)
+                values = dict(zip(("north", "east", "down"), usual, strict=True))
+                sd = f"{sizes} {_UNITS[kind]}"
+                notices.append(notice("sd-assumed", kind, values, sd=sd))
+        return cls(
+            imu=log.imu,
+            aiding=aiding,
+            sensors=sensors,
+            start=log.start,
+            heading=spec.heading,
+            heading_sd=spec.heading_sd,
+            attitude=spec.attitude,
+            attitude_sd=spec.attitude_sd,
+            title=log.source,
+            notices=tuple(notices),
+        )
+
+
+def with_turn_on_bias(
+    models: SensorModels, given: Mapping[str, float]
+) -> tuple[SensorModels, list[Notice]]:
+    """Models with the standard deviation of a turn-on bias, and a notice of assumed ones."""
+    bias_sd, assumed = {}, {}
+    for axis in AXES:
+        kind = axis.partition("_")[0]
+        bias_sd[axis] = given.get(kind, models.bias_sd[axis] or tuning.TURN_ON_SD[kind])
+        if kind not in given and not models.bias_sd[axis]:
+            assumed[kind] = bias_sd[axis]
+    words = []
+    if "gyro" in assumed:
+        words.append(f"gyros {np.degrees(assumed['gyro']):g} deg/s")
+    if "accel" in assumed:
+        words.append(f"accelerometers {assumed['accel']:g} m/s^2")
+    notices = [notice("biases-assumed", values=assumed, sd=" and ".join(words))] if words else []
+    return replace(models, bias_sd=bias_sd), notices
+
+
+def _within(aiding: Aiding, log: ImuLog, source: str) -> tuple[Aiding, list[Notice]]:
+    """The fixes in the time of the IMU's record."""
+    dt, end = log.imu.dt, log.imu.n * log.imu.dt
+    kept, left_out, total = [], 0, 0
+    for each in aiding.fixes:
+        inside = (each.time > -0.5 * dt) & (each.time < end + 0.5 * dt)
+        left_out += int(np.count_nonzero(~inside))
+        total += inside.size
+        kept.append(each.part(inside))
+    if left_out == total:
+        times = np.concatenate([[np.nan], *(each.time + log.start for each in aiding.fixes)])
+        spans = "no fix at all"
+        if total:
+            spans = f"fixes from {np.nanmin(times):.10g} s to {np.nanmax(times):.10g} s"
+        raise InputError(
+            f"{source} has {spans}, none in the time of {log.source}, {log.start:.10g} s to "
+            f"{log.start + end:.10g} s: bring both to one clock"
+        )
+    notices = [notice("fixes-left-out", values={"count": left_out})] if left_out else []
+    return replace(aiding, fixes=tuple(kept)), notices
+
+
+def _with_barometer(
+    aiding: Aiding, spec: BarometerSpec, folder: Path, log: ImuLog
+) -> tuple[Aiding, list[Notice]]:
+    """The fixes with heights, which are set to the first position fix.
+
+    Raises InputError if no height is near it.
+    """
+    source, time, height = read_heights(folder / spec.file)
+    time = time - log.start
+    inside = np.isfinite(height) & (time > -0.5 * log.imu.dt)
+    inside &= time < (log.imu.n + 0.5) * log.imu.dt
+    time, height = time[inside], height[inside]
+    first = aiding.of("position")
+    near = np.abs(time - (np.nan if first is None else first.time[0])) <= tuning.CHORD
+    if first is None or not np.any(near):
+        raise InputError(
+            f"{source} has no height within {tuning.CHORD:g} s of the first position fix, to be "
+            "set to it: bring both to one clock"
+        )
+    shift = float(first.value[0, 2] - np.mean(height[near]))
+    value, sd = np.zeros((time.size, 3)), np.zeros((time.size, 3))
+    value[:, 0], sd[:, 0] = height + shift, spec.sd
+    fixes = (*aiding.fixes, Fixes("height", time, value, sd))
+    aiding = replace(aiding, fixes=fixes, barometer_sd=spec.drift_sd, barometer_tau=spec.drift_tau)
+    return aiding, [notice("barometer-set", values={"shift": shift})]
+
+
+def _with_standstills(aiding: Aiding, imu: Imu, sd: float) -> tuple[Aiding, list[Notice]]:
+    """The fixes with the standstills that the IMU shows."""
+    found = standstills(imu, aiding, sd)
+    if found is None:
+        return aiding, [notice("standstills-unknown")]
+    values = {"count": found.time.size}
+    noticed = notice("standstills", values=values, length=tuning.ZERO_VELOCITY[1])
+    return replace(aiding, fixes=(*aiding.fixes, found)), [noticed]

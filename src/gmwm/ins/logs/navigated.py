@@ -1,0 +1,455 @@
+"""Real data filtered: the solution, and whether the innovations agree with the filter's model."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from gmwm._core.distributions import chi2
+from gmwm._core.files import written
+from gmwm._core.pages import make
+from gmwm._core.text import brief, bullets, wrapped
+from gmwm._core.typing import FloatArray
+from gmwm.errors import InputError
+from gmwm.ins.filter import KINDS, Solution
+from gmwm.ins.geometry import ned_difference
+from gmwm.ins.logs import tuning
+from gmwm.ins.logs.alignment import Alignment
+from gmwm.ins.logs.faults import Faults, fault_notice, resolution_notice
+from gmwm.ins.logs.hypotheses import LEVEL
+from gmwm.ins.logs.measured import Measured
+from gmwm.ins.logs.replay import Replay, alignment_of, innovation_sizes
+from gmwm.ins.simulation import InnovationTest
+from gmwm.issues import Notice, notice, worst_first
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_HEADER = (
+    "time_s,latitude_deg,longitude_deg,height_m,velocity_north_mps,velocity_east_mps,"
+    "velocity_down_mps,roll_deg,pitch_deg,yaw_deg,sd_north_m,sd_east_m,sd_down_m,"
+    "sd_velocity_north_mps,sd_velocity_east_mps,sd_velocity_down_mps,sd_tilt_north_deg,"
+    "sd_tilt_east_deg,sd_heading_deg"
+)
+
+
+@dataclass(frozen=True)
+class LongestOutage:
+    """The longest time without a position fix.
+
+    start, end: s since the filter's start.
+    sd: Predicted standard deviations of the position to the north, east and down before the fix at
+        its end, m; NaN if the filter diverged before.
+    distance: Horizontal distance of the fix at its end from where it was expected, m; ``None`` if
+        there is none.
+    """
+
+    start: float
+    end: float
+    sd: tuple[float, float, float]
+    distance: float | None
+
+
+@dataclass(frozen=True, eq=False)
+class Navigated:
+    """A solution of real data.
+
+    Attributes
+    ----------
+    measured : Measured
+    alignment : Alignment
+    solution : Solution
+    longest_outage : LongestOutage
+    """
+
+    measured: Measured
+    alignment: Alignment
+    solution: Solution
+    longest_outage: LongestOutage
+
+    @classmethod
+    def of(cls, measured: Measured, interval: float = 1.0) -> Navigated:
+        """Align and filter.
+
+        Parameters
+        ----------
+        measured : Measured
+        interval : float, optional
+            Of the solution, s.
+
+        Raises
+        ------
+        InputError
+            If the initial state cannot be known, or no fix follows it.
+        """
+        alignment = alignment_of(measured)
+        replay = Replay.of(measured, alignment)
+        imu = replay.imu
+        positions = replay.aiding.of("position")
+        if positions is None:
+            raise InputError("no position fix follows the first one: there is nothing to filter")
+        ends = np.concatenate([[0.0], positions.time, [imu.n * imu.dt]])
+        longest = int(np.argmax(np.diff(ends)))
+        start, end = float(ends[longest]), float(ends[longest + 1])
+        solution = replay.solution(interval, (end,))
+        return cls(measured, alignment, solution, _longest_outage(solution, start, end))
+
+    # -- numbers ----------------------------------------------------------------------------------
+
+    def test(self, kind: str | None = None) -> InnovationTest:
+        """Size and whiteness of the innovations.
+
+        Parameters
+        ----------
+        kind : {"position", "velocity"}, optional
+            By default both together.
+        """
+        return innovation_sizes(self.solution.innovations, kind)
+
+    @cached_property
+    def faults(self) -> Faults:
+        """Faults of the log; tens of runs of the filter where the innovations contradict it, five
+        where they do not.
+        """
+        return Faults.of(Replay.of(self.measured, self.alignment), self.measured)
+
+    @property
+    def fault_notices(self) -> tuple[Notice, ...]:
+        """Faults that were found, by code and values."""
+        start = float(self.clock(np.zeros(1))[0])
+        return tuple(fault_notice(each, start) for each in self.faults.found)
+
+    @property
+    def kinds(self) -> tuple[str, ...]:
+        """Kinds of fixes that were used."""
+        fixes = [each for each in self.measured.aiding.fixes if each.time.size]
+        return tuple(each.kind for each in fixes if each.kind != "standstill")
+
+    @property
+    def rejections(self) -> tuple[Notice, ...]:
+        """Fixes that were beyond their gate and not used, kind by kind."""
+        innovations = self.solution.innovations
+        notices = []
+        for kind, code in KINDS.items():
+            rejected = np.flatnonzero((innovations.kind == code) & ~innovations.used)
+            if not rejected.size:
+                continue
+            size = np.sqrt(innovations.nis[rejected])
+            far = int(np.argmax(size))
+            at = float(self.clock(innovations.time[rejected[far : far + 1]])[0])
+            of = int(np.count_nonzero(innovations.kind == code))
+            values = {"count": rejected.size, "of": of, "size": float(size[far]), "time": at}
+            notices.append(notice("fixes-rejected", kind, values))
+        return tuple(notices)
+
+    @property
+    def farthest(self) -> tuple[float, float]:
+        """Largest innovation in its expected standard deviation, and its time on the clock, s."""
+        size = np.nanmax(np.abs(self.solution.innovations.standard), axis=1, initial=0.0)
+        i = int(np.argmax(size))
+        return float(size[i]), float(self.clock(self.solution.innovations.time[i : i + 1])[0])
+
+    def clock(self, time: FloatArray) -> FloatArray:
+        """Times of the files, s, of times since the filter's start."""
+        imu = self.measured.imu
+        return np.asarray(time + self.measured.start + self.alignment.epoch * imu.dt, dtype=float)
+
+    @property
+    def fits(self) -> bool:
+        """Whether the innovations do not contradict the filter's model."""
+        # Kind by kind: too large positions and too small velocities must not make each other good.
+        return (
+            self.solution.diverged_at is None
+            and not self._misfits
+            and not self.test().whiteness <= LEVEL  # NaN of too few
+            and not self.faults.found
+        )
+
+    @property
+    def _misfits(self) -> dict[str, float]:
+        """Kinds whose innovations have another size than expected -> how many times it is."""
+        tests = {kind: self.test(kind).nis for kind in self.kinds}
+        tests["all"] = self.test().nis
+        found = {k: float(np.sqrt(t.value)) for k, t in tests.items() if t.p_value <= LEVEL}
+        return found if set(found) == {"all"} else {k: v for k, v in found.items() if k != "all"}
+
+    @cached_property
+    def verdict(self) -> Notice:
+        """Whether the filter's model fits these data; only the innovations show it.
+
+        A fault of the log comes before a fault of the sensor models.
+        """
+        sizes = self._misfits
+        largest = max(sizes.values(), default=1.0)
+        if self.faults.found and (self.faults.explained or largest <= tuning.LOST):
+            return self._fault_verdict(self.fault_notices)
+        if self.solution.diverged_at is not None:
+            return notice("diverged", values={"time": self.solution.diverged_at})
+        if self.fits:
+            return notice("consistent")
+        if largest > tuning.LOST:
+            stuck, up = (
+                [each for each in self.measured.notices if each.code == code]
+                for code in ("stuck", "axis-up")
+            )
+            first = f"{', '.join(each.where for each in stuck)}, which held one value, then at "
+            first = first if stuck else ""
+            first += f"accel_z, which points up ({up[0].hint}), then at " if up else ""
+            return notice("lost", values=sizes, times=brief(largest), first=first)
+        if not sizes:
+            return notice("not-white", values={"whiteness": self.test().whiteness})
+        shown = " and ".join(
+            f"{brief(size)} times as large{'' if kind == 'all' else f' in {kind}'}"
+            for kind, size in sizes.items()
+        )
+        assumed = {each.where for each in self.measured.notices if each.code == "sd-assumed"}
+        hint = " and ".join(f"{kind}_sd" for kind in sizes if kind in assumed)
+        hint = f"give {hint}" if hint else ""
+        is_mild = all(1.0 / tuning.MILD < size < tuning.MILD for size in sizes.values())
+        if sizes.keys() <= assumed and is_mild:
+            code = "too-large" if largest > 1.0 else "too-small"
+            return notice(
+                code, values=sizes, severity="note", variant="assumed", sizes=shown, hint=hint
+            )
+        if min(sizes.values()) < 1.0 < largest:
+            code = "mixed-sizes"
+        elif largest < 1.0:
+            code = "too-small"
+        else:
+            # By the median, which a few far fixes do not move.
+            squares = self.solution.innovations.standard**2
+            usual = float(np.nanmedian(squares) / chi2.ppf(0.5, 1))
+            if usual < tuning.MOSTLY_FINE:
+                words: dict[str, Any] = {"variant": "innovations", "hint": "", "sizes": shown}
+                return notice("outliers", "", sizes, severity="bad", **words)
+            code = "too-large"
+        return notice(code, values=sizes, sizes=shown, hint=hint)
+
+    def _fault_verdict(self, faults: tuple[Notice, ...]) -> Notice:
+        first, found = faults[0], self.faults
+        text = "The filter's model does not fit these data: " + "; ".join(map(str, faults))
+        if found.alternatives:
+            text += f"; nearly as probable: {', '.join(found.alternatives)}"
+        text += (
+            ". With that, the innovations are as large as expected, and white."
+            if found.explained
+            else ". That does not explain all: something else is wrong too."
+        )
+        values = {**first.values, "explained": found.explained, "faults": len(faults)}
+        return Notice(first.code, worst_first(faults)[0].severity, first.where, text, values)
+
+    # -- words and files --------------------------------------------------------------------------
+
+    def __str__(self) -> str:
+        imu = self.measured.imu
+        length = imu.n * imu.dt - self.alignment.epoch * imu.dt
+        lines = [f"{self.measured.title}: {length:.6g} s at {imu.rate:.6g} Hz"]
+        lines += bullets(self.notices)
+        lines += ["", "Innovations: NIS per degree of freedom, p-value of whiteness"]
+        lines += [f"{kind:10} {self.test(kind)}" for kind in self.kinds]
+        far, at = self.farthest
+        lines.append(f"largest: {far:.3g} sigma at {at:.10g} s")
+        verdict, hint = self.verdict.text, self.verdict.hint
+        for sentence in (*self.accuracy, f"{verdict} ({hint})" if hint else verdict):
+            lines += ["", *wrapped(sentence)]
+        lines += ["", *wrapped(self.resolution.sentence)]
+        return "\n".join(lines)
+
+    @property
+    def resolution(self) -> Notice:
+        """The smallest constant errors of the log that this motion shows."""
+        return resolution_notice(self.faults)
+
+    @property
+    def notices(self) -> tuple[Notice, ...]:
+        """Notices of the sensor models, the files, the start, and of rejected fixes."""
+        given = (*self.measured.sensors.notices, *self.measured.notices)
+        return (*given, *self.alignment.notices, *self.rejections)
+
+    @property
+    def accuracy(self) -> list[str]:
+        """Sentences on the predicted accuracy: at the end, and in the longest outage."""
+        sentences = []
+        if self.solution.diverged_at is not None:
+            at = float(self.clock(np.array([self.solution.diverged_at]))[0])
+            sentences.append(f"The filter diverged at {at:.10g} s and was stopped")
+        elif self.solution.time.size:
+            sd = self.solution.sd[-1]
+            is_right = self.fits or self.verdict.severity == "note"
+            caveat = "" if is_right else " (if its model were right, which it is not)"
+            sentences.append(
+                f"Predicted accuracy at the end, 1 sigma{caveat}: horizontal "
+                f"{np.hypot(sd[0], sd[1]):.3g} m, vertical {sd[2]:.3g} m, velocity "
+                f"{np.linalg.norm(sd[3:6]):.3g} m/s, tilt "
+                f"{np.degrees(np.hypot(sd[6], sd[7])):.3g} deg, heading "
+                f"{np.degrees(sd[8]):.3g} deg"
+            )
+        outage = self.longest_outage
+        begin, end = self.clock(np.array([outage.start, outage.end]))
+        text = (
+            f"Longest time without a position fix: {outage.end - outage.start:.4g} s, from "
+            f"{begin:.10g} s to {end:.10g} s"
+        )
+        if np.all(np.isfinite(outage.sd)):
+            text += (
+                "; predicted error at its end, 1 sigma: horizontal "
+                f"{np.hypot(outage.sd[0], outage.sd[1]):.3g} m, vertical {outage.sd[2]:.3g} m"
+            )
+        if outage.distance is not None:
+            text += f"; the next fix was {outage.distance:.3g} m away (horizontal)"
+        return [*sentences, text]
+
+    def to_dict(self) -> dict[str, Any]:
+        """What was found, in JSON types: the verdict, faults, tests of the innovations."""
+        return {
+            "title": self.measured.title,
+            "verdict": self.verdict.to_dict(),
+            "faults": [each.to_dict() for each in self.fault_notices],
+            "resolution": self.resolution.to_dict(),
+            "notices": [each.to_dict() for each in self.notices],
+            "innovations": {
+                kind: {
+                    "nis": test.nis.value,
+                    "nis_p_value": test.nis.p_value,
+                    "whiteness": None if np.isnan(test.whiteness) else test.whiteness,
+                }
+                for kind, test in ((kind, self.test(kind)) for kind in self.kinds)
+            },
+        }
+
+    def write_solution(self, path: Path) -> Path:
+        """Write the solution as a CSV file.
+
+        Raises
+        ------
+        InputError
+            If it cannot be written.
+        """
+        kept = ~self.solution.before
+        solution, sd = self.solution, self.solution.sd[kept]
+        time, height = self.clock(solution.time[kept]), solution.lla[kept, 2]
+        angles = np.degrees(solution.lla[kept, :2])
+        angles[:, 1] = (angles[:, 1] + 180.0) % 360.0 - 180.0
+        motion = np.hstack([solution.velocity[kept], np.degrees(solution.rpy[kept])])
+        deviations = np.hstack([sd[:, :6], np.degrees(sd[:, 6:])])
+        columns = np.column_stack([time, angles, height, motion, deviations])
+        digits = ["%.6f", "%.10f", "%.10f", "%.4f", *["%.5f"] * 6, *["%.4g"] * 9]
+        with written(path) as stream:
+            np.savetxt(stream, columns, digits, delimiter=",", header=_HEADER, comments="")
+        return path
+
+    # -- figures ----------------------------------------------------------------------------------
+
+    def report(self, path: str | os.PathLike[str]) -> Path:
+        """Write the page; see `gmwm.report.write_navigated_report`."""
+        page: Path = make("page", self, path)
+        return page
+
+    def plot_track(self) -> Figure:
+        """The solution's track and the fixes."""
+        from gmwm import plotting
+
+        kept = ~self.solution.before
+        origin = self.alignment.state.lla
+        positions = next(each for each in self.measured.aiding.fixes if each.kind == "position")
+        track = ned_difference(self.solution.lla[kept], origin)[:, 1::-1]
+        fixes = ned_difference(positions.value, origin)[:, 1::-1]
+        inside = self.solution.time[kept]
+        without = (inside >= self.longest_outage.start) & (inside <= self.longest_outage.end)
+        return plotting.measured_track(track, fixes, track[without])
+
+    def plot_innovations(self) -> Figure:
+        """Innovations with the bands that the filter expected."""
+        from gmwm import plotting
+
+        innovations = self.solution.innovations
+        panels = {}
+        for kind in self.kinds:
+            of_kind = innovations.kind == KINDS[kind]
+            unit = "m/s" if kind == "velocity" else "m"
+            panels[f"{kind} [{unit}]"] = (
+                self.clock(innovations.time[of_kind]),
+                innovations.value[of_kind],
+                innovations.sd[of_kind],
+            )
+        return plotting.innovations(panels)
+
+    def position_outages(self) -> list[tuple[float, float]]:
+        """Times without position fixes, s since the filter's start; the longest first.
+
+        Each lasts at least five usual intervals between fixes and five seconds; at most
+        `gmwm.ins.logs.tuning.OUTAGES_SHOWN`.
+        """
+        innovations = self.solution.innovations
+        time = innovations.time[innovations.kind == KINDS["position"]]
+        time = np.concatenate([[0.0], time])
+        steps = np.diff(time)
+        if not steps.size:
+            return []
+        long = np.flatnonzero(steps > max(5.0 * float(np.median(steps)), 5.0))
+        long = long[np.argsort(-steps[long], kind="stable")][: tuning.OUTAGES_SHOWN]
+        return [(float(time[i]), float(time[i + 1])) for i in long]
+
+    def plot_outages(self) -> list[tuple[str, Figure]]:
+        """A title and a figure of each time without position fixes: track, and errors with bands.
+
+        The truth is unknown: the error is the difference of each fix from where it was expected,
+        and the band is the predicted standard deviation, which grows until the next fix.
+        """
+        from gmwm import plotting
+
+        solution, innovations = self.solution, self.solution.innovations
+        positions = innovations.kind == KINDS["position"]
+        fix_time, error = innovations.time[positions], innovations.value[positions]
+        fixes = next(each for each in self.measured.aiding.fixes if each.kind == "position")
+        time = fixes.time - self.alignment.epoch * self.measured.imu.dt
+        pictures = []
+        for start, end in self.position_outages():
+            margin = max(0.25 * (end - start), 5.0)
+            first, last = start - margin, end + margin
+            shown = (solution.time >= first) & (solution.time <= last)
+            # At the end of the longest one, the state before the fix comes first.
+            if np.count_nonzero(shown) < 2:
+                continue
+            inside = shown & (solution.time >= start) & (solution.time <= end)
+            seen = (fix_time >= first) & (fix_time <= last)
+            near = (time >= first) & (time <= last)
+            origin = solution.lla[shown][0]
+            track, without, around = (
+                ned_difference(lla, origin)[:, 1::-1]
+                for lla in (solution.lla[shown], solution.lla[inside], fixes.value[near])
+            )
+            begin = self.clock(np.array([start]))[0]
+            title = f"{end - start:.4g} s without position fixes, from {begin:.10g} s"
+            figure = plotting.measured_outage(
+                track=track,
+                without=without,
+                fixes=around,
+                time=solution.time[shown] - start,
+                sd=solution.sd[shown, :3],
+                fix_time=fix_time[seen] - start,
+                error=error[seen],
+            )
+            pictures.append((title, figure))
+        return pictures
+
+
+def _longest_outage(solution: Solution, start: float, end: float) -> LongestOutage:
+    """Prediction for the end of a time without fixes, and the distance of the next fix from it."""
+    # The one epoch that is kept before its measurements is the nearest to the end; none, if the
+    # filter diverged earlier.
+    early = np.flatnonzero(solution.before)
+    sd = solution.sd[early[0], :3] if early.size else np.full(3, np.nan)
+    innovations = solution.innovations
+    first = np.flatnonzero(
+        (np.abs(innovations.time - end) < 1e-5) & (innovations.kind == KINDS["position"])
+    )
+    distance = None
+    if first.size and np.all(np.isfinite(innovations.value[first[0], :2])):
+        distance = float(np.hypot(*innovations.value[first[0], :2]))
+    return LongestOutage(start, end, (float(sd[0]), float(sd[1]), float(sd[2])), distance)

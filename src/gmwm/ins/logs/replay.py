@@ -1,0 +1,258 @@
+"""A log ready for the filter, to be filtered again under other assumptions."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from gmwm._core.distributions import norm
+from gmwm._core.typing import BoolArray, FloatArray
+from gmwm.ins.filter import KINDS, Aiding, FilterInnovations, Fixes, InitialSd, Solution, navigate
+from gmwm.ins.geometry import gravity_at, matrix_from_rpy, offset
+from gmwm.ins.imu import AXES, Imu, SensorModels
+from gmwm.ins.logs import tuning
+from gmwm.ins.logs.alignment import Alignment, align, started
+from gmwm.ins.logs.measured import Measured
+from gmwm.ins.simulation import InnovationTest, chi_square_ratio, lag_one
+from gmwm.ins.trajectory import NavState
+
+Shift = Callable[[FloatArray], FloatArray]
+"""Delay of the stamps of fixes, s, as a function of their times."""
+
+
+@dataclass(frozen=True, eq=False)
+class Replay:
+    """The inputs of a filter of real data.
+
+    imu: From the first epoch of the filter on.
+    state: State at that epoch.
+    aiding: On the time of ``imu``.
+    is_at_rest: Whether the vehicle stands still at that epoch.
+    """
+
+    imu: Imu
+    state: NavState
+    sd: InitialSd
+    models: SensorModels
+    aiding: Aiding
+    is_at_rest: bool = False
+
+    @classmethod
+    def of(cls, measured: Measured, alignment: Alignment) -> Replay:
+        """Real data from the alignment on."""
+        imu, aiding = started(measured.imu, measured.aiding, alignment)
+        models = measured.sensors
+        if alignment.gyro_bias_sd is not None:
+            known = dict.fromkeys(AXES[:3], alignment.gyro_bias_sd)
+            models = replace(models, bias_sd={**models.bias_sd, **known})
+        is_at_rest = alignment.stood > 0.0
+        return cls(imu, alignment.state, alignment.sd, models, aiding, is_at_rest)
+
+    # -- what the filter finds --------------------------------------------------------------------
+
+    def solution(self, interval: float, before: tuple[float, ...] = ()) -> Solution:
+        """The filter's solution every ``interval`` (s), and ``before`` the fixes of some times."""
+        return navigate(
+            self.imu,
+            self.state,
+            self.models,
+            self.aiding,
+            initial_sd=self.sd,
+            interval=interval,
+            before=before,
+        )
+
+    @cached_property
+    def innovations(self) -> FilterInnovations:
+        """Innovations of all fixes."""
+        return self.solution(self.imu.n * self.imu.dt).innovations
+
+    @cached_property
+    def track(self) -> Solution:
+        """The solution along which fixes are moved."""
+        return self.solution(tuning.TRACK_STEP)
+
+    @property
+    def _is_fix(self) -> BoolArray:
+        """Innovations that are compared: a standstill may be none, and is gated all the time."""
+        return np.asarray(self.innovations.kind != KINDS["standstill"])
+
+    @cached_property
+    def standard(self) -> FloatArray:
+        """Innovations of the fixes in their expected standard deviations, (E, 3)."""
+        return self.innovations.standard[self._is_fix]
+
+    @cached_property
+    def log_likelihood(self) -> float:
+        """Log-likelihood of all fixes, up to a constant; -inf if the filter diverged.
+
+        The innovations of a correct filter are white, so that the density of the fixes is the
+        product of theirs (Schweppe 1965, *IEEE Trans. Inf. Theory* 11, 61-70).
+        """
+        standard = self.standard
+        if np.any(np.all(np.isnan(standard), axis=1)):
+            return -np.inf
+        sd = self.innovations.sd[self._is_fix]
+        return float(-0.5 * np.nansum(standard**2 + 2.0 * np.log(sd)))
+
+    @property
+    def is_lost(self) -> bool:
+        """Whether errors may be too large to show in the innovations in proportion."""
+        sizes = [self.test(kind).nis.value for kind in self.kinds]
+        return not np.isfinite(self.log_likelihood) or max(sizes) > tuning.LOST
+
+    @property
+    def kinds(self) -> tuple[str, ...]:
+        """Kinds of fixes, but standstills."""
+        return tuple(
+            dict.fromkeys(
+                each.kind
+                for each in self.aiding.fixes
+                if each.time.size and each.kind != "standstill"
+            )
+        )
+
+    def test(self, kind: str | None = None) -> InnovationTest:
+        """Size and whiteness of the innovations of a kind, or of all."""
+        return innovation_sizes(self.innovations, kind)
+
+    # -- other assumptions ------------------------------------------------------------------------
+
+    def later(self, shift: Shift) -> Replay:
+        """Fixes with later stamps, and with them the one that made the initial state.
+
+        Fixes that would leave the record stay at its end: only filters of the same fixes compare.
+        """
+        fixes = []
+        for each in self.aiding.fixes:
+            time = np.clip(each.time + shift(each.time), 0.0, self.imu.n * self.imu.dt)
+            order = np.argsort(time, kind="stable")
+            value, sd = each.value[order], each.sd[order]
+            fixes.append(replace(each, time=time[order], value=value, sd=sd))
+        return self._with_fixes(fixes, -float(shift(np.zeros(1))[0]))
+
+    def along(self, shift: Shift) -> Replay:
+        """Fixes moved along the track instead of later stamps.
+
+        By the velocity of the filter, and by the accelerometers over a second: less averages no
+        noise, and the filter's own change of velocity contains the noise of the fix.
+        """
+        track, dt = self.track, self.imu.dt
+        summed, turned = (
+            np.cumsum(np.vstack([np.zeros(3), each]), axis=0)
+            for each in (self.imu.velocity, self.imu.rotation)
+        )
+        fixes = []
+        for each in self.aiding.fixes:
+            seconds = shift(each.time)
+            reach = 0.5 * np.maximum(np.abs(seconds), tuning.TRACK_STEP)
+            middle = each.time + 0.5 * seconds
+            ends = (np.clip(middle + by, 0.0, self.imu.n * dt) for by in (-reach, reach))
+            first, last = (np.rint(end / dt).astype(int) for end in ends)
+            force = (summed[last] - summed[first]) / (np.maximum(last - first, 1) * dt)[:, None]
+            middle_at = np.clip(np.rint(middle / dt), 0, self.imu.n).astype(int)
+            near = np.searchsorted(track.time, middle_at * dt - 0.5 * tuning.TRACK_STEP)
+            near = np.clip(near, 0, track.time.size - 1)
+            # The track's attitude there, and the turn of the vehicle from then on.
+            since = np.rint(track.time[near] / dt).astype(int)
+            force += np.cross(turned[middle_at] - turned[since], force)
+            change = seconds[:, None] * np.einsum("eij,ej->ei", track.matrix[near], force)
+            change[:, 2] += seconds * gravity_at(np.sin(track.lla[near, 0]), track.lla[near, 2])
+            velocity = np.stack(
+                [np.interp(each.time, track.time, one) for one in track.velocity.T], axis=1
+            )
+            by = {"velocity": change, "standstill": 0.0 * change}.get(
+                each.kind, seconds[:, None] * (velocity + 0.5 * change)
+            )
+            if each.kind == "height":
+                by = -by[:, 2:]
+            fixes.append(replace(each, value=each.moved(-by)))
+        return self._with_fixes(fixes, -float(shift(np.zeros(1))[0]))
+
+    def _with_fixes(self, fixes: list[Fixes], seconds: float) -> Replay:
+        """Other fixes, and the initial state some time later; earlier if negative."""
+        state = self.state
+        if not self.is_at_rest:
+            samples = max(round(abs(seconds) / self.imu.dt), 1)
+            force = np.mean(self.imu.velocity[:samples], axis=0) / self.imu.dt
+            acceleration = matrix_from_rpy(state.rpy) @ force
+            acceleration[2] += gravity_at(np.sin(state.lla[0]), state.lla[2])
+            way = (state.velocity + 0.5 * acceleration * seconds) * seconds
+            velocity = state.velocity + acceleration * seconds
+            state = replace(state, lla=offset(state.lla, way), velocity=velocity)
+        return replace(self, state=state, aiding=replace(self.aiding, fixes=tuple(fixes)))
+
+    def with_arm_longer(self, by: FloatArray) -> Replay:
+        """A lever arm longer by a vector, m."""
+        arm = np.asarray(self.aiding.lever_arm) + by
+        lla = offset(self.state.lla, -matrix_from_rpy(self.state.rpy) @ by)
+        aiding = replace(self.aiding, lever_arm=arm)
+        return replace(self, state=replace(self.state, lla=lla), aiding=aiding)
+
+    def turned_by(self, by: float, sd: float | None = None) -> Replay:
+        """An initial heading that is larger by an angle, rad, with standard deviation ``sd``."""
+        rpy = self.state.rpy + np.array([0.0, 0.0, by])
+        heading = self.sd.heading if sd is None else sd
+        return replace(
+            self, state=replace(self.state, rpy=rpy), sd=replace(self.sd, heading=heading)
+        )
+
+    def with_signs(self, kind: str, signs: tuple[float, ...]) -> Replay:
+        """Axes of a kind of sensors times signs; levelled by the accelerometers anew."""
+        turn = np.array(signs)
+        if kind == "gyro":
+            return replace(self, imu=replace(self.imu, rotation=self.imu.rotation * turn))
+        x, y, z = -turn * matrix_from_rpy(self.state.rpy)[2]
+        rpy = np.array([np.arctan2(-y, -z), np.arctan2(x, np.hypot(y, z)), self.state.rpy[2]])
+        imu = replace(self.imu, velocity=self.imu.velocity * turn)
+        return replace(self, imu=imu, state=replace(self.state, rpy=rpy))
+
+    def anywhere(self) -> Replay:
+        """A start that the first fix does not show: it is an outlier."""
+        return replace(self, sd=replace(self.sd, position=tuning.ANYWHERE))
+
+    def without(self, rejected: dict[str, BoolArray]) -> Replay:
+        """Without some fixes; a mask for each kind."""
+        fixes = tuple(
+            each.part(~rejected[each.kind]) if each.kind in rejected else each
+            for each in self.aiding.fixes
+        )
+        return replace(self, aiding=replace(self.aiding, fixes=fixes))
+
+    def within(self, margin: float, longest: float) -> Replay:
+        """Without fixes near the ends and anything after ``longest`` (s); no fix is rejected."""
+        n = min(self.imu.n, round(longest / self.imu.dt))
+        imu = Imu(self.imu.dt, self.imu.rotation[:n], self.imu.velocity[:n])
+        end = n * imu.dt - margin
+        fixes = tuple(
+            each.part((each.time > margin) & (each.time < end)) for each in self.aiding.fixes
+        )
+        return replace(self, imu=imu, aiding=replace(self.aiding, fixes=fixes, gate=None))
+
+
+def alignment_of(measured: Measured) -> Alignment:
+    """The start of a filter of real data; `align` with all that is known."""
+    return align(
+        measured.imu,
+        measured.aiding,
+        measured.sensors,
+        measured.heading,
+        measured.heading_sd,
+        measured.attitude,
+        measured.attitude_sd,
+    )
+
+
+def innovation_sizes(innovations: FilterInnovations, kind: str | None = None) -> InnovationTest:
+    """Size and whiteness of the innovations of a kind, or of all but standstills."""
+    kinds = [KINDS[kind]] if kind else list(np.unique(innovations.kind))
+    parts = [
+        innovations.standard[innovations.kind == each]
+        for each in kinds
+        if each != KINDS["standstill"]
+    ]
+    seen = np.concatenate([part[np.isfinite(part)] for part in parts])
+    return InnovationTest(chi_square_ratio(seen**2, 1), float(2.0 * norm.sf(abs(lag_one(parts)))))

@@ -1,0 +1,213 @@
+"""Positions from all fixes, those before and those after: the reference where there is no truth.
+
+The fixed-interval smoother of Rauch, Tung & Striebel (1965, *AIAA Journal* 3, 1445-1450) in the
+form of Bryson & Frazier, which inverts no covariance (Bierman 1973, *Automatica* 9, 503-511):
+backwards, an adjoint vector collects the innovations, and a matrix their information.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from gmwm._core.typing import FloatArray
+from gmwm.ins.filter import (
+    NAVIGATION,
+    Events,
+    Filter,
+    Kinematics,
+    Outputs,
+    SensorStates,
+    Solution,
+    Transition,
+    measurement_update,
+    new_scratch,
+    new_transition,
+    observe,
+    propagate,
+    transition,
+)
+from gmwm.ins.geometry import offset
+from gmwm.ins.logs import tuning
+from gmwm.ins.logs.replay import Replay
+
+
+@dataclass(frozen=True, eq=False)
+class Smoothed:
+    """Positions and their covariance at K times.
+
+    time: (K,), s.
+    lla: (K, 3), latitude, longitude, rad, and height, m.
+    covariance: (K, 3, 3), north, east, down, m^2.
+    solution: Solution of the forward filter.
+    """
+
+    time: FloatArray
+    lla: FloatArray
+    covariance: FloatArray
+    solution: Solution
+
+
+@dataclass(frozen=True, eq=False)
+class _Update:
+    """One scalar measurement: its row, gain and innovation with its variance."""
+
+    row: FloatArray
+    gain: FloatArray
+    innovation: float
+    variance: float
+
+
+def smooth(replay: Replay, at: FloatArray) -> Smoothed:
+    """Smooth a log.
+
+    at: (K,), wanted times, s, rising; each is rounded to the nearest sample.
+    Returns: NaN if the forward filter diverged.
+    """
+    imu, step = replay.imu, tuning.SMOOTHER_STEP
+    ready = Filter.of(replay.models, replay.aiding, imu.dt, step)
+    outputs = Outputs.every(step, imu.dt, imu.n, also=at)
+    events = replay.aiding.events(imu.dt, imu.n)
+    solution = ready.run(imu, replay.state, replay.sd, events, outputs)
+    wanted = np.rint(at / imu.dt).astype(np.int64)
+    if solution.diverged_at is not None:
+        nothing = np.full((at.size, 3), np.nan)
+        return Smoothed(at, nothing, np.full((at.size, 3, 3), np.nan), solution)
+    P = ready.covariance(replay.state, replay.sd)
+    forward = _Forward(replay, ready, events, solution, P)
+    kept = forward.run(set(wanted.tolist()))
+    n = P.shape[0]
+    adjoint, information = np.zeros(n), np.zeros((n, n))
+    lla, covariance = np.empty((at.size, 3)), np.empty((at.size, 3, 3))
+    place = {epoch: i for i, epoch in enumerate(wanted.tolist())}
+    for before, epoch, updates in reversed(forward.steps):
+        if epoch in place:
+            i, C = place[epoch], kept[epoch]
+            error = -C[:3] @ adjoint
+            lla[i] = offset(forward.position(epoch)[None], -error[None])[0]
+            covariance[i] = C[:3, :3] - C[:3] @ information @ C[:, :3]
+        for update in reversed(updates):
+            h, K = update.row, update.gain
+            adjoint = adjoint - h * (K @ adjoint + update.innovation / update.variance)
+            left = information - np.outer(h, K @ information)
+            information = left - np.outer(left @ K, h) + np.outer(h, h) / update.variance
+        for first, count in reversed(forward.strides(before, epoch)):
+            advance = forward.transition(first, count)[0]
+            adjoint = advance.T @ adjoint
+            information = advance.T @ information @ advance
+    return Smoothed(at, lla, covariance, solution)
+
+
+class _Forward:
+    """The covariance along a solution, and the measurements for the way back.
+
+    Transitions are computed again on the way back: kept, they would be most of the memory.
+    """
+
+    def __init__(
+        self, replay: Replay, ready: Filter, events: Events, solution: Solution, P: FloatArray
+    ) -> None:
+        self._imu, self._ready, self._P = replay.imu, ready, P
+        self._aiding = replay.aiding
+        nodes = np.rint(solution.time / replay.imu.dt).astype(np.int64)
+        self._index = {int(epoch): i for i, epoch in enumerate(nodes)}
+        self._nodes, self._solution = nodes, solution
+        self.steps: list[tuple[int, int, list[_Update]]] = []
+        self._events = events
+
+    def position(self, epoch: int) -> FloatArray:
+        """Latitude, longitude and height of the solution at an epoch."""
+        return np.asarray(self._solution.lla[self._index[epoch]])
+
+    def run(self, wanted: set[int]) -> dict[int, FloatArray]:
+        """Run forwards; the covariance after the measurements of the wanted epochs."""
+        epochs = np.union1d(self._nodes, self._events.epoch)
+        kept, event, before = {}, 0, int(epochs[0])
+        for epoch in epochs.tolist():
+            for first, count in self.strides(before, epoch):
+                self._propagate(first, count)
+            updates = []
+            while event < self._events.epoch.size and self._events.epoch[event] == epoch:
+                updates += self._updates(event, epoch)
+                event += 1
+            self.steps.append((before, epoch, updates))
+            before = epoch
+            if epoch in wanted:
+                kept[epoch] = self._P.copy()
+        return kept
+
+    def strides(self, before: int, epoch: int) -> list[tuple[int, int]]:
+        """First epoch and number of samples of each step of the covariance between two epochs."""
+        stride = self._ready.stride
+        return [(k, min(stride, epoch - k)) for k in range(before, epoch, stride)]
+
+    def _nominal(self, epoch: float) -> tuple[FloatArray, FloatArray, FloatArray, int]:
+        i = int(np.clip(np.searchsorted(self._nodes, epoch, side="right") - 1, 0, None))
+        return self._solution.velocity[i], self._solution.lla[i], self._solution.matrix[i], i
+
+    def transition(self, epoch: int, count: int) -> tuple[FloatArray, Transition]:
+        """Transition of all states over some samples, and its parts: navigation, and by sensors."""
+        v, lla, C, i = self._nominal(epoch + 0.5 * count)
+        if i + 1 < self._nodes.size:
+            later = i + 1
+            share = (epoch + 0.5 * count - self._nodes[i]) / max(
+                int(self._nodes[later] - self._nodes[i]), 1
+            )
+            v = (1.0 - share) * v + share * self._solution.velocity[later]
+            C = (1.0 - share) * C + share * self._solution.matrix[later]
+        change = new_transition()
+        transition(Kinematics(np.ascontiguousarray(C), v, lla), count * self._imu.dt, change)
+        return _whole(self._ready.states, change.A, change.B, count), change
+
+    def _propagate(self, epoch: int, count: int) -> None:
+        """Propagate the covariance by some samples."""
+        _, change = self.transition(epoch, count)
+        table = self._ready.states.table
+        propagate(self._P, change, table, count, new_scratch(self._P.shape[0]))
+
+    def _updates(self, event: int, epoch: int) -> list[_Update]:
+        """Update the covariance by the components of a fix, with the filter's innovations."""
+        innovations = self._solution.innovations
+        kind = int(innovations.kind[event])
+        v, lla, C, _ = self._nominal(epoch)
+        at = Kinematics(np.ascontiguousarray(C), v, lla)
+        last = min(max(epoch - 1, 0), self._imu.n - 1)
+        rate = self._imu.rotation[last] / self._imu.dt
+        found, n = [], self._P.shape[0]
+        for component in range(3):
+            value, sd = innovations.value[event, component], self._events.sd[event, component]
+            if not (np.isfinite(value) and innovations.used[event]):
+                continue
+            h, row, gain = np.zeros(NAVIGATION), np.zeros(n), np.zeros(n)
+            lever = np.asarray(self._aiding.lever_arm)
+            observe(kind, component, self._events.value[event], at, rate, lever, h)
+            row[:NAVIGATION] = h
+            state = int(self._ready.noise_states[kind, component])
+            if state >= 0:
+                state += NAVIGATION
+                row[state] = -1.0
+            # The filter's own variance, which allows for more than the noise of the fix.
+            predicted = float(row @ self._P @ row)
+            noise = max(float(innovations.sd[event, component] ** 2) - predicted, float(sd**2))
+            _, variance = measurement_update(self._P, h, state, noise, 0.0, np.zeros(n), gain)
+            found.append(_Update(row, gain, float(value), float(variance)))
+        return found
+
+
+def _whole(states: SensorStates, A: FloatArray, B: FloatArray, count: int) -> FloatArray:
+    """Transition of all states over some samples, (9 + m, 9 + m)."""
+    table, n = states.table, NAVIGATION + states.m
+    whole = np.zeros((n, n))
+    whole[:NAVIGATION, :NAVIGATION] = A
+    index = np.arange(states.m)
+    whole[NAVIGATION + index, NAVIGATION + index] = table.phi[count]
+    paired = table.partner != index
+    whole[NAVIGATION + index[paired], NAVIGATION + table.partner[paired]] = table.phi_off[count][
+        paired
+    ]
+    of_sensor = np.flatnonzero(table.axis >= 0)
+    whole[:NAVIGATION, NAVIGATION + of_sensor] = (
+        B[:, table.axis[of_sensor]] * table.gain[count][of_sensor]
+    )
+    return whole

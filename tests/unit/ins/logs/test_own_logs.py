@@ -1,0 +1,407 @@
+"""Logs as IMUs and receivers write them: jitter, holes, dates, signs; starts in motion; aids."""
+
+from dataclasses import replace
+from datetime import UTC, datetime
+from functools import partial
+
+import numpy as np
+import pytest
+import yaml
+from click.testing import CliRunner
+
+from gmwm.cli.navigate import navigate
+from gmwm.errors import InputError
+from gmwm.ins import Measured, Navigated, Outage, car_drive, emulate, fixed_wing_loiter, gnss
+from gmwm.ins.geometry import ned_difference
+from gmwm.ins.spec import sensor_models
+
+RATE = 25.0
+DATE = datetime(2024, 2, 29, 23, 59, 0, tzinfo=UTC)
+START = DATE.timestamp()
+SENSORS = {
+    "gyro": {"N": "10 deg/h/sqrt(Hz)", "GM": [["10 deg/h", 100]]},
+    "accel": {"N": "100 ug/sqrt(Hz)", "GM": [["100 ug", 100]]},
+}
+BIAS = {"gyro": "0.02 deg/s", "accel": "5 mg"}
+NAMES = ("gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z")
+
+
+class Log:
+    """Samples and fixes of a known drive, and the files that they are written to."""
+
+    def __init__(self, truth, seed=0, velocity=True, outages=()):
+        rng = np.random.default_rng(seed)
+        self.truth, ideal = truth, emulate(truth)
+        errors = sensor_models(SENSORS, "test").simulate(ideal.n, ideal.dt, rng).total
+        errors += np.repeat([3e-4, 0.04], 3) * rng.standard_normal(6)
+        imu = ideal.with_errors(errors[:, :3], errors[:, 3:])
+        self.samples = np.hstack([imu.rotation, imu.velocity]) / imu.dt
+        self.stamps = START + imu.dt * (1.0 + np.arange(imu.n))
+        aiding = gnss(truth, velocity_sd=0.1 if velocity else None)
+        self.aiding = aiding.noisy(rng).without(outages)
+
+    def imu(self, folder, stamps=None, keep=None, names=NAMES, stamped=True):
+        keep = slice(None) if keep is None else keep
+        stamps = self.stamps if stamps is None else stamps
+        columns = [stamps[keep]] if stamped else []
+        header = ",".join((["time_s"] if stamped else []) + list(names))
+        np.savetxt(folder / "imu.csv", np.column_stack([*columns, self.samples[keep]]), "%.12g",
+                   ",", header=header, comments="")  # fmt: skip
+
+    def fixes(self, folder, time=lambda t: f"{t:.6f}", name="time_s"):
+        position = self.aiding.fixes[0]
+        header = [name, "latitude_deg", "longitude_deg", "height_m"]
+        rows = [np.degrees(position.value[:, :2]), position.value[:, 2:]]
+        if len(self.aiding.fixes) > 1:
+            header += ["velocity_north_mps", "velocity_east_mps", "velocity_down_mps"]
+            rows.append(self.aiding.fixes[1].value)
+        lines = [
+            ",".join([time(START + t), *(f"{each:.12g}" for each in row)])
+            for t, row in zip(position.time, np.hstack(rows), strict=True)
+        ]
+        (folder / "fixes.csv").write_text("\n".join([",".join(header), *lines]) + "\n")
+
+
+@pytest.fixture(scope="module")
+def log():
+    return Log(car_drive(duration=110.0, dt=1.0 / RATE))
+
+
+@pytest.fixture(scope="module")
+def as_it_is(log, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("plain")
+    log.imu(folder)
+    log.fixes(folder)
+    return navigated(folder)
+
+
+def navigated(folder, **changes):
+    units = {"gyro": "rad/s", "accel": "m/s^2"}
+    imu = {"file": "imu.csv", "units": units} | changes.pop("imu", {})
+    content = {"imu": imu, "gnss_fixes": "fixes.csv", "sensors": SENSORS, "bias": BIAS} | changes
+    return Navigated.of(Measured.of(content, folder))
+
+
+def standardised(found, truth):
+    part = truth.segment(found.alignment.epoch * truth.dt, truth.duration)
+    return found.solution.errors(part) / found.solution.sd
+
+
+def apart(found, other):
+    """Of two solutions on their common clock, m."""
+
+    def by_time(each):
+        after = ~each.solution.before
+        times = np.round(each.clock(each.solution.time[after]), 3)
+        return dict(zip(times, each.solution.lla[after], strict=True))
+
+    here, there = by_time(found), by_time(other)
+    common = [(here[t], there[t]) for t in here if t in there]
+    ours, theirs = (np.array(each) for each in zip(*common, strict=True))
+    assert len(ours) > 80
+    return np.abs(ned_difference(ours, theirs))
+
+
+def codes(found):
+    return {notice.code for notice in found.measured.notices}
+
+
+def test_stamps_that_jitter_by_a_millisecond_change_centimetres(log, as_it_is, tmp_path):
+    rng = np.random.default_rng(1)
+    log.imu(tmp_path, stamps=log.stamps + 1e-3 * rng.standard_normal(log.stamps.size))
+    log.fixes(tmp_path)
+    found = navigated(tmp_path)
+    assert found.measured.start == pytest.approx(START, abs=2e-4)
+    ours, theirs = (each.solution.lla[-20:] for each in (found, as_it_is))
+    assert np.abs(ned_difference(ours, theirs)).max() < 0.05
+
+
+def test_a_missing_sample_is_filled_and_reported(log, as_it_is, tmp_path):
+    kept = np.delete(np.arange(log.stamps.size), 1500)
+    log.imu(tmp_path, keep=kept)
+    log.fixes(tmp_path)
+    found = navigated(tmp_path)
+    notice = next(each for each in found.measured.notices if each.code == "samples-filled")
+    assert notice.values == {"count": 1, "longest": 1}
+    assert apart(found, as_it_is).max() < 0.05
+
+
+def test_a_long_hole_is_refused_with_its_place(log, tmp_path):
+    log.imu(tmp_path, keep=np.delete(np.arange(log.stamps.size), np.arange(1500, 1520)))
+    log.fixes(tmp_path)
+    with pytest.raises(InputError, match="sample 1,501 of gyro_x, 60 s after the first"):
+        navigated(tmp_path)
+
+
+def test_a_record_without_stamps_starts_when_its_start_says(log, as_it_is, tmp_path):
+    log.imu(tmp_path, stamped=False)
+    log.fixes(tmp_path)
+    found = navigated(tmp_path, imu={"rate": RATE, "start": log.stamps[0]})
+    assert "no-time-stamps" not in codes(found)
+    np.testing.assert_allclose(apart(found, as_it_is), 0.0, atol=1e-3)
+
+
+def test_a_start_beside_stamps_is_refused(log, tmp_path):
+    log.imu(tmp_path)
+    log.fixes(tmp_path)
+    with pytest.raises(InputError, match="has time stamps: leave its start out"):
+        navigated(tmp_path, imu={"start": START})
+
+
+def iso(t):
+    return datetime.fromtimestamp(t, UTC).strftime("%Y-%m-%dT%H:%M:%S.%fZ")
+
+
+def zoned(t):
+    return datetime.fromtimestamp(t + 5400.0, UTC).strftime("%Y-%m-%d %H:%M:%S.%f") + "+01:30"
+
+
+@pytest.mark.parametrize("write", [iso, zoned])
+def test_dates_are_seconds(log, as_it_is, tmp_path, write):
+    log.imu(tmp_path)
+    log.fixes(tmp_path, write, "time")
+    found = navigated(tmp_path)
+    assert "dates" in codes(found)
+    np.testing.assert_allclose(apart(found, as_it_is), 0.0, atol=1e-3)
+
+
+def dated(log, folder):
+    """The IMU's stamps as dates."""
+    log.imu(folder)
+    head, *rows = (folder / "imu.csv").read_text().splitlines()
+    rows = [
+        f"{iso(float(stamp))},{rest}" for stamp, _, rest in (row.partition(",") for row in rows)
+    ]
+    (folder / "imu.csv").write_text("\n".join([head.replace("time_s", "UTC"), *rows]) + "\n")
+
+
+def test_dates_of_both_files_are_one_clock(log, as_it_is, tmp_path):
+    dated(log, tmp_path)
+    log.fixes(tmp_path, iso, "time")
+    found = navigated(tmp_path)
+    np.testing.assert_allclose(apart(found, as_it_is), 0.0, atol=1e-3)
+    assert "time-scales" not in codes(found)
+
+
+def test_a_date_that_is_none_is_named_with_its_line(log, tmp_path):
+    log.imu(tmp_path)
+    log.fixes(tmp_path, iso, "time")
+    path = tmp_path / "fixes.csv"
+    path.write_text(path.read_text().replace("2024-02-29T23:59:05", "2024-02-31T23:59:05"))
+    with pytest.raises(InputError, match=r"fixes.csv, line 6.*2024-02-31T"):
+        navigated(tmp_path)
+
+
+@pytest.mark.parametrize("weeks", [False, True])
+def test_a_solution_of_rtklib(log, as_it_is, tmp_path, weeks):
+    (log.imu if weeks else partial(dated, log))(tmp_path)
+    position = log.aiding.fixes[0]
+    lines = [
+        "% program   : RTKLIB",
+        "% (lat/lon/height=WGS84/ellipsoidal,Q=1:fix,2:float,3:sbas,4:dgps,5:single,6:ppp)",
+        "%  GPST             latitude(deg) longitude(deg)  height(m)   Q  ns   sdn(m)   sde(m)   "
+        "sdu(m)  sdne(m)  sdeu(m)  sdun(m) age(s)  ratio",
+    ]
+    for t, value in zip(START + position.time, position.value, strict=True):
+        if weeks:
+            week, rest = divmod(t - 315964800.0, 604800.0)
+            stamp = f"{int(week)} {rest:10.3f}"
+        else:
+            stamp = datetime.fromtimestamp(t, UTC).strftime("%Y/%m/%d %H:%M:%S.%f")[:-3]
+        lat, lon = np.degrees(value[:2])
+        lines.append(f"{stamp}   {lat:.9f}   {lon:.9f} {value[2]:.4f}   1  12   1.0000   1.0000   "
+                     "1.5000   0.0000   0.0000   0.0000   0.00    3.5")  # fmt: skip
+    (tmp_path / "rover.pos").write_text("\n".join(lines) + "\n")
+    found = navigated(tmp_path, gnss_fixes="rover.pos")
+    assert "sd-assumed" not in codes(found)
+    np.testing.assert_allclose(found.measured.aiding.fixes[0].time, position.time, atol=2e-3)
+    np.testing.assert_allclose(found.measured.aiding.fixes[0].sd[0], [1.0, 1.0, 1.5])
+    assert apart(found, as_it_is).max() < 5.0  # there are no velocities here
+    assert ("time-scales" in codes(found)) is not weeks  # GPS time beside dates of the IMU
+
+
+def test_a_shift_of_the_fixes_is_added_to_their_times(log, as_it_is, tmp_path):
+    log.imu(tmp_path)
+    log.fixes(tmp_path, lambda t: f"{t - 18.0:.6f}")
+    found = navigated(tmp_path, gnss_shift=18)
+    np.testing.assert_allclose(apart(found, as_it_is), 0.0, atol=1e-3)
+
+
+# ---- Starts in motion ----
+
+
+@pytest.fixture(scope="module")
+def underway():
+    """A car that turns and brakes from the first sample on."""
+    whole = car_drive(duration=200.0, dt=1.0 / RATE)
+    return whole.segment(60.0, 200.0)
+
+
+def test_an_attitude_that_is_given_starts_a_record_in_motion(underway, tmp_path):
+    log = Log(underway, 2)
+    log.imu(tmp_path)
+    log.fixes(tmp_path)
+    rng = np.random.default_rng(3)
+    at_fix = underway.rpy[int(RATE)] + np.radians(1.0) * rng.standard_normal(3)
+    found = navigated(tmp_path, attitude=[f"{each} deg" for each in np.degrees(at_fix)])
+    assert found.alignment.notices[0].code == "attitude-given"
+    np.testing.assert_allclose(found.alignment.state.rpy, at_fix, atol=1e-9)
+    assert np.mean(standardised(found, underway)[5:] ** 2) < 2.5
+
+
+def test_a_heading_beside_an_attitude_is_refused(underway, tmp_path):
+    log = Log(underway, 2)
+    log.imu(tmp_path)
+    log.fixes(tmp_path)
+    with pytest.raises(InputError, match="leave the heading out"):
+        navigated(tmp_path, attitude=[0, 0, 0], heading=1.0)
+
+
+@pytest.mark.parametrize("velocity", [True, False])
+def test_a_record_that_never_is_steady_is_aligned_by_its_accelerations(
+    underway, tmp_path, velocity, monkeypatch
+):
+    monkeypatch.setattr("gmwm.ins.logs.alignment.steady", lambda imu: None)
+    squares = []
+    for seed in range(3):
+        log = Log(underway, seed, velocity=velocity)
+        log.imu(tmp_path)
+        log.fixes(tmp_path)
+        found = navigated(tmp_path)
+        assert found.alignment.notices[0].code == "aligned-in-motion"
+        assert found.alignment.sd.heading < np.radians(10.0)
+        standard = standardised(found, underway)
+        squares.append(np.mean(standard[0, 6:] ** 2))
+        assert np.mean(standard[-60:] ** 2) < 3.0
+    assert np.mean(squares) < 4.0
+
+
+def test_motion_without_acceleration_shows_no_heading(tmp_path, monkeypatch):
+    monkeypatch.setattr("gmwm.ins.logs.alignment.steady", lambda imu: None)
+    straight = Log(car_drive(duration=110.0, dt=1.0 / RATE).segment(0.0, 18.0))
+    straight.imu(tmp_path)
+    straight.fixes(tmp_path)
+    with pytest.raises(InputError, match="the attitude cannot be known"):
+        navigated(tmp_path)
+
+
+# ---- More aids ----
+
+
+def test_rejected_fixes_are_reported(log, tmp_path):
+    position = log.aiding.fixes[0]
+    by = np.zeros_like(position.value)
+    by[50, 0] = 300.0
+    far = Log.__new__(Log)
+    moved = (replace(position, value=position.moved(by)), *log.aiding.fixes[1:])
+    far.__dict__ = log.__dict__ | {"aiding": replace(log.aiding, fixes=moved)}
+    far.imu(tmp_path)
+    far.fixes(tmp_path)
+    found = navigated(tmp_path, gate=1e-5)
+    (notice,) = found.rejections
+    assert (notice.code, notice.where, notice.values["count"]) == ("fixes-rejected", "position", 1)
+    assert notice.values["time"] == pytest.approx(START + position.time[50])
+    assert "position: 1 of " in str(found)
+    assert np.abs(standardised(found, log.truth)[:, :3]).max() < 5.0
+    assert not navigated(tmp_path).rejections
+
+
+@pytest.fixture(scope="module")
+def stopping():
+    """A car that stands for 20 s at the start, and in an outage again."""
+    log = Log(car_drive(duration=160.0, dt=1.0 / RATE), 5, outages=[Outage(100.0, 55.0)])
+    # Engine and road shake a car that moves.
+    speed = np.linalg.norm(log.truth.velocity[1:], axis=1)
+    shake = np.repeat([2e-3, 0.03], 3) * (speed > 0.05)[:, None]
+    log.samples = log.samples + shake * np.random.default_rng(9).standard_normal((speed.size, 6))
+    return log
+
+
+def test_standstills_are_recognised_and_hold_the_velocity(stopping, tmp_path):
+    stopping.imu(tmp_path)
+    stopping.fixes(tmp_path)
+    shaken = {"gyro": {"N": "100 deg/h/sqrt(Hz)"}, "accel": {"N": "800 ug/sqrt(Hz)"}}
+    found = navigated(tmp_path, zero_velocity="0.02 m/s", sensors=shaken)
+    fixes = found.measured.aiding.fixes[-1]
+    assert fixes.kind == "standstill" and fixes.time.size >= 10
+    truth = stopping.truth
+    speed = np.linalg.norm(truth.velocity[np.rint(fixes.time * RATE).astype(int)], axis=1)
+    assert speed.max() < 0.05
+    assert "standstill" not in found.kinds
+    assert not found.rejections
+
+
+def test_a_barometer_of_another_datum_holds_the_height(log, tmp_path):
+    gone = replace(log.aiding.without([Outage(60.0, 45.0)]))
+    without = Log.__new__(Log)
+    without.__dict__ = log.__dict__ | {"aiding": gone}
+    without.imu(tmp_path)
+    without.fixes(tmp_path)
+    rng = np.random.default_rng(4)
+    index = np.arange(0, log.truth.n, int(RATE))
+    height = log.truth.lla[index, 2] - 48.0 + 0.3 * rng.standard_normal(index.size)
+    np.savetxt(tmp_path / "baro.csv", np.column_stack([START + index / RATE, height]), "%.12g", ",",
+               header="time_s,height_m", comments="")  # fmt: skip
+    found = navigated(tmp_path, barometer={"file": "baro.csv", "drift_sd": "3 m"})
+    (set_to,) = (each for each in found.measured.notices if each.code == "barometer-set")
+    assert set_to.values["shift"] == pytest.approx(48.0, abs=5.0)
+    assert found.kinds == ("position", "velocity", "height")
+    alone = navigated(tmp_path)
+    assert found.longest_outage.sd[2] < 0.6 * alone.longest_outage.sd[2]
+    assert np.abs(standardised(found, log.truth)[:, 2]).max() < 5.0
+
+
+def test_coloured_noise_of_the_fixes_is_a_state(log, tmp_path):
+    log.imu(tmp_path)
+    log.fixes(tmp_path)
+    found = navigated(tmp_path, coloured_sd=[0.5, 0.5, 1.0], coloured_tau="60 s")
+    assert found.solution.state_names[-3:] == ("GNSS north", "GNSS east", "GNSS down")
+
+
+def test_a_flight_is_still_levelled_in_steady_motion(tmp_path):
+    log = Log(fixed_wing_loiter(duration=60.0, dt=1.0 / RATE), 3)
+    log.imu(tmp_path)
+    log.fixes(tmp_path)
+    found = navigated(tmp_path)
+    assert found.alignment.notices[0].code == "levelled"
+
+
+def test_each_outage_is_drawn_with_its_band_and_what_the_next_fix_showed(tmp_path):
+    import matplotlib.pyplot as plt
+
+    outages = [Outage(40.0, 12.0), Outage(70.0, 25.0)]
+    log = Log(car_drive(duration=110.0, dt=1.0 / RATE), 6, outages=outages)
+    log.imu(tmp_path)
+    log.fixes(tmp_path)
+    pictures = navigated(tmp_path).plot_outages()
+    assert [title.split(" s ")[0] for title, _ in pictures] == ["25", "12"]
+    for (_, figure), length in zip(pictures, (25.0, 12.0), strict=True):
+        track, north, *_ = figure.axes
+        assert track.get_legend() is not None
+        (band,) = north.collections
+        width = np.ptp(band.get_paths()[0].vertices[:, 1])
+        assert 1.0 < width < 200.0
+        time = north.lines[0].get_xdata()
+        assert length in np.round(time, 6) and not np.any((time > 0.1) & (time < length - 0.1))
+        plt.close(figure)
+
+
+def test_the_options_of_the_command(underway, tmp_path):
+    log = Log(underway, 2)
+    log.imu(tmp_path, stamped=False, names=("a", "b", "c", "d", "e", "f"))
+    log.fixes(tmp_path, iso, "time")
+    file = tmp_path / "run.yaml"
+    file.write_text(yaml.safe_dump({"sensors": SENSORS, "bias": BIAS}))
+    roll, pitch, yaw = np.degrees(underway.rpy[int(RATE)])
+    arguments = [
+        file, "--imu", tmp_path / "imu.csv", "--gnss", tmp_path / "fixes.csv", "--rate", RATE,
+        "--gyro-unit", "rad/s", "--accel-unit", "m/s^2", "--imu-start", f"{log.stamps[0]:.6f}",
+        "--attitude", f"{roll},{pitch},{yaw}", "--gate", "1e-5", "-o", tmp_path / "out",
+        *(f"--channel={name}={column}" for name, column in zip(NAMES, "abcdef", strict=True)),
+    ]  # fmt: skip
+    done = CliRunner().invoke(navigate, list(map(str, arguments)), catch_exceptions=False)
+    assert done.exit_code == 0
+    assert "roll, pitch and yaw as given" in done.output
+    assert (tmp_path / "out" / "report.html").exists()
+    with pytest.raises(InputError, match="write ROLL,PITCH,YAW in degrees"):
+        CliRunner().invoke(navigate, ["--attitude", "1,2"], catch_exceptions=False)
