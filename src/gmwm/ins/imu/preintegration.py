@@ -109,7 +109,17 @@ def preintegrate(
     dt, (turns, mean, half, by_mean, by_half) = imu.dt, _steps(imu)
     rotation, velocity, position = np.eye(3), np.zeros(3), np.zeros(3)
     covariance = np.zeros((9 + m, 9 + m))
-    covariance[9:, 9:] = _start(start, stationary)
+    if isinstance(start, str):
+        if checks.choice("start", start, ("known", "stationary")) == "stationary":
+            covariance[9:, 9:] = stationary
+    else:
+        given = checks.real_numbers(start, "start")
+        if given.shape != stationary.shape:
+            raise InputError(
+                f"start has shape {given.shape}: the sensors have {m} states, give a "
+                "covariance of theirs"
+            )
+        covariance[9:, 9:] = given
     jacobian = np.eye(9 + m)[:, 9:]
     A, B, Q = np.eye(9 + m), np.zeros((9, 6)), np.zeros((9 + m, 9 + m))
     A[9:, 9:], A[6:9, 3:6], Q[9:, 9:] = transition, dt * np.eye(3), drive
@@ -151,16 +161,3 @@ def _steps(imu: Imu) -> tuple[FloatArray, ...]:
     by_mean = -np.einsum("s,snij->nij", _WEIGHTS, inner)
     by_half = -np.einsum("s,snij->nij", _WEIGHTS * (1.0 - _NODES), inner)
     return matrix_from_rotation_vector(imu.rotation), mean, half, by_mean, by_half
-
-
-def _start(start: Start | FloatArray, stationary: FloatArray) -> FloatArray:
-    if isinstance(start, str):
-        known = checks.choice("start", start, ("known", "stationary")) == "known"
-        return np.zeros_like(stationary) if known else stationary
-    given = checks.real_numbers(start, "start")
-    if given.shape != stationary.shape:
-        raise InputError(
-            f"start has shape {given.shape}: the sensors have {len(stationary)} states, give a "
-            "covariance of theirs"
-        )
-    return given

@@ -25,17 +25,15 @@ from gmwm.ins.simulation.consistency import (
     innovation_test,
     over_time,
 )
-from gmwm.ins.simulation.filter_errors import FilterErrors
-from gmwm.ins.simulation.outage_errors import (
+from gmwm.ins.simulation.filter_errors import (
     QUANTITIES,
     ErrorDifference,
     ErrorSizes,
+    FilterErrors,
     difference,
-    pooled_sizes,
     spread,
 )
-from gmwm.ins.simulation.scenario import Experiment
-from gmwm.ins.simulation.trials import MonteCarlo, RunOptions, monte_carlo
+from gmwm.ins.simulation.trials import Experiment, MonteCarlo, RunOptions, monte_carlo, pooled_sizes
 from gmwm.issues import Notice, notice
 
 if TYPE_CHECKING:
@@ -62,11 +60,8 @@ class Validation:
     @classmethod
     def of(cls, experiment: Experiment, **options: Unpack[RunOptions]) -> Validation:
         """Do the runs of an experiment; see `gmwm.ins.monte_carlo`."""
-        filters, runs, seed = experiment.filters, experiment.runs, experiment.seed
-        return cls(
-            experiment,
-            monte_carlo(experiment.scenario, experiment.source, filters, runs, seed, **options),
-        )
+        e = experiment
+        return cls(e, monte_carlo(e.scenario, e.source, e.filters, e.runs, e.seed, **options))
 
     # -- numbers ----------------------------------------------------------------------------------
 

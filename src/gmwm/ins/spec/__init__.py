@@ -1,6 +1,5 @@
 """Studies of navigation as people write them, in YAML."""
 
-from gmwm.ins.spec.document import read_document as read_document
 from gmwm.ins.spec.experiment import ReadingSpec as ReadingSpec, experiment_from as experiment_from
 from gmwm.ins.spec.fields import (
     FileName as FileName,
@@ -14,6 +13,7 @@ from gmwm.ins.spec.fields import (
     Spec as Spec,
     Three as Three,
     number as number,
+    read_document as read_document,
     written as written,
 )
 from gmwm.ins.spec.sensor_terms import (

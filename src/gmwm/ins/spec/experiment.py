@@ -162,9 +162,8 @@ def experiment_from(content: Mapping[str, Any], folder: Path = Path()) -> Experi
         That paths are relative to.
     """
     spec = ExperimentSpec.parse(content)
-    trajectory, outages = _trajectory(spec, folder), _outages(spec)
-    scenario = Scenario(trajectory, _aiding(spec.gnss, trajectory), outages, spec.initial_sd)
-    _check_fixes(scenario)
+    trajectory = _trajectory(spec, folder)
+    scenario = _scenario(spec, trajectory)
     truth, source = _source(spec.truth, trajectory, folder)
     known = _Known(truth, source, _about_outages(spec, scenario), folder)
     filters = {
@@ -198,8 +197,8 @@ def _trajectory(spec: ExperimentSpec, folder: Path) -> Trajectory:
     return trajectory.segment(0.0, duration)
 
 
-def _outages(spec: ExperimentSpec) -> tuple[Outage, ...]:
-    """Outages in order of time; rejected if two overlap."""
+def _scenario(spec: ExperimentSpec, trajectory: Trajectory) -> Scenario:
+    """Reject outages that overlap or take no fix away, and a study without fixes."""
     outages = sorted((Outage(*each) for each in spec.outages), key=lambda outage: outage.start)
     for first, second in pairwise(outages):
         if second.start < first.end - _SAME_TIME:
@@ -207,28 +206,25 @@ def _outages(spec: ExperimentSpec) -> tuple[Outage, ...]:
                 f"outages: that from {second.start:g} s begins before that from {first.start:g} s "
                 f"ends at {first.end:g} s: write them as one, or apart"
             )
-    return tuple(outages)
-
-
-def _aiding(spec: GnssSpec, trajectory: Trajectory) -> Aiding:
-    return gnss(trajectory, **spec.given, imu=emulate(trajectory) if any(spec.lever_arm) else None)
-
-
-def _check_fixes(scenario: Scenario) -> None:
-    """Reject a study without fixes, and an outage that takes none away."""
-    aiding = scenario.aiding
+    aiding = _aiding(spec.gnss, trajectory)
+    scenario = Scenario(trajectory, aiding, tuple(outages), spec.initial_sd)
     total = sum(each.time.size for each in aiding.fixes)
     if not total:
         raise InputError(
             "gnss: there is no fix: give position_sd or velocity_sd, and an interval below the "
             "duration"
         )
-    for outage in scenario.outages:
+    for outage in outages:
         if sum(each.time.size for each in aiding.without([outage]).fixes) == total:
             raise InputError(
                 f"outages: no fix falls into that from {outage.start:g} s to {outage.end:g} s: "
                 "make it longer than the interval of the fixes"
             )
+    return scenario
+
+
+def _aiding(spec: GnssSpec, trajectory: Trajectory) -> Aiding:
+    return gnss(trajectory, **spec.given, imu=emulate(trajectory) if any(spec.lever_arm) else None)
 
 
 def _about_outages(spec: ExperimentSpec, scenario: Scenario) -> Scenario:
