@@ -1,8 +1,4 @@
-"""Constants of navigation that change answers, each with its source or its reason.
-
-Constants of the Earth stand in `gmwm.ins.geometry`; those that only keep arithmetic safe, and words
-of file formats, stand where they are used.
-"""
+"""Constants of navigation that change answers, each with its source or its reason."""
 
 import math
 

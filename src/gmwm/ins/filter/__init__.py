@@ -1,11 +1,6 @@
 """The INS/GNSS filter: mechanization, error states, measurement updates."""
 
-from gmwm.ins.filter.aiding import (
-    Aiding as Aiding,
-    Fixes as Fixes,
-    Outage as Outage,
-    gnss as gnss,
-)
+from gmwm.ins.filter.aiding import Aiding as Aiding, Fixes as Fixes, Outage as Outage, gnss as gnss
 from gmwm.ins.filter.covariance_kernels import (
     NAVIGATION as NAVIGATION,
     excess as excess,

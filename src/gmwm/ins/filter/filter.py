@@ -219,10 +219,7 @@ class Filter:
         second_order: bool = True,
         drift_known: bool = False,
     ) -> Filter:
-        """A filter for an IMU of sampling interval ``dt`` with covariance steps of ``step`` (s).
-
-        For ``drift_known`` see `SensorStates.of`.
-        """
+        """A filter for an IMU of interval ``dt`` (s), covariance steps of ``step`` (s)."""
         stride = max(round(checks.positive("step", step) / dt), 1)
         states = SensorStates.of(sensors, dt, stride, drift_known)
         noise_states = np.full((len(MEASUREMENTS), 3), -1, dtype=np.int64)
@@ -245,12 +242,6 @@ class Filter:
         """Number of states, those of navigation included."""
         return NAVIGATION + self.states.m
 
-    @property
-    def settings(self) -> Settings:
-        """Record for the kernels."""
-        table, lever = self.states.table, self.lever_arm
-        return Settings(table, self.noise_states, lever, self.second_order, self.stride)
-
     def covariance(self, initial: NavState, sd: InitialSd) -> FloatArray:
         """Covariance at the first epoch, (9 + m, 9 + m), with the modified velocity error."""
         P = np.zeros((self.size, self.size))
@@ -261,14 +252,7 @@ class Filter:
     def run(
         self, imu: Imu, initial: NavState, initial_sd: InitialSd, events: Events, outputs: Outputs
     ) -> Solution:
-        """Filter a record.
-
-        imu: Of the filter's sampling interval.
-        initial: FilterState at the first epoch.
-        events: Measurements.
-        outputs: Epochs to be kept.
-        Raises InputError if it starts closer than 1 deg to a pole.
-        """
+        """Filter a record of the filter's sampling interval; ``outputs`` are kept."""
         check_latitudes(initial.lla[None, :], "initial")
         C, v, lla = matrix_from_rpy(initial.rpy), initial.velocity.copy(), initial.lla.copy()
         P, x = self.covariance(initial, initial_sd), self.states.mean.copy()
@@ -282,7 +266,8 @@ class Filter:
         samples = Samples(imu.rotation, imu.velocity, imu.dt)
         place, rejected = np.zeros(4, dtype=np.int64), np.zeros(len(KINDS), dtype=np.int64)
         where = RunPlace(place, rejected, np.zeros(7))
-        stopped, settings = PAUSED, self.settings
+        table, lever, stopped = self.states.table, self.lever_arm, PAUSED
+        settings = Settings(table, self.noise_states, lever, self.second_order, self.stride)
         for part in (*windows(imu.n), slice(imu.n, imu.n)):
             if stopped == PAUSED:
                 stopped = run(samples, settings, estimate, events, found, kept, where, part.stop)

@@ -1,9 +1,7 @@
 """Preintegrated increments of an IMU and their exact covariance with any composite error model.
 
-Preintegration (Forster et al. 2017, *IEEE Trans. Robotics* 33(1), 1-21) sums the samples between
-two keyframes in the body axes of the first. Its usual covariance knows white noise and a random
-walk; here the states of any error model go along, so that slow terms correlate the increments of a
-pair of keyframes, and of the next pairs through the states, as they do in truth.
+The usual covariance (Forster et al. 2017, *IEEE Trans. Robotics* 33(1), 1-21) knows white noise and
+a random walk; here slow terms of any model correlate the increments of all pairs of keyframes.
 """
 
 from __future__ import annotations
@@ -146,10 +144,10 @@ def preintegrate(
 
 
 def _steps(imu: Imu) -> tuple[FloatArray, ...]:
-    """What the samples of an IMU do: each an array of n matrices, (n, 3, 3).
+    """Effects of the samples, (n, 3, 3) each.
 
-    With the rotation vector r of a sample and its velocity increment u: turn exp(r), mean turn G1,
-    half of its mean G2 for the position, and the derivatives of G1 u and G2 u to r.
+    For a rotation vector r and a velocity increment u: turn exp(r), mean turn G1, G2 for the
+    position, and the derivatives of G1 u and G2 u to r.
     """
     part = matrix_from_rotation_vector(_NODES[:, None, None] * imu.rotation)  # exp(s r)
     mean = np.einsum("s,snij->nij", _WEIGHTS, part)

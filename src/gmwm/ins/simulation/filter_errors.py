@@ -81,10 +81,7 @@ class FilterErrors:
         return int(np.count_nonzero(np.isnan(self.error[:, -1, 0])))
 
     def index(self, time: float, *, before: bool = True) -> int:
-        """Place of an epoch.
-
-        Raises InputError if it was not kept.
-        """
+        """Place of an epoch; InputError if it was not kept."""
         found = np.flatnonzero((np.abs(self.time - time) < _SAME_TIME) & (self.before == before))
         if found.size == 0:
             raise InputError(f"no errors were kept at {time:g} s: give the end of an outage")
@@ -98,10 +95,7 @@ PER_RUN = tuple(name for name in FilterErrors.__annotations__ if name not in ("t
 def errors_of_run(
     solution: Solution, truth: Trajectory, errors: SensorErrors, outputs: Outputs
 ) -> dict[str, FloatArray]:
-    """Figures of a run, by the names of `PER_RUN`; NaN where the solution does not reach.
-
-    outputs: The K epochs that were asked for.
-    """
+    """Figures of a run, by the names of `PER_RUN`; NaN where the solution does not reach."""
     done = solution.time.size
     error = solution.errors(truth)
     nees, log_det = np.empty((2, done, len(GROUPS)))
@@ -152,10 +146,7 @@ def _normalised(error: FloatArray, covariance: FloatArray) -> tuple[FloatArray, 
 
 
 def lag_one(parts: Sequence[FloatArray]) -> float:
-    """Autocorrelation of innovations from fix to fix, in its standard error if they are white.
-
-    parts: (E, 3), standardised innovations of each kind in order of time.
-    """
+    """Autocorrelation of standardised innovations of each kind, (E, 3), in its standard error."""
     products = [np.zeros(0), *((part[1:] * part[:-1]).ravel() for part in parts)]
     together = np.concatenate(products)
     together = together[np.isfinite(together)]

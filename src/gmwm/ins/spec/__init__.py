@@ -4,6 +4,7 @@ from gmwm.ins.spec.experiment import ReadingSpec as ReadingSpec, experiment_from
 from gmwm.ins.spec.fields import (
     FileName as FileName,
     Meters as Meters,
+    Models as Models,
     PositiveMeters as PositiveMeters,
     PositiveRadians as PositiveRadians,
     PositiveSeconds as PositiveSeconds,
@@ -14,10 +15,7 @@ from gmwm.ins.spec.fields import (
     Three as Three,
     number as number,
     read_document as read_document,
-    written as written,
-)
-from gmwm.ins.spec.sensor_terms import (
-    Models as Models,
     read_models as read_models,
     sensor_models as sensor_models,
+    written as written,
 )

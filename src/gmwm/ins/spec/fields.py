@@ -16,21 +16,38 @@ from pydantic import (
     BaseModel,
     BeforeValidator,
     ConfigDict,
+    Discriminator,
     Field,
     GetCoreSchemaHandler,
     StringConstraints,
+    Tag,
+    TypeAdapter,
     ValidationError,
+    ValidationInfo,
     ValidatorFunctionWrapHandler,
     WrapValidator,
     create_model,
+    field_validator,
     model_validator,
 )
 from pydantic_core import CoreSchema, core_schema
 
 from gmwm._core import checks
 from gmwm._core.files import opened
-from gmwm._core.units import factor
+from gmwm._core.units import SI_UNIT, factor, si_parameter_unit
+from gmwm.calibration import load
 from gmwm.errors import InputError
+from gmwm.ins.imu import SensorModels
+from gmwm.process import (
+    BiasInstability,
+    GaussMarkov,
+    Model,
+    Process,
+    QuantizationNoise,
+    RandomWalk,
+    RateRamp,
+    WhiteNoise,
+)
 
 FILE, RECORDINGS, MODELS, REDUCED = TAGS = ("<file>", "<recordings>", "<models>", "<reduced>")
 """Forms that one key may have; pydantic puts them into the place of an error."""
@@ -116,10 +133,7 @@ def _sentence(error: ValidationError, where: str, needs: str) -> tuple[str, str]
 
 
 def value(given: Any, si_unit: str) -> float:
-    """A number in SI units, from a number or from text such as ``"140 deg/h"``.
-
-    Raises InputError if it is not a finite number, or its unit is of another dimension.
-    """
+    """A finite number in SI units, from a number or from text such as ``"140 deg/h"``."""
     if checks.is_number(given):
         found = float(given)
     else:
@@ -179,10 +193,7 @@ _LARGEST_FILE = 1 << 20  # bytes of a document that a person writes
 
 
 def read_document(path: Path) -> dict[str, Any]:
-    """Content of a YAML file; keys without a value are left out.
-
-    Raises InputError if it cannot be read, is not YAML or not a mapping, or has a key twice.
-    """
+    """Content of a YAML file, a mapping; keys without a value are left out."""
     try:
         with opened(path) as stream:
             text = stream.read(_LARGEST_FILE + 1)
@@ -217,10 +228,7 @@ def _load(text: str) -> Any:
 
 
 def _check_keys(node: Any, checked: set[int]) -> None:
-    """YAML lets a later key replace an earlier one; two filters of one name are a slip.
-
-    checked: Nodes that were; an alias is the node that it stands for.
-    """
+    """Reject a key given twice, which YAML would replace; an alias is a node checked before."""
     if node is None or isinstance(node.value, str) or id(node) in checked:
         return
     checked.add(id(node))
@@ -249,3 +257,133 @@ def _reason(error: Exception) -> str:
         fits = isinstance(error, ValueError | RecursionError | yaml.YAMLError)
         return text if fits else f"a value does not fit its tag, {text}"
     return f"line {mark.line + 1}, column {mark.column + 1}: {problem}"
+
+
+_KINDS: dict[str, type[Process]] = {
+    "N": WhiteNoise,
+    "K": RandomWalk,
+    "Q": QuantizationNoise,
+    "B": BiasInstability,
+    "R": RateRamp,
+}
+
+_PAIRS = TypeAdapter(Annotated[tuple[tuple[Any, Any], ...], written("[[sigma, tau], ...]")])
+
+
+class Terms(Spec):
+    """The error model of a sensor; ``bias`` is the standard deviation of a constant."""
+
+    QUANTITY: ClassVar[str]
+
+    N: WhiteNoise | None = None
+    K: RandomWalk | None = None
+    Q: QuantizationNoise | None = None
+    B: BiasInstability | None = None
+    R: RateRamp | None = None
+    GM: tuple[GaussMarkov, ...] = ()
+    bias: float = 0.0
+
+    @field_validator(*_KINDS, mode="before")
+    @classmethod
+    def _term(cls, given: Any, info: ValidationInfo) -> Process:
+        kind = _KINDS[info.field_name or ""]
+        unit = si_parameter_unit(kind.parameters[0].unit, cls.QUANTITY).replace(" s", "*s")
+        return kind(value(given, unit))
+
+    @field_validator("GM", mode="before")
+    @classmethod
+    def _markov(cls, given: Any) -> tuple[GaussMarkov, ...]:
+        unit, pairs = SI_UNIT[cls.QUANTITY], _PAIRS.validate_python(given)
+        return tuple(GaussMarkov(value(sigma, unit), value(tau, "s")) for sigma, tau in pairs)
+
+    @field_validator("bias", mode="before")
+    @classmethod
+    def _bias(cls, given: Any) -> float:
+        return value(given, SI_UNIT[cls.QUANTITY])
+
+    @model_validator(mode="after")
+    def _has_noise(self) -> Self:
+        if not self.terms:
+            raise ValueError("there is no noise: give N at least")
+        Model(self.terms)
+        return self
+
+    @property
+    def terms(self) -> tuple[Process, ...]:
+        """In the order of the keys above."""
+        single = (self.N, self.K, self.Q, self.B, self.R)
+        return (*(term for term in single if term is not None), *self.GM)
+
+
+class GyroTerms(Terms):
+    """The error model of a gyro."""
+
+    QUANTITY = "gyro"
+
+
+class AccelTerms(Terms):
+    """The error model of an accelerometer."""
+
+    QUANTITY = "accel"
+
+
+class ModelsSpec(Spec):
+    """Models by kind of sensor or by axis; an axis goes before its kind."""
+
+    gyro: GyroTerms | None = None
+    accel: AccelTerms | None = None
+    gyro_x: GyroTerms | None = None
+    gyro_y: GyroTerms | None = None
+    gyro_z: GyroTerms | None = None
+    accel_x: AccelTerms | None = None
+    accel_y: AccelTerms | None = None
+    accel_z: AccelTerms | None = None
+
+    @model_validator(mode="after")
+    def _complete(self) -> Self:
+        self.models()
+        return self
+
+    def models(self) -> SensorModels:
+        """Models of all six axes."""
+        given: dict[str, Terms] = self.given
+        return SensorModels.of(
+            {name: Model(each.terms) for name, each in given.items()},
+            {name: each.bias for name, each in given.items()},
+        )
+
+
+def form_of(given: Any) -> str | None:
+    """The form of what may be a file, models or a mapping that says where to take them from."""
+    if isinstance(given, str):
+        return FILE
+    if not isinstance(given, Mapping):
+        return None
+    return RECORDINGS if "recordings" in given else REDUCED if "reduce" in given else MODELS
+
+
+OfFile = Annotated[FileName, Tag(FILE)]
+OfTerms = Annotated[ModelsSpec, Tag(MODELS)]
+Models = Annotated[
+    OfFile | OfTerms, Discriminator(form_of), written("a calibration.json, or models")
+]
+"""Sensor models, or the name of a calibration.json that has them."""
+
+
+def sensor_models(given: Mapping[str, Any], where: str) -> SensorModels:
+    """Models of six sensors from a mapping as of `ModelsSpec`, written at ``where``."""
+    return ModelsSpec.parse(given, where).models()
+
+
+def read_models(where: str, given: str | ModelsSpec, folder: Path) -> SensorModels:
+    """Sensor models from what was written, or from a calibration.json relative to a folder."""
+    if isinstance(given, ModelsSpec):
+        return given.models()
+    try:
+        calibration = load(folder / given)
+    except InputError as error:
+        raise InputError(f"{where}: {error}") from None
+    try:
+        return SensorModels.of(calibration)
+    except InputError as error:
+        raise InputError(f"{where}, {given}: {error}") from None

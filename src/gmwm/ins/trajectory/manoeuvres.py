@@ -344,10 +344,7 @@ def _walk(
     start: FloatArray,
     lla: FloatArray,
 ) -> None:
-    """Integrate the way over the ellipsoid by the fourth-order Runge-Kutta rule.
-
-    ``speed``, ``heading`` and ``climb`` are given at epochs and half-way.
-    """
+    """Integrate the way by the fourth-order Runge-Kutta rule; inputs at epochs and half-way."""
     lla[0] = start
     for i in range(lla.shape[0] - 1):
         a, b, c = 2 * i, 2 * i + 1, 2 * i + 2
@@ -448,11 +445,7 @@ def through(
 
 
 def _cut(corner: Pulse, speed: float, waypoint: int) -> float:
-    """How far before a waypoint a turn begins, and behind it ends, m.
-
-    A turn with ramps is symmetric, so its begin, the waypoint and its end make an isosceles
-    triangle.
-    """
+    """How far before a waypoint a turn, which is symmetric, begins, and behind it ends, m."""
     if abs(corner.change) > _HALF_TURN:
         raise InputError(
             f"waypoint {waypoint} asks to turn back: put two waypoints there, side by side"
@@ -464,12 +457,7 @@ def _cut(corner: Pulse, speed: float, waypoint: int) -> float:
 
 
 def displacement(turn: Pulse, heading: float, speed: float) -> tuple[float, float]:
-    """How far a turn leads to the north and east, m.
-
-    turn: Change of the heading, rad.
-    heading: Before the turn, rad.
-    speed: m/s.
-    """
+    """How far a turn from a heading (rad) at a speed (m/s) leads to the north and east, m."""
     time = np.linspace(0.0, turn.duration, _TURN_POINTS)
     along = heading + turn.value(time)
     north, east = (float(simpson(each, x=time)) for each in (np.cos(along), np.sin(along)))

@@ -29,11 +29,9 @@ def unwrapped_longitudes(lla: FloatArray) -> FloatArray:
 
 
 def unwrapped_angles(rpy: FloatArray) -> FloatArray:
-    """Roll, pitch and yaw that do not jump at +-180 deg.
+    """Roll, pitch and yaw, (n + 1, 3), rad, that do not jump at +-180 deg.
 
-    rpy: (n + 1, 3), rad.
-    Raises InputError if roll or yaw turn by more than 90 deg between epochs all the same, as where
-        the body points straight up or down.
+    Raises InputError if roll or yaw still turn by more than 90 deg between epochs.
     """
     result = np.unwrap(np.asarray(rpy, dtype=float), axis=0)
     result[:, 1] = rpy[:, 1]
@@ -49,24 +47,13 @@ def unwrapped_angles(rpy: FloatArray) -> FloatArray:
 
 
 def coefficients(values: FloatArray, dt: float) -> FloatArray:
-    """Polynomials of the spline through evenly spaced values.
-
-    values: (n + 1, 3).
-    dt: s.
-    Returns: (n, 3, 4), for each interval and column the coefficients of 1, t, t^2, t^3, with t in s
-        from the beginning of the interval.
-    """
+    """Spline through values (n + 1, 3): coefficients (n, 3, 4) of 1, t, t^2, t^3 by interval."""
     spline = CubicSpline(np.arange(len(values)) * dt, values, axis=0)
     return np.ascontiguousarray(np.transpose(spline.c[::-1], (1, 2, 0)))
 
 
 def track_velocity(lla: FloatArray, dt: float) -> FloatArray:
-    """Velocity along a track.
-
-    lla: (n + 1, 3), latitude, longitude without jumps, rad, and height, m.
-    dt: s.
-    Returns: (n + 1, 3), to the north, east and down, m/s.
-    """
+    """Velocity, (n + 1, 3), along a track without jumps of the longitude."""
     # Relative to the first epoch fewer digits are lost in the differences.
     spline = CubicSpline(np.arange(len(lla)) * dt, lla - lla[0], axis=0)
     rate = spline(np.arange(len(lla)) * dt, 1)
@@ -81,12 +68,8 @@ def track_velocity(lla: FloatArray, dt: float) -> FloatArray:
 def smoothed(values: FloatArray, dt: float, cutoff: float) -> FloatArray:
     """Least-squares cubic spline with evenly spaced knots: what moves faster is left out.
 
-    values: (n + 1, 3), without jumps.
-    dt: s.
-    cutoff: Hz. Knots are half its period apart; with less than two samples from knot to knot,
-        nothing is left out.
-    Returns: (n + 1, 3), values of the spline. de Boor (1978), *A Practical Guide to Splines*, ch.
-        XIV.
+    Knots are half a period of the cutoff (Hz) apart; with less than two samples from knot to knot,
+    nothing is left out. de Boor (1978), *A Practical Guide to Splines*, ch. XIV.
     """
     n = len(values) - 1
     spans = max(round(2.0 * cutoff * n * dt), 1)
@@ -272,10 +255,7 @@ def check_latitudes(lla: FloatArray, name: str) -> None:
 
 
 def finite_numbers(values: object, name: str) -> FloatArray:
-    """An array of finite numbers.
-
-    Raises InputError with the row of the first that is not finite.
-    """
+    """An array of finite numbers; InputError names the row of the first that is not."""
     array = np.ascontiguousarray(real_numbers(values, name))
     for part in windows(len(array)):
         if not np.all(np.isfinite(array[part])):

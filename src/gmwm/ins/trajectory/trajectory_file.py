@@ -81,8 +81,6 @@ class LogColumns:
         quantities: Quantities that a column of a name holds; empty if it is something else.
         needed: Quantities that must be there.
         header: An example that has them.
-        Raises InputError if there is no such table, two columns look like one quantity, or one that
-            is needed has none.
         """
         table = CsvTable.open(existing_file(path))
         columns: dict[str, int] = {}
@@ -139,10 +137,7 @@ class LogColumns:
             )
 
     def metres(self, quantity: str, values: FloatArray) -> FloatArray:
-        """Lengths in m.
-
-        Raises InputError if the column is in another unit than m or ft.
-        """
+        """Lengths in m; InputError if the column is in another unit than m or ft."""
         unit = self.unit(quantity) or "m"
         if unit not in ("m", "ft"):
             raise InputError(
@@ -160,8 +155,6 @@ class LogColumns:
 
         values: Quantities, with the latitude.
         limits: Quantities that are angles -> largest possible size, rad.
-        Raises InputError if a unit is unknown or is none of an angle, or an angle is too large; the
-            message names the line of the first.
         """
         beyond = bool(np.any(np.abs(values["latitude"]) > 0.5 * np.pi))
         common = self.unit("latitude") or ("deg" if beyond else None)
