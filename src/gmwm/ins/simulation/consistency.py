@@ -133,30 +133,31 @@ def _consistency(
     runs: FilterErrors, alive: BoolArray, epochs: IntArray, *, single: bool
 ) -> Consistency:
     """Consistency of some runs at one epoch, or over several."""
+    result = Consistency({}, {}, {}, {})
 
-    def nees_of(squares: FloatArray, size: int) -> Ratio:
+    def judge(name: str, squares: FloatArray, standard: FloatArray, size: int) -> None:
         if single:
-            return chi_square_ratio(squares, size)
-        return mean_ratio(np.mean(squares, axis=1) / size)
+            result.nees[name] = chi_square_ratio(squares, size)
+        else:
+            result.nees[name] = mean_ratio(np.mean(squares, axis=1) / size)
+        result.coverage[name] = coverage_of(standard, single)
+        result.rms[name] = float(np.sqrt(np.mean(standard**2))) if standard.size else float("nan")
 
-    nees, coverage, rms, score = {}, {}, {}, {}
     for i, (name, part) in enumerate(GROUPS.items()):
         size = part.stop - part.start
         squares = runs.nees[alive][:, epochs, i]
-        nees[name] = nees_of(squares, size)
-        standard = runs.error[alive][:, epochs, part] / runs.sd[alive][:, epochs, part]
-        coverage[name], rms[name] = coverage_of(standard, single), _rms(standard)
+        error, sd = runs.error[alive][:, epochs, part], runs.sd[alive][:, epochs, part]
+        judge(name, squares, error / sd, size)
         densities = squares + runs.log_det[alive][:, epochs, i] + size * np.log(2.0 * np.pi)
-        score[name] = float(0.5 * np.mean(densities)) if squares.size else float("nan")
+        result.score[name] = float(0.5 * np.mean(densities)) if squares.size else float("nan")
     settled = epochs[np.all(np.isfinite(runs.sensor_nees[alive][:, epochs]), axis=0)]
     if np.any(alive) and settled.size:
         # Only sensors that have states.
         error, sd = runs.sensor_error[alive][:, settled], runs.sensor_sd[alive][:, settled]
         known = np.all(sd > 0.0, axis=(0, 1))
         standard = np.asarray(error[..., known] / sd[..., known])
-        nees["sensors"] = nees_of(runs.sensor_nees[alive][:, settled], int(np.sum(known)))
-        coverage["sensors"], rms["sensors"] = coverage_of(standard, single), _rms(standard)
-    return Consistency(nees, coverage, rms, score)
+        judge("sensors", runs.sensor_nees[alive][:, settled], standard, int(np.sum(known)))
+    return result
 
 
 @dataclass(frozen=True)
@@ -237,7 +238,3 @@ def _binomial(level: float, fraction: float, draws: float) -> Coverage:
     lower = float(betaincinv(hits, draws - hits + 1.0, tail)) if hits > 0.0 else 0.0
     upper = float(betaincinv(hits + 1.0, draws - hits, 1.0 - tail)) if hits < draws else 1.0
     return Coverage(level, fraction, lower, upper)
-
-
-def _rms(standard: FloatArray) -> float:
-    return float(np.sqrt(np.mean(standard**2))) if standard.size else float("nan")

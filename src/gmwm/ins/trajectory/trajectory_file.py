@@ -15,17 +15,13 @@ from gmwm.errors import InputError
 from gmwm.readers import TIME, CsvTable, label, meaning, stated_seconds
 
 
-def by_word(words: Mapping[str, str]) -> dict[str, str]:
-    """Word -> meaning, from meaning -> words with blanks between them."""
+def by_word(**words: str) -> dict[str, str]:
+    """Word -> meaning, from words with blanks between them by meaning."""
     return {word: meant for meant, each in words.items() for word in each.split()}
 
 
 POSITION_WORDS = by_word(
-    {
-        "latitude": "latitude lat",
-        "longitude": "longitude lon long lng",
-        "height": "height altitude alt h hgt",
-    }
+    latitude="latitude lat", longitude="longitude lon long lng", height="height altitude alt h hgt"
 )
 """Meaning of the last word of a column's name, if it is a position."""
 
@@ -33,12 +29,10 @@ FACTORS = {"rad": 1.0, "deg": np.pi / 180.0, "m": 1.0, "ft": 0.3048}
 """Units of angles and lengths in SI."""
 
 _UNITS = by_word(
-    {
-        "rad": "rad rads radian radians",
-        "deg": "deg degs degree degrees °",
-        "m": "m meter meters metre metres",
-        "ft": "ft feet",
-    }
+    rad="rad rads radian radians",
+    deg="deg degs degree degrees °",
+    m="m meter meters metre metres",
+    ft="ft feet",
 )
 _WORD = re.compile(r"°|[A-Z]?[a-z]+|[A-Z]+")
 
@@ -178,9 +172,7 @@ class LogColumns:
 
 
 _HEADER = "time_s,latitude_deg,longitude_deg,height_m,roll_deg,pitch_deg,yaw_deg"
-_WORDS = POSITION_WORDS | by_word(
-    {"roll": "roll bank", "pitch": "pitch", "yaw": "yaw heading hdg azimuth"}
-)
+_WORDS = POSITION_WORDS | by_word(roll="roll bank", pitch="pitch", yaw="yaw heading hdg azimuth")
 _NOT_THE_VALUE = frozenset(
     {"std", "sigma", "var", "cov", "err", "error", "rate", "ref", "acc", "accuracy", "dot"}
 )
