@@ -1,4 +1,4 @@
-"""Error models of the six inertial sensors, as a navigation filter and a simulation take them."""
+"""Errors of the six inertial sensors: models, and static recordings cut into stretches."""
 
 from __future__ import annotations
 
@@ -22,6 +22,7 @@ AXES = ("gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z")
 """The sensors, in the order of all arrays."""
 
 _KINDS = ("gyro", "accel")
+_RATE_TOLERANCE = 1e-3
 
 
 @dataclass(frozen=True)
@@ -165,9 +166,6 @@ def _standard_deviations(given: Mapping[str, float]) -> dict[str, float]:
         if value != 0.0:
             values[axis] = checks.positive(f"bias_sd of {axis}", value)
     return values
-
-
-_RATE_TOLERANCE = 1e-3
 
 
 @dataclass(frozen=True, eq=False)

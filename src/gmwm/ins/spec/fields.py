@@ -1,7 +1,6 @@
-"""What people write, checked field by field: values with units, and messages that name the place.
+"""What people write, checked field by field: values with units, models of sensors, YAML files.
 
-A value with a unit such as ``"140 deg/h"`` becomes a number in SI units by a validator of the
-field; pydantic says where it stood.
+A value such as ``"140 deg/h"`` becomes a number in SI units; pydantic says where a fault stood.
 """
 
 from __future__ import annotations
@@ -53,6 +52,7 @@ FILE, RECORDINGS, MODELS, REDUCED = TAGS = ("<file>", "<recordings>", "<models>"
 """Forms that one key may have; pydantic puts them into the place of an error."""
 
 _LEAST, _LARGEST = 1e-60, 1e60  # SI: beyond, powers overflow or vanish
+_LARGEST_FILE = 1 << 20  # bytes of a document that a person writes
 _NUMBER = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*)")
 
 
@@ -187,9 +187,6 @@ PositiveRadians = Annotated[Radians, Field(gt=0.0)]
 PositiveSeconds = Annotated[Seconds, Field(gt=0.0)]
 PositiveSpeed = Annotated[float, number("m/s"), Field(gt=0.0)]
 FileName = Annotated[str, StringConstraints(pattern=r"^[^\x00]+$"), written("the name of a file")]
-
-
-_LARGEST_FILE = 1 << 20  # bytes of a document that a person writes
 
 
 def read_document(path: Path) -> dict[str, Any]:

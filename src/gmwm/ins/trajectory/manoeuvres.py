@@ -1,8 +1,7 @@
-"""Manoeuvres, and the trajectories that a list of them gives.
+"""Trajectories from lists of manoeuvres or through waypoints.
 
-Speed is horizontal speed over ground. Heading is counted from north to the east. Every change
-begins and ends with a ramp of its rate that is smooth in its second derivative, so angular rates
-and specific forces are continuous.
+Speed is horizontal, over ground; heading is counted from north to the east. Rates of change rise
+and fall smoothly, so that angular rates and specific forces are continuous.
 """
 
 from __future__ import annotations
@@ -26,6 +25,9 @@ Lla = Sequence[float] | FloatArray
 """Latitude, longitude, rad, and height, m."""
 
 _LONGEST = 10_000_000  # steps: 2 GB while the trajectory is built
+_SHORTEST = 1e-6  # m
+_HALF_TURN = math.radians(179.0)  # the corner of a U-turn lies at infinity
+_TURN_POINTS = 1001
 
 
 @dataclass(frozen=True)
@@ -367,11 +369,6 @@ def _angular_speed(lat: float, h: float, speed: float, heading: float) -> tuple[
     meridian, transverse = radii(lat)
     north, east = speed * math.cos(heading), speed * math.sin(heading)
     return north / (meridian + h), east / ((transverse + h) * math.cos(lat))
-
-
-_SHORTEST = 1e-6  # m
-_HALF_TURN = math.radians(179.0)  # the corner of a U-turn lies at infinity
-_TURN_POINTS = 1001
 
 
 def through(

@@ -19,6 +19,8 @@ from gmwm.ins.trajectory.trajectory_file import read_log
 
 _DEGREE = 3
 _LARGEST_TURN = 0.5 * np.pi  # rad from epoch to epoch; beyond, the way round would be a guess
+_ATTITUDE_CUTOFF = 5.0  # of that of the track
+_HIGHEST_LATITUDE = math.radians(89.0)  # beyond, north-east-down axes turn too fast
 
 
 def unwrapped_longitudes(lla: FloatArray) -> FloatArray:
@@ -81,10 +83,6 @@ def smoothed(values: FloatArray, dt: float, cutoff: float) -> FloatArray:
     mean = np.mean(values, axis=0)
     spline = make_lsq_spline(x, values - mean, knots, _DEGREE)
     return mean + spline(x)
-
-
-_ATTITUDE_CUTOFF = 5.0  # of that of the track
-_HIGHEST_LATITUDE = math.radians(89.0)  # beyond, north-east-down axes turn too fast
 
 
 @dataclass(frozen=True, eq=False)
