@@ -82,9 +82,8 @@ def frame(rows: Iterable[Any], columns: type | Sequence[str], **same: Any) -> pa
 def text_table(
     rows: Sequence[Any], quantity: str | None = None, unit: str = "", units: str = "field"
 ) -> str:
-    """Declared rows as lines of at most 80 columns; the unit stands below the heading.
+    """Rows of a declared class as lines of at most 80 columns, units below the headings.
 
-    rows: Of one class.
     quantity, unit: Of the channel: {"gyro", "accel", None} and its SI unit.
     units: {"field", "si"}, data-sheet units or SI.
     """

@@ -118,8 +118,8 @@ def imu_of(
     calibrations = [each for each in given if isinstance(each, Calibration)]
     fits = {name: fit for each in calibrations for name, fit in each.items()}
     axes = {
-        name: axis_of(name, one, _rate(source, each, name), fits.get(name), tau)
-        for source, each in zip(given, numbers, strict=True)
+        name: axis_of(name, one, each.rate, fits.get(name), tau)
+        for each in numbers
         for name, one in each.items()
     }
     gyro, accel = (_triad(quantity, numbers, axes, form) for quantity in SENSORS)
@@ -139,13 +139,6 @@ def imu_of(
         cautions=_remarks(given, numbers, cautions=True),
         topic=_topic(calibrations),
     )
-
-
-def _rate(source: Any, numbers: SensorNumbers, name: str) -> float:
-    """Sampling rate of a channel, Hz."""
-    if isinstance(source, Calibration) and not source.has_one_rate:
-        return 1.0 / source[name].wv.dt
-    return numbers.rate
 
 
 def _triad(
@@ -217,6 +210,8 @@ def axis_of(
     )
     if fitted is None:
         return axis
+    if not rate > 0.0:  # channels of several rates
+        axis = replace(axis, rate=1.0 / fitted.wv.dt)
     if axis.N <= 0.0:
         axis = replace(axis, N=noise_density(fitted).value, upper=axis.upper | {"N"})
     if "K" in numbers.form and axis.K <= 0.0:

@@ -137,7 +137,12 @@ def bound_of(
     for axis, target, found, best in zip(group, problem.targets, errors, tight, strict=True):
         notices = list(target.notices)
         notices += _overconfidence(axis, model, sd, horizon) if target.notices else []
-        notices += [] if best is None else _looseness(found[0], best)
+        if best is not None and found[0].tightness > tuning.LOOSE:
+            values = {"tightness": found[0].tightness, "with_state": best.tightness}
+            is_worth = best.tightness <= found[0].tightness / tuning.WORTH_A_STATE
+            hint = f"use {TIGHTEST} where the filter has a state for it" if is_worth else ""
+            more = {"hint": hint, "time": found[0].time, "tightest": TIGHTEST}
+            notices.append(notice("loose-form", "", values, **more))
         notices += covered_terms_notices(axis, target, model, problem.targets)
         notices += fit_notices(axis, level)
         about = (form, model, horizon, sd, "bound", found, tuple(notices), axis.quantity, stderr)
@@ -207,20 +212,11 @@ def _overconfidence(axis: AxisModel, model: Model, sd: float, horizon: float) ->
     worst = max(unaided(tuning.SUSPECT))
     if worst[0] <= tuning.OPTIMISTIC:  # not NaN, where nothing is predicted
         usual = axis.chain
-        (pose, *_), fixed = (
-            chain.errors(
-                axis.model,
-                model,
-                axis.dt,
-                [horizon],
-                true_sd=axis.bias_sd,
-                believed_sd=sd,
-                every_fix=chain is usual,
-            ).nees()
-            for chain in (axis.between(horizon), usual)
-        )
+        given, starts = (axis.model, model, axis.dt, [horizon]), (axis.bias_sd, sd)
+        poses = Chain.of_poses(axis.quantity, horizon).errors(*given, *starts)
+        fixed = usual.errors(*given, *starts, every_fix=True).nees()
         worst = max(
-            (float(pose), horizon, f"between keyframes every {horizon:g} s"),
+            (float(poses.nees()[0]), horizon, f"between keyframes every {horizon:g} s"),
             (float(np.max(fixed[:-1])), 0.0, f"with a fix every {usual.interval:g} s"),
             *unaided(tuning.EARLY),
         )
@@ -228,16 +224,6 @@ def _overconfidence(axis: AxisModel, model: Model, sd: float, horizon: float) ->
     if not nees > tuning.OPTIMISTIC:
         return []
     return [notice("optimistic", "", {"nees": nees, "time": time}, variant="bound", when=when)]
-
-
-def _looseness(found: Predicted, best: Predicted) -> list[Notice]:
-    """How conservative a form is, and whether another is worth its state."""
-    if found.tightness <= tuning.LOOSE:
-        return []
-    values = {"tightness": found.tightness, "with_state": best.tightness}
-    is_worth = best.tightness <= found.tightness / tuning.WORTH_A_STATE
-    hint = f"use {TIGHTEST} where the filter has a state for it" if is_worth else ""
-    return [notice("loose-form", "", values, hint=hint, time=found.time, tightest=TIGHTEST)]
 
 
 def covered_terms_notices(

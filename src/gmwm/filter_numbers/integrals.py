@@ -92,9 +92,6 @@ def integral_rms(
     return _from_states(form, t, dt, known=known_start and not process.lines())
 
 
-# -- by states ------------------------------------------------------------------------------------
-
-
 def _from_states(form: StateSpace, t: FloatArray, dt: float, *, known: bool) -> FloatArray:
     mean = np.concatenate([np.zeros(ORDERS), form.initial_mean])
     covariance = np.zeros((mean.size, mean.size))
@@ -123,9 +120,6 @@ def _steps(t: FloatArray, dt: float) -> tuple[list[int], FloatArray]:
     return [int(n) for n in whole], rest
 
 
-# -- by the spectrum ------------------------------------------------------------------------------
-
-
 def _from_spectrum(process: Process, t: FloatArray, dt: float) -> FloatArray:
     """2 int S(f) |G(f)|^2 df with the gain G of each integral, less G(0) for a start at zero."""
     # The rule by which a simulation decides whether it starts at zero.
@@ -151,9 +145,8 @@ def _from_spectrum(process: Process, t: FloatArray, dt: float) -> FloatArray:
                 "budget: give the process a state_space"
             )
         for place, amplitude in lines:
-            line = _squared_gain(
-                np.array([place]), np.ones(1), count, rest, dt, False, moment[:, i]
-            )
+            about = (count, rest, dt, False, moment[:, i])
+            line = _squared_gain(np.array([place]), np.ones(1), *about)
             variance += 0.5 * amplitude**2 * line[:, 0]
         result[:, i] = np.sqrt(variance + (process.drift_rate() * moment[:, i]) ** 2)
     return result
