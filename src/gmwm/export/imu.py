@@ -121,17 +121,10 @@ class Triad:
         known = [axis.tau for axis in self.axes if axis.tau > 0.0]
         # To this correlation time all can be moved at the least cost to the one it costs most.
         tau = float(np.sqrt(min(known) * max(known))) if known else float("nan")
-        moved = [axis.moved(tau) if axis.tau > 0.0 else axis for axis in self.axes]
-        largest = Axis(
-            "",
-            self.N,
-            self.K,
-            max(axis.sigma for axis in moved),
-            tau,
-            self.initial_sd,
-            rate=self.rate,
-            upper=frozenset().union(*(axis.upper for axis in self.axes)),
-        )
+        sigma = max((a.moved(tau) if a.tau > 0.0 else a).sigma for a in self.axes)
+        upper = frozenset().union(*(axis.upper for axis in self.axes))
+        values = (self.N, self.K, sigma, tau, self.initial_sd)
+        largest = Axis("", *values, rate=self.rate, upper=upper)
         return tuple(
             by_letter.get(letter, replace(largest, name=f"{self.quantity}_{letter}"))
             for letter in LETTERS

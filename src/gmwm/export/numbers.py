@@ -127,18 +127,11 @@ def imu_of(
         gyro, accel = (_with_shared(t, given, numbers, fits, form) for t in (gyro, accel))
     if outlook is None:
         outlook = _outlook(calibrations) if len(calibrations) == len(given) else {}
-    return ImuNumbers(
-        gyro=gyro,
-        accel=accel,
-        form=form,
-        horizon=horizons[0],
-        method=next(one.method for each in numbers for one in each.values()),
-        sources=tuple(map(_source, numbers)),
-        outlook=outlook,
-        remarks=_remarks(given, numbers),
-        cautions=_remarks(given, numbers, cautions=True),
-        topic=_topic(calibrations),
-    )
+    method = next(one.method for each in numbers for one in each.values())
+    about = (tuple(map(_source, numbers)), outlook)
+    remarks = (_remarks(given, numbers), _remarks(given, numbers, cautions=True))
+    topic = _topic(calibrations)
+    return ImuNumbers(gyro, accel, form, horizons[0], method, *about, *remarks, topic)
 
 
 def _triad(
@@ -197,17 +190,8 @@ def axis_of(
 ) -> Axis:
     """An axis by its numbers; consumers reject zeros, so upper limits of its fit replace them."""
     sigma, own = (values[0] if values else float("nan") for values in (numbers.sigma, numbers.tau))
-    axis = Axis(
-        name,
-        numbers.N,
-        numbers.K,
-        sigma,
-        own,
-        numbers.initial_sd,
-        dict(numbers.nees),
-        rate,
-        notices=numbers.notices,
-    )
+    values = (numbers.N, numbers.K, sigma, own, numbers.initial_sd, dict(numbers.nees))
+    axis = Axis(name, *values, rate, notices=numbers.notices)
     if fitted is None:
         return axis
     if not rate > 0.0:  # channels of several rates

@@ -249,30 +249,16 @@ def _scaled(problem: Problem, processes: Sequence[Process], shares: FloatArray) 
 
 
 def least_sum(rows: FloatArray, least: FloatArray) -> FloatArray:
-    """The x of least sum with ``rows @ x >= 1`` and ``x >= least``.
+    """The x of least sum with ``rows @ x >= 1`` and ``x >= least``, (b, m); NaN if there is none.
 
-    Parameters
-    ----------
-    rows : (b, n, m) ndarray
-        Of b programs; not negative.
-    least : (m,) ndarray
-        Not negative.
-
-    Returns
-    -------
-    (b, m) ndarray
-        NaN where there is none.
-
-    Notes
-    -----
-    The programs have two to four variables under hundreds of constraints. The dual has as many rows
-    as variables, so a step of the revised simplex method costs one product with the matrix of
-    constraints and the inverse of a few numbers. A general solver takes far longer, mostly to set
-    up, and keeps to constraints to 1e-7 only.
+    rows: (b, n, m), of b programs of two to four variables under hundreds of constraints.
+    least: (m,).
 
     With x = least + y and the rest r = 1 - rows @ least the dual is to maximise r @ u over u >= 0
     with rows^T u <= 1, for which u = 0 is a start. The prices of a basis are y; the constraint that
-    they miss most enters it (Dantzig 1963, *Linear Programming and Extensions*, chapter 9).
+    they miss most enters it (Dantzig 1963, *Linear Programming and Extensions*, chapter 9). A step
+    costs one product with the constraints; a general solver takes far longer, mostly to set up, and
+    keeps to constraints to 1e-7 only.
     """
     b, n, m = rows.shape
     scale = np.max(rows, axis=2)
