@@ -23,14 +23,22 @@ from gmwm.export.target import Target
 from gmwm.filter_numbers import SensorNumbers
 from gmwm.process import Model
 
-_OWN_FILES: tuple[type[Target], ...] = (
-    *(Gtsam, GtsamCpp, Ros, Matlab, StateSpaceFile, Gazebo, PyIns, GnssInsSim),
-    *(KfGins, Basalt, Glim),
+_CONSUMERS: tuple[type[Target], ...] = (
+    *KEYED,
+    Gtsam,
+    GtsamCpp,
+    Ros,
+    Matlab,
+    StateSpaceFile,
+    Gazebo,
+    PyIns,
+    GnssInsSim,
+    KfGins,
+    Basalt,
+    Glim,
 )
 
-TARGETS: Mapping[str, Target] = MappingProxyType(
-    {each.name: each() for each in (*KEYED, *_OWN_FILES)}
-)
+TARGETS: Mapping[str, Target] = MappingProxyType({each.name: each() for each in _CONSUMERS})
 """Every consumer by name."""
 
 _RATES = ("update_rate", "IMU.Frequency")
