@@ -75,11 +75,7 @@ def results(
 
 
 def extra_workers(jobs: int, items: int) -> int:
-    """How many processes beside this one are of use, of which ``jobs`` are to share the work.
-
-    jobs: -1 for one a core.
-    items: That can be worked on side by side.
-    """
+    """How many processes beside this one help, if ``jobs`` (-1: one a core) share some items."""
     if current_process().name != "MainProcess":  # whoever started it has shared the cores out
         return 0
     cores = os.cpu_count() or 1

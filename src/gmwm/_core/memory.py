@@ -67,12 +67,7 @@ def held() -> float:
 
 
 def require(needed: float, what: str) -> None:
-    """Reject what needs more than the budget.
-
-    needed: Bytes.
-    what: For the message: the file.
-    Raises InputError with the code "memory".
-    """
+    """Raise InputError with the code "memory" if a file needs more bytes than the budget."""
     allowed = budget()
     if needed > allowed:
         size, most = (f"{count / (1 << 30):.3g} GB" for count in (needed, allowed))

@@ -170,13 +170,7 @@ class ImuNumbers:
 
     @property
     def rate(self) -> float:
-        """The higher of the two sensors' rates, Hz, at which a common message is sent.
-
-        Raises
-        ------
-        InputError
-            If it is not known.
-        """
+        """The higher of the two sensors' rates, Hz; raises InputError if it is not known."""
         rate = max(self.gyro.rate, self.accel.rate)
         if not rate > 0.0:
             raise InputError(NO_RATE)

@@ -193,11 +193,7 @@ def predicted(
 
 
 def judged(source: One | Several, numbers: FilterNumbers) -> FilterNumbers:
-    """The same numbers with the predictions where an error model is the truth.
-
-    source: The error model of the axis; as a mapping, with its name.
-    numbers: Of any origin; the times of its predictions are kept.
-    """
+    """The same numbers with the predictions where an error model is the truth, at their times."""
     axis = SensorAxes.of(source, None, 0.0).axes[0]
     times = [each.time for each in numbers.predicted]
     found = predicted(axis, axis.chain, numbers.model, numbers.initial_sd, times)
@@ -231,10 +227,7 @@ def _overconfidence(axis: AxisModel, model: Model, sd: float, horizon: float) ->
 def covered_terms_notices(
     axis: AxisModel, target: RequiredSpectrum, model: Model, sharing: Sequence[RequiredSpectrum]
 ) -> list[Notice]:
-    """The terms that N and K cover beside white noise and a random walk, where they are needed.
-
-    sharing: Spectra of the axes that share the numbers; needs of another axis are not explained.
-    """
+    """The terms that N and K cover beside white noise and a random walk, where they are needed."""
     f = target.frequencies(tuning.POINTS)
     need, believed = target.psd(f), model.psd(f, axis.dt)
     alike = np.minimum(need / believed, believed / need)

@@ -263,11 +263,7 @@ def certify(
 
 
 def _in_use(given: Given, axis: AxisModel, horizon: float, start: float) -> FilterNumbers:
-    """The numbers of one axis in use.
-
-    horizon, start: s, and standard deviation of the bias at the start (u), of numbers without.
-    Raises InputError if there are none for this axis.
-    """
+    """The numbers of one axis in use; those without a horizon (s) or start (u) get the given."""
     item: Any = given
     kind = axis.quantity or axis.name
     if isinstance(given, Mapping):

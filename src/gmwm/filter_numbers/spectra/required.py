@@ -162,8 +162,7 @@ def _weight(
 ) -> tuple[float, float]:
     """Share of a spectrum that counts, and its low-frequency density (its foot).
 
-    low: Largest density below the frequency above which peaks average out within the horizon.
-    passing: That frequency, which may lie beyond the band, Hz.
+    low: Largest density below ``passing`` (Hz), above which peaks average out within the horizon.
     """
     high, own = float(np.max(density)), float(density[0])
     if high <= low:
