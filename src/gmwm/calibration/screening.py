@@ -1,4 +1,4 @@
-"""What is done with a recording before a model is fitted to it: stretches at rest, issues."""
+"""Prepare a recording for a fit: stretches at rest, samples left out, terms offered."""
 
 from __future__ import annotations
 

@@ -71,10 +71,10 @@ HARMFUL_SHARE = 0.19
 lower, as much as a valid fit may miss."""
 
 MOST_DEPARTURES = 5
-"""Of one channel."""
+"""Departures of one channel at most."""
 
 REMOVALS = 3
-"""Rounds of taking off what is found: beside the noise that is left without it more may show."""
+"""Rounds of subtracting departures: without the first ones more may show."""
 
 FEWEST_DIFFERENCES = 16
 """Of block means, from which departures are looked for."""
@@ -83,7 +83,7 @@ NO_SLOW_PART = 1e-12
 """Of the floor: a part above it that is only rounding errors, as of white noise alone."""
 
 RATIO_OF_TIMES = 1.2
-"""Of neighbouring time constants and ends."""
+"""Ratio of neighbouring time constants and ends."""
 
 FEWEST_CYCLES, MOST_CYCLES = 0.5, 24.0
 """In a record, of slow periods: half a one is a hump or a bend; `gmwm.health` finds lines from 20
@@ -100,7 +100,7 @@ NEAR = 2
 """Members on either side of one that is found that are known with it: its time is between them."""
 
 SPANNED = 1e-6
-"""Of the largest singular value, below which curves are no others."""
+"""Part of the largest singular value below which curves are not independent."""
 
 FREQUENCIES = 64
 """At which the floor of the spectrum is looked for, from one period of the record to two blocks."""

@@ -1,4 +1,4 @@
-"""What the checks of a channel know of it."""
+"""A channel as its checks see it."""
 
 from __future__ import annotations
 

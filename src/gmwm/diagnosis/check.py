@@ -81,7 +81,7 @@ CHECKS: tuple[Callable[[Examined], Iterator[Notice]], ...] = (
 
 @dataclass(frozen=True, eq=False)
 class _Found:
-    """What was found of a channel, and its prediction errors in standard deviations."""
+    """Notices and numbers of a channel, and its prediction errors in standard deviations."""
 
     notices: list[Notice]
     facts: ChannelHealth = field(default_factory=ChannelHealth)
@@ -308,7 +308,7 @@ def _with_errors(
 
 
 def _standardized(channel: Examined) -> npt.NDArray[np.float32] | None:
-    """Prediction errors in standard deviations, clipped, 0 where there is none."""
+    """Prediction errors in standard deviations, clipped; 0 where there are none."""
     errors = channel.errors
     if not errors.level > 0.0:
         return None

@@ -179,7 +179,7 @@ def _unsteadiness(channel: Examined) -> dict[str, float] | None:
     if not lengths.size or not errors.level > 0.0:
         return None
     bounded = np.minimum(size, tuning.LARGE * errors.level)
-    # What is far beyond the noise around it is clipped: a shock is no change of the noise.
+    # What is far beyond the noise around it is clipped: a shock does not change the noise.
     squares = errors.scale[usable]
     squares *= tuning.CLIP
     np.minimum(size, squares, out=squares)
@@ -213,10 +213,10 @@ def _unsteadiness(channel: Examined) -> dict[str, float] | None:
 
 
 def _long_run_variance(values: FloatArray, memory: int) -> float:
-    """Of means, times their length: from neighbouring means of what is remembered."""
+    """Variance of long means times their length, from differences of neighbouring means."""
     return 0.5 * memory * float(np.mean(np.diff(_means(values, memory)) ** 2))
 
 
 def _means(values: FloatArray, length: int) -> FloatArray:
-    """Of parts of a length."""
+    """Means of parts of a length."""
     return np.asarray(values[: values.size // length * length].reshape(-1, length).mean(axis=1))

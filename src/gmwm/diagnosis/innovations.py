@@ -1,4 +1,4 @@
-"""What cannot be predicted of each sample from those before it.
+"""Errors of predicting each sample from those before it.
 
 Spikes, stuck values and changes of the noise are distinguished from the noise of a sensor where
 that noise is white. An autoregression of the first differences makes it so, whether it was white, a
@@ -111,7 +111,7 @@ def _autoregression(differences: FloatArray, known: int) -> FloatArray:
 
 
 def _complete(known: BoolArray, order: int) -> BoolArray:
-    """Whether a difference and the ``order`` before it are known."""
+    """Mark differences that are known together with the ``order`` before them."""
     complete = known.copy()
     complete[:order] = False
     if np.all(known):

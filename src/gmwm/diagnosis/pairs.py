@@ -1,4 +1,4 @@
-"""What two channels have in common."""
+"""Crosstalk between channels, and channels that follow the temperature."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def crosstalk_notices(errors: dict[str, npt.NDArray[np.float32]]) -> list[Notice
     were; one that matters is above 0.05.
 
     errors: Channel name -> prediction errors in units of their standard deviation, clipped, zero
-        where there is none, which counts for nothing in a sum of products.
+        where it is unknown, which adds nothing to a sum of products.
     """
     pairs = list(combinations(errors, 2))
     notices = []

@@ -50,7 +50,7 @@ class Spectrum:
 
     @property
     def frequency(self) -> FloatArray:
-        """Of each bin, Hz."""
+        """Frequency of each bin, Hz."""
         return np.asarray(self.resolution * np.arange(self.density.size), dtype=float)
 
 

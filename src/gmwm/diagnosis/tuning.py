@@ -118,7 +118,7 @@ FEWEST_KNOWN = 64
 """Samples in a row from which prediction errors are made: four coefficients."""
 
 ORDER = 16
-"""Of the autoregression; enough to whiten resonances and first differences."""
+"""Order of the autoregression; enough to whiten resonances and first differences."""
 
 SAMPLES_PER_COEFFICIENT = 16
 """Fewest: a coefficient then has an error of a quarter."""
@@ -231,7 +231,7 @@ FEWEST_IN_BAND = 8
 # -- lines ----------------------------------------------------------------------------------------
 
 NARROW = 0.01
-"""Of its frequency: what is wider is a resonance."""
+"""Part of its frequency that a line may be wide: wider ones are resonances."""
 
 UNRESOLVED = 6
 """Bins that a pure line takes under the Hann window, its foot included."""
@@ -253,7 +253,7 @@ FOOT_RATIO = 1.5
 """Ratio to the background that ends the foot of a line."""
 
 FOOT = 0.05
-"""Of the frequency: no foot reaches farther."""
+"""Part of the frequency beyond which no foot reaches."""
 
 # -- resonances -----------------------------------------------------------------------------------
 

@@ -7,9 +7,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from gmwm.issues import Notice
 from gmwm.errors import InputError
 from gmwm.filter_numbers import FilterNumbers
+from gmwm.issues import Notice
 from gmwm.process import GaussMarkov, Model, RandomWalk, WhiteNoise
 
 SENSORS = {"gyro": "gyroscope", "accel": "accelerometer"}
@@ -118,9 +118,15 @@ class Triad:
         tau = _common_tau(self.axes)
         moved = [axis.moved(tau) if axis.tau > 0.0 else axis for axis in self.axes]
         largest = Axis(
-            "", self.N, self.K, max(axis.sigma for axis in moved), tau, self.initial_sd,
-            rate=self.rate, upper=frozenset().union(*(axis.upper for axis in self.axes)),
-        )  # fmt: skip
+            "",
+            self.N,
+            self.K,
+            max(axis.sigma for axis in moved),
+            tau,
+            self.initial_sd,
+            rate=self.rate,
+            upper=frozenset().union(*(axis.upper for axis in self.axes)),
+        )
         return tuple(
             by_letter.get(letter, replace(largest, name=f"{self.quantity}_{letter}"))
             for letter in LETTERS

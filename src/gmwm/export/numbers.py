@@ -205,9 +205,16 @@ def axis_of(
     """An axis by its numbers; consumers reject zeros, so upper limits of its fit replace them."""
     sigma, own = (values[0] if values else float("nan") for values in (numbers.sigma, numbers.tau))
     axis = Axis(
-        name, numbers.N, numbers.K, sigma, own, numbers.initial_sd, dict(numbers.nees), rate,
+        name,
+        numbers.N,
+        numbers.K,
+        sigma,
+        own,
+        numbers.initial_sd,
+        dict(numbers.nees),
+        rate,
         notices=numbers.notices,
-    )  # fmt: skip
+    )
     if fitted is None:
         return axis
     if axis.N <= 0.0:

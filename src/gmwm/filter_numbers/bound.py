@@ -209,11 +209,16 @@ def _overconfidence(axis: AxisModel, model: Model, sd: float, horizon: float) ->
         usual = axis.chain
         (pose, *_), fixed = (
             chain.errors(
-                axis.model, model, axis.dt, [horizon],
-                true_sd=axis.bias_sd, believed_sd=sd, every_fix=chain is usual,
+                axis.model,
+                model,
+                axis.dt,
+                [horizon],
+                true_sd=axis.bias_sd,
+                believed_sd=sd,
+                every_fix=chain is usual,
             ).nees()
             for chain in (axis.between(horizon), usual)
-        )  # fmt: skip
+        )
         worst = max(
             (float(pose), horizon, f"between keyframes every {horizon:g} s"),
             (float(np.max(fixed[:-1])), 0.0, f"with a fix every {usual.interval:g} s"),

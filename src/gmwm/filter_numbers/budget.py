@@ -179,16 +179,16 @@ class ErrorBudget:
             channels = [c for c in self.channels if quantity in self.quantities(c)]
             if not channels:
                 continue
-            table = []
+            table: list[tuple[str, str, FloatArray]] = []
             for channel in channels:
                 rows = self._rows(channel, quantity)
                 parts = [(row.component, np.array(row.values)) for row in rows]
                 if len(rows) > 1:
                     parts.append(("total", self.total(channel)[quantity]))
-                table += [["" if i else channel, *part] for i, part in enumerate(parts)]
+                table += [("" if i else channel, *part) for i, part in enumerate(parts)]
             if HORIZONTAL in self.groups and quantity in self.quantities():
                 label = "tilt" if quantity == "attitude" else "horizontal, radial"
-                table.append([label, "", self.total()[quantity]])
+                table.append((label, "", self.total()[quantity]))
             cells = [
                 [name, component, *(brief(per_si(quantity) * value, 3) for value in values)]
                 for name, component, values in table

@@ -121,10 +121,16 @@ class Certificate(Document, Printed):
         lines = [f"Numbers in use: {self.numbers.source or 'given'}"]
         for consumer, title in CONSUMERS.items():
             rows = [
-                [c.where, f"{c.quantity} [{c.unit}]", f"{c.time:g}", cell(c.true), cell(c.believed),
-                 cell(c.nees, 3)]
+                [
+                    c.where,
+                    f"{c.quantity} [{c.unit}]",
+                    f"{c.time:g}",
+                    cell(c.true),
+                    cell(c.believed),
+                    cell(c.nees, 3),
+                ]
                 for c in self.of(consumer)
-            ]  # fmt: skip
+            ]
             if rows:
                 heads = ["", "", "time [s]", "true", "believed", "NEES/dof"]
                 lines += ["", title, plain_table(heads, rows)]
@@ -132,12 +138,13 @@ class Certificate(Document, Printed):
             lines += ["", *self._covered(quantity, units)]
         if self.causes:
             time = self.recommended.horizon
-            lines += ["", *wrapped(
+            note = (
                 f"Each row below the first has N and K for {time:g} s without aiding that are "
-                "never overconfident for the error model together with the cause in the row. The "
-                "factors are over those in use, and over those of the error model alone. Use N and "
-                "K as a pair: a factor can be below 1."
-            )]  # fmt: skip
+                "never overconfident for the error model together with the row's cause. The "
+                "factors are over those in use, and over those of the error model alone. Use N "
+                "and K as a pair: a factor can be below 1."
+            )
+            lines += ["", *wrapped(note)]
         lines += bullets(self.notices)
         return "\n".join([*lines, "", "Recommended: " + self.recommended.text(units)])
 

@@ -58,7 +58,7 @@ class Motion:
                 )
             sizes.append(float(np.sqrt(np.mean([np.nanvar(values) for values in found]))))
             memories += [_memory(values, 1.0 / motion.rate) for values in found]
-        return cls(*sizes, float(np.median(memories)))
+        return cls(sizes[0], sizes[1], float(np.median(memories)))
 
 
 @dataclass(frozen=True)

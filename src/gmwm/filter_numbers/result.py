@@ -282,10 +282,13 @@ class SensorNumbers(Mapping[str, FilterNumbers], Document, Printed):
         for quantity in dict.fromkeys(each.quantity for each in self.values()):
             lines += ["", *_tables(self.of(quantity), quantity, units)]
         if first.predicted:
-            lines += ["", *wrapped(
-                "NEES: predicted, per degree of freedom, after a time without aiding; sd: "
-                "predicted over true standard deviation then."
-            )]  # fmt: skip
+            lines += [
+                "",
+                *wrapped(
+                    "NEES: predicted, per degree of freedom, after a time without aiding; sd: "
+                    "predicted over true standard deviation then."
+                ),
+            ]
         if first.form != "N+GM":
             lines += wrapped("N and the slow terms belong together: use them as a pair.")
         places: dict[str, list[str]] = {}

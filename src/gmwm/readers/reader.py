@@ -113,8 +113,8 @@ def read(
     Notes
     -----
     Columns that would need more than 1 GB, with what is made of them, are kept in temporary files
-    (in ``TMPDIR``) and mapped: reading, `gmwm.health` and `gmwm.calibrate` then need about three
-    times the memory of one channel. The environment variable ``GMWM_MEMORY`` sets another limit.
+    (in ``TMPDIR``) and mapped, a channel at a time is worked on, and its wavelet variance needs at
+    most about three times its memory. The environment variable ``GMWM_MEMORY`` sets another limit.
 
     Raises
     ------

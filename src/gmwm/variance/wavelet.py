@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Annotated, Any, Self
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 from annotated_types import Gt, Le
@@ -25,7 +25,6 @@ from gmwm._core.tables import frame, plain_table
 from gmwm._core.text import Printed
 from gmwm._core.typing import FloatArray
 from gmwm._core.units import shown_unit
-from gmwm.errors import InputError
 from gmwm.issues import Notice, notice
 from gmwm.process import PSD, wavelet as known_wavelet
 from gmwm.variance import tuning
@@ -284,26 +283,6 @@ class WaveletVariance(Printed, Document):
         ]
         heads = ["tau [s]", f"Allan dev. [{self.unit}]", interval, "dof"]
         return f"{head}\n{plain_table(heads, rows)}"
-
-    def to_dict(self) -> dict[str, Any]:
-        """Everything needed to make the object again, in JSON types; see `from_dict`."""
-        return self.content()
-
-    @classmethod
-    def from_dict(cls, content: Mapping[str, Any]) -> Self:
-        """Inverse of `to_dict`.
-
-        Raises
-        ------
-        InputError
-            With the place of the first value that cannot be used.
-        """
-        try:
-            return cls.from_content(content)
-        except InputError:
-            raise
-        except (LookupError, TypeError, ValueError, ArithmeticError) as error:
-            raise InputError(f"the wavelet variance cannot be used ({error})") from None
 
     def check_content(self) -> None:
         size, complete = self.tau.size, self._complete_levels

@@ -98,6 +98,7 @@ class Fit(Document, Printed):
     """
 
     SCHEMA: ClassVar[str] = "gmwm.fit"
+    KEYS: ClassVar[Mapping[str, str]] = {"wv": "wavelet_variance"}
 
     model: Model
     wv: WaveletVariance
@@ -401,11 +402,6 @@ class Fit(Document, Printed):
         """A table of the parameters, one a row, in SI units; needs pandas."""
         return frame((estimate.to_dict() for estimate in self.estimates), Estimate.COLUMNS)
 
-    def content(self) -> dict[str, Any]:
-        content = super().content()
-        content["wavelet_variance"] = content.pop("wv")
-        return content
-
     def derived(self) -> dict[str, Any]:
         return {
             "params": self.params,
@@ -425,7 +421,7 @@ class Fit(Document, Printed):
 
     @classmethod
     def from_content(cls, content: Mapping[str, Any]) -> Self:
-        found = super().from_content({**content, "wv": content["wavelet_variance"]})
+        found = super().from_content(content)
         if content["params"] != found.params:
             raise InputError(f"its model {found.model!r} and its parameters do not belong together")
         return found

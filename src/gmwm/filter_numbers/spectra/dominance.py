@@ -125,9 +125,11 @@ def correlation_time(problems: Sequence[Problem], form: str) -> float:
     best = int(np.argmax(found <= np.min(found) * (1.0 + tuning.AS_GOOD)))
     around = grid[max(best - 1, 0)], grid[min(best + 1, grid.size - 1)]
     refined = minimize_scalar(
-        lambda x: float(costs(np.array([x]))[0]), bounds=around, method="bounded",
+        lambda x: float(costs(np.array([x]))[0]),
+        bounds=around,
+        method="bounded",
         options={"xatol": 1e-3},
-    )  # fmt: skip
+    )
     is_less = refined.fun < found[best] * (1.0 - tuning.AS_GOOD)
     return float(np.exp(refined.x if is_less else grid[best]))
 
@@ -209,9 +211,12 @@ def _with_care(columns: FloatArray, least: FloatArray) -> FloatArray:
     """The same of one set whose numbers lie too far apart for bases of a few of them."""
     largest = np.max(columns, axis=1)
     found = linprog(
-        np.ones(columns.shape[1]), A_ub=-columns / largest[:, None], b_ub=-1.0 / largest,
-        bounds=[(value, None) for value in least], method="highs",
-    )  # fmt: skip
+        np.ones(columns.shape[1]),
+        A_ub=-columns / largest[:, None],
+        b_ub=-1.0 / largest,
+        bounds=[(value, None) for value in least],
+        method="highs",
+    )
     if found.x is None:
         raise InputError(
             "no numbers of this form dominate the model to the precision of the computer: its "

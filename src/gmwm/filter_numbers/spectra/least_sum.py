@@ -43,9 +43,12 @@ def least_sum(rows: FloatArray, least: FloatArray) -> FloatArray:
     scale[~usable] = 1.0
     # Those of slack variables come after the constraints.
     columns = np.concatenate(
-        [np.where(usable[:, None, None], rows, 1.0) / scale[:, :, None],
-         np.broadcast_to(np.eye(m), (b, m, m))], axis=1
-    )  # fmt: skip
+        [
+            np.where(usable[:, None, None], rows, 1.0) / scale[:, :, None],
+            np.broadcast_to(np.eye(m), (b, m, m)),
+        ],
+        axis=1,
+    )
     weight = np.concatenate([scale, np.ones((b, m))], axis=1)
     gains = np.concatenate([(1.0 - rows @ least) / scale, np.zeros((b, m))], axis=1)
     basis = np.tile(np.arange(n, n + m), (b, 1))

@@ -11,7 +11,7 @@ from gmwm._core.text import brief, readable
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.filter_numbers import tuning
-from gmwm.issues import Notice, notice
+from gmwm.issues import Notice, Severity, notice
 from gmwm.process import Model, Process, evaluated
 
 
@@ -71,24 +71,24 @@ class RequiredSpectrum:
                 for f, amplitude in term.lines():
                     values = {"frequency": f, "amplitude": amplitude}
                     slow = f < passing
-                    notices.append(notice(
-                        "line-left-out", "", values, severity="warning" if slow else "note",
-                        variant="slow" if slow else "", label=label, size=readable(amplitude, unit),
-                    ))  # fmt: skip
+                    severity: Severity = "warning" if slow else "note"
+                    variant, size = "slow" if slow else "", readable(amplitude, unit)
+                    notices.append(
+                        notice(
+                            "line-left-out",
+                            "",
+                            values,
+                            severity=severity,
+                            variant=variant,
+                            label=label,
+                            size=size,
+                        )
+                    )
             else:
                 band = _frequencies([term], floor, nyquist, tuning.PEAK_DECADE, tuning.PEAK_POINTS)
                 density = evaluated(term.psd, band, dt)
                 high, low = float(np.max(density)), float(np.max(density[band <= fast]))
-                own = float(density[0])
-                if high <= low:
-                    weight = 1.0
-                elif own <= tuning.NO_FOOT * high:
-                    weight = float(high <= tuning.PEAK * low)
-                    own = 0.0
-                else:
-                    near = (passing / band[int(np.argmax(density))]) ** tuning.FADING
-                    within = tuning.PEAK * (low - own) / (high - own)
-                    weight = float(np.clip(within, min(near, 1.0), 1.0))
+                weight, own = _weight(band, density, low, passing)
                 if high > tuning.PEAK * low and weight < 1.0:
                     notices.append(_peak(label, band, density, weight, fast))
                 if weight * high > 0.0:
@@ -102,9 +102,17 @@ class RequiredSpectrum:
                 "than that of a random walk: no form dominates it"
             )
         target = cls(
-            tuple(kept), tuple(weights), tuple(feet), constant, dt, horizon, lowest, floor,
-            slope, tuple(notices),
-        )  # fmt: skip
+            tuple(kept),
+            tuple(weights),
+            tuple(feet),
+            constant,
+            dt,
+            horizon,
+            lowest,
+            floor,
+            slope,
+            tuple(notices),
+        )
         if not kept:
             raise InputError(
                 f"{model!r} has nothing that white noise, a random walk or a Gauss-Markov process "
@@ -173,6 +181,24 @@ class RequiredSpectrum:
         return 2.0 * _integral(np.maximum(total, 0.0) * f, np.log(f))
 
 
+def _weight(
+    band: FloatArray, density: FloatArray, low: float, passing: float
+) -> tuple[float, float]:
+    """Share of a spectrum that counts, and its low-frequency density (its foot).
+
+    low: Largest density below the frequency above which peaks average out within the horizon.
+    passing: That frequency, which may lie beyond the band, Hz.
+    """
+    high, own = float(np.max(density)), float(density[0])
+    if high <= low:
+        return 1.0, own
+    if own <= tuning.NO_FOOT * high:
+        return float(high <= tuning.PEAK * low), 0.0
+    near = (passing / band[int(np.argmax(density))]) ** tuning.FADING
+    within = tuning.PEAK * (low - own) / (high - own)
+    return float(np.clip(within, min(near, 1.0), 1.0)), own
+
+
 def _frequencies(
     terms: Sequence[Process], low: float, high: float, points: int, of_peak: int
 ) -> FloatArray:
@@ -222,8 +248,11 @@ def _peak(label: str, f: FloatArray, density: FloatArray, weight: float, fast: f
     variance = 2.0 * _integral((density * f)[high], np.log(f[high]))
     also = f" and {brief(100.0 * weight)} % of the peak" if weight > tuning.FADED else ""
     values = {
-        "density": float(density[0]), "frequency": place, "variance": variance, "share": weight,
-    }  # fmt: skip
+        "density": float(density[0]),
+        "frequency": place,
+        "variance": variance,
+        "share": weight,
+    }
     return notice("fast-peak-left-out", "", values, also=also, label=label, fast=fast)
 
 

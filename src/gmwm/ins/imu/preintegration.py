@@ -81,7 +81,7 @@ def preintegrate(
     Parameters
     ----------
     imu : Imu
-        Increments between the two keyframes, with known biases taken off.
+        Increments between the two keyframes, less known biases.
     models : SensorModels, Calibration or mapping
         One model an axis, as `SensorModels.of` takes them; each may have any number of states.
     start : {"known", "stationary"} or (m, m) ndarray, optional

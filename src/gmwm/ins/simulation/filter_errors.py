@@ -96,7 +96,7 @@ PER_RUN = tuple(name for name in FilterErrors.__annotations__ if name not in ("t
 def errors_of_run(
     solution: Solution, truth: Trajectory, errors: SensorErrors, outputs: Outputs
 ) -> dict[str, FloatArray]:
-    """What is kept of a run, by the names of `PER_RUN`; NaN where the solution does not reach.
+    """Figures of a run, by the names of `PER_RUN`; NaN where the solution does not reach.
 
     outputs: The K epochs that were asked for.
     """

@@ -15,7 +15,7 @@ from gmwm.ins.simulation.filter_errors import FilterErrors
 from gmwm.ins.simulation.trials import MonteCarlo
 
 QUANTITIES = {"horizontal": "m", "vertical": "m", "velocity": "m/s", "attitude": "deg"}
-"""What is judged, with its unit."""
+"""Errors that are compared, with their units."""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""What is navigated: a trajectory, what aids along it, where errors come from, which filters."""
+"""Scenarios and experiments: trajectory, aiding, outages, sources of errors, filters."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class Simulated:
 
 @dataclass(frozen=True, eq=False)
 class Scenario:
-    """What is flown or driven, and what aids it.
+    """A trajectory with its aiding and outages.
 
     Attributes
     ----------

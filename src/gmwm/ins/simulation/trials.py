@@ -128,7 +128,7 @@ class _Task:
     seed: int
 
     def __call__(self, run: int) -> dict[str, FloatArray]:
-        """What is kept of a run, by filter and name."""
+        """Figures of a run, by filter and name."""
         outputs, truth = self.scenario.outputs(), self.scenario.trajectory
         found, errors = self.solutions(run, outputs)
         return {

@@ -1,4 +1,4 @@
-"""YAML documents that people write: a key that is there twice is refused, not replaced."""
+"""YAML documents that people write: a key given twice is rejected, not replaced."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ def _check_keys(node: Any, checked: set[int]) -> None:
 
 
 def _reason(error: Exception) -> str:
-    """What is wrong, and in which line, without the parser's own picture of it."""
+    """The error and its line, without the parser's own picture of it."""
     import yaml
 
     mark = getattr(error, "problem_mark", None)

@@ -134,7 +134,7 @@ class ExperimentSpec(Spec):
 
     NEEDS: ClassVar[str] = (
         "say what is flown or driven (trajectory), where sensor errors come from (truth), what "
-        "each filter believes (filters)"
+        "each filter assumes (filters)"
     )
 
     trajectory: Annotated[str, written(f"{', '.join(MISSIONS)} or a file")]

@@ -88,13 +88,13 @@ class Terms(Spec):
 
 
 class GyroTerms(Terms):
-    """Of a gyro."""
+    """The error model of a gyro."""
 
     QUANTITY = "gyro"
 
 
 class AccelTerms(Terms):
-    """Of an accelerometer."""
+    """The error model of an accelerometer."""
 
     QUANTITY = "accel"
 
@@ -117,7 +117,7 @@ class ModelsSpec(Spec):
         return self
 
     def models(self) -> SensorModels:
-        """Of all six axes."""
+        """Models of all six axes."""
         given: dict[str, Terms] = self.given
         return SensorModels.of(
             {name: Model(each.terms) for name, each in given.items()},
