@@ -145,6 +145,15 @@ def test_a_comparison_shows_itself(compared, tmp_path):
     assert not re.search("<script|https?:|url\\(", text)
 
 
+def test_a_number_that_is_not_known_is_null_in_json(compared):
+    axis = compared["gyro_x"]
+    unknown = replace(axis.numbers.covering, predicted=())
+    with_nan = replace(axis, numbers=replace(axis.numbers, covering=unknown))
+    content = json.loads(json.dumps(with_nan.to_dict(), allow_nan=False))
+    assert content["numbers"]["covering"]["nees"] is None
+    assert content["numbers"]["covering"]["N"] == unknown.N
+
+
 def test_the_same_file_twice_is_one_recording(three, compared):
     with pytest.raises(InputError, match="is the same recording as"):
         gmwm.compare([three[0], three[0]])
