@@ -13,8 +13,7 @@ from gmwm.issues import Notice, notice
 from gmwm.readers.names import AXES, CANONICAL, TIME, bare, meaning
 from gmwm.readers.table import Table, label
 
-Reference = str | int
-"""A column's name, or its index counted from 0."""
+Reference = str | int  # a column's name, or its index counted from 0
 
 _EXAMPLE = 'channels={"gyro_x": 0, "accel_x": 3}'
 _EXAMPLES = {"gyro": "deg/s", "accel": "g"}
@@ -32,13 +31,9 @@ class Given:
 
     def __post_init__(self) -> None:
         units = self.units
-        if not isinstance(units, Mapping) or not all(
-            isinstance(each, str) for each in units.values()
-        ):
-            raise InputError(
-                f"units = {checks.shown(units)}: give that of each sensor, e.g. "
-                'units={"gyro": "deg/s", "accel": "g"}'
-            )
+        if not (isinstance(units, Mapping) and all(isinstance(u, str) for u in units.values())):
+            hint = 'give that of each sensor, e.g. units={"gyro": "deg/s", "accel": "g"}'
+            raise InputError(f"units = {checks.shown(units)}: {hint}")
 
 
 @dataclass(frozen=True)
@@ -86,8 +81,6 @@ def roles_of(table: Table, given: Given) -> Roles:
 
     The caller decides first, then the columns' names, then their number; the units decide what one
     or three columns without names are.
-
-    Raises InputError if it cannot be decided, or no channel is a gyro's or an accelerometer's.
     """
     names, channels = table.names, given.channels
     time: int | None = None
@@ -144,11 +137,7 @@ def roles_of(table: Table, given: Given) -> Roles:
 
 
 def find_column(table: Table, reference: Reference, what: str) -> int:
-    """Index of a column that the user names.
-
-    what: What it is for, in messages.
-    Raises InputError if there is no such column, or more than one.
-    """
+    """Index of a column that the user names; ``what`` it is for, in messages."""
     if isinstance(reference, bool) or not isinstance(reference, str | int):
         raise InputError(
             f"{what} = {reference!r} is not a column: give its name or its index counted from 0"
@@ -189,8 +178,7 @@ def _listed(table: Table, most: int = 12) -> str:
 
 
 def _named_channels(table: Table) -> dict[str, int]:
-    found: dict[str, int] = {}
-    roles = [meaning(name).role for name in table.names]
+    found, roles = dict[str, int](), [meaning(name).role for name in table.names]
     for channel in CANONICAL:
         indices = [i for i, role in enumerate(roles) if role == channel]
         if len(indices) > 1:
@@ -243,11 +231,8 @@ def _only(table: Table, found: dict[str, int], names: Collection[str] | None) ->
                 f"{table.source} has no channel {name!r}: it has {', '.join(found)}",
                 "channel-unknown",
             )
-    return {
-        name: column
-        for name, column in found.items()
-        if not wanted.isdisjoint((name, name.partition("_")[0]))
-    }
+    sensors = {name: name.partition("_")[0] for name in found}
+    return {n: column for n, column in found.items() if not wanted.isdisjoint((n, sensors[n]))}
 
 
 def _given_auxiliary(
@@ -269,10 +254,7 @@ def _given_auxiliary(
 
 
 def _found_auxiliary(
-    table: Table,
-    used: Collection[int | None],
-    chosen: Mapping[str, int],
-    units: Mapping[str, str],
+    table: Table, used: Collection[int | None], chosen: Collection[str], units: Mapping[str, str]
 ) -> list[AuxiliaryColumn]:
     """Columns without another use that are auxiliary by their names."""
     found: list[AuxiliaryColumn] = []
@@ -305,8 +287,6 @@ def channel_units(
     units: Units that the user gave, by sensor or by channel; the latter goes first.
     unknown_rate: Says what is wrong with the sampling rate, which is then asked for at once.
     Returns: units, by channel; notices of units that the user did not give.
-    Raises InputError if a unit is missing, unknown, or not one of what the channel measures; or the
-        rate is missing.
     """
     known = (*roles.channels, *(column.name for column in roles.auxiliary))
     for key in units:
@@ -315,9 +295,7 @@ def channel_units(
                 f"units has {key!r}, which is neither gyro nor accel nor a channel: the channels "
                 f"are {', '.join(known)}"
             )
-    found: dict[str, str] = {}
-    from_header: dict[str, str] = {}
-    overruled: dict[str, str] = {}
+    found, from_header, overruled = dict[str, str](), dict[str, str](), dict[str, str]()
     missing: dict[str, str] = {}  # one channel of each sensor stands for the others
     for channel, column in roles.channels.items():
         in_header = meaning(table.names[column]).unit
@@ -340,20 +318,16 @@ def channel_units(
     rate = unknown_rate() if missing or roles.time is None else None
     if missing or rate is not None:
         raise _incomplete(table.source, missing, rate)
-    notices = []
+    notices, origin = [], table.origin
     if from_header:
         listed = "; ".join(
             f"{', '.join(name for name, u in from_header.items() if u == unit)} in {unit}"
             for unit in dict.fromkeys(from_header.values())
         )
-        notices.append(
-            notice("units-from-names", "", from_header, origin=table.origin, listed=listed)
-        )
+        notices.append(notice("units-from-names", "", from_header, origin=origin, listed=listed))
     if overruled:
         listed = "; ".join(f"{name} in {text}" for name, text in overruled.items())
-        notices.append(
-            notice("units-contradicted", "", overruled, origin=table.origin, listed=listed)
-        )
+        notices.append(notice("units-contradicted", "", overruled, origin=origin, listed=listed))
     return found, tuple(notices)
 
 

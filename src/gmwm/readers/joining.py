@@ -14,8 +14,7 @@ from gmwm.readers.names import CANONICAL, bare, meaning
 from gmwm.readers.recording import Channel, Recording, notices_of_gaps
 from gmwm.readers.table import Table
 
-_SAMPLE = 0.5
-"""Samples by which two clocks may part over a recording and count as one."""
+_SAMPLE = 0.5  # by which two clocks may part over a recording and count as one
 
 
 @dataclass(frozen=True)
@@ -39,10 +38,7 @@ def has_sensors(table: Table) -> bool:
 def shares(
     tables: Sequence[Table], channels: Mapping[str, str | int] | Iterable[str] | None
 ) -> list[tuple[Table, Collection[str] | None]]:
-    """Which of the channels that the caller names are in which table; those without any go.
-
-    Raises InputError if columns are assigned, which needs one table, or a channel is in none.
-    """
+    """Which of the channels that the caller names are in which table; those without any go."""
     source = tables[0].source
     if channels is None:
         return [(table, None) for table in tables]
@@ -53,13 +49,14 @@ def shares(
         )
     wanted = [channels] if isinstance(channels, str) else list(channels)
     found: list[tuple[Table, Collection[str] | None]] = []
+    known = set[str]()
     for table in tables:
         roles = {role for name in table.names if (role := meaning(name).role) in CANONICAL}
         sensors = {str(role).partition("_")[0] for role in roles}
         own = [name for name in wanted if name in roles | sensors]
         if own:
             found.append((table, own))
-    known = {name for _, own in found for name in own or ()}
+            known.update(own)
     for name in wanted:
         if name not in known:
             raise InputError(f"{source} has no channel {name!r} in what is read", "channel-unknown")
@@ -67,10 +64,7 @@ def shares(
 
 
 def joined(parts: Sequence[Part]) -> Recording:
-    """Parts cut to the time that they have in common.
-
-    Raises InputError if they have no such time, or hold the same channel.
-    """
+    """Parts cut to the time that they have in common."""
     first = parts[0].recording
     if len(parts) == 1:
         return first
@@ -80,9 +74,7 @@ def joined(parts: Sequence[Part]) -> Recording:
             f'{first.source}: its topics have no time in common: choose one, or clock="log"',
             "topics-apart",
         )
-    channels: list[Channel] = []
-    for part in parts:
-        channels += _cut(part, start, stop)
+    channels = [channel for part in parts for channel in _cut(part, start, stop)]
     names = [channel.name for channel in channels]
     if len(set(names)) < len(names):
         raise InputError(f"{first.source}: two topics have the same channels: choose one", "topic")
@@ -162,13 +154,8 @@ def with_temperature(part: Part, table: Table) -> Part:
                 )
                 name = bare(table.names[column])
                 channels.append(Channel(name, values, recording.dt, "temperature", "degC"))
-        names = ", ".join(channel.name for channel in channels)
+        names, first = ", ".join(channel.name for channel in channels), recording.names[0]
         count = {"count": stamps.size}
-        first = recording.names[0]
         told = notice("temperature-interpolated", "", count, listed=names, first=first)
-    wider = replace(
-        recording,
-        channels=(*recording.channels, *channels),
-        notices=(*recording.notices, told),
-    )
-    return replace(part, recording=wider)
+    wider, notices = (*recording.channels, *channels), (*recording.notices, told)
+    return replace(part, recording=replace(recording, channels=wider, notices=notices))

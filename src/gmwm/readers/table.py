@@ -19,11 +19,8 @@ from gmwm.errors import InputError
 from gmwm.issues import Notice, notice
 from gmwm.readers import tuning
 
-LARGEST = 1e150
-"""Magnitudes from here on are rejected like infinities: their squares overflow."""
-
-Columns = dict[int, FloatArray]
-"""Index of a column -> its values, NaN where a sample is missing."""
+LARGEST = 1e150  # magnitudes from here on are rejected like infinities: their squares overflow
+Columns = dict[int, FloatArray]  # index of a column -> its values, NaN where a sample is missing
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -81,7 +78,11 @@ class Table(ABC):
                 held += values.size
             if tuning.BYTES_PER_SAMPLE * held > allowed:
                 memory.require(tuning.BYTES_PER_SAMPLE * max(samples, held), self.source)
-        return {column: _joined(parts.pop(column)) for column in columns}
+
+        def joined(some: list[FloatArray]) -> FloatArray:
+            return some[0] if len(some) == 1 else np.concatenate([np.zeros(0), *some])
+
+        return {column: joined(parts.pop(column)) for column in columns}
 
     def check_usable(self, column: int, values: FloatArray, first: int) -> None:
         """Reject infinite values and those too large for use; ``first`` is the row of the first."""
@@ -117,12 +118,6 @@ def load_columns(table: Table, columns: Sequence[int]) -> Columns:
     return {column: spool.array()[:, 0] for column, spool in spools.items()}
 
 
-def _joined(parts: list[FloatArray]) -> FloatArray:
-    if len(parts) == 1:
-        return parts[0]
-    return np.concatenate(parts) if parts else np.zeros(0)
-
-
 def label(names: Sequence[str], index: int) -> str:
     """How messages call a column: its name, or its place if it has none."""
     return repr(names[index]) if names[index] else f"{index} (counted from 0)"
@@ -156,7 +151,6 @@ def damage_named(
 ) -> Iterator[None]:
     """Turn whatever a library raises about a file into one sentence.
 
-    source: Name of the file.
     say: End of the sentence, or exception -> end of the sentence.
     """
     try:
@@ -178,15 +172,9 @@ def damage_named(
 
 
 def library(module: str, extra: str, source: str) -> ModuleType:
-    """Import a library of an extra of this package.
-
-    source: The file that needs it.
-    Raises InputError with the command that installs it, if it is absent.
-    """
+    """Import a library of an extra of this package, which a file needs."""
     try:
         return import_module(module)
     except ImportError as error:
-        needed = module.partition(".")[0]
-        raise InputError(
-            f"{source} needs {needed}, which is not installed: pip install 'gmwm[{extra}]'", "extra"
-        ) from error
+        text = f"{source} needs {module.partition('.')[0]}, which is not installed"
+        raise InputError(f"{text}: pip install 'gmwm[{extra}]'", "extra") from error

@@ -8,11 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from gmwm._core.typing import FloatArray, known_of, median
-from gmwm.readers import tuning
 from gmwm.readers.names import AXES
 from gmwm.readers.recording import Recording
 
 _ROWS = 1 << 16  # at a time
+_LEAST_CONE = 0.01  # rad by which gravity leaves its mean where a sensor turns; at rest, 0.3 deg
+_LAGS, _FEWEST_LAGS = (1, 4, 16), 20  # blocks between which changes count; how many at least
 
 
 @dataclass(frozen=True)
@@ -29,12 +30,10 @@ class TurningGravity:
     change: float
 
 
-def _triad(recording: Recording, sensor: str) -> list[FloatArray] | None:
-    """Samples of three axes; None if one is missing."""
+def _triad(recording: Recording, sensor: str) -> list[FloatArray]:
+    """Samples of three axes; none if one is missing."""
     names = [f"{sensor}_{axis}" for axis in AXES]
-    if not all(name in recording for name in names):
-        return None
-    return [recording[name].values for name in names]
+    return [recording[name].values for name in names] if set(names) <= set(recording) else []
 
 
 def block_means(axes: Sequence[FloatArray], size: int) -> FloatArray:
@@ -65,7 +64,7 @@ def turning_gravity(recording: Recording, size: int, parts: int = 1) -> TurningG
     Returns: None if an axis is missing or nothing changes.
     """
     rate, force = _triad(recording, "gyro"), _triad(recording, "accel")
-    if rate is None or force is None or recording.n < 4 * size:
+    if not (rate and force) or recording.n < 4 * size:
         return None
     # The same means of the integral as of the force: both changes are filtered alike.
     predicted = np.diff(_integral_means(rate, force, size) * -recording.dt, axis=0)
@@ -113,16 +112,14 @@ def steady_turn(recording: Recording, size: int) -> float:
     size: Samples of the blocks whose means are compared.
     """
     force = _triad(recording, "accel")
-    if force is None:
-        return 0.0
-    means = block_means(force, size)
+    means = block_means(force, size) if force else np.full((1, 1), np.nan)
     if np.all(np.any(np.isnan(means), axis=1)):
         return 0.0
     wander = np.linalg.norm(means - np.nanmean(means, axis=0), axis=1)
-    if not np.nanmax(wander) > tuning.LEAST_CONE * np.linalg.norm(np.nanmean(means, axis=0)):
+    if not np.nanmax(wander) > _LEAST_CONE * np.linalg.norm(np.nanmean(means, axis=0)):
         return 0.0
-    for lag in tuning.LAGS_OF_TURN:
-        if means.shape[0] < tuning.FEWEST_TURNING * lag:
+    for lag in _LAGS:
+        if means.shape[0] < _FEWEST_LAGS * lag:
             break
         change = means[lag:] - means[:-lag]
         known = ~np.any(np.isnan(change), axis=1)

@@ -39,7 +39,6 @@ class BinaryLayout:
 
     @property
     def record(self) -> np.dtype[np.void]:
-        """Numpy type of a record."""
         return np.dtype([("time", f"{self.order}f8"), ("values", f"{self.order}{self.kind}", (6,))])
 
 
@@ -53,18 +52,13 @@ LAYOUTS = {
     "NAVCHIP_FLT": BinaryLayout("f8", 2.0 * math.pi / (3600.0 * 360.0), 0.001),
     "KF-GINS": BinaryLayout("f8", 1.0, 1.0, order="<"),
 }
-"""Layouts with a name."""
-
 _KINDS = {"int16": "i2", "int32": "i4", "int64": "i8", "float32": "f4", "float64": "f8"}
 _ORDERS = {"native": "=", "little": "<", "big": ">"}
 _FORM = "TYPE,GYRO_SCALE,ACCEL_SCALE[,rates][,little|big]"
 
 
 def layout_of(text: str) -> BinaryLayout:
-    """A layout by its name, or as ``TYPE,GYRO_SCALE,ACCEL_SCALE[,rates][,little|big]``.
-
-    Raises InputError if it is neither.
-    """
+    """A layout by its name, or as ``TYPE,GYRO_SCALE,ACCEL_SCALE[,rates][,little|big]``."""
     if text.upper() in LAYOUTS:
         return LAYOUTS[text.upper()]
     parts = [part.strip() for part in text.split(",")]
@@ -78,9 +72,8 @@ def layout_of(text: str) -> BinaryLayout:
     try:
         found = BinaryLayout(_KINDS[parts[0]], float(parts[1]), float(parts[2]))
     except ValueError:
-        raise InputError(
-            f"layout {text!r}: a scale is no number: write {_FORM}", "layout"
-        ) from None
+        problem = f"layout {text!r}: a scale is no number: write {_FORM}"
+        raise InputError(problem, "layout") from None
     for word in parts[3:]:
         if word in _ORDERS:
             found = replace(found, order=_ORDERS[word])
@@ -107,8 +100,7 @@ class BinaryTable(Table):
 
         Raises InputError if it is too short, or its times are not those of this layout.
         """
-        record = layout.record.itemsize
-        size = path.stat().st_size
+        record, size = layout.record.itemsize, path.stat().st_size
         count, rest = divmod(size, record)
         if count < tuning.FEWEST_SAMPLES:
             raise InputError(
@@ -136,14 +128,9 @@ class BinaryTable(Table):
         return table
 
     def expected_rows(self) -> float:
-        """Number of records."""
         return float(self.count)
 
     def segments(self, columns: Sequence[int], rows: int) -> Iterator[Columns]:
-        """Columns of ``rows`` records at a time.
-
-        Raises InputError if a number is infinite.
-        """
         interval = self._interval(rows) if self.layout.increments else 1.0
         scales = (1.0, *(self.layout.gyro / interval,) * 3, *(self.layout.accel / interval,) * 3)
         for start in range(0, self.count, rows):
@@ -178,5 +165,4 @@ class BinaryTable(Table):
         return float(np.mean(near))
 
     def where(self, row: int) -> str:
-        """The record."""
         return f"record {row} (counted from 0)"

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import mmap
 from abc import abstractmethod
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from gmwm._core.units import SI_UNIT
 from gmwm.errors import InputError
 from gmwm.issues import Notice, notice
+from gmwm.readers.formats.arrays import AnyArray, ArrayTable, array_of
 from gmwm.readers.registry import Wanted
 from gmwm.readers.table import Columns, Table
 
@@ -38,7 +39,6 @@ class Topic:
 def choose(source: str, topics: Sequence[Topic], wanted: Wanted) -> tuple[Topic, ...]:
     """The topics to read: those wanted, else the only one, else one of gyros with one of forces.
 
-    source: Name of the file, for messages.
     topics: One at least.
     Raises InputError with the code "topic", if one is not there, or it cannot be decided; with
         "sensor-absent", if the log has one sensor and not the other, and no channel is named.
@@ -95,13 +95,10 @@ def _are_parts(topics: Sequence[Topic]) -> bool:
 def choose_first(
     source: str, ranks: Sequence[Sequence[Topic]], wanted: Wanted
 ) -> tuple[Topic, ...]:
-    """As `choose`, of the first rank that has any topic unless others are wanted.
-
-    Raises InputError as `choose` does.
-    """
+    """As `choose`, of the first rank that has any topic unless others are wanted."""
     if wanted.topics:
         return choose(source, [topic for rank in ranks for topic in rank], wanted)
-    return choose(source, next(rank for rank in ranks if rank), wanted)
+    return choose(source, next(filter(None, ranks)), wanted)
 
 
 def left_out(ranks: Sequence[Sequence[Topic]], chosen: Sequence[Topic]) -> tuple[Notice, ...]:
@@ -116,18 +113,29 @@ def left_out(ranks: Sequence[Sequence[Topic]], chosen: Sequence[Topic]) -> tuple
 
 def end_of_content(path: Path) -> int:
     """Byte after the last one that may be something else than padding, zeros or 0xFF."""
-    end = path.stat().st_size
-    if not end:
+    if not (end := path.stat().st_size):
         return 0
     with path.open("rb") as stream, mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ) as data:
         last = data[end - 1 :]
         while end and last in (b"\0", b"\xff"):
             start = max(end - _BLOCK, 0)
-            kept = len(data[start:end].rstrip(last))
-            end = start + kept
-            if kept:
+            end = start + len(data[start:end].rstrip(last))
+            if end > start:
                 break
     return end
+
+
+def topic_table(
+    source: str,
+    topic: Topic,
+    columns: Mapping[str, AnyArray],
+    origin: str,
+    notices: Sequence[Notice] = (),
+) -> ArrayTable:
+    """A table of the samples of a topic that are in memory."""
+    entries = {name: array_of(values) for name, values in columns.items()}
+    about = {"stamps": f"stamps of {topic.name}", "origin": origin}
+    return ArrayTable.of_entries(source, entries, notices, **about)
 
 
 def cut_off(seconds: float) -> str:
@@ -146,14 +154,9 @@ class MessageTable(Table):
         """Columns of one block of messages after another."""
 
     def expected_rows(self) -> float:
-        """Number of messages."""
         return float(self.topic.count)
 
     def segments(self, columns: Sequence[int], rows: int) -> Iterator[Columns]:
-        """Columns of some messages at a time.
-
-        Raises InputError if the log is damaged, or a number is infinite.
-        """
         row = 0
         for part in self.parts(columns):
             for column, values in part.items():
@@ -167,5 +170,4 @@ class MessageTable(Table):
             )
 
     def where(self, row: int) -> str:
-        """The message."""
         return f"message {row} of {self.topic.name} (counted from 0)"
