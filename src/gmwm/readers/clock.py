@@ -26,22 +26,16 @@ _DAY = 86400.0
 
 @dataclass(frozen=True)
 class Clock:
-    """Time stamps of a recording.
+    """Time stamps of a recording."""
 
-    source, column: File and column, for messages, ``"column 't'"``.
-    stamps: (n,), in a unit of ``seconds``.
-    seconds: The unit; None if the header states none that is known.
-    own_unit: The unit as the header states it.
-    where: Row -> its place in the file.
-    same: Row numbers in an order -> whether each has the samples of the one before.
-    """
-
+    # source, column: file and column, for messages, ``"column 't'"``.
     source: str
     column: str
-    stamps: FloatArray
-    seconds: float | None
-    own_unit: str
-    where: Callable[[int], str]
+    stamps: FloatArray  # (n,), in a unit of ``seconds``
+    seconds: float | None  # the unit; None if the header states none that is known
+    own_unit: str  # the unit as the header states it
+    where: Callable[[int], str]  # row -> its place in the file
+    # Row numbers in an order -> whether each has the samples of the one before.
     same: Callable[[IntArray], BoolArray]
 
     def error(self, row: int | None, text: str, hint: str = _WAY_OUT) -> InputError:
@@ -52,18 +46,13 @@ class Clock:
 
 @dataclass(frozen=True)
 class Timing:
-    """What time stamps say.
+    """What time stamps say."""
 
-    rate: Hz, as the stamps have it.
-    jumps: Where rows are missing.
-    notices: The rate, its unit, the jitter, the jumps, and what else is uneven.
-    jitter: Standard deviation of the steps, as a share of a step.
-    """
-
-    rate: float
-    jumps: Jumps
+    rate: float  # Hz, as the stamps have it
+    jumps: Jumps  # where rows are missing
+    # The rate, its unit, the jitter, the jumps, and what else is uneven.
     notices: tuple[Notice, ...]
-    jitter: float
+    jitter: float  # standard deviation of the steps, as a share of a step
 
 
 def agree(rate: float, other: float) -> bool:
@@ -239,7 +228,6 @@ def without_unit(
 ) -> InputError | None:
     """What stamps without a unit may be; None if they are seconds of a sensor.
 
-    source, column: For the message, ``"column 't'"``.
     expected: Rate that is stated but fits no unit, Hz.
     """
     if tuning.LEAST_STEP <= step < tuning.LARGEST_STEP or not step > 0.0:

@@ -38,17 +38,12 @@ class Given:
 
 @dataclass(frozen=True)
 class AuxiliaryColumn:
-    """A column of temperatures, voltages or time stamps of another clock.
+    """A column of temperatures, voltages or time stamps of another clock."""
 
-    name: Name of its channel.
-    quantity: One of `AUXILIARY`.
-    unit: Unit in the file; None if unknown.
-    """
-
-    name: str
+    name: str  # name of its channel
     index: int
-    quantity: str
-    unit: AuxiliaryUnit | None
+    quantity: str  # one of `AUXILIARY`
+    unit: AuxiliaryUnit | None  # unit in the file; None if unknown
 
     def __str__(self) -> str:
         return f"{self.name!r} ({self.quantity}{'' if self.unit else ', unit unknown'})"
@@ -56,18 +51,12 @@ class AuxiliaryColumn:
 
 @dataclass(frozen=True)
 class Roles:
-    """What the columns are.
+    """What the columns are."""
 
-    channels: Name of a gyro's or accelerometer's channel -> index of its column.
-    auxiliary: Other channels that are kept.
-    time: Index of the column of time stamps.
-    notices: Auxiliary columns, and columns that are not used.
-    """
-
-    channels: dict[str, int]
-    auxiliary: tuple[AuxiliaryColumn, ...]
-    time: int | None
-    notices: tuple[Notice, ...]
+    channels: dict[str, int]  # name of a gyro's or accelerometer's channel -> index of its column
+    auxiliary: tuple[AuxiliaryColumn, ...]  # other channels that are kept
+    time: int | None  # index of the column of time stamps
+    notices: tuple[Notice, ...]  # auxiliary columns, and columns that are not used
 
     @property
     def columns(self) -> tuple[int, ...]:
@@ -98,11 +87,9 @@ def roles_of(table: Table, given: Given) -> Roles:
             known = {time, *stamps}
             rest = [i for i in range(len(names)) if i not in known]
             if not rest or (any(names[i] for i in rest) and not table.tentative):
-                raise InputError(
-                    f"{table.source}: no column is known as a gyro's or an accelerometer's, "
-                    f"{_listed(table)}: say which is which, e.g. {_EXAMPLE}",
-                    "channel-unknown",
-                )
+                text = f"{table.source}: no column is known as a gyro's or an accelerometer's"
+                hint = f"{_listed(table)}: say which is which, e.g. {_EXAMPLE}"
+                raise InputError(f"{text}, {hint}", "channel-unknown")
             chosen, stamp = _by_number(table, rest, bool(known - {None}), given.units)
             stamps = [stamp] if stamp is not None else stamps
         chosen = _only(table, chosen, channels)
@@ -128,20 +115,16 @@ def roles_of(table: Table, given: Given) -> Roles:
         count = {"count": len(ignored)}
         notices.append(notice("columns-not-used", "", count, listed=", ".join(ignored)))
     if not chosen:
-        raise InputError(
-            f"{table.source}: every channel is auxiliary: name one of a gyro or an accelerometer, "
-            'e.g. channels={"gyro_x": 1}',
-            "channel-unknown",
-        )
+        hint = 'name one of a gyro or an accelerometer, e.g. channels={"gyro_x": 1}'
+        raise InputError(f"{table.source}: every channel is auxiliary: {hint}", "channel-unknown")
     return Roles(chosen, tuple(auxiliary), time, tuple(notices))
 
 
 def find_column(table: Table, reference: Reference, what: str) -> int:
     """Index of a column that the user names; ``what`` it is for, in messages."""
     if isinstance(reference, bool) or not isinstance(reference, str | int):
-        raise InputError(
-            f"{what} = {reference!r} is not a column: give its name or its index counted from 0"
-        )
+        hint = "give its name or its index counted from 0"
+        raise InputError(f"{what} = {reference!r} is not a column: {hint}")
     index = reference if isinstance(reference, int) else None
     if isinstance(reference, str):
         for known in (table.names, [bare(name) for name in table.names]):
@@ -156,9 +139,8 @@ def find_column(table: Table, reference: Reference, what: str) -> int:
                         f"the one for {what}, counted from 0: {', '.join(map(str, found))}"
                     )
         if not (reference.isascii() and reference.isdigit()):
-            raise InputError(
-                f"{table.source} has no column {reference!r} for {what}: {_listed(table)}"
-            )
+            text = f"{table.source} has no column {reference!r} for {what}"
+            raise InputError(f"{text}: {_listed(table)}")
         index = int(reference)
     if index is None or not 0 <= index < len(table.names):
         raise InputError(
@@ -183,11 +165,9 @@ def _named_channels(table: Table) -> dict[str, int]:
         indices = [i for i, role in enumerate(roles) if role == channel]
         if len(indices) > 1:
             names = " and ".join(label(table.names, i) for i in indices[:2])
-            raise InputError(
-                f"{table.source}: columns {names} may both be {channel}: choose one, "
-                f'e.g. channels={{"{channel}": {indices[0]}}}',
-                "channel-unknown",
-            )
+            text = f"{table.source}: columns {names} may both be {channel}: choose one"
+            example = f'channels={{"{channel}": {indices[0]}}}'
+            raise InputError(f"{text}, e.g. {example}", "channel-unknown")
         if indices:
             found[channel] = indices[0]
     return found
@@ -203,11 +183,8 @@ def _by_number(
     if len(rest) == len(CANONICAL):
         return dict(zip(CANONICAL, rest, strict=True)), stamp
     if len(rest) not in (1, len(AXES)):
-        raise InputError(
-            f"{table.source} has {len(table.names)} columns without names that are known: say "
-            f"which is which, e.g. {_EXAMPLE}",
-            "channel-unknown",
-        )
+        text = f"{table.source} has {len(table.names)} columns without names that are known"
+        raise InputError(f"{text}: say which is which, e.g. {_EXAMPLE}", "channel-unknown")
     sensors = [sensor for sensor in SI_UNIT if sensor in units]
     if len(sensors) != 1:
         raise InputError(
@@ -227,10 +204,8 @@ def _only(table: Table, found: dict[str, int], names: Collection[str] | None) ->
     wanted = {names} if isinstance(names, str) else set(names)
     for name in wanted:
         if name not in found and not any(name == each.partition("_")[0] for each in found):
-            raise InputError(
-                f"{table.source} has no channel {name!r}: it has {', '.join(found)}",
-                "channel-unknown",
-            )
+            text = f"{table.source} has no channel {name!r}: it has {', '.join(found)}"
+            raise InputError(text, "channel-unknown")
     sensors = {name: name.partition("_")[0] for name in found}
     return {n: column for n, column in found.items() if not wanted.isdisjoint((n, sensors[n]))}
 
@@ -291,10 +266,8 @@ def channel_units(
     known = (*roles.channels, *(column.name for column in roles.auxiliary))
     for key in units:
         if key not in SI_UNIT and key not in known:
-            raise InputError(
-                f"units has {key!r}, which is neither gyro nor accel nor a channel: the channels "
-                f"are {', '.join(known)}"
-            )
+            text = f"units has {key!r}, which is neither gyro nor accel nor a channel"
+            raise InputError(f"{text}: the channels are {', '.join(known)}")
     found, from_header, overruled = dict[str, str](), dict[str, str](), dict[str, str]()
     missing: dict[str, str] = {}  # one channel of each sensor stands for the others
     for channel, column in roles.channels.items():
@@ -344,10 +317,7 @@ def _same(unit: str, other: str) -> bool:
 
 
 def _incomplete(source: str, missing: Mapping[str, str], rate: InputError | None) -> InputError:
-    """One error that asks for everything that the file and the user leave out.
-
-    missing: Sensor, or channel of another name -> channel without a unit.
-    """
+    """One error that asks for the rate and for the units of ``missing`` sensors or channels."""
     if rate is not None and not missing:
         return rate
     text = f"does not give the unit of {' and '.join(missing.values())}"

@@ -14,19 +14,14 @@ from gmwm.readers import tuning
 
 @dataclass(frozen=True)
 class Jumps:
-    """Where a clock jumps forward because rows are missing, and which rows are copies.
+    """Where a clock jumps forward because rows are missing, and which rows are copies."""
 
-    rows: (k,), first row after each jump.
-    steps: (k,), how far the clock goes there, in sampling intervals; 1 would be no jump.
-    missing: (k,), whole number of rows that are missing there, one or more.
-    interval: Sampling interval, in the unit of the stamps.
-    repeated: (r,), rows that repeat one before them.
-    """
-
-    rows: IntArray
+    rows: IntArray  # (k,), first row after each jump
+    # (k,), how far the clock goes there, in sampling intervals; 1 would be no jump.
     steps: FloatArray
-    missing: FloatArray
-    interval: float
+    missing: FloatArray  # (k,), whole number of rows that are missing there, one or more
+    interval: float  # sampling interval, in the unit of the stamps
+    # (r,), rows that repeat one before them.
     repeated: IntArray = field(default_factory=lambda: np.empty(0, dtype=np.int64))
 
     @property
@@ -176,19 +171,13 @@ def _advance(stamps: FloatArray, rows: IntArray, interval: float) -> FloatArray:
 
 @dataclass(frozen=True)
 class Uneven:
-    """Uneven stamps on an even grid: jitter, bursts, late stamps.
-
-    late: (m,), how far each different stamp is after the grid, in sampling intervals.
-    last: (m,), last row that has the stamp.
-    burst: Rows that have one stamp, usually.
-    jitter: Standard deviation of the steps without losses, in sampling intervals.
-    """
+    """Uneven stamps on an even grid: jitter, bursts, late stamps."""
 
     jumps: Jumps
-    late: FloatArray
-    last: IntArray
-    burst: int
-    jitter: float
+    late: FloatArray  # (m,), how far each different stamp is after the grid, in sampling intervals
+    last: IntArray  # (m,), last row that has the stamp
+    burst: int  # rows that have one stamp, usually
+    jitter: float  # standard deviation of the steps without losses, in sampling intervals
 
 
 def place_uneven(stamps: FloatArray) -> Uneven | int | None:

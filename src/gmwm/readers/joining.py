@@ -43,10 +43,9 @@ def shares(
     if channels is None:
         return [(table, None) for table in tables]
     if isinstance(channels, Mapping):
-        raise InputError(
-            f"{source}: columns are given for channels, and {len(tables)} topics are read: name "
-            'the channels alone, e.g. channels=["gyro"], or choose one topic'
-        )
+        text = f"{source}: columns are given for channels, and {len(tables)} topics are read"
+        hint = 'name the channels alone, e.g. channels=["gyro"], or choose one topic'
+        raise InputError(f"{text}: {hint}")
     wanted = [channels] if isinstance(channels, str) else list(channels)
     found: list[tuple[Table, Collection[str] | None]] = []
     known = set[str]()
@@ -70,15 +69,22 @@ def joined(parts: Sequence[Part]) -> Recording:
         return first
     start, stop = max(part.start for part in parts), min(part.stop for part in parts)
     if not stop > start:
-        raise InputError(
-            f'{first.source}: its topics have no time in common: choose one, or clock="log"',
-            "topics-apart",
-        )
+        text = f'{first.source}: its topics have no time in common: choose one, or clock="log"'
+        raise InputError(text, "topics-apart")
     channels = [channel for part in parts for channel in _cut(part, start, stop)]
     names = [channel.name for channel in channels]
     if len(set(names)) < len(names):
         raise InputError(f"{first.source}: two topics have the same channels: choose one", "topic")
-    channels = _aligned(channels)
+    # Clocks that are the same within half a sample get one rate and length.
+    dt, n = channels[0].dt, channels[0].n
+    for i, channel in enumerate(channels):
+        if abs(channel.dt / dt - 1.0) * channel.n < _SAMPLE and abs(channel.n - n) <= 1:
+            channels[i] = replace(channel, dt=dt, values=channel.values[:n])
+    shortest = min(channel.n for channel in channels if channel.dt == dt)
+    channels = [
+        replace(channel, values=channel.values[:shortest]) if channel.dt == dt else channel
+        for channel in channels
+    ]
     notices: list[Notice] = []
     for each in (each for part in parts for each in part.recording.notices):
         if each.code != "missing-samples" and each not in notices:
@@ -105,35 +111,14 @@ def _cut(part: Part, start: float, stop: float) -> list[Channel]:
         round((start - part.start) * recording.rate), round((stop - part.start) * recording.rate)
     )
     if rows.stop - rows.start < tuning.FEWEST_SAMPLES:
-        raise InputError(
-            f"{recording.source}: its topics have {stop - start:.3g} s in common, fewer than "
-            f"{tuning.FEWEST_SAMPLES} samples: choose one, or record longer",
-            "topics-apart",
-        )
+        common = f"{recording.source}: its topics have {stop - start:.3g} s in common"
+        hint = f"fewer than {tuning.FEWEST_SAMPLES} samples: choose one, or record longer"
+        raise InputError(f"{common}, {hint}", "topics-apart")
     return [replace(channel, values=channel.values[rows]) for channel in recording.channels]
 
 
-def _aligned(channels: Sequence[Channel]) -> list[Channel]:
-    """Channels of clocks that are the same within half a sample get one rate and length."""
-    first = channels[0]
-    result = []
-    for channel in channels:
-        apart = abs(channel.dt / first.dt - 1.0) * channel.n
-        if apart < _SAMPLE and abs(channel.n - first.n) <= 1:
-            channel = replace(channel, dt=first.dt, values=channel.values[: first.n])
-        result.append(channel)
-    shortest = min(channel.n for channel in result if channel.dt == first.dt)
-    return [
-        replace(channel, values=channel.values[:shortest]) if channel.dt == first.dt else channel
-        for channel in result
-    ]
-
-
 def with_temperature(part: Part, table: Table) -> Part:
-    """A thermometer beside the sensors, at their rate.
-
-    Between its stamps it is interpolated; before the first and after the last it is missing.
-    """
+    """A thermometer beside the sensors, interpolated at their rate between its stamps."""
     recording, columns = part.recording, range(len(table.names))
     time = next((i for i in columns if meaning(table.names[i]).role == "time"), None)
     channels: list[Channel] = []

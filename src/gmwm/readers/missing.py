@@ -24,15 +24,11 @@ _ODD = np.array([*_CODES, *_ENDS])
 
 @dataclass(frozen=True)
 class Missing:
-    """How many samples of a series are missing.
+    """How many samples of a series are missing."""
 
-    n: Samples, missing ones included.
-    samples: Missing samples.
-    gaps, longest: Runs of missing samples, and the length of the longest.
-    """
-
-    n: int = 0
-    samples: int = 0
+    n: int = 0  # samples, missing ones included
+    samples: int = 0  # missing samples
+    # gaps, longest: runs of missing samples, and the length of the longest.
     gaps: int = 0
     longest: int = 0
 

@@ -97,29 +97,22 @@ _POWER = re.compile(r"(?<=[A-Za-z])(?:\^|\*\*)?(-?[1-3])")
 
 @dataclass(frozen=True)
 class Meaning:
-    """What a name says.
+    """What a name says."""
 
-    role: One of `CANONICAL`, `TIME`, "temperature", "voltage", or ``None`` for anything else.
-    unit: Its unit, if the name has one that is understood.
-    seconds: For a time column, its unit in seconds.
-    stated: For a time column, what stands in brackets after its name, understood or not.
-    """
-
+    # One of `CANONICAL`, `TIME`, "temperature", "voltage", or ``None`` for anything else.
     role: str | None
-    unit: str | None = None
-    seconds: float | None = None
-    stated: str = ""
+    unit: str | None = None  # its unit, if the name has one that is understood
+    seconds: float | None = None  # for a time column, its unit in seconds
+    stated: str = ""  # for a time column, what stands in brackets after its name, understood or not
 
 
 def stated_seconds(source: str, name: str) -> float | None:
     """Unit of a time column in seconds, ``None`` if its name states none; rejects other units."""
     found = meaning(name)
     if found.stated and found.seconds is None:
-        raise InputError(
-            f"{source}, column {name!r}: {found.stated!r} is not a known unit of time: write s, "
-            "ms, us, ns, min, h or days in the header, or give the sampling rate, rate=100",
-            "time-unit",
-        )
+        text = f"{source}, column {name!r}: {found.stated!r} is not a known unit of time"
+        hint = "write s, ms, us, ns, min, h or days in the header, or give the sampling rate"
+        raise InputError(f"{text}: {hint}, rate=100", "time-unit")
     return found.seconds
 
 

@@ -202,10 +202,8 @@ def _stated_rate(table: Table, rate: float | None) -> float | None:
     if not (0.0 < rate < math.inf and 1.0 / rate < math.inf):
         raise InputError(f"rate = {rate!r}: give a positive sampling rate in Hz", "rate")
     if table.rate is not None and not clocks.agree(rate, table.rate):
-        raise InputError(
-            f"{table.source} states a rate of {table.rate:.6g} Hz, not {rate:.6g} Hz: leave out "
-            "the rate to use that of the file"
-        )
+        text = f"{table.source} states a rate of {table.rate:.6g} Hz, not {rate:.6g} Hz"
+        raise InputError(f"{text}: leave out the rate to use that of the file")
     return rate
 
 
@@ -222,11 +220,8 @@ def _check_one_sensor(table: Table, roles: Roles) -> None:
         several = np.unique(numbers).size
         turns = np.count_nonzero(np.diff(numbers))
         if 1 < several <= tuning.MOST_SENSORS and turns > tuning.IN_TURNS * numbers.size:
-            raise InputError(
-                f"{table.source}, {table.column(index)}: rows of {several} sensors come in "
-                "turns: keep those of one",
-                "several-sensors",
-            )
+            text = f"{table.source}, {table.column(index)}: rows of {several} sensors come in turns"
+            raise InputError(f"{text}: keep those of one", "several-sensors")
 
 
 def _unknown_rate(table: Table, time: int | None, stated: float | None) -> InputError | None:
@@ -244,10 +239,7 @@ def _unknown_rate(table: Table, time: int | None, stated: float | None) -> Input
 def _load(
     table: Table, roles: Roles
 ) -> tuple[dict[int, FloatArray], list[AuxiliaryColumn], list[Notice]]:
-    """Columns, auxiliary columns among them, and a notice if some of these are left out.
-
-    An auxiliary column is left out if it cannot be read or has another length.
-    """
+    """Columns; auxiliary ones that cannot be read or have another length are left out."""
     wanted = {*roles.columns, *(column.index for column in roles.auxiliary)}
     kept, notices = list(roles.auxiliary), list[Notice]()
     try:
@@ -270,10 +262,9 @@ def _load(
     most = max(n - int(np.count_nonzero(np.isnan(arrays[i]))) for i in roles.channels.values())
     if most < tuning.FEWEST_SAMPLES:
         of_any = "" if most == n else " of any channel"
-        raise InputError(
-            f"{table.source} has {most} samples{of_any} where at least "
-            f"{tuning.FEWEST_SAMPLES} are needed: record longer"
-        )
+        text = f"{table.source} has {most} samples{of_any}"
+        least = f"at least {tuning.FEWEST_SAMPLES} are needed"
+        raise InputError(f"{text} where {least}: record longer")
     return arrays, kept, notices
 
 

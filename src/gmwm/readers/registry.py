@@ -24,41 +24,29 @@ CLOCKS = ("header", "log")  # stamps of messages: of their headers, or of when t
 
 @dataclass(frozen=True)
 class Wanted:
-    """What the caller asks of a file.
+    """What the caller asks of a file."""
 
-    topics: Topics of a log to read; by default the only one of an IMU, or one of gyros and one of
-        accelerometers.
-    clock: Which of `CLOCKS` counts.
-    by_channel: Whether channels are named, all of which one sensor may have.
-    damaged: Whether the rest of a damaged file is used.
-    """
-
-    topics: Sequence[str] = ()
-    clock: str = "header"
-    by_channel: bool = False
-    damaged: bool = False
+    topics: Sequence[str] = ()  # by default the only one of an IMU, or one of each sensor
+    clock: str = "header"  # which of `CLOCKS` counts
+    by_channel: bool = False  # whether channels are named, all of which one sensor may have
+    damaged: bool = False  # whether the rest of a damaged file is used
 
 
 @dataclass(frozen=True)
 class Format:
     """A kind of file.
 
-    title: What messages call such files.
     opener: Function of a path and `Wanted` that gives tables, as "module:name" in this room; it
         asks for the libraries of an extra that it needs by `gmwm.readers.table.library`.
-    suffixes: Endings of its files.
-    magic: Bytes that its files begin with.
-    is_log: Whether there may be several topics of messages to choose from.
-    has_clocks: Whether messages have the stamp of their header and that of their recording.
     """
 
     name: str
-    title: str
+    title: str  # what messages call such files
     opener: str
     suffixes: tuple[str, ...] = ()
-    magic: tuple[bytes, ...] = ()
-    is_log: bool = False
-    has_clocks: bool = False
+    magic: tuple[bytes, ...] = ()  # bytes that its files begin with
+    is_log: bool = False  # whether there may be several topics of messages to choose from
+    has_clocks: bool = False  # whether messages have stamps of their header and of their recording
 
 
 _TEXT = Format("text", "CSV and other delimited text (plain or .gz)", "text.csv_table:open_text")
@@ -89,10 +77,9 @@ READABLE = f"gmwm reads {', '.join(each.title for each in FORMATS)}"
 
 
 def open_tables(data: Any, wanted: Wanted, name: str | None = None) -> Sequence[Table]:
-    """Open a file or a table in memory, whatever it is.
+    """Open a file or a table in memory, whatever it is; sensors with own rates are own tables.
 
     name: One of `NAMES`, in place of what the first bytes and the name of the file show.
-    Returns: several tables if the sensors have rates of their own.
     """
     if wanted.clock not in CLOCKS:
         raise InputError(f"clock = {wanted.clock!r}: give one of {', '.join(CLOCKS)}")

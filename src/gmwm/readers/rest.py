@@ -31,16 +31,14 @@ def rest_notices(
     are_columns_given: bool,
     has_layout: bool,
 ) -> tuple[Notice, ...]:
-    """Notices where means or noise contradict the units or the columns.
+    """Notices where means or noise contradict the units or the columns; InputError if not given.
 
-    An accelerometer without gravity is fine (gravity may have been subtracted), and so is a gyro
-    that turns.
+    An accelerometer without gravity is fine (it may have been subtracted), and so is a gyro that
+    turns.
 
     unit_of: Unit of each channel in the file.
     given: Units that the user gave, by channel or sensor.
     has_layout: Whether the scales are those of a binary layout, where gravity has to show.
-    Raises InputError if the unit of the accelerometer, the columns or the layout are wrong, and
-        the user did not give them.
     """
     rate, force = _Sensor.of(recording, unit_of, "gyro"), _Sensor.of(recording, unit_of, "accel")
     swapped = _swapped(recording.source, rate, force, are_columns_given)
@@ -154,12 +152,8 @@ def _gravity(
     hint = f"check the unit: all accelerometer values are off by {_GRAVITY / force.size:.4g}"
     found = notice("gravity", "accel", values, variant="unit", hint=hint, in_file=in_file)
     if not is_given:
-        raise InputError(
-            f"{recording.source}: {found.text}",
-            "accel-unit-missing",
-            f'give the unit, units={{"accel": "{likely[0]}"}}',
-            {"unit": likely[0]},
-        )
+        hint, unit = f'give the unit, units={{"accel": "{likely[0]}"}}', {"unit": likely[0]}
+        raise InputError(f"{recording.source}: {found.text}", "accel-unit-missing", hint, unit)
     return (found,)
 
 
@@ -167,12 +161,9 @@ def _scale(recording: Recording, force: _Sensor, *, must_show: bool) -> tuple[No
     """A length that is gravity in no unit, and too large for an accelerometer without gravity."""
     values, usual, ratio = {"norm": force.size}, force.usual, force.usual / _GRAVITY
     if must_show and not 0.5 < ratio < 2.0:
-        raise InputError(
-            f"{recording.source}: the accelerometer reads {usual:.4g} m/s^2, {ratio:.3g} times "
-            "gravity: the file has another layout",
-            "layout",
-            'give the layout of this file, or units={"accel": "m/s^2"} if there is no gravity',
-        )
+        text = f"the accelerometer reads {usual:.4g} m/s^2, {ratio:.3g} times gravity"
+        hint = 'give the layout of this file, or units={"accel": "m/s^2"} if there is no gravity'
+        raise InputError(f"{recording.source}: {text}: the file has another layout", "layout", hint)
     if _is_gravity(force.size * recording.rate, tuning.GRAVITY_SURE):
         hint = "divide the increments, and those of the gyro, by the sampling interval"
         return (notice("gravity", "", values, variant="increments", hint=hint, usual=usual),)

@@ -18,16 +18,11 @@ _LAGS, _FEWEST_LAGS = (1, 4, 16), 20  # blocks between which changes count; how 
 
 @dataclass(frozen=True)
 class TurningGravity:
-    """Changes of the specific force against those that the angular rate explains.
+    """Changes of the specific force against those that the angular rate explains."""
 
-    factor: Least-squares factor of the predicted changes: 1 for a sensor that is turned.
-    explained: Share of the squared changes that the prediction explains: zero for noise.
-    change: Root mean square of the predicted changes, m/s^2.
-    """
-
-    factor: float
-    explained: float
-    change: float
+    factor: float  # least-squares factor of the predicted changes: 1 for a sensor that is turned
+    explained: float  # share of the squared changes that the prediction explains: zero for noise
+    change: float  # root mean square of the predicted changes, m/s^2
 
 
 def _triad(recording: Recording, sensor: str) -> list[FloatArray]:
@@ -37,10 +32,7 @@ def _triad(recording: Recording, sensor: str) -> list[FloatArray]:
 
 
 def block_means(axes: Sequence[FloatArray], size: int) -> FloatArray:
-    """Means of blocks of ``size`` samples; NaN where three quarters of one are missing.
-
-    Returns: (n // size, axes).
-    """
+    """Means (n // size, axes) of blocks; NaN where three quarters of one are missing."""
 
     def means(values: FloatArray) -> FloatArray:
         rows = values[: values.size // size * size].reshape(-1, size)
@@ -108,8 +100,6 @@ def steady_turn(recording: Recording, size: int) -> float:
 
     The constant w of da/dt = -w x a by least squares, from changes over several times. It counts if
     it explains most of the changes and turns by a radian in all, which noise and drifts do not.
-
-    size: Samples of the blocks whose means are compared.
     """
     force = _triad(recording, "accel")
     means = block_means(force, size) if force else np.full((1, 1), np.nan)

@@ -91,14 +91,10 @@ def _entries(path: Path) -> dict[str, Array]:
 
 @dataclass(frozen=True, eq=False)
 class Array:
-    """An array, or a part of one, that is not read yet.
+    """An array, or a part of one, that is not read yet."""
 
-    like: An array of its shape and type, without its content.
-    read: Gives the array itself.
-    """
-
-    like: AnyArray
-    read: Callable[[], AnyArray]
+    like: AnyArray  # an array of its shape and type, without its content
+    read: Callable[[], AnyArray]  # gives the array itself
 
     def __getitem__(self, part: Any) -> Array:
         return Array(self.like[part], lambda: self.read()[part])
@@ -154,10 +150,8 @@ class ArrayTable(Table):
         elif like.ndim == 2:
             columns = _unnamed(source, array)
         else:
-            raise InputError(
-                f"{source} has shape {like.shape}: save samples along rows, one column for each "
-                "channel"
-            )
+            hint = "save samples along rows, one column for each channel"
+            raise InputError(f"{source} has shape {like.shape}: {hint}")
         return cls._of(source, columns)
 
     @classmethod
@@ -170,9 +164,8 @@ class ArrayTable(Table):
         about: Mapping[str, Any] = MappingProxyType({}),
     ) -> ArrayTable:
         if not columns:
-            raise InputError(
-                f"{source} holds no column of more than one sample: save arrays of samples in it"
-            )
+            text = f"{source} holds no column of more than one sample"
+            raise InputError(f"{text}: save arrays of samples in it")
         names, arrays = zip(*columns, strict=True)
         told = list(notices)
         return cls(source=source, names=names, arrays=arrays, rate=rate, notices=told, **about)
@@ -256,9 +249,8 @@ def _fields(array: Array) -> list[_Named]:
 def _unnamed(source: str, array: Array) -> list[_Named]:
     rows, width = array.like.shape
     if width > rows and width >= tuning.FEWEST_SAMPLES:
-        raise InputError(
-            f"{source} has shape {array.like.shape}: samples run along the rows here, save array.T"
-        )
+        text = f"{source} has shape {array.like.shape}"
+        raise InputError(f"{text}: samples run along the rows here, save array.T")
     return [("", array[:, i]) for i in range(width)]
 
 

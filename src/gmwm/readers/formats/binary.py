@@ -24,18 +24,14 @@ from gmwm.readers.table import LARGEST, Columns, Table, usable
 
 @dataclass(frozen=True)
 class BinaryLayout:
-    """A record: time (float64), then six numbers, gyro and accelerometer x, y, z.
+    """A record: time (float64), then six numbers, gyro and accelerometer x, y, z."""
 
-    kind: numpy type of the six numbers.
-    gyro, accel: Scales of the numbers: rad and m/s of increments, rad/s and m/s^2 of rates.
-    order: {"=", "<", ">"}, native, little- or big-endian.
-    """
-
-    kind: str
+    kind: str  # numpy type of the six numbers
+    # gyro, accel: scales of the numbers: rad and m/s of increments, rad/s and m/s^2 of rates.
     gyro: float
     accel: float
     increments: bool = True
-    order: str = "="
+    order: str = "="  # {"=", "<", ">"}, native, little- or big-endian
 
     @property
     def record(self) -> np.dtype[np.void]:
@@ -64,11 +60,8 @@ def layout_of(text: str) -> BinaryLayout:
     parts = [part.strip() for part in text.split(",")]
     number = re.compile(r"[0-9.]+(?:[eE][+-]?[0-9]+)?")
     if len(parts) < 3 or parts[0] not in _KINDS or not all(map(number.fullmatch, parts[1:3])):
-        raise InputError(
-            f"layout {text!r} is unknown: give one of {', '.join(LAYOUTS)}, or {_FORM} with a type "
-            f"of {', '.join(_KINDS)}",
-            "layout",
-        )
+        known = f"{', '.join(LAYOUTS)}, or {_FORM} with a type of {', '.join(_KINDS)}"
+        raise InputError(f"layout {text!r} is unknown: give one of {known}", "layout")
     try:
         found = BinaryLayout(_KINDS[parts[0]], float(parts[1]), float(parts[2]))
     except ValueError:
@@ -96,10 +89,7 @@ class BinaryTable(Table):
 
     @classmethod
     def open(cls, path: Path, layout: BinaryLayout) -> BinaryTable:
-        """Look at the size of a file and its first times.
-
-        Raises InputError if it is too short, or its times are not those of this layout.
-        """
+        """Look at the size of a file and its first times."""
         record, size = layout.record.itemsize, path.stat().st_size
         count, rest = divmod(size, record)
         if count < tuning.FEWEST_SAMPLES:
@@ -120,11 +110,9 @@ class BinaryTable(Table):
             even = np.all(np.isfinite(first)) and np.count_nonzero(steps > 0.0) > steps.size // 2
             median = float(np.median(steps)) if even else 0.0
         if not tuning.LEAST_STEP <= median < tuning.LARGEST_OF_BINARY:
-            raise InputError(
-                f"{path.name}: its first times, {first[0]:.6g} and {first[1]:.6g}, are no seconds "
-                "of a clock: give the layout of this file",
-                "layout",
-            )
+            times = f"{path.name}: its first times, {first[0]:.6g} and {first[1]:.6g}"
+            hint = "give the layout of this file"
+            raise InputError(f"{times}, are no seconds of a clock: {hint}", "layout")
         return table
 
     def expected_rows(self) -> float:
@@ -140,10 +128,8 @@ class BinaryTable(Table):
                     found[column] = raw[column] * scales[column]
                 if not usable(found[column]):
                     row = int(np.flatnonzero(np.abs(found[column]) >= LARGEST)[0])
-                    raise InputError(
-                        f"{self.source}, {self.where(start + row)}: {found[column][row]} is not a "
-                        "usable number: check the layout"
-                    )
+                    text = f"{self.source}, {self.where(start + row)}: {found[column][row]}"
+                    raise InputError(f"{text} is not a usable number: check the layout")
             yield found
 
     def _raw(self, start: int, rows: int) -> list[FloatArray]:

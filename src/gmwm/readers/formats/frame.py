@@ -21,14 +21,11 @@ _Parts = Callable[[Sequence[int], int], Iterator[Sequence[Any]]]
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class FrameTable(Table):
-    """Columns of an Arrow table.
-
-    parts: Indices of columns and a number of rows -> their values, so many rows at a time.
-    """
+    """Columns of an Arrow table."""
 
     types: tuple[Any, ...]
     rows: int
-    parts: _Parts
+    parts: _Parts  # indices of columns and a number of rows -> their values, so many rows at a time
 
     def expected_rows(self) -> float:
         return float(self.rows)
@@ -37,10 +34,8 @@ class FrameTable(Table):
         for column in columns:
             kind = self.types[column]
             if not _is_number(kind):
-                raise InputError(
-                    f"{self.source}, column {label(self.names, column)} holds {kind}: give "
-                    "numbers, a column for each axis"
-                )
+                text = f"{self.source}, column {label(self.names, column)} holds {kind}"
+                raise InputError(f"{text}: give numbers, a column for each axis")
         first, row = dict[int, int](), 0
         with damage_named(self.source):
             for part in self.parts(columns, rows):

@@ -142,10 +142,8 @@ def read_hdf5(path: Path) -> ArrayTable:
             if name.startswith("#") or not isinstance(item, h5py.Dataset):
                 return
             if item.external:
-                raise InputError(
-                    f"{path.name}: {name} is in another file, {item.external[0][0]!r}, which is "
-                    "not opened: save its samples in this one"
-                )
+                text = f"{path.name}: {name} is in another file, {item.external[0][0]!r}"
+                raise InputError(f"{text}, which is not opened: save its samples in this one")
             if item.dtype.kind in "iufV" and item.shape:
                 like = np.broadcast_to(np.empty((), item.dtype), item.shape)
                 unit = "" if is_mat or meaning(name).unit is not None else _unit(item.attrs)

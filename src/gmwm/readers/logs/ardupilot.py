@@ -133,14 +133,10 @@ class Messages:
 
 @dataclass
 class Extent:
-    """How much of a log is messages, as far as it was read.
+    """How much of a log is messages, as far as it was read."""
 
-    between: Bytes between them that are none.
-    end: Of the last one.
-    """
-
-    between: int = 0
-    end: int = 0
+    between: int = 0  # bytes between them that are none
+    end: int = 0  # of the last one
 
 
 def messages(
@@ -298,20 +294,15 @@ def _contents(
                 }
     order = sorted(counts, key=lambda each: (list(_RANKS).index(each.kind), each.instance or 0))
     seconds = (stamps[-1] - stamps[0]) * 1e-6 if stamps else 0.0
-    damage = _damage_of(path, extent, seconds)
-    return {each: counts[each] for each in order}, sensors, _batches(headers, data), damage
-
-
-def _damage_of(path: Path, extent: Extent, seconds: float) -> str:
-    """What is wrong with a log, if anything is."""
     end = topics.end_of_content(path)
     with path.open("rb") as stream:
         stream.seek(extent.end)
         rest = stream.read(max(min(end - extent.end, _REMAINS), 0))
-    between = extent.between + (len(rest) if len(rest) == _REMAINS else 0)
-    if between:
-        return f"is damaged in places, where {between:,} bytes or more are no messages"
-    return topics.cut_off(seconds) if rest and rest[:2] == _MARKS[: len(rest)] else ""
+    is_cut = bool(rest) and rest[:2] == _MARKS[: len(rest)]
+    damage = topics.cut_off(seconds) if is_cut else ""
+    if between := extent.between + (len(rest) if len(rest) == _REMAINS else 0):
+        damage = f"is damaged in places, where {between:,} bytes or more are no messages"
+    return {each: counts[each] for each in order}, sensors, _batches(headers, data), damage
 
 
 def _batches(parts_of_header: Sequence[Messages], parts: Sequence[Messages]) -> _Batches:

@@ -40,14 +40,10 @@ ANGULAR_VELOCITY, LINEAR_ACCELERATION = 13, 25
 
 @dataclass(frozen=True)
 class Message:
-    """A type of message: a header, then numbers.
+    """A type of message: a header, then numbers."""
 
-    count: Numbers behind the header.
-    columns: Name of a column, with its unit -> index of its number.
-    """
-
-    count: int
-    columns: Mapping[str, int]
+    count: int  # numbers behind the header
+    columns: Mapping[str, int]  # name of a column, with its unit -> index of its number
 
 
 IMU = Message(
@@ -64,14 +60,10 @@ COVARIANCE_OF = {"gyro": ANGULAR_VELOCITY + 3, "accel": LINEAR_ACCELERATION + 3}
 
 @dataclass(frozen=True)
 class Serialization:
-    """How the header is written.
+    """How the header is written."""
 
-    stamp: Offset of the stamp, bytes.
-    is_cdr: Whether an encapsulation header says the byte order and numbers are aligned.
-    """
-
-    stamp: int
-    is_cdr: bool
+    stamp: int  # offset of the stamp, bytes
+    is_cdr: bool  # whether an encapsulation header says the byte order and numbers are aligned
 
     @property
     def text(self) -> int:
@@ -112,8 +104,8 @@ def decode(
         raise _cut_off(where(int(np.argmax(sizes < serialization.text))))
     joined = np.frombuffer(b"".join(raw), np.uint8)
     starts = np.cumsum(sizes) - sizes
-    text = np.arange(serialization.text)
-    head = joined.reshape(n, -1) if is_even else joined[starts[:, None] + text]
+    inside = np.arange(serialization.text)
+    head = joined.reshape(n, -1) if is_even else joined[starts[:, None] + inside]
     codes = _field(head, 0, "<u2") if serialization.is_cdr else np.full(n, _LITTLE)
     frames = _field(head, serialization.text - 4, "<u4")
     stamps = np.empty(n, np.int64)
@@ -123,10 +115,9 @@ def decode(
         first = int(np.argmax(left))
         size, code = int(sizes[first]), int(codes[first])
         if code not in _ORDERS:
-            raise InputError(
-                f"{where(first)}: encoding 0x{code.to_bytes(2, 'little').hex()} is not plain CDR: "
-                "record with a usual RMW, or convert the bag with ros2 bag convert"
-            )
+            text = f"{where(first)}: encoding 0x{code.to_bytes(2, 'little').hex()} is not plain CDR"
+            hint = "record with a usual RMW, or convert the bag with ros2 bag convert"
+            raise InputError(f"{text}: {hint}")
         order = _ORDERS[code]
         alike = (sizes == size) & (codes == code) & (frames == frames[first])
         if alike.all():
@@ -212,16 +203,12 @@ class _Bag:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class BagTable(MessageTable):
-    """A topic of a bag: one message a row, its stamp and numbers in it.
-
-    is_log: Whether the stamps are the times at which the messages were recorded.
-    start: Stamp that is written as zero, ns.
-    """
+    """A topic of a bag: one message a row, its stamp and numbers in it."""
 
     bag: _Bag
     message: Message
-    is_log: bool
-    start: int
+    is_log: bool  # whether the stamps are the times at which the messages were recorded
+    start: int  # stamp that is written as zero, ns
 
     def parts(self, columns: Sequence[int]) -> Iterator[Columns]:
         wanted = [column for column in columns if column > 0]
@@ -246,11 +233,8 @@ class BagTable(MessageTable):
                 part = dict(zip(wanted, found, strict=True))
                 yield {0: (stamps - self.start).astype(float)} | part if 0 in columns else part
         if 0 in columns and row > 1 and not changes:
-            raise InputError(
-                f"{self.source}, topic {self.topic.name}: every header has the same stamp",
-                "no-stamps",
-                'use the time of recording, clock="log"',
-            )
+            text = f"{self.source}, topic {self.topic.name}: every header has the same stamp"
+            raise InputError(text, "no-stamps", 'use the time of recording, clock="log"')
 
 
 def open_bag(path: Path, wanted: Wanted) -> tuple[BagTable, ...]:
@@ -261,20 +245,16 @@ def open_bag(path: Path, wanted: Wanted) -> tuple[BagTable, ...]:
     """
     is_folder = path.is_dir()
     if is_folder and not (path / "metadata.yaml").is_file():
-        raise InputError(
-            f"{path.name} has no metadata.yaml: name the .db3 or .mcap file in it, or write one "
-            "with ros2 bag reindex"
-        )
+        hint = "name the .db3 or .mcap file in it, or write one with ros2 bag reindex"
+        raise InputError(f"{path.name} has no metadata.yaml: {hint}")
     bag = _Bag(path, not is_folder and _is_ros1(path))
     with bag.opened() as reader:
         counts, others = _counts(reader)
         of_imu, warmth = counts["sensor_msgs/msg/Imu"], counts["sensor_msgs/msg/Temperature"]
         if not of_imu:
             listed = ", ".join(others[:8]) + (", ..." if len(others) > 8 else "")
-            raise InputError(
-                f"{path.name} has no messages of sensor_msgs/Imu: "
-                + (f"it has {listed}; record the topic of the IMU" if others else "it is empty")
-            )
+            held = f"it has {listed}; record the topic of the IMU" if others else "it is empty"
+            raise InputError(f"{path.name} has no messages of sensor_msgs/Imu: {held}")
         heads = {topic: list(islice(_messages(reader, topic), _SEEN)) for topic in of_imu}
         found = [
             Topic(topic, count, _sensors(reader, topic, bag, heads[topic]))

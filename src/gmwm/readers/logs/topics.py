@@ -21,14 +21,11 @@ _MEASURED = {"gyro": "angular rates", "accel": "accelerations"}
 
 @dataclass(frozen=True)
 class Topic:
-    """A series of messages of one IMU, or of one sensor of it.
-
-    count: Number of messages.
-    sensors: "gyro", "accel" or both, if not zeros all the time.
-    """
+    """A series of messages of one IMU, or of one sensor of it."""
 
     name: str
-    count: int
+    count: int  # number of messages
+    # "gyro", "accel" or both, if not zeros all the time.
     sensors: frozenset[str] = frozenset(SI_UNIT)
 
     def __str__(self) -> str:
@@ -39,7 +36,6 @@ class Topic:
 def choose(source: str, topics: Sequence[Topic], wanted: Wanted) -> tuple[Topic, ...]:
     """The topics to read: those wanted, else the only one, else one of gyros with one of forces.
 
-    topics: One at least.
     Raises InputError with the code "topic", if one is not there, or it cannot be decided; with
         "sensor-absent", if the log has one sensor and not the other, and no channel is named.
     """
@@ -50,12 +46,9 @@ def choose(source: str, topics: Sequence[Topic], wanted: Wanted) -> tuple[Topic,
     is_part = absent in [topic.sensors for topic in topics]
     if there and absent and not (is_part or wanted.by_channel):
         (sensor,), (other,) = there, absent
-        raise InputError(
-            f"{source} has no {_MEASURED[other]}, or only zeros, in {chosen[0].name}",
-            "sensor-absent",
-            f'record them too, or read the rest alone, channels="{sensor}"',
-            {"sensor": sensor},
-        )
+        text = f"{source} has no {_MEASURED[other]}, or only zeros, in {chosen[0].name}"
+        hint = f'record them too, or read the rest alone, channels="{sensor}"'
+        raise InputError(text, "sensor-absent", hint, {"sensor": sensor})
     return chosen
 
 
@@ -64,24 +57,17 @@ def _chosen(source: str, topics: Sequence[Topic], wanted: Sequence[str]) -> tupl
     if not wanted:
         if len(topics) == 1 or _are_parts(topics):
             return tuple(topics)
-        raise InputError(
-            f"{source} has {len(topics)} topics of an IMU: {listed}",
-            "topic",
-            f'choose one, topic="{topics[0].name}"',
-        )
+        text = f"{source} has {len(topics)} topics of an IMU: {listed}"
+        raise InputError(text, "topic", f'choose one, topic="{topics[0].name}"')
     by_name = {topic.name.strip("/"): topic for topic in topics}
     for name in wanted:
         if name.strip("/") not in by_name:
-            raise InputError(
-                f"{source} has no topic {name!r} of an IMU: it has {listed}", "topic-unknown"
-            )
+            text = f"{source} has no topic {name!r} of an IMU: it has {listed}"
+            raise InputError(text, "topic-unknown")
     chosen = tuple(by_name[name.strip("/")] for name in dict.fromkeys(wanted))
     if len(chosen) > 1 and not _are_parts(chosen):
-        raise InputError(
-            f"{source}: {' and '.join(map(str, chosen))} are no pair of gyros and "
-            "accelerometers: choose one, or two such",
-            "topic",
-        )
+        text = f"{source}: {' and '.join(map(str, chosen))} are no pair of gyros and accelerometers"
+        raise InputError(f"{text}: choose one, or two such", "topic")
     return chosen
 
 
@@ -164,10 +150,8 @@ class MessageTable(Table):
             row += next(iter(part.values())).size
             yield part
         if not 0 < row <= self.topic.count:
-            raise InputError(
-                f"{self.source}, topic {self.topic.name}: its messages are not as many as its "
-                "index says: get a whole copy, or reindex it"
-            )
+            text = f"{self.source}, topic {self.topic.name}: its messages are not as many"
+            raise InputError(f"{text} as its index says: get a whole copy, or reindex it")
 
     def where(self, row: int) -> str:
         return f"message {row} of {self.topic.name} (counted from 0)"

@@ -47,10 +47,7 @@ _MINUTE, _LEAP_MINUTE = 60.0, 61.0  # s
 
 
 def split_line(line: str, delimiter: str) -> list[str]:
-    """Fields of a line, without blanks around them and without quotes.
-
-    Raises ValueError if the quotes do not match.
-    """
+    """Fields of a line without blanks or quotes around them; ValueError if quotes do not match."""
     if delimiter == BLANKS:
         return [cell.strip('"') for cell in _RUN_OF_BLANKS.split(line.strip(" \t"))]
     if '"' not in line:
@@ -119,11 +116,6 @@ def _day(text: str) -> date:
     return date(*map(int, parts))
 
 
-def has_zone(found: re.Match[str]) -> bool:
-    """Whether the zone of a date is written."""
-    return found[9] is not None
-
-
 def date_columns(rows: Sequence[Sequence[str]]) -> dict[int, bool]:
     """Columns whose every field in these rows is a date, or empty; whether they have a zone."""
     result = {}
@@ -131,5 +123,5 @@ def date_columns(rows: Sequence[Sequence[str]]) -> dict[int, bool]:
         cells = [row[column] for row in rows if row[column]]
         found = [FIELD_OF_DATE.fullmatch(cell) for cell in cells]
         if cells and all(found):
-            result[column] = any(each is not None and has_zone(each) for each in found)
+            result[column] = any(each is not None and each[9] is not None for each in found)
     return result

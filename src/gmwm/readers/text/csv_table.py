@@ -38,13 +38,11 @@ _NULLS = ["", "NA", "na", "N/A", "n/a", "#N/A", "null", "NULL", "Null", "None", 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class CsvTable(Table):
-    """A text file whose layout is known.
-
-    is_taken: Whether the rest of a damaged file is used; None if that cannot be asked for.
-    """
+    """A text file whose layout is known."""
 
     path: Path
     layout: Layout
+    # Whether the rest of a damaged file is used; None if that cannot be asked for.
     is_taken: bool | None = None
 
     @classmethod
@@ -140,10 +138,8 @@ class CsvTable(Table):
                 cell = cell if len(cell) <= 30 else f"{cell[:27]}..."
                 place = f"line {line}, column {label(self.names, column)}: {cell!r}"
                 if value is None:
-                    raise InputError(
-                        f"{self.source}, {place} {problem}: correct the line, or choose other "
-                        "columns with channels= and time="
-                    )
+                    hint = "correct the line, or choose other columns with channels= and time="
+                    raise InputError(f"{self.source}, {place} {problem}: {hint}")
                 if math.isinf(value):
                     infinite.append(place)
                 values.append(value)
@@ -155,16 +151,13 @@ class CsvTable(Table):
         try:
             fields = cells.split_line(text, self.layout.delimiter)
         except ValueError as error:
-            raise InputError(
-                f"{self.source}, line {line}: quotes that do not match: correct the line"
-            ) from error
+            text = f"{self.source}, line {line}: quotes that do not match"
+            raise InputError(f"{text}: correct the line") from error
         if len(fields) == width + 1 and not fields[-1]:
             fields.pop()
         if len(fields) != width:
-            raise InputError(
-                f"{self.source}, line {line}: {len(fields)} fields where {width} were expected: "
-                "correct the line or remove it"
-            )
+            text = f"{self.source}, line {line}: {len(fields)} fields where {width} were expected"
+            raise InputError(f"{text}: correct the line or remove it")
         return fields
 
 
@@ -188,7 +181,12 @@ def _parse_with_arrow(
     if b'"' in block or b"(" in block:  # the latter for nan(1), which Arrow takes for NaN
         return None
     if layout.delimiter == BLANKS:
-        block = _single_blanks(block)
+        block = block.replace(b"\t", b" ")
+        while b"  " in block:
+            block = block.replace(b"  ", b" ")
+        for end in (b"\n", b"\r"):
+            block = block.replace(b" " + end, end).replace(end + b" ", end)
+        block = block.strip(b" ")
     names = [str(i) for i in range(layout.width + layout.trailing)]
     types = {
         names[i]: pyarrow.timestamp("ns", tz="UTC" if layout.dates[i] else None)
@@ -243,20 +241,10 @@ def _floats(column: pyarrow.ChunkedArray) -> FloatArray:
     return result
 
 
-def _single_blanks(block: bytes) -> bytes:
-    """Turn runs of blanks to single ones, none at the ends of lines."""
-    block = block.replace(b"\t", b" ")
-    while b"  " in block:
-        block = block.replace(b"  ", b" ")
-    for end in (b"\n", b"\r"):
-        block = block.replace(b" " + end, end).replace(end + b" ", end)
-    return block.strip(b" ")
-
-
 def _date(cell: str, zoned: bool) -> tuple[float | None, str]:
     """Seconds since 1970, or ``None`` and what is wrong with the field."""
     found = cells.FIELD_OF_DATE.fullmatch(cell)
-    if found is not None and cells.has_zone(found) is not zoned:
+    if found is not None and (found[9] is not None) is not zoned:
         return None, f"has {'no' if zoned else 'a'} zone, unlike the dates before it"
     try:
         return (cells.seconds_of(found), "") if found else (None, "is no date")

@@ -59,7 +59,16 @@ def with_dialect(layout: Layout, source: str, head: bytes) -> Layout:
     """
     names, preamble = layout.names, head[: layout.offset]
     if names[:1] == ("loopIteration",):
-        return _of_blackbox(layout, preamble)
+        steps = _GRAVITY_IN_STEPS.search(preamble)
+        meant, scales = {"time": "time [us]", "time (us)": "time [us]"}, {}
+        for i, name in enumerate(names):
+            if found := _BLACKBOX_AXIS.fullmatch(name):
+                sensor, unit = ("gyro", " [deg/s]") if found[1] == "gyroADC" else ("accel", " [g]")
+                unit = unit if steps or sensor == "gyro" else ""
+                meant[name] = f"{sensor}_{AXES[int(found[2])]}{unit}"
+            if steps and name.startswith("accSmooth"):
+                scales[i] = 1.0 / max(int(steps[1]), 1)
+        return replace(_renamed(layout, meant), scales=scales)
     if preamble.startswith(b"GYROFLOW IMU LOG"):
         sizes = {letter.decode(): float(size) for letter, size in _SCALES.findall(preamble)}
         meant = {name: new for name, new in _GYROFLOW.items() if name[0] in sizes}
@@ -83,45 +92,21 @@ def _renamed(layout: Layout, meant: dict[str, str]) -> Layout:
     return replace(layout, names=tuple(meant.get(name, name) for name in layout.names))
 
 
-def _of_blackbox(layout: Layout, preamble: bytes) -> Layout:
-    steps = _GRAVITY_IN_STEPS.search(preamble)
-    meant, scales = {"time": "time [us]", "time (us)": "time [us]"}, {}
-    for i, name in enumerate(layout.names):
-        if found := _BLACKBOX_AXIS.fullmatch(name):
-            axis = AXES[int(found[2])]
-            if found[1] == "gyroADC":
-                meant[name] = f"gyro_{axis} [deg/s]"
-            else:
-                meant[name] = f"accel_{axis} [g]" if steps else f"accel_{axis}"
-        if steps and name.startswith("accSmooth"):
-            scales[i] = 1.0 / max(int(steps[1]), 1)
-    return replace(_renamed(layout, meant), scales=scales)
-
-
 @dataclass(frozen=True)
 class Layout:
-    """How to read a delimited text.
+    """How to read a delimited text."""
 
-    delimiter: One character; a space stands for runs of spaces and tabs.
-    decimal: {".", ","}.
-    names: Names of the columns, ``""`` where there is none.
-    tentative: Whether the names, if any, come from a comment line.
-    trailing: Whether every line of data ends with a delimiter.
-    offset: Bytes before the first line of data.
-    line: Number of that line, counted from 1.
-    scales: Index of a column -> factor of its numbers.
-    dates: Index of a column of dates -> whether they have a zone.
-    """
-
-    delimiter: str
-    decimal: str
-    names: tuple[str, ...]
-    tentative: bool
-    trailing: bool
-    offset: int
-    line: int
+    delimiter: str  # one character; a space stands for runs of spaces and tabs
+    decimal: str  # {".", ","}
+    names: tuple[str, ...]  # names of the columns, ``""`` where there is none
+    tentative: bool  # whether the names, if any, come from a comment line
+    trailing: bool  # whether every line of data ends with a delimiter
+    offset: int  # bytes before the first line of data
+    line: int  # number of that line, counted from 1
     notices: tuple[Notice, ...] = ()
+    # Index of a column -> factor of its numbers.
     scales: Mapping[int, float] = field(default_factory=dict)
+    # Index of a column of dates -> whether they have a zone.
     dates: Mapping[int, bool] = field(default_factory=dict)
 
     @property
@@ -138,11 +123,7 @@ class _Line:
 
 
 def find_layout(source: str, head: bytes) -> Layout:
-    """Find out how a text is laid out from its first lines.
-
-    head: The beginning of the file, whole lines.
-    Raises InputError if this is not a text, has no data, or its header does not fit the data.
-    """
+    """How a text is laid out, from the whole lines at its beginning."""
     if head.startswith(_UTF16_MARKS):
         raise InputError(f"{source} is UTF-16 text: save it as UTF-8 or ASCII")
     if b"\0" in head:
@@ -203,10 +184,8 @@ def _first_lines(source: str, head: bytes) -> tuple[list[_Line], list[_Line]]:
     if _BLACKBOX.match(head, start):
         header = _BLACKBOX_HEADER.search(head, start)
         if header is None:
-            raise InputError(
-                f"{source} has the preamble of a blackbox log but no line that begins with "
-                "loopIteration: decode the log again"
-            )
+            text = f"{source} has the preamble of a blackbox log but no line that begins with"
+            raise InputError(f"{text} loopIteration: decode the log again")
         preamble = header.start()
     for i, found in enumerate(_LINE.finditer(head, start), start=1):
         raw = found.group().strip(b" \r\n")
@@ -291,9 +270,8 @@ def _fields(source: str, line: _Line, delimiter: str, header: bool = False) -> l
     try:
         return (split_header if header else split_line)(line.text, delimiter)
     except ValueError as error:
-        raise InputError(
-            f"{source}, line {line.number}: quotes that do not match: correct the line"
-        ) from error
+        text = f"{source}, line {line.number}: quotes that do not match"
+        raise InputError(f"{text}: correct the line") from error
 
 
 def _without_last_empty(names: list[str], width: int) -> list[str]:

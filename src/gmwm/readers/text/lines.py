@@ -104,10 +104,8 @@ def _open(path: Path) -> BinaryIO:
         return cast(BinaryIO, gzip.open(path, "rb"))
     if magic and path.suffix.lower() == ".gz":
         stream.close()
-        raise InputError(
-            f"{path.name} is not a gzip file although its name ends in .gz: "
-            "compress it with gzip, or remove .gz from its name"
-        )
+        hint = "compress it with gzip, or remove .gz from its name"
+        raise InputError(f"{path.name} is not a gzip file although its name ends in .gz: {hint}")
     return stream
 
 
