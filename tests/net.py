@@ -56,7 +56,7 @@ from gmwm import (
 )
 
 SI = {"gyro": "rad/s", "accel": "m/s^2"}
-TEXTS = {"text", "hint", "action", "sentence", "message", "prose"}
+TEXTS = {"comment", "text", "hint", "action", "sentence", "message", "prose"}
 """Keys that are not recorded."""
 ROUND_OFF = {"jitter": 1e-9}
 """Absolute tolerance of keys whose value may be what rounding leaves of zero."""
@@ -768,29 +768,7 @@ def _make_lot(folder: Path) -> None:
     (folder / "unit_9.csv").write_text("no,numbers\nat,all\n")
 
 
-TARGETS = [
-    "kalibr",
-    "openvins",
-    "vins",
-    "orbslam3",
-    "fastlio",
-    "liosam",
-    "kimera",
-    "okvis2",
-    "maplab",
-    "px4",
-    "gtsam",
-    "gtsam-cpp",
-    "ros-covariance",
-    "matlab",
-    "state-space",
-    "gazebo",
-    "pyins",
-    "gnss-ins-sim",
-    "kfgins",
-    "basalt",
-    "glim",
-]
+TARGETS = tuple(importlib.import_module("gmwm.export").TARGETS)
 
 
 @part
@@ -821,23 +799,8 @@ def _exported(found: Any, target: str, **more: Any) -> Any:
 
 # -- damaged files --------------------------------------------------------------------------------
 
-READ = [
-    "text",
-    "gzip",
-    "npy",
-    "npz",
-    "ulog",
-    "ardupilot",
-    "mat",
-    "mat73",
-    "hdf5",
-    "parquet",
-    "feather",
-    "bag1",
-    "sqlite3",
-    "mcap",
-    "records",
-]
+BINARY = "ulog ardupilot mat mat73 hdf5 parquet feather bag1 sqlite3 mcap records"
+READ = ("text", "gzip", "npy", "npz", *BINARY.split(" "))
 USES: dict[str, Callable[[Path, int], Any]] = {
     "document": lambda path, case: gmwm.load(path),
     "imu": lambda path, case: ins.read_imu(path, 100.0 if case % 2 else None, SI),
@@ -849,7 +812,9 @@ USES: dict[str, Callable[[Path, int], Any]] = {
         gmwm.health(gmwm.read(path, units=SI)),
         gmwm.calibrate(gmwm.read(path, units=SI), WhiteNoise() + RandomWalk(), jobs=1),
     ],
-    "numbers": lambda path, case: gmwm.export.read_numbers(path, 100.0 if case % 2 else None),
+    "numbers": lambda path, case: importlib.import_module("gmwm.export").read_numbers(
+        path, 100.0 if case % 2 else None
+    ),
     "datasheet": lambda path, case: gmwm.report.read_datasheet(
         path, {"gyro_x": "gyro", "accel_x": "accel"}
     ),

@@ -5,11 +5,13 @@ from __future__ import annotations
 import json
 import math
 import os
+import re
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
 from functools import cache
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self
 
 import numpy as np
@@ -32,6 +34,9 @@ _being_adapted: ContextVar[type | None] = ContextVar("_being_adapted", default=N
 
 _ASYMMETRY = 1e-6  # of correlations: what is left by rounding in a computed covariance
 _NEGATIVE = -1e-4  # eigenvalue of correlations; all but redundant parameters leave rounding errors
+
+_DAMAGE = (LookupError, TypeError, ValueError, AttributeError, ArithmeticError, RecursionError)
+"""What content that does not belong together raises somewhere in a constructor."""
 
 _DEEPEST = 32
 """Levels of lists and mappings in a document; what is saved has 12 at most."""
@@ -84,6 +89,8 @@ Rate = Annotated[float, Ge(1.0 / checks.LONGEST_INTERVAL), Le(1.0 / checks.SHORT
 Interval = Annotated[float, Ge(checks.SHORTEST_INTERVAL), Le(checks.LONGEST_INTERVAL)]
 OrNaN = Annotated[float, NoneIs(math.nan)]
 """A number that may be unknown."""
+Probability = Annotated[float, Ge(0.0), Le(1.0), NoneIs(math.nan)]
+"""One that may be unknown."""
 OrInfinity = Annotated[float, NoneIs(math.inf)]
 """A number that may be infinite."""
 Array = Annotated[FloatArray, _IsArray()]
@@ -97,13 +104,12 @@ def _array_of(value: Any) -> FloatArray:
     if isinstance(value, np.ndarray):
         return value
     rows = value if isinstance(value, list) and value and isinstance(value[0], list) else [value]
-    if not all(isinstance(row, list) and all(map(_is_element, row)) for row in rows):
+    if not all(
+        isinstance(row, list) and all(each is None or checks.is_number(each) for each in row)
+        for row in rows
+    ):
         raise ValueError("not a list of numbers")
     return np.array(value, dtype=float)  # None becomes NaN
-
-
-def _is_element(value: Any) -> bool:
-    return value is None or checks.is_number(value)
 
 
 def _lists_of(array: FloatArray) -> list[Any]:
@@ -129,13 +135,16 @@ def plain_schema(read: Callable[[Any], Any], write: Callable[[Any], Any]) -> Any
 class Document:
     """A result that can be saved, and comes back from its file by `load_document`.
 
-    A subclass is a frozen dataclass that names its ``SCHEMA``. Its fields are the document:
+    A subclass is a frozen dataclass that names its ``SCHEMA``; one without is a part of other
+    documents only. Its fields are the document:
     pydantic reads and writes them by their annotations, with `OrNaN`, `OrInfinity` and `Array`
     where JSON has no such value. A field that is another document is stored as one.
     """
 
     SCHEMA: ClassVar[str] = ""
     SCHEMA_VERSION: ClassVar[int] = 1
+    KEYS: ClassVar[Mapping[str, str]] = {}
+    """Field -> key of the document, where it is another."""
 
     _kinds: ClassVar[dict[str, type[Document]]] = {}
 
@@ -147,8 +156,8 @@ class Document:
     def content(self) -> dict[str, Any]:
         """The fields in JSON types, with what is `derived` from them."""
         kind: Any = type(self)
-        fields: dict[str, Any] = _adapter(kind).dump_python(self, mode="json", by_alias=True)
-        return fields | self.derived()
+        fields = _adapter(kind).dump_python(self, mode="json")
+        return {self.KEYS.get(name, name): each for name, each in fields.items()} | self.derived()
 
     def derived(self) -> dict[str, Any]:
         """Keys of the document that are no fields, for readers of the file."""
@@ -161,16 +170,19 @@ class Document:
     def from_content(cls, content: Mapping[str, Any]) -> Self:
         """Inverse of `content`.
 
-        Raises InputError with the place of the first value that cannot be used.
+        Raises InputError or ValueError with the place of the first value that cannot be used.
         """
         from pydantic import ValidationError
 
+        fields = {field: key for field, key in cls.KEYS.items() if key in content}
+        own = {key: each for key, each in content.items() if key not in fields.values()}
+        own |= {field: content[key] for field, key in fields.items()}
+        kind: Any = cls
         try:
             # Strict: lists become tuples, and mappings dataclasses, only if they come from JSON.
-            kind: Any = cls
-            found: Self = _adapter(kind).validate_json(json.dumps(content), strict=True)
+            found: Self = _adapter(kind).validate_json(json.dumps(own), strict=True)
         except ValidationError as error:
-            raise InputError(validation_sentence(error)) from None
+            raise InputError(validation_sentence(error, cls.KEYS)) from None
         found.check_content()
         return found
 
@@ -179,15 +191,15 @@ class Document:
         """Schema of a field that is a document; that of the class itself has its fields."""
         if cls is _being_adapted.get():
             return handler(source)
-        return plain_schema(cls._restored, lambda document: document.to_dict())
-
-    @classmethod
-    def _restored(cls, value: Any) -> Self:
-        return value if isinstance(value, cls) else cls.from_dict(value)
+        return plain_schema(
+            lambda value: value if isinstance(value, cls) else cls._rebuilt(value),
+            lambda document: document.to_dict(),
+        )
 
     def to_dict(self) -> dict[str, Any]:
         """Everything, in JSON types; see `from_dict`."""
-        return {"schema": self.SCHEMA, "schema_version": self.SCHEMA_VERSION, **self.content()}
+        head = {"schema": self.SCHEMA, "schema_version": self.SCHEMA_VERSION}
+        return {**(head if self.SCHEMA else {}), **self.content()}
 
     @classmethod
     def from_dict(cls, content: Any) -> Self:
@@ -195,27 +207,39 @@ class Document:
 
         Raises InputError if the content is of another schema or version, or damaged.
         """
+        try:
+            return cls._rebuilt(content)
+        except InputError as error:
+            if error.code:
+                raise
+            what = cls._title()
+            raise InputError(f"the {what} cannot be rebuilt ({error}): make it again") from None
+
+    @classmethod
+    def _rebuilt(cls, content: Any) -> Self:
         kind = cls._kind_of(content)
         if kind is not None and kind is not cls and issubclass(kind, cls):
-            return kind.from_dict(content)
-        what = cls.SCHEMA.rpartition(".")[2]
-        if not isinstance(content, Mapping) or content.get("schema") != cls.SCHEMA:
-            raise InputError(f"this is not a {what}: give a file that was saved from one")
+            return kind._rebuilt(content)
+        what = cls._title()
+        if not isinstance(content, Mapping) or content.get("schema", "") != cls.SCHEMA:
+            raise InputError(f"this is not a {what}: give a file that was saved from one", "schema")
         version = content.get("schema_version")
-        if version != cls.SCHEMA_VERSION:
+        if cls.SCHEMA and version != cls.SCHEMA_VERSION:
             raise InputError(
                 f"schema version {checks.shown(version)} is not known here (known is "
-                f"{cls.SCHEMA_VERSION}): make the {what} again or update gmwm"
+                f"{cls.SCHEMA_VERSION}): make the {what} again or update gmwm",
+                "schema",
             )
         try:
             return cls.from_content(content)
-        except InputError as error:
-            raise InputError(f"the {what} cannot be rebuilt ({error}): make it again") from None
-        except (
-            LookupError, TypeError, ValueError, AttributeError, ArithmeticError, RecursionError
-        ) as error:  # fmt: skip
-            which = f"{type(error).__name__}: {checks.line(str(error))}"
-            raise InputError(f"the {what} is damaged ({which}): make it again") from None
+        except InputError:
+            raise
+        except _DAMAGE as error:
+            raise InputError(checks.line(str(error)) or type(error).__name__) from None
+
+    @classmethod
+    def _title(cls) -> str:
+        return cls.SCHEMA.rpartition(".")[2] or re.sub(r"\B([A-Z])", r" \1", cls.__name__).lower()
 
     @staticmethod
     def _kind_of(content: Any) -> type[Document] | None:
@@ -256,14 +280,21 @@ def _adapter(kind: Any) -> TypeAdapter[Any]:
         _being_adapted.reset(token)
 
 
-def validation_sentence(error: ValidationError) -> str:
-    """The place of the first wrong value, and what is wrong with it."""
+def validation_sentence(
+    error: ValidationError, keys: Mapping[str, str] = MappingProxyType({})
+) -> str:
+    """The place of the first wrong value, and what is wrong with it.
+
+    keys: Field -> key, where a document has another.
+    """
     first = error.errors(include_url=False)[0]
-    place = ".".join(str(part) for part in first["loc"]) or "content"
+    top, *below = first["loc"] or ("content",)
+    place = ".".join(map(str, (keys.get(str(top), top), *below)))
     if first["type"] == "missing":
         return f"there is no {place}"
     if first["type"] == "value_error":
-        return f"{place}: {first['ctx']['error']}"
+        inner = first["ctx"]["error"]
+        return f"{place}{'.' if isinstance(inner, InputError) else ': '}{inner}"
     return f"{place} = {checks.shown(first['input'])}: {first['msg'][0].lower()}{first['msg'][1:]}"
 
 

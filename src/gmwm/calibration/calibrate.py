@@ -18,6 +18,7 @@ from gmwm._core.jobs import (
     shared,
     worker_pool,
 )
+from gmwm._core.spool import is_spooled
 from gmwm._core.typing import Progress
 from gmwm.calibration import tuning
 from gmwm.calibration.calibration import Calibration
@@ -111,9 +112,9 @@ def calibrate(
     _check_together(given)
     size = sum(each.n * len(each.inertial) for each in given)
     others = extra_workers(jobs, max(len(each.inertial) for each in given))
-    with worker_pool(
-        others if size > tuning.WORTH_PROCESSES else 0, "gmwm.estimate:compile_search"
-    ):
+    on_disk = any(is_spooled(c.values) for each in given for c in each.inertial)
+    is_worth = size > tuning.WORTH_PROCESSES and not on_disk  # memory for one channel at a time
+    with worker_pool(others if is_worth else 0, "gmwm.estimate:compile_search"):
         return _calibrated(given, model, screening, still, remove_departures, progress)
 
 

@@ -6,7 +6,7 @@ import os
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from annotated_types import Ge
 
@@ -60,10 +60,11 @@ class Calibration(Mapping[str, Fit], Document):
     """
 
     SCHEMA: ClassVar[str] = "gmwm.calibration"
+    KEYS: ClassVar[Mapping[str, str]] = {"rate": "rate_hz", "fits": "channels"}
     SCHEMA_VERSION: ClassVar[int] = 2
 
-    fits: Mapping[str, Fit]
-    skipped: Mapping[str, Notice]
+    fits: Mapping[Text, Fit]
+    skipped: Mapping[Text, Notice]
     source: Text
     rate: Rate
     n: Samples
@@ -173,18 +174,6 @@ class Calibration(Mapping[str, Fit], Document):
         return frame(rows, ("channel", *Estimate.COLUMNS, "valid"))
 
     # -- files ------------------------------------------------------------------------------------
-
-    def content(self) -> dict[str, Any]:
-        found = super().content()
-        return found | {"rate_hz": found.pop("rate"), "channels": found.pop("fits")}
-
-    @classmethod
-    def from_content(cls, content: Mapping[str, Any]) -> Self:
-        own = {
-            k: content.get(v)
-            for k, v in (("rate", "rate_hz"), ("fits", "channels"), ("notices", "notices"))
-        }
-        return super().from_content({**content, **own})
 
     def report(
         self,

@@ -20,12 +20,12 @@ GivenModels = Process | Model | Mapping[str, Process | Model] | None
 """Models as the user gives them."""
 
 Removed = Sequence[Sequence[Departure]]
-"""Departures of each recording that were taken off."""
+"""Departures of each recording that were subtracted."""
 
 
 @dataclass(frozen=True)
 class ChannelModel:
-    """What was found of a channel.
+    """Fit of a channel and how its model was chosen.
 
     selection: None where the model was given.
     largest: With the largest walk that the record leaves open, if the selected model has none.
@@ -37,7 +37,7 @@ class ChannelModel:
 
 
 def model_of(name: str, model: GivenModels) -> Process | Model | None:
-    """What is given for a channel."""
+    """The model given for a channel."""
     if not isinstance(model, Mapping):
         return model
     if name not in model:
@@ -60,7 +60,7 @@ def channel_model(
     model: Fitted; None selects one.
     sources: Of the recordings.
     extra: Terms that a selected model may have.
-    removals: How many times evident departures are taken off, and the rest fitted again.
+    removals: How many times evident departures are subtracted, and the rest fitted again.
     """
     removed: list[tuple[Departure, ...]] = [()] * len(sources)
     before: Sequence[WaveletVariance] = ()

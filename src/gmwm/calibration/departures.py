@@ -71,7 +71,7 @@ def departures(fitted: Fit, wv: WaveletVariance | None = None) -> tuple[Departur
     """Find what a recording has that stationary noise does not have.
 
     They are found one after the other, each beside those before it, and measured beside all others.
-    A straight drift of the whole record competes with them and is none of them: the rate ramp of a
+    A straight drift of the whole record competes with them but is not reported: the rate ramp of a
     model has a test of its own.
 
     wv: The recording, where the fit is one of several.

@@ -1,4 +1,4 @@
-"""How departures from stationary noise are taken off, and what that takes of the noise."""
+"""Subtract departures from stationary noise, and give back the noise that this takes."""
 
 from __future__ import annotations
 
@@ -112,7 +112,7 @@ def _is_departure(notice: Notice) -> bool:
 
 
 def _departure(notice: Notice) -> Departure:
-    """Of a notice."""
+    """The departure that a notice reports."""
     of = notice.values
     return Departure(
         notice.code,

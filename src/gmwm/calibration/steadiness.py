@@ -1,4 +1,4 @@
-"""Whether the slow noise of a record is of one size all the time.
+"""Find slow noise that changes its size during a record.
 
 A model is an average over the record. Where a random walk begins halfway, or a Gauss-Markov process
 grows, it stands for no part of it, and the wavelet variances do not show that: the average fits.
@@ -44,7 +44,7 @@ class Means:
 
     @classmethod
     def of(cls, wv: WaveletVariance, most: int) -> Means:
-        """Of a series, as few as asked for."""
+        """Block means of a series, at most so many."""
         merged = -(-wv.blocks.size // most)
         whole = wv.blocks.size // merged * merged
         means = wv.blocks[:whole].reshape(-1, merged).mean(axis=1)
@@ -57,7 +57,7 @@ class Means:
 
     @property
     def length(self) -> float:
-        """Of all blocks, s."""
+        """Length of all blocks, s."""
         return self.blocks.size * self.step
 
     @cached_property
@@ -67,7 +67,7 @@ class Means:
 
     @property
     def time(self) -> FloatArray:
-        """Of the middles of the blocks, s, (B,)."""
+        """Middles of the blocks, s, (B,)."""
         return np.asarray(self.step * (np.arange(self.blocks.size) + 0.5), dtype=float)
 
     def without(self, curves: Sequence[FloatArray]) -> Means:
@@ -78,7 +78,7 @@ class Means:
         return replace(self, blocks=self.blocks - sizes @ rows)
 
     def parts(self, count: int) -> list[Means]:
-        """Of so many parts of equal length, one after the other."""
+        """Split into parts of equal length."""
         size = self.blocks.size // count
         rows = self.blocks[: size * count].reshape(count, size)
         return [Means(row, self.samples, self.dt) for row in rows]
@@ -93,12 +93,12 @@ class Means:
         return float(max(np.min(density), tuning.NO_INFORMATION * np.max(density)))
 
     def differences(self, curves: FloatArray) -> FloatArray:
-        """Of each block that exists and the next that does, (..., B) to (..., D)."""
+        """Differences of each block that exists and the next that does, (..., B) to (..., D)."""
         there = ~np.isnan(self.blocks)
         return np.asarray(np.diff(curves[..., there], axis=-1))
 
     def covariance(self, spectrum: PSD) -> FloatArray:
-        """Of these differences under a spectrum, (D, D), u^2."""
+        """Covariance of these differences under a spectrum, (D, D), u^2."""
         column = difference_covariance(spectrum, self.dt, self.samples, self.blocks.size)
         last = int(np.flatnonzero(~np.isnan(self.blocks))[-1])
         whole = toeplitz(column[:last])
@@ -190,7 +190,7 @@ class _Test:
 
 
 def _tests(means: Means, psd: PSD, count: int) -> list[_Test]:
-    """Of a division into so many parts, with all weights that leave enough degrees of freedom."""
+    """Tests of a division into parts, with all weights that leave enough degrees of freedom."""
     floor = means.floor(psd)
     parts = means.parts(count)
     if floor == 0.0 or parts[0].blocks.size < tuning.FEWEST_DIFFERENCES:
@@ -222,7 +222,7 @@ def _tests(means: Means, psd: PSD, count: int) -> list[_Test]:
 
 
 def _gains(part: Means, psd: PSD, floor: float) -> tuple[FloatArray, FloatArray]:
-    """What share of the variance is above the floor in directions that are independent, and these.
+    """Share of the variance above the floor in independent directions, and these directions.
 
     Returns: (D,) and (D, D); the differences have a variance of one in each direction.
     """

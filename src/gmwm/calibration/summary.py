@@ -1,4 +1,4 @@
-"""What a fitted model means: equivalent noise density, floor, and sentences for people."""
+"""Sensor numbers of a fit: noise density, lowest Allan deviation, and random walk."""
 
 from __future__ import annotations
 
@@ -138,7 +138,7 @@ def _bound(fitted: Fit, process: Process, key: str) -> float:
 
 
 def sentence(fitted: Fit) -> str:
-    """What the model means for who averages this sensor, in the units of the field."""
+    """The sensor's noise in a sentence, in data-sheet units."""
     density, low = white_density(fitted), floor(fitted)
 
     def shown(value: float, unit: str) -> str:
@@ -198,7 +198,7 @@ def left_open(calibration: Calibration) -> dict[str, tuple[float, str]]:
 
 
 def _shown(walk: float, fitted: Fit) -> tuple[float, str]:
-    """A K in the unit of the field, SI where there is none."""
+    """K in its data-sheet unit, or SI."""
     unit, per_si = customary_unit("u/s/sqrt(Hz)", fitted.wv.quantity, fitted.wv.unit)
     return walk * per_si, unit
 

@@ -1,4 +1,4 @@
-"""What in the data makes fits invalid, and one cut that avoids several departures."""
+"""Issues of the data that make fits invalid, and one cut that avoids several departures."""
 
 from __future__ import annotations
 

@@ -45,8 +45,9 @@ NONE_VALID = 1
 _LARGE, _CHANNELS = 4 << 20, 6
 """Bytes of a file, plain or packed, that has enough samples for two processes; their channels."""
 
-_ON_DISK = 2 << 30
-"""Bytes of a file whose samples are too many to be in several processes."""
+_ARRAYS = 2.0
+"""Memory of a file's columns and of the arrays made of them, in its size; a file whose samples are
+kept on disk is calibrated by one process."""
 
 _SHOWN_OTHERWISE = ("gap", "dead", "infinite")
 """Codes of issues that notices of the reader or reasons to skip say already."""
@@ -124,14 +125,17 @@ def calibrate(
       gmwm calibrate a.csv b.csv --rate 100 --gyro-unit deg/s --accel-unit g
       gmwm calibrate static.bag --export kalibr -o out
     """
-    if any(file.is_file() and _LARGE < file.stat().st_size < _ON_DISK for file in files):
+    from gmwm._core.memory import held, limited
+
+    with limited(memory):
+        on_disk = held() * (1 << 30) / _ARRAYS
+    if any(file.is_file() and _LARGE < file.stat().st_size < on_disk for file in files):
         from gmwm._core.jobs import extra_workers, worker_pool
 
         # Started first, so that it has imported what it needs when there is work for it.
         others = worker_pool(extra_workers(jobs, _CHANNELS), "gmwm.estimate:compile_search")
         click.get_current_context().with_resource(others)
     from gmwm._core.files import folder_to_fill, replaceable
-    from gmwm._core.memory import limited
     from gmwm.calibration import SCREENING, Stopwatch, calibrate as run, stage
     from gmwm.report import read_datasheet
 

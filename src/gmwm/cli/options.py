@@ -41,6 +41,20 @@ def option(usage: str, text: str, *, name: str = "", **settings: Any) -> Callabl
     return click.option(*names, metavar=metavar or None, help=text or None, **settings)
 
 
+def _terms() -> str:
+    from gmwm.process import CATALOGUE
+
+    return ", ".join(kind.short_name for kind in CATALOGUE)
+
+
+class _ModelOption(click.Option):
+    """An option whose help names the terms of a model, which take long to import."""
+
+    def get_help_record(self, ctx: click.Context) -> tuple[str, str] | None:
+        self.help = (self.help or "").replace("{terms}", _terms())
+        return super().get_help_record(ctx)
+
+
 def together(*options: Callable[[Any], Any]) -> Callable[[Any], Any]:
     """One decorator that gives a command several options, listed in this order."""
 
@@ -134,9 +148,9 @@ part_options = together(
 estimating_options = together(
     option(
         "--model [NAME=]MODEL",
-        "Fit this in place of selecting: terms such as N, B, K, Q, R, GM, Resonance or "
-        "ARMA (all are in docs/processes.md), e.g. 'N + K + 2 GM'; or "
+        "Fit this in place of selecting: terms {terms}, e.g. 'N + K + 2 GM'; or "
         "'gyro=N + 2 GM' for a sensor or channel; repeat.",
+        cls=_ModelOption,
         name="models",
         multiple=True,
     ),
@@ -319,9 +333,8 @@ def _model(text: str) -> Model:
         found = _TERM.fullmatch(part)
         if found is None or found[2] not in kinds:
             raise InputError(
-                f"--model {text}: {part.strip()!r} is no term: write "
-                f"{', '.join(kind.short_name for kind in CATALOGUE)} with +, e.g. "
-                "--model 'N + K + 2 GM'"
+                f"--model {text}: {part.strip()!r} is no term: write {_terms()} with +, "
+                "e.g. --model 'N + K + 2 GM'"
             )
         terms += [kinds[found[2]]() for _ in range(int(found[1] or 1))]
     try:

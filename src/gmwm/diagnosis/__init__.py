@@ -1,4 +1,4 @@
-"""What is wrong with a recording, before a model is fitted to it."""
+"""Faults of a recording, found before a model is fitted to it."""
 
 from gmwm.diagnosis.check import CHECKS as CHECKS, OF_RECORDING as OF_RECORDING, health as health
 from gmwm.diagnosis.copies import first_in_common as first_in_common

@@ -1,10 +1,10 @@
-"""What was found in a recording: notices for people, and numbers for programs."""
+"""Results of an examination: notices for people, numbers for programs."""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import numpy as np
 from annotated_types import Ge, Le
@@ -45,7 +45,7 @@ class Repetition:
 
 @dataclass(frozen=True)
 class ChannelHealth:
-    """What a program wants to know of one channel.
+    """Numbers of one channel, for programs.
 
     lines: Frequency (Hz) and amplitude (u) of each periodic line, strongest first.
     resonances: Undamped natural frequency (Hz) and damping ratio of each resonance, strongest
@@ -74,7 +74,7 @@ class ChannelHealth:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Health(Document, Printed):
-    """What was found in a recording.
+    """Faults and features of a recording.
 
     Attributes
     ----------
@@ -96,6 +96,7 @@ class Health(Document, Printed):
     """
 
     SCHEMA: ClassVar[str] = "gmwm.health"
+    KEYS: ClassVar[Mapping[str, str]] = {"rate": "rate_hz"}
     SCHEMA_VERSION: ClassVar[int] = 2
 
     notices: tuple[Notice, ...]
@@ -223,14 +224,6 @@ class Health(Document, Printed):
 
     def derived(self) -> dict[str, Any]:
         return {"worst": self.worst}
-
-    def content(self) -> dict[str, Any]:
-        found = super().content()
-        return found | {"rate_hz": found.pop("rate")}
-
-    @classmethod
-    def from_content(cls, content: Mapping[str, Any]) -> Self:
-        return super().from_content({"rate": content.get("rate_hz"), **content})
 
     def check_content(self) -> None:
         for name, channel in self.channels.items():

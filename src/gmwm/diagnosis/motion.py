@@ -84,7 +84,7 @@ class Motion:
     def outside(
         self, events: tuple[tuple[int, int], ...], dt: float
     ) -> tuple[tuple[int, int], ...]:
-        """Those sample intervals that do not touch a move, which is no shock."""
+        """Sample intervals that do not touch a move: a move is not a shock."""
         if not self.static:
             return events
         return tuple(
@@ -161,7 +161,7 @@ def find_motion(recording: Recording) -> Motion:
 
 
 def _channels(recording: Recording, sensor: str) -> list[Channel]:
-    """Those of a sensor of which most samples are there, and in the range of sensors."""
+    """Channels of a sensor with most samples present and within the range of sensors."""
     return [
         channel
         for channel in recording.inertial
@@ -170,7 +170,7 @@ def _channels(recording: Recording, sensor: str) -> list[Channel]:
 
 
 def is_moved_with(channel: Channel) -> bool:
-    """Whether motion can be seen in a channel: one that no sensor gives says nothing of it."""
+    """Whether motion can be seen in a channel, which needs half of its samples in range."""
     largest = np.fmax.reduce(np.abs(channel.values), initial=0.0)
     return 2 * channel.missing <= channel.n and bool(largest < tuning.LARGEST_OF_SENSOR)
 
@@ -208,7 +208,7 @@ def _white(values: FloatArray, size: int) -> float:
 
 
 def _changing(series: FloatArray, limit: float, least: float) -> BoolArray:
-    """Whether a block is among those across which the level changes by more than noise."""
+    """Mark blocks across which the level changes by more than noise."""
     lag = tuning.MEDIAN_BLOCKS
     change = np.abs(series[lag:] - series[:-lag])
     # Most blocks may move: a low quantile knows the noise all the same.
@@ -232,7 +232,7 @@ def _runs(chosen: BoolArray) -> list[tuple[int, int]]:
 
 
 def _still(rate: FloatArray, runs: list[tuple[int, int]]) -> list[tuple[int, int]]:
-    """Those runs whose rate is that of the run nearest to zero."""
+    """Runs with the rate of the run nearest to zero."""
     if not rate.shape[1] or not runs:
         return runs
     levels = np.array([np.median(rate[a:b], axis=0) for a, b in runs])
@@ -278,7 +278,7 @@ def _tilts_slowly(force: FloatArray) -> bool:
 
 def _never_rests(recording: Recording, rate: FloatArray, size: int) -> bool:
     """Whether gravity turns all the time, as the gyros say, or rates are not those of a bias."""
-    # A straight drift is none of them, however steep.
+    # A straight drift is not motion, however steep.
     straight = np.vander(np.linspace(-1.0, 1.0, rate.shape[0]), 2)
     rest = rate - straight @ np.linalg.lstsq(straight, rate, rcond=None)[0]
     spread = np.ptp(np.quantile(rest, [tuning.QUIET, 1.0 - tuning.QUIET], axis=0), axis=0)

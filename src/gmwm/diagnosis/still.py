@@ -88,7 +88,7 @@ def find_still(recording: Recording) -> Still:
 
     Blocks of a quarter of a second whose scatter is that of the noise, in all axes together and in
     each, and whose mean rate is that of the quietest ones. A stretch in which an axis scatters more
-    than in the quietest stretch, or has a narrow band of vibration, is no rest.
+    than in the quietest stretch, or has a narrow band of vibration, is not at rest.
 
     Parameters
     ----------
@@ -131,7 +131,7 @@ def rest_of(recording: Recording) -> Still | None:
     """The stretches at rest of a log that is not static; None if it is.
 
     It is not if it moves, or if it scatters more at some times than at others and begins or ceases
-    to do so within seconds, as what vibrates. A tilt between two attitudes at rest is no motion.
+    to do so within seconds, as what vibrates. A tilt between two attitudes does not count.
     """
     motion = find_motion(recording)
     if motion.turns_steadily:
@@ -162,7 +162,7 @@ def _floor(scatter: FloatArray, size: int) -> FloatArray:
 
 
 def _quiet(scatter: FloatArray, floor: FloatArray, size: int) -> BoolArray:
-    """Whether the ratio of a block of so many samples is that of noise.
+    """Mark blocks that scatter as noise does.
 
     By running medians: motion lasts longer than a shock, and to leave out the largest samples of
     noise of heavy tails would make it smaller than it is.
@@ -282,7 +282,7 @@ class Blocks:
 
     @property
     def length(self) -> float:
-        """Of a block, s."""
+        """Length of a block, s."""
         return self.size * self.channels[0].dt
 
     @property
@@ -392,7 +392,7 @@ def loudness(scatter: FloatArray, step: FloatArray) -> Loudness:
 
 
 def _loud_blocks(logs: FloatArray) -> tuple[BoolArray, float]:
-    """Those blocks of one axis that are loud, and the highest of their levels above the lowest."""
+    """Loud blocks of one axis, and their highest level above the lowest one."""
     ends = _changes(logs)
     levels = np.array([np.median(logs[a:b]) for a, b in pairwise(ends)])
     lengths = np.diff(ends)

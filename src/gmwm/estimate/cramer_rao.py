@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar, NamedTuple, Self
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
@@ -79,6 +79,7 @@ class CramerRao(Document):
     """
 
     SCHEMA: ClassVar[str] = "gmwm.cramer-rao"
+    KEYS: ClassVar[Mapping[str, str]] = {"dt": "dt_s"}
 
     model: Model
     n: Samples
@@ -93,15 +94,6 @@ class CramerRao(Document):
 
     def __repr__(self) -> str:
         return f"<CramerRao of {self.model!r}, n = {self.n:,}, dt = {self.dt:g} s>"
-
-    def content(self) -> dict[str, Any]:
-        content = super().content()
-        content["dt_s"] = content.pop("dt")
-        return content
-
-    @classmethod
-    def from_content(cls, content: Mapping[str, Any]) -> Self:
-        return super().from_content({**content, "dt": content["dt_s"]})
 
     def check_content(self) -> None:
         if not {*self.keys} <= {*self.model.params}:

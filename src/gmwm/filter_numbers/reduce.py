@@ -21,12 +21,7 @@ from gmwm.filter_numbers.axes import (
     given_tau,
     per_axis,
 )
-from gmwm.filter_numbers.bound import (
-    covered_terms_notices,
-    fit_notices,
-    predicted,
-    start_sd,
-)
+from gmwm.filter_numbers.bound import covered_terms_notices, fit_notices, predicted, start_sd
 from gmwm.filter_numbers.propagation import Chain, ChainErrors
 from gmwm.filter_numbers.result import FORMS, FilterNumbers, Predicted, SensorNumbers
 from gmwm.filter_numbers.spectra import Problem, RequiredSpectrum, with_correlation_times
@@ -134,7 +129,7 @@ class _Search:
     is_relative: bool
 
     def chain(self, axis: AxisModel) -> Chain:
-        return axis.between(self.times[-1]) if self.is_relative else axis.chain
+        return Chain.of_poses(axis.quantity, self.times[-1]) if self.is_relative else axis.chain
 
     def required(self, group: Sequence[AxisModel]) -> tuple[RequiredSpectrum, ...]:
         longest = self.times[-1]

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from gmwm.diagnosis.channel import Examined
+from gmwm.diagnosis.innovations import Examined
 from gmwm.diagnosis.innovations import Innovations
 
 

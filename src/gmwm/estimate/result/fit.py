@@ -27,9 +27,15 @@ from gmwm._core.typing import FloatArray
 from gmwm._core.units import shown_unit
 from gmwm.errors import InputError, MissingNameError
 from gmwm.estimate.problem import FittedMoments, Scales, drift_key, error_growth
-from gmwm.estimate.result.estimate import HEAD, Estimate, Region, estimates_of, slope_name
+from gmwm.estimate.result.estimate import (
+    HEAD,
+    Estimate,
+    Region,
+    confidence_interval,
+    estimates_of,
+    slope_name,
+)
 from gmwm.estimate.result.goodness import Goodness
-from gmwm.estimate.result.intervals import confidence_interval
 from gmwm.issues import CATALOGUE, Notice
 from gmwm.process import Model
 from gmwm.variance import WaveletVariance
@@ -98,6 +104,7 @@ class Fit(Document, Printed):
     """
 
     SCHEMA: ClassVar[str] = "gmwm.fit"
+    KEYS: ClassVar[Mapping[str, str]] = {"wv": "wavelet_variance"}
 
     model: Model
     wv: WaveletVariance
@@ -181,7 +188,7 @@ class Fit(Document, Printed):
     def interval(self, level: float = 0.95) -> dict[str, tuple[float, float]]:
         """Confidence intervals that stay in the parameters' ranges.
 
-        See `gmwm.estimate.result.intervals.confidence_interval`. An amplitude that is not
+        See `gmwm.estimate.result.estimate.confidence_interval`. An amplitude that is not
         significantly above zero has the interval from zero to its 95 % upper limit.
 
         Parameters
@@ -401,11 +408,6 @@ class Fit(Document, Printed):
         """A table of the parameters, one a row, in SI units; needs pandas."""
         return frame((estimate.to_dict() for estimate in self.estimates), Estimate.COLUMNS)
 
-    def content(self) -> dict[str, Any]:
-        content = super().content()
-        content["wavelet_variance"] = content.pop("wv")
-        return content
-
     def derived(self) -> dict[str, Any]:
         return {
             "params": self.params,
@@ -425,7 +427,7 @@ class Fit(Document, Printed):
 
     @classmethod
     def from_content(cls, content: Mapping[str, Any]) -> Self:
-        found = super().from_content({**content, "wv": content["wavelet_variance"]})
+        found = super().from_content(content)
         if content["params"] != found.params:
             raise InputError(f"its model {found.model!r} and its parameters do not belong together")
         return found

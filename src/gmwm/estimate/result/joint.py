@@ -10,7 +10,7 @@ import numpy as np
 from annotated_types import MinLen
 
 from gmwm._core.distributions import chi2
-from gmwm._core.documents import NotNegative, OrNaN, Text
+from gmwm._core.documents import NotNegative, Probability, Text
 from gmwm._core.frozen import freeze
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
@@ -48,8 +48,8 @@ class JointFit(Fit):
     SCHEMA: ClassVar[str] = "gmwm.joint-fit"
 
     parts: Annotated[tuple[Fit, ...], MinLen(1)] = ()
-    equality_p: OrNaN = float("nan")
-    curves_p: OrNaN = float("nan")
+    equality_p: Probability = float("nan")
+    curves_p: Probability = float("nan")
     spread: Mapping[Text, NotNegative] = field(default_factory=dict)
 
     def __post_init__(self) -> None:

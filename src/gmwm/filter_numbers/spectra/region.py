@@ -178,12 +178,18 @@ def region_spectra(
     for k in range(f.size):
         start = points[int(np.argmax([each[k] for each in densities]))]
         best = minimize(
-            spectrum.least, start, args=(f[k : k + 1],), jac=True, method="SLSQP",
+            spectrum.least,
+            start,
+            args=(f[k : k + 1],),
+            jac=True,
+            method="SLSQP",
             options={"maxiter": 40, "ftol": 1e-6},
             constraints={
-                "type": "ineq", "fun": lambda p: 1.0 - float(p @ p), "jac": lambda p: -2.0 * p,
+                "type": "ineq",
+                "fun": lambda p: 1.0 - float(p @ p),
+                "jac": lambda p: -2.0 * p,
             },
-        ).x  # fmt: skip
+        ).x
         points.append(best / max(1.0, float(np.linalg.norm(best))))
         densities.append(spectrum.density(points[-1], f))
     fine = np.append(f[:2], target.frequencies(10 * tuning.REGION_POINTS))

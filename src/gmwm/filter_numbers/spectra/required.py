@@ -11,7 +11,7 @@ from gmwm._core.text import brief, readable
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.filter_numbers import tuning
-from gmwm.issues import Notice, notice
+from gmwm.issues import Notice, Severity, notice
 from gmwm.process import Model, Process, evaluated
 
 
@@ -68,27 +68,14 @@ class RequiredSpectrum:
                 size = readable(constant, unit)
                 notices.append(notice("ramp-as-constant", "", values, label=label, size=size))
             elif term.is_line:
-                for f, amplitude in term.lines():
-                    values = {"frequency": f, "amplitude": amplitude}
-                    slow = f < passing
-                    notices.append(notice(
-                        "line-left-out", "", values, severity="warning" if slow else "note",
-                        variant="slow" if slow else "", label=label, size=readable(amplitude, unit),
-                    ))  # fmt: skip
+                notices += [
+                    _line(label, f, amplitude, f < passing, unit) for f, amplitude in term.lines()
+                ]
             else:
                 band = _frequencies([term], floor, nyquist, tuning.PEAK_DECADE, tuning.PEAK_POINTS)
                 density = evaluated(term.psd, band, dt)
                 high, low = float(np.max(density)), float(np.max(density[band <= fast]))
-                own = float(density[0])
-                if high <= low:
-                    weight = 1.0
-                elif own <= tuning.NO_FOOT * high:
-                    weight = float(high <= tuning.PEAK * low)
-                    own = 0.0
-                else:
-                    near = (passing / band[int(np.argmax(density))]) ** tuning.FADING
-                    within = tuning.PEAK * (low - own) / (high - own)
-                    weight = float(np.clip(within, min(near, 1.0), 1.0))
+                weight, own = _weight(band, density, low, passing)
                 if high > tuning.PEAK * low and weight < 1.0:
                     notices.append(_peak(label, band, density, weight, fast))
                 if weight * high > 0.0:
@@ -101,16 +88,13 @@ class RequiredSpectrum:
                 f"the spectrum of {model!r} rises as f^-{slope:.2g} towards zero frequency, more "
                 "than that of a random walk: no form dominates it"
             )
-        target = cls(
-            tuple(kept), tuple(weights), tuple(feet), constant, dt, horizon, lowest, floor,
-            slope, tuple(notices),
-        )  # fmt: skip
         if not kept:
             raise InputError(
                 f"{model!r} has nothing that white noise, a random walk or a Gauss-Markov process "
                 "stands for: add the white noise of the sensor"
             )
-        return target
+        parts = (tuple(kept), tuple(weights), tuple(feet))
+        return cls(*parts, constant, dt, horizon, lowest, floor, slope, tuple(notices))
 
     @property
     def foot(self) -> float:
@@ -173,6 +157,23 @@ class RequiredSpectrum:
         return 2.0 * _integral(np.maximum(total, 0.0) * f, np.log(f))
 
 
+def _weight(
+    band: FloatArray, density: FloatArray, low: float, passing: float
+) -> tuple[float, float]:
+    """Share of a spectrum that counts, and its low-frequency density (its foot).
+
+    low: Largest density below ``passing`` (Hz), above which peaks average out within the horizon.
+    """
+    high, own = float(np.max(density)), float(density[0])
+    if high <= low:
+        return 1.0, own
+    if own <= tuning.NO_FOOT * high:
+        return float(high <= tuning.PEAK * low), 0.0
+    near = (passing / band[int(np.argmax(density))]) ** tuning.FADING
+    within = tuning.PEAK * (low - own) / (high - own)
+    return float(np.clip(within, min(near, 1.0), 1.0)), own
+
+
 def _frequencies(
     terms: Sequence[Process], low: float, high: float, points: int, of_peak: int
 ) -> FloatArray:
@@ -216,14 +217,20 @@ def _has_variance(term: Process, dt: float) -> bool:
     return True
 
 
+def _line(label: str, f: float, amplitude: float, is_slow: bool, unit: str) -> Notice:
+    values, size = {"frequency": f, "amplitude": amplitude}, readable(amplitude, unit)
+    severity: Severity = "warning" if is_slow else "note"
+    more = {"variant": "slow" if is_slow else "", "label": label, "size": size}
+    return notice("line-left-out", "", values, severity=severity, **more)
+
+
 def _peak(label: str, f: FloatArray, density: FloatArray, weight: float, fast: float) -> Notice:
     place = float(f[int(np.argmax(density))])
     high = f >= fast
     variance = 2.0 * _integral((density * f)[high], np.log(f[high]))
     also = f" and {brief(100.0 * weight)} % of the peak" if weight > tuning.FADED else ""
-    values = {
-        "density": float(density[0]), "frequency": place, "variance": variance, "share": weight,
-    }  # fmt: skip
+    values = {"density": float(density[0]), "frequency": place}
+    values |= {"variance": variance, "share": weight}
     return notice("fast-peak-left-out", "", values, also=also, label=label, fast=fast)
 
 

@@ -16,7 +16,7 @@ from gmwm._core.typing import FloatArray
 from gmwm.calibration import Calibration
 from gmwm.errors import InputError
 from gmwm.ins import tuning
-from gmwm.ins.covariance.analysis import Course
+from gmwm.ins.covariance.analysis import Analysis, Course
 from gmwm.ins.filter import Outage, gnss
 from gmwm.ins.imu import AXES, SensorModels
 from gmwm.ins.simulation import Scenario
@@ -188,29 +188,30 @@ def reduce(
     _, logs = smallest_score(score, [np.zeros(len(names))])
     best = scaled(logs)
     full, read, reduced = (course.analyse(truth, each) for each in (truth, start, best))
-
-    def error(outage: Outage) -> ReducedError:
-        at = full.index(outage.end)
-
-        def horizontal(sd: FloatArray) -> float:
-            return float(np.hypot(*sd[at, :2]))
-
-        return ReducedError(
-            duration=outage.duration,
-            full=horizontal(full.sd),
-            read_off=horizontal(read.sd),
-            read_off_predicted=horizontal(read.predicted_sd),
-            reduced=horizontal(reduced.sd),
-            reduced_predicted=horizontal(reduced.predicted_sd),
-            nees=float(reduced.nees()[at]),
-        )
-
     return Reduction(
         form=form,
         models=best,
         inflation=dict(zip(names, map(float, np.exp(logs)), strict=True)),
-        errors=tuple(map(error, scenario.outages)),
+        errors=tuple(_error(each, full, read, reduced) for each in scenario.outages),
         notices=(*reduced.notices, *([notice("judged-on-loiter")] if assumed else ())),
+    )
+
+
+def _error(outage: Outage, full: Analysis, read: Analysis, reduced: Analysis) -> ReducedError:
+    """Errors at the end of an outage, by the three models of the filter."""
+    at = full.index(outage.end)
+
+    def horizontal(sd: FloatArray) -> float:
+        return float(np.hypot(*sd[at, :2]))
+
+    return ReducedError(
+        duration=outage.duration,
+        full=horizontal(full.sd),
+        read_off=horizontal(read.sd),
+        read_off_predicted=horizontal(read.predicted_sd),
+        reduced=horizontal(reduced.sd),
+        reduced_predicted=horizontal(reduced.predicted_sd),
+        nees=float(reduced.nees()[at]),
     )
 
 
