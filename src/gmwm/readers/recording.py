@@ -142,14 +142,26 @@ class Recording(Mapping[str, Channel], Printed):
     ) -> Recording:
         """Build a recording from arrays in any unit.
 
-        arrays: Channel name -> samples (n,), NaN where one is missing; or pairs of these, of which
-            each series is in memory once if they are made one by one.
-        rate: Sampling rate, Hz.
-        units: Channel name, or "gyro" and "accel" for all of them, -> unit: ``{"gyro": "deg/s"}``.
-            A channel in degC, K, V, mV or s is auxiliary.
-        notices: Added to those about missing samples.
-        Raises InputError if the rate is not positive, a unit is missing or unknown, or the channels
-            are not series of numbers of one length, none infinite.
+        Parameters
+        ----------
+        arrays : mapping, or iterable of pairs
+            Channel name -> samples (n,), NaN where one is missing. Pairs that are made one by one
+            save memory.
+        rate : float
+            Sampling rate, Hz.
+        units : mapping
+            Channel name, or "gyro" and "accel", -> unit: ``{"gyro": "deg/s"}``. A channel in degC,
+            K, V, mV or s is auxiliary.
+        source : str, optional
+            Name of the recording.
+        notices : sequence of Notice, optional
+            Added to those about missing samples.
+
+        Raises
+        ------
+        InputError
+            If the rate is not positive, a unit is missing or unknown, or the channels are not
+            series of numbers of one length, none infinite.
         """
         if not tuning.SLOWEST_RATE <= rate <= tuning.FASTEST_RATE:
             limits = f"{tuning.SLOWEST_RATE:g} to {tuning.FASTEST_RATE:g}"
@@ -235,9 +247,16 @@ class Recording(Mapping[str, Channel], Printed):
     def part(self, start: float = 0.0, stop: float | None = None) -> Recording:
         """The recording between two times, whose own times count from ``start``.
 
-        start, stop: s from the first sample; by default to the end.
-        Raises InputError if fewer than 64 samples lie between, or the sampling rate changes, so
-            that the times are not those of the file.
+        Parameters
+        ----------
+        start, stop : float, optional
+            s from the first sample; by default to the end.
+
+        Raises
+        ------
+        InputError
+            If fewer than 64 samples lie between, or the sampling rate changes, so that the times
+            are not those of the file.
         """
         end = self.duration if stop is None else min(float(stop), self.duration)
         if start == 0.0 and end == self.duration:
