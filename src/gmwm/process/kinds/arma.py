@@ -56,7 +56,10 @@ class ARIMA(Process):
     separable_shape = False
     d: int
     orders: tuple[int, int]
-    _examples = (([0.5], 1, [0.3], 0.7), ([0.9, -0.5], 0, [0.4, 0.1], 2.0))
+    _examples: ClassVar[tuple[tuple[Any, ...], ...]] = (
+        ([0.5], 1, [0.3], 0.7),
+        ([0.9, -0.5], 0, [0.4, 0.1], 2.0),
+    )
 
     def __init__(
         self,
