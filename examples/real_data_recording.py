@@ -10,8 +10,8 @@ from scipy.signal import welch
 
 import gmwm
 from gmwm import Channel, Fit, Health, JointFit, Recording
-from gmwm.issues import Notice
 from gmwm._core.units import SI_UNIT, factor
+from gmwm.issues import Notice
 
 NUMBERS = (1, 2, 3, 4)
 CHANNELS = ("gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z")
