@@ -47,10 +47,13 @@ def _percent(share: float) -> str:
     return per_cent(share) if share < 0.995 else f"a factor of {brief(1.0 + share)}"
 
 
-def _content(estimate: Estimate) -> dict[str, Any]:
-    """An estimate in JSON types; ``None`` for an interval without an end."""
-    content = estimate.to_dict()
-    return {key: plain(v) if isinstance(v, float) else v for key, v in content.items()}
+def _without_nan(value: Any) -> Any:
+    """JSON types without NaN and infinity, which JSON lacks: ``None`` in their place."""
+    if isinstance(value, Mapping):
+        return {key: _without_nan(each) for key, each in value.items()}
+    if isinstance(value, list | tuple):
+        return [_without_nan(each) for each in value]
+    return plain(value) if isinstance(value, float) else value
 
 
 @dataclass(frozen=True)
@@ -199,26 +202,26 @@ class AxisComparison:
     def to_dict(self) -> dict[str, Any]:
         """In JSON types, SI."""
         equality = self.equality
-        return {
+        content = {
             "state": self.state,
-            "p_value": plain(self.p_value),
+            "p_value": self.p_value,
             "recordings": list(self.fits),
             "left_out": {label: notice.to_dict() for label, notice in self.left_out.items()},
             "differences": [
                 {"part": d.part, "shortest_s": d.shortest, "longest_s": d.longest}
                 | {name: getattr(d, name) for name in ("extent", "sigma", "resolution")}
-                | {k: [plain(r) for r in getattr(d, k).tolist()] for k in ("ratios", "errors")}
+                | {name: getattr(d, name).tolist() for name in ("ratios", "errors")}
                 for d in (equality.differences if equality else ())
             ],
             "joint": None if self.joint is None else self.joint.to_dict(),
-            "equality_p": plain(self.joint.equality_p) if self.joint else None,
+            "equality_p": self.joint.equality_p if self.joint else None,
             "parameters": [
                 {
                     "key": each.key,
-                    "joint": _content(each.joint),
-                    "spread": plain(each.spread),
-                    "p_value": plain(each.p_value),
-                    "each": [None if e is None else _content(e) for e in each.each],
+                    "joint": each.joint.to_dict(),
+                    "spread": each.spread,
+                    "p_value": each.p_value,
+                    "each": [None if e is None else e.to_dict() for e in each.each],
                 }
                 for each in self.parameters
             ],
@@ -226,12 +229,13 @@ class AxisComparison:
                 "each": {label: each.row() for label, each in self.numbers.each.items()},
                 "joint": self.numbers.joint.row() if self.numbers.joint else None,
                 "covering": self.numbers.covering.row() if self.numbers.covering else None,
-                "nees": {label: plain(value) for label, value in self.numbers.nees.items()},
+                "nees": dict(self.numbers.nees),
                 "upper_bounds": dict(self.numbers.upper),
-                "inflation": {k: plain(self.numbers.inflation(k)) for k in _UNITS},
+                "inflation": {k: self.numbers.inflation(k) for k in _UNITS},
             },
-            "curve_inflation": plain(self.curve_inflation),
+            "curve_inflation": self.curve_inflation,
         }
+        return dict(_without_nan(content))
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -16,8 +16,7 @@ from gmwm.ins.covariance.reduction import (
 )
 from gmwm.ins.filter.aiding import Outage, gnss
 from gmwm.ins.imu.sensors import AXES, SensorModels
-from gmwm.ins.simulation.scenario import Scenario, Simulated
-from gmwm.ins.simulation.trials import monte_carlo
+from gmwm.ins.simulation.trials import Scenario, Simulated, monte_carlo
 from gmwm.ins.trajectory.missions import car_drive, fixed_wing_loiter
 
 DT = 0.1
