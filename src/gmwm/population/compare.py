@@ -160,9 +160,9 @@ def labelled(
             list(PurePath(paths[k]).with_suffix("").parts) if str(paths[k]) else [] for k in same
         ]
         for end in (0, -1):
-            while all(parts) and len({each[end] for each in parts}) == 1:
-                for each in parts:
-                    each.pop(end)
+            while all(parts) and len({own[end] for own in parts}) == 1:
+                for own in parts:
+                    own.pop(end)
         for place, part in zip(same, map("/".join, parts), strict=True):
             wanted[place] = printable(part[-_LONGEST_LABEL:]) or name
     found: dict[str, Calibration] = {}

@@ -386,5 +386,4 @@ class SensorComparison(Mapping[str, AxisComparison], Printed):
         provenance: Mapping[str, str] | None = None,
     ) -> Path:
         """Write two pages of HTML; see `gmwm.report.write_sensor_comparison_report`."""
-        written: Path = make("page", self, path, datasheet=datasheet, provenance=provenance)
-        return written
+        return Path(make("page", self, path, datasheet=datasheet, provenance=provenance))

@@ -105,8 +105,7 @@ class Fleet(Mapping[str, Calibration | Notice]):
         return f"<Fleet of {len(self)} units: {len(self.done)} calibrated{failed}>"
 
     def _repr_html_(self) -> str:
-        html: str = make("fragment", self)
-        return html
+        return str(make("fragment", self))
 
     def __str__(self) -> str:
         valid = sum(unit.valid for unit in self.units.values())
@@ -161,8 +160,7 @@ class Fleet(Mapping[str, Calibration | Notice]):
 
     def report(self, path: str | os.PathLike[str]) -> Path:
         """Write the self-contained HTML report; see `gmwm.report.write_fleet_report`."""
-        written: Path = make("page", self, path)
-        return written
+        return Path(make("page", self, path))
 
     def save(self, folder: str | os.PathLike[str]) -> Path:
         """Write what `fleet` writes: calibrations, the table (Parquet) and the report.

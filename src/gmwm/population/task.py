@@ -100,10 +100,7 @@ class Task:
             "reading": dict(self.reading),
             "start": self.start,
             "stop": self.stop,
-            "models": {
-                name: [term.to_dict() for term in model.terms]
-                for name, model in self.models.items()
-            },
+            "models": {k: [t.to_dict() for t in m.terms] for k, m in self.models.items()},
             "screening": sorted(self.screening),
             "still": self.still,
             "horizon": self.horizon,

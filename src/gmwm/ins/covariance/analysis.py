@@ -192,7 +192,7 @@ class Course:
             if tilt > tuning.LINEAR_TILT or heading > tuning.LINEAR_HEADING:
                 values = {"time": end, "tilt": tilt, "heading": heading}
                 tilt_deg, heading_deg = map(float, np.degrees([tilt, heading]))
-                words = {"tilt_deg": tilt_deg, "heading_deg": heading_deg}
+                words: dict[str, Any] = {"tilt_deg": tilt_deg, "heading_deg": heading_deg}
                 notices.append(notice("outside-linearity", "", values, **words))
         return replace(found, notices=tuple(notices))
 

@@ -190,7 +190,7 @@ def reduce(
     for outage in scenario.outages:
         at = full.index(outage.end)
         horizontal = [float(np.hypot(*sd[at, :2])) for sd in deviations]
-        errors.append(ReducedError(outage.duration, *horizontal, nees=float(reduced.nees()[at])))
+        errors.append(ReducedError(outage.duration, *horizontal, float(reduced.nees()[at])))
     return Reduction(
         form=form,
         models=best,

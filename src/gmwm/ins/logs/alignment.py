@@ -14,7 +14,7 @@ import numpy as np
 from gmwm._core.spool import Spool, is_spooled, release, windows
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
-from gmwm.ins.filter import Aiding, InitialSd
+from gmwm.ins.filter import Aiding, Fixes, InitialSd
 from gmwm.ins.geometry import (
     RATE,
     STANDARD_GRAVITY,
@@ -64,6 +64,7 @@ class _Start:
 
     imu: Imu
     aiding: Aiding
+    positions: Fixes
     epoch: int
     fix: int
 
@@ -75,12 +76,12 @@ class _Start:
         if not later.size:
             raise InputError("there is no position fix once the IMU is steady: give later ones")
         fix = int(later[0])
-        return cls(imu, aiding, int(np.rint(positions.time[fix] / imu.dt)), fix)
+        return cls(imu, aiding, positions, int(np.rint(positions.time[fix] / imu.dt)), fix)
 
     @property
     def lla(self) -> FloatArray:
         """Position of the fix."""
-        return np.asarray(positions_of(self.aiding).value[self.fix])
+        return np.asarray(self.positions.value[self.fix])
 
     def velocity(self) -> tuple[FloatArray, float]:
         """Velocity and its standard deviation: of a fix, or of the way to the next position."""
@@ -89,16 +90,14 @@ class _Start:
             i = int(np.argmin(np.abs(velocity.time - now)))
             if abs(velocity.time[i] - now) < self.imu.dt:
                 return velocity.value[i], float(np.sqrt(np.mean(velocity.sd[i] ** 2)))
-        positions = positions_of(self.aiding)
-        i = int(np.argmin(np.abs(positions.time - now)))
-        last = i + 1 >= positions.time.size
-        if last or positions.time[i + 1] - positions.time[i] > tuning.CHORD:
+        time, value = self.positions.time, self.positions.value
+        i = int(np.argmin(np.abs(time - now)))
+        if i + 1 >= time.size or time[i + 1] - time[i] > tuning.CHORD:
             raise InputError(
                 "the first position fix has no other near it: begin where fixes are dense"
             )
-        step = positions.time[i + 1] - positions.time[i]
-        way = ned_difference(positions.value[i + 1], positions.value[i])
-        sd = np.hypot(positions.sd[i], positions.sd[i + 1]) / step
+        step, way = time[i + 1] - time[i], ned_difference(value[i + 1], value[i])
+        sd = np.hypot(self.positions.sd[i], self.positions.sd[i + 1]) / step
         # The vehicle may speed up by 1 m/s^2 on the way.
         return way / step, float(np.hypot(np.sqrt(np.mean(sd**2)), 0.5 * step))
 
@@ -107,10 +106,9 @@ class _Start:
     ) -> tuple[NavState, InitialSd]:
         """The state with an attitude C_bn; ``rest_sd`` is the velocity's of a vehicle at rest."""
         velocity, sd = (np.zeros(3), rest_sd) if rest_sd is not None else self.velocity()
-        positions = positions_of(self.aiding)
-        later = velocity * (self.epoch * self.imu.dt - positions.time[self.fix])
+        later = velocity * (self.epoch * self.imu.dt - self.positions.time[self.fix])
         lla = offset(self.lla, later - C @ np.asarray(self.aiding.lever_arm))
-        position = float(np.sqrt(np.mean(positions.sd[self.fix] ** 2)))
+        position = float(np.sqrt(np.mean(self.positions.sd[self.fix] ** 2)))
         return (
             NavState(lla, velocity, rpy_from_matrix(C)),
             InitialSd(position=position, velocity=sd, tilt=tilt_sd, heading=heading_sd),

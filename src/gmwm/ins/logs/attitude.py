@@ -201,10 +201,10 @@ def _course(aiding: Aiding, start: float) -> _Course | None:
         fast = (speed > tuning.COURSE_RATIO * sd) & (velocity.time >= start)
         fast &= velocity.time <= start + tuning.SEARCHED
         if np.any(fast):
-            i = int(np.argmax(fast))
-            at = float(velocity.time[i])
-            angle = float(np.arctan2(velocity.value[i, 1], velocity.value[i, 0]))
-            return _Course(angle, float(sd[i] / speed[i]), at, at)
+            k = int(np.argmax(fast))
+            at = float(velocity.time[k])
+            angle = float(np.arctan2(velocity.value[k, 1], velocity.value[k, 0]))
+            return _Course(angle, float(sd[k] / speed[k]), at, at)
     positions = positions_of(aiding)
     time, sd = positions.time, np.sqrt(np.mean(positions.sd[:, :2] ** 2, axis=1))
     first = None

@@ -287,8 +287,7 @@ class Comparison:
 
     def report(self, path: str | os.PathLike[str]) -> Path:
         """Write the page; see `gmwm.report.write_comparison_report`."""
-        written: Path = make("page", self, path)
-        return written
+        return Path(make("page", self, path))
 
     def plot(self) -> Figure:
         """Errors at the end of each outage, and their ratios with intervals."""

@@ -148,9 +148,8 @@ def _fill(source: str, dt: float, *triads: FloatArray) -> list[Notice]:
         missing = np.concatenate(
             [p.start + np.flatnonzero(np.isnan(samples[p])) for p in windows(n)]
         )
-        for gap in np.split(missing, np.flatnonzero(np.diff(missing) > 1) + 1):
-            if not gap.size:
-                continue
+        gaps = np.split(missing, np.flatnonzero(np.diff(missing) > 1) + 1)
+        for gap in (gap for gap in gaps if gap.size):
             begin, end = int(gap[0]), int(gap[-1]) + 1
             if end - begin > most or begin == 0 or end == n:
                 raise InputError(

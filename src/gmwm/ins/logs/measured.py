@@ -227,12 +227,10 @@ def with_turn_on_bias(
 def _within(aiding: Aiding, log: ImuLog, source: str) -> tuple[Aiding, list[Notice]]:
     """The fixes in the time of the IMU's record."""
     dt, end = log.imu.dt, log.imu.n * log.imu.dt
-    kept, left_out, total = [], 0, 0
-    for each in aiding.fixes:
-        inside = (each.time > -0.5 * dt) & (each.time < end + 0.5 * dt)
-        left_out += int(np.count_nonzero(~inside))
-        total += inside.size
-        kept.append(each.part(inside))
+    inside = [(each.time > -0.5 * dt) & (each.time < end + 0.5 * dt) for each in aiding.fixes]
+    kept = tuple(each.part(own) for each, own in zip(aiding.fixes, inside, strict=True))
+    total = sum(each.size for each in inside)
+    left_out = total - sum(int(np.count_nonzero(each)) for each in inside)
     if left_out == total:
         times = np.concatenate([[np.nan], *(each.time + log.start for each in aiding.fixes)])
         spans = "no fix at all"
@@ -243,7 +241,7 @@ def _within(aiding: Aiding, log: ImuLog, source: str) -> tuple[Aiding, list[Noti
             f"{log.start + end:.10g} s: bring both to one clock"
         )
     notices = [notice("fixes-left-out", values={"count": left_out})] if left_out else []
-    return replace(aiding, fixes=tuple(kept)), notices
+    return replace(aiding, fixes=kept), notices
 
 
 def _with_barometer(

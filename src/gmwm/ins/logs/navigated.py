@@ -343,8 +343,7 @@ class Navigated:
 
     def report(self, path: str | os.PathLike[str]) -> Path:
         """Write the page; see `gmwm.report.write_navigated_report`."""
-        page: Path = make("page", self, path)
-        return page
+        return Path(make("page", self, path))
 
     def plot_track(self) -> Figure:
         """The solution's track and the fixes."""
