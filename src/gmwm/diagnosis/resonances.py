@@ -26,18 +26,12 @@ _GAIN = 1e-9  # of the deviance
 
 @dataclass(frozen=True)
 class Bump:
-    """A resonance of second order on a smooth background.
+    """A resonance of second order on a smooth background."""
 
-    frequency: Undamped natural frequency, Hz.
-    damping: Damping ratio: half of the half-power width over the frequency, where that is small.
-    sigma: Standard deviation, u.
-    ratio: Of the density at the peak, background included, to the background.
-    """
-
-    frequency: float
-    damping: float
-    sigma: float
-    ratio: float
+    frequency: float  # undamped natural frequency, Hz
+    damping: float  # damping ratio
+    sigma: float  # standard deviation, u
+    ratio: float  # of the density at the peak, background included, to the background
 
 
 def find_resonances(
@@ -49,8 +43,7 @@ def find_resonances(
     and by half, is a candidate; a second-order Gauss-Markov spectrum on the background is fitted
     around it by Whittle's likelihood, which gives frequency and damping.
 
-    found: Without the lines.
-    smooth: (n // 2 + 1,), background, u^2/Hz.
+    found, smooth: Bands without the lines, and their background at each bin, u^2/Hz.
     left_out: (n // 2 + 1,) of bool, bins of lines.
     """
     height = found.level - found.smooth
