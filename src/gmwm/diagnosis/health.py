@@ -255,11 +255,11 @@ def gathered(notices: Iterable[Notice]) -> list[Notice]:
 
 def _is_shared(group: list[Notice], other: Notice) -> bool:
     first = group[0]
-    if other.code not in ("line", "resonance") or "count" in other.values:
+    if other.code not in ("line", "resonance") or "count" in {**first.values, **other.values}:
         return False
     if (first.code, first.severity, first.source) != (other.code, other.severity, other.source):
         return False
-    if "count" in first.values or other.where in (each.where for each in group):
+    if other.where in (each.where for each in group):
         return False
     within = tuning.SHARED_FREQUENCY * first.values["frequency"]
     return bool(abs(other.values["frequency"] - first.values["frequency"]) < within)

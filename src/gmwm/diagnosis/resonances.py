@@ -10,7 +10,7 @@ from gmwm._core.distributions import norm
 from gmwm._core.text import brief, readable
 from gmwm._core.typing import BoolArray, FloatArray
 from gmwm.diagnosis import tuning
-from gmwm.diagnosis.lines import Line, find_lines, line_notices
+from gmwm.diagnosis.lines import Line, find_lines
 from gmwm.diagnosis.spectrum import Bands, Spectrum, background, bands, spectrum
 from gmwm.issues import Notice, notice
 from gmwm.process import Resonance
@@ -202,10 +202,3 @@ def peaks(values: FloatArray, dt: float) -> tuple[tuple[Line, ...], tuple[Bump, 
         return lines, ()  # a square wave: hardly anything is left to be a background
     rest = bands(power, occupied)
     return lines, find_resonances(power, rest, background(power, rest), occupied)
-
-
-def spectral_notices(
-    name: str, unit: str, lines: tuple[Line, ...], bumps: tuple[Bump, ...]
-) -> list[Notice]:
-    """Say which lines and resonances a channel has."""
-    return [*line_notices(name, unit, lines), *(resonance_notice(name, unit, b) for b in bumps)]
