@@ -2,6 +2,7 @@
 
 from gmwm.calibration.calibrate import AMBIGUITY as AMBIGUITY, calibrate as calibrate
 from gmwm.calibration.calibration import Calibration as Calibration, load as load
+from gmwm.calibration.channel import LONGEST_PART as LONGEST_PART
 from gmwm.calibration.departures import (
     DEPARTURES as DEPARTURES,
     Departure as Departure,
@@ -19,4 +20,3 @@ from gmwm.calibration.summary import (
     sentence as sentence,
     white_density as white_density,
 )
-from gmwm.calibration.validity import LONGEST_PART as LONGEST_PART

@@ -10,19 +10,20 @@ from typing import Any
 
 import numpy as np
 
-from gmwm._core.jobs import (
-    PROCESSES,
-    during_startup,
-    extra_workers,
-    one_blas_thread,
-    shared,
-    worker_pool,
-)
+from gmwm._core import jobs as workers
+from gmwm._core.jobs import PROCESSES, one_blas_thread
 from gmwm._core.spool import is_spooled
 from gmwm._core.typing import Progress
 from gmwm.calibration import tuning
 from gmwm.calibration.calibration import Calibration
-from gmwm.calibration.channel import ChannelModel, GivenModels, channel_model, model_of
+from gmwm.calibration.channel import (
+    ChannelModel,
+    GivenModels,
+    advise_cut,
+    channel_model,
+    model_of,
+    with_validity,
+)
 from gmwm.calibration.removal import variance_without
 from gmwm.calibration.screening import (
     SCREENING,
@@ -33,7 +34,6 @@ from gmwm.calibration.screening import (
 )
 from gmwm.calibration.stages import Stopwatch, current, stage
 from gmwm.calibration.summary import unresolved_notice
-from gmwm.calibration.validity import advise_cut, with_validity
 from gmwm.diagnosis import first_in_common, thinned
 from gmwm.errors import InputError
 from gmwm.estimate import compile_steps
@@ -111,10 +111,10 @@ def calibrate(
     given: list[Recording] = [read(each) if is_frame(each) else each for each in parts]
     _check_together(given)
     size = sum(each.n * len(each.inertial) for each in given)
-    others = extra_workers(jobs, max(len(each.inertial) for each in given))
+    others = workers.extra_workers(jobs, max(len(each.inertial) for each in given))
     on_disk = any(is_spooled(c.values) for each in given for c in each.inertial)
     is_worth = size > tuning.WORTH_PROCESSES and not on_disk  # memory for one channel at a time
-    with worker_pool(others if is_worth else 0, "gmwm.estimate:compile_search"):
+    with workers.worker_pool(others if is_worth else 0, "gmwm.estimate:compile_search"):
         return _calibrated(given, model, screening, still, remove_departures, progress)
 
 
@@ -154,7 +154,7 @@ def _calibrated(
         _Channel(name, parts, name in robust, models[name], sources[name], offered[name], removals)
         for name, parts in alive.items()
     ]
-    during_startup(compile_steps)
+    workers.during_startup(compile_steps)
     found = _models_found(channels, progress)
     issues: list[Notice] = []  # sensors with rates of their own share those of the reader
     for one in treated:
@@ -272,7 +272,7 @@ def _models_found(
             report(channel.name)
             yield channel
 
-    for channel, (one, watch) in shared(_Channel.model_found, begun()):
+    for channel, (one, watch) in workers.shared(_Channel.model_found, begun()):
         found[channel.name] = one
         if (running := current()) is not None:
             for name, elapsed in watch.elapsed.items():

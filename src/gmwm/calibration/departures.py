@@ -1,12 +1,10 @@
 """Departures from stationary noise: steps, settling after switching on, slow periods.
 
-A random walk follows all of them, so that the chi-square test of a fit passes although the walk has
-the wrong size. They are therefore compared with it: means of blocks of samples are explained by
-white noise beside a random walk, and by these beside the departure, each time by the sizes that
-explain them best. Twice the gain in the logarithm of the likelihood must exceed a limit that
-stationary noise passes in one of a hundred records. Whatever the sensor's slow noise is, a random
-walk that matches it over some blocks is larger than it over many, so that the limit holds for
-Gauss-Markov processes and bias instability too.
+A random walk follows all of them, so the chi-square test of a fit passes with a walk of the wrong
+size. Block means are therefore explained by white noise and a random walk, with and without the
+departure: twice the gain in log likelihood must exceed a limit that stationary noise passes in one
+of a hundred records. Over many blocks a random walk is larger than other slow noise that it matches
+over a few, so the limit holds for Gauss-Markov processes and bias instability too.
 """
 
 from __future__ import annotations
@@ -106,19 +104,13 @@ def departures(fitted: Fit, wv: WaveletVariance | None = None) -> tuple[Departur
 
 @dataclass(frozen=True, eq=False)
 class _Shape:
-    """Departures of one kind that are looked for.
-
-    times: (G,), when, how long or how slow each is, s.
-    curves: (G, r, B), block means at unit size; two of a period, a cosine and a sine.
-    rows: (G, r, D), their differences.
-    limit: Twice the gain in log likelihood that stationary noise has in one of 400 records.
-    """
+    """Departures of one kind that are looked for."""
 
     kind: str
-    times: FloatArray
-    curves: FloatArray
-    rows: FloatArray
-    limit: float
+    times: FloatArray  # (G,), when, how long or how slow each is, s
+    curves: FloatArray  # (G, r, B), block means at unit size; cosine and sine of a period
+    rows: FloatArray  # (G, r, D), their differences
+    limit: float  # see `tuning.LIMITS`
 
 
 def _shapes(means: Means) -> list[_Shape]:
@@ -170,16 +162,11 @@ def _known_rows(fitted: Fit, means: Means) -> FloatArray:
 
 @dataclass(frozen=True, eq=False)
 class _Noise:
-    """White noise beside a random walk, in one ratio, with what is known beside it.
+    """White noise beside a random walk, in one ratio, with what is known beside it."""
 
-    factor: (2, D), Cholesky factor of the tridiagonal covariance of differences, in bands.
-    basis: (k, D), orthonormal, what is known, whitened.
-    log_weight: Logarithm of the likelihood, without what the data give.
-    """
-
-    factor: FloatArray
-    basis: FloatArray
-    log_weight: float
+    factor: FloatArray  # (2, D), Cholesky factor of the tridiagonal covariance, in bands
+    basis: FloatArray  # (k, D), orthonormal, what is known, whitened
+    log_weight: float  # logarithm of the likelihood, without the part of the data
 
     @classmethod
     def of(cls, white: float, walk: float, steps: FloatArray, known: FloatArray) -> _Noise:
@@ -227,17 +214,12 @@ def _noises(means: Means, known: Sequence[FloatArray]) -> list[_Noise]:
 
 @dataclass(frozen=True, eq=False)
 class _Test:
-    """How much better a departure of some shape explains the data.
-
-    gains: (G,), twice the gain in log likelihood of each time.
-    sizes: (r,), of the best one's curves.
-    error: Standard error of a size.
-    """
+    """How much better a departure of some shape explains the data."""
 
     shape: _Shape
-    gains: FloatArray
-    sizes: FloatArray
-    error: float
+    gains: FloatArray  # (G,), twice the gain in log likelihood of each time
+    sizes: FloatArray  # (r,), of the best one's curves
+    error: float  # standard error of a size
 
     @property
     def best(self) -> int:

@@ -12,7 +12,6 @@ from gmwm.calibration import tuning
 from gmwm.calibration.departures import DEPARTURES, WIDE, Departure
 from gmwm.errors import InputError
 from gmwm.estimate import Fit
-from gmwm.issues import Notice
 from gmwm.readers import Channel, Recording
 from gmwm.variance import WaveletVariance, wavelet_variance
 
@@ -58,13 +57,18 @@ def without_departures(recording: Recording, fits: Mapping[str, Fit]) -> Recordi
                 f"{recording.source or 'the recording'} is not the one that was calibrated: "
                 f"{recording.duration:g} s, and the fit of {name} has {fit.wv.n * fit.wv.dt:g} s"
             )
-    channels = tuple(
-        _without(channel, [_departure(n) for n in fits[channel.name].notices if _is_departure(n)])
-        if channel.name in fits
-        else channel
-        for channel in recording.channels
-    )
-    return replace(recording, channels=channels)
+    channels = []
+    for channel in recording.channels:
+        found = []
+        for each in fits[channel.name].notices if channel.name in fits else ():
+            of = each.values
+            if each.code in DEPARTURES and of["evidence"] >= tuning.EVIDENT:
+                time = (of["time"], of["time_lower"], of["time_upper"])
+                size = (of["size"], of["lower"], of["upper"])
+                numbers = (of["evidence"], of["share"], of["phase"])
+                found.append(Departure(each.code, time, size, *numbers))
+        channels.append(_without(channel, found))
+    return replace(recording, channels=tuple(channels))
 
 
 def variance_without(
@@ -105,23 +109,6 @@ def _independent(curves: FloatArray, errors: FloatArray) -> FloatArray:
     values, vectors = np.linalg.eigh(covariance / np.outer(scale, scale))
     found = (vectors * np.sqrt(np.maximum(values, 0.0))).T * errors
     return np.asarray(found[values > tuning.NO_INFORMATION])
-
-
-def _is_departure(notice: Notice) -> bool:
-    return notice.code in DEPARTURES and notice.values["evidence"] >= tuning.EVIDENT
-
-
-def _departure(notice: Notice) -> Departure:
-    """The departure that a notice reports."""
-    of = notice.values
-    return Departure(
-        notice.code,
-        (of["time"], of["time_lower"], of["time_upper"]),
-        (of["size"], of["lower"], of["upper"]),
-        of["evidence"],
-        of["share"],
-        of["phase"],
-    )
 
 
 def _times(channel: Channel) -> FloatArray:

@@ -1,8 +1,7 @@
 """Find slow noise that changes its size during a record.
 
-A model is an average over the record. Where a random walk begins halfway, or a Gauss-Markov process
-grows, it stands for no part of it, and the wavelet variances do not show that: the average fits.
-The fast noise has a check of its own, of prediction errors (`gmwm.health`).
+A model is an average over the record: it fits even where a random walk begins halfway, but
+describes no part of it. `gmwm.health` checks the fast noise by prediction errors.
 """
 
 from __future__ import annotations
@@ -31,16 +30,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Means:
-    """Means of blocks.
+    """Means of blocks."""
 
-    blocks: (B,), NaN where samples are missing, u.
-    samples: In a block.
-    dt: s.
-    """
-
-    blocks: FloatArray
-    samples: int
-    dt: float
+    blocks: FloatArray  # (B,), NaN where samples are missing, u
+    samples: int  # in a block
+    dt: float  # s
 
     @classmethod
     def of(cls, wv: WaveletVariance, most: int) -> Means:
@@ -154,16 +148,11 @@ def _rest(means: Means, lines: Sequence[float], known: Sequence[Departure]) -> M
 
 @dataclass(frozen=True, eq=False)
 class _Test:
-    """Sizes of the slow noise in parts of a record.
+    """Sizes of the slow noise in P parts of a record."""
 
-    sizes: (P,), mean squares over that of all; NaN of a part of which most is missing.
-    freedom: (P,), degrees of freedom.
-    length: Of a part, s.
-    """
-
-    sizes: FloatArray
-    freedom: FloatArray
-    length: float
+    sizes: FloatArray  # (P,), mean squares over that of all; NaN where most is missing
+    freedom: FloatArray  # (P,), degrees of freedom
+    length: float  # of a part, s
 
     @cached_property
     def p_value(self) -> float:
@@ -243,13 +232,6 @@ def _notice(test: _Test) -> Notice:
     values = {"excess": test.excess, "p_value": test.p_value, "quiet": quiet, "loud": loud}
     values |= {"start": high * test.length, "stop": (high + 1) * test.length}
     severity: Severity = "bad" if loud > tuning.HARMFUL_UNSTEADY * quiet else "warning"
-    return notice(
-        "unsteady",
-        "",
-        values,
-        severity=severity,
-        quiet_part=quiet_part,
-        loud_part=loud_part,
-        less=brief(quiet),
-        more=brief(loud),
-    )
+    words = {"quiet_part": quiet_part, "loud_part": loud_part}
+    words |= {"less": brief(quiet), "more": brief(loud)}
+    return notice("unsteady", "", values, severity=severity, **words)

@@ -24,9 +24,10 @@ from gmwm.diagnosis.drift import drift, temperature_notices, variance
 from gmwm.diagnosis.events import event, find_events, with_single_outliers
 from gmwm.diagnosis.health import ChannelHealth, Health
 from gmwm.diagnosis.innovations import Examined, crosstalk_notices, innovations
+from gmwm.diagnosis.lines import line_notices
 from gmwm.diagnosis.motion import Motion, find_motion, moves
 from gmwm.diagnosis.resolution import rounding, step_size, widest_step
-from gmwm.diagnosis.resonances import peaks, spectral_notices
+from gmwm.diagnosis.resonances import peaks, resonance_notice
 from gmwm.diagnosis.still import vibration
 from gmwm.diagnosis.tails import contamination, heavy_tails, outliers_or_tails
 from gmwm.issues import Notice, Severity, notice, worst_first
@@ -47,7 +48,7 @@ OF_RECORDING = (samples.length, moves, clock, copied_rows, vibration)
 _OF_SAMPLES = (repeats.held_or_stuck, samples.cut_off_or_abrupt_end, samples.repeated_value)
 
 CHECKS = (*_OF_SAMPLES, event, outliers_or_tails, rounding, variance, drift)
-"""Checks of a channel; those of its spectrum come last (`spectral_notices`)."""
+"""Checks of a channel; those of its spectrum come last."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -212,7 +213,8 @@ def _examined(channel: Channel, motion: Motion) -> _Found:
     lines, bumps = peaks(quiet, channel.dt)
     if any(one.code == "rounding" and one.severity == "bad" for one in notices):
         bumps = ()  # steps that come and go as the level passes them make bumps of their own
-    notices += spectral_notices(name, channel.unit, lines, bumps)
+    notices += line_notices(name, channel.unit, lines)
+    notices += [resonance_notice(name, channel.unit, bump) for bump in bumps]
     facts = ChannelHealth(
         lines=tuple((line.frequency, line.amplitude) for line in lines),
         resonances=tuple((bump.frequency, bump.damping) for bump in bumps),

@@ -23,15 +23,11 @@ Programming* 3, sec. 6.4)."""
 
 @dataclass(frozen=True)
 class Copy:
-    """Rows that are as earlier ones in all channels.
-
-    start, stop: First row, and the one after the last.
-    first: The row that the first is a copy of.
-    """
+    """Rows that equal earlier ones in all channels."""
 
     start: int
-    stop: int
-    first: int
+    stop: int  # the one after the last
+    first: int  # the row that the first is a copy of
 
 
 @remembered
@@ -67,13 +63,10 @@ def copied_rows(recording: Recording) -> Iterator[Notice]:
     if not found:
         return
     longest = max(found, key=lambda each: each.stop - each.start)
-    values = {
-        "samples": float(sum(each.stop - each.start for each in found)),
-        "count": float(len(found)),
-        "longest": (longest.stop - longest.start) * dt,
-        "start": longest.start * dt,
-        "first": longest.first * dt,
-    }
+    samples = float(sum(each.stop - each.start for each in found))
+    values = {"samples": samples, "count": float(len(found))}
+    values |= {"longest": (longest.stop - longest.start) * dt, "start": longest.start * dt}
+    values["first"] = longest.first * dt
     yield notice("rows-copied", "", values, variant="several" if found[1:] else "")
 
 
@@ -87,16 +80,15 @@ def _copies(keys: _RowKeys) -> Iterator[Copy]:
         stop = anchor + _same_from(keys, anchor, first)
         if stop - anchor < window:
             continue  # other rows of the same number
-        before = _same_before(keys, anchor, first, anchor - done)
+        most = min(anchor - done, first)
+        differ = np.flatnonzero(keys[anchor - most : anchor] != keys[first - most : first])
+        before = most - 1 - int(differ[-1]) if differ.size else most
         done = stop
         yield Copy(anchor - before, stop, first - before)
 
 
 def _row_keys(columns: Iterable[FloatArray]) -> _RowKeys:
-    """A number for each row, the same for the same values.
-
-    columns: One at least, of (n,).
-    """
+    """A number for each row, the same for the same values of the columns, (n,)."""
     keys: _RowKeys = np.zeros(1, dtype=np.uint64)
     for values in columns:
         keys = keys ^ np.ascontiguousarray(values, dtype=float).view(np.uint64)
@@ -148,13 +140,6 @@ def _seen_before(keys: _RowKeys, window: int) -> tuple[IntArray, IntArray]:
     firsts = chosen[where[group]]
     again = firsts < chosen
     return chosen[again] + 1, firsts[again] + 1
-
-
-def _same_before(keys: _RowKeys, row: int, first: int, most: int) -> int:
-    """Rows before two that are the same, up to some."""
-    most = min(most, first)
-    differ = np.flatnonzero(keys[row - most : row] != keys[first - most : first])
-    return most - 1 - int(differ[-1]) if differ.size else most
 
 
 def _same_from(keys: _RowKeys, row: int, first: int) -> int:

@@ -216,32 +216,20 @@ def temperature_notices(recording: Recording) -> list[Notice]:
     warmer = {c.name: np.diff(part_means(c.values, least=0.0)) for c in thermometers}
     notices = []
     for channel in recording.inertial:
-        step = np.diff(part_means(channel.values))
-        found = [
-            (size, r, slope, thermometer)
-            for thermometer in thermometers
-            for size, r, slope in _correlation(warmer[thermometer.name], step, pairs)
-        ]
+        change, found = np.diff(part_means(channel.values)), []
+        for thermometer in thermometers:
+            known = ~np.isnan(warmer[thermometer.name] + change)
+            x, y, n = warmer[thermometer.name][known], change[known], int(np.count_nonzero(known))
+            if n < tuning.FEWEST_PARTS or np.std(x) == 0.0 or np.std(y) == 0.0:
+                continue
+            r = float(np.corrcoef(x, y)[0, 1])
+            t = abs(r) * np.sqrt((n - 2) / max(1.0 - r**2, 1e-12))
+            if t > student.isf(0.5 * tuning.FALSE_ALARM / pairs, n - 2):
+                found.append((float(t), r, float(np.polyfit(x, y, 1)[0]), thermometer))
         if found:
             _, r, slope, thermometer = max(found, key=lambda one: one[0])
             values = {"correlation": r, "slope": slope}
             per = f"{readable(slope, channel.unit)} per {thermometer.unit or 'unit'}"
-            notices.append(
-                notice("temperature", channel.name, values, name=thermometer.name, per=per)
-            )
+            name = thermometer.name
+            notices.append(notice("temperature", channel.name, values, name=name, per=per))
     return notices
-
-
-def _correlation(
-    warmer: FloatArray, step: FloatArray, pairs: int
-) -> list[tuple[float, float, float]]:
-    """Student's t, correlation and slope, if there is a correlation."""
-    known = ~np.isnan(warmer + step)
-    n = int(np.count_nonzero(known))
-    if n < tuning.FEWEST_PARTS or np.std(warmer[known]) == 0.0 or np.std(step[known]) == 0.0:
-        return []
-    r = float(np.corrcoef(warmer[known], step[known])[0, 1])
-    size = abs(r) * np.sqrt((n - 2) / max(1.0 - r**2, 1e-12))
-    if size <= student.isf(0.5 * tuning.FALSE_ALARM / pairs, n - 2):
-        return []
-    return [(float(size), r, float(np.polyfit(warmer[known], step[known], 1)[0]))]

@@ -11,6 +11,7 @@ from gmwm._core.text import readable
 from gmwm._core.typing import FloatArray
 from gmwm.diagnosis import tuning
 from gmwm.diagnosis.innovations import Examined, Innovations, Spans, innovations, running_scale
+from gmwm.diagnosis.motion import runs_of
 from gmwm.diagnosis.tails import Tails
 from gmwm.issues import Notice, notice
 
@@ -86,8 +87,7 @@ def with_single_outliers(
     if sum(stop - start for start, stop in events) < tuning.MUCH_LEFT_OUT * values.size:
         for start, stop in events:
             far[start:stop] = True
-    edges = np.flatnonzero(np.diff(far, prepend=False, append=False)).tolist()
-    return tuple(zip(edges[::2], edges[1::2], strict=True))
+    return tuple(runs_of(far))
 
 
 def _level(values: FloatArray) -> tuple[FloatArray, FloatArray]:

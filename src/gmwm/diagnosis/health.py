@@ -82,10 +82,9 @@ class Health(Document, Printed):
         Those of the whole recording, then channel by channel, worst first. Beside those of the
         reader, their codes are "length", "not-static", "tilt", "vibration", "clock", "gap", "dead",
         "rows-copied", "infinite", "size", "stuck", "held", "saturation", "abrupt-end",
-        "value-repeated",
-        "repeated-samples", "interpolated", "filled", "event",
-        "outliers", "heavy-tails", "rounding", "line", "resonance",
-        "drift", "variance", "temperature", "crosstalk" and "clean".
+        "value-repeated", "repeated-samples", "interpolated", "filled", "event", "outliers",
+        "heavy-tails", "rounding", "line", "resonance", "drift", "variance", "temperature",
+        "crosstalk" and "clean".
     channels : dict
         Channel name -> `ChannelHealth`.
     source : str
@@ -116,11 +115,8 @@ class Health(Document, Printed):
 
     def of(self, where: str = "", code: str = "") -> tuple[Notice, ...]:
         """Notices of one channel, with one code, or both."""
-        return tuple(
-            notice
-            for notice in self.notices
-            if where in ("", notice.where) and code in ("", notice.code)
-        )
+        every = self.notices
+        return tuple(n for n in every if where in ("", n.where) and code in ("", n.code))
 
     def lines(self, channel: str) -> tuple[tuple[float, float], ...]:
         """Frequency (Hz) and amplitude (u) of each periodic line, strongest first."""
@@ -243,27 +239,27 @@ def gathered(notices: Iterable[Notice]) -> list[Notice]:
             groups.append([each])
         else:
             group.append(each)
-    return [_one(group) if len(group) > 1 else group[0] for group in groups]
+    found = []
+    for group in groups:
+        best = group[0]
+        if len(group) > 1:
+            best = max(group, key=lambda each: each.values["ratio"])
+            also = f"{len(group)} channels have it: look at the mounting and the power supply"
+            where = ", ".join(each.where for each in group)
+            hints = "; ".join(dict.fromkeys(each.hint for each in group if each.hint))
+            text = f"{best.text} (in {best.where}); {also}"
+            best = replace(best, where=where, text=text, hint=hints)
+        found.append(best)
+    return found
 
 
 def _is_shared(group: list[Notice], other: Notice) -> bool:
     first = group[0]
-    if other.code not in ("line", "resonance") or "count" in other.values:
+    if other.code not in ("line", "resonance") or "count" in {**first.values, **other.values}:
         return False
     if (first.code, first.severity, first.source) != (other.code, other.severity, other.source):
         return False
-    if "count" in first.values or other.where in (each.where for each in group):
+    if other.where in (each.where for each in group):
         return False
     within = tuning.SHARED_FREQUENCY * first.values["frequency"]
     return bool(abs(other.values["frequency"] - first.values["frequency"]) < within)
-
-
-def _one(group: list[Notice]) -> Notice:
-    best = max(group, key=lambda each: each.values["ratio"])
-    text = (
-        f"{best.text} (in {best.where}); {len(group)} channels have it: look at the mounting and "
-        "the power supply"
-    )
-    where = ", ".join(each.where for each in group)
-    actions = dict.fromkeys(each.hint for each in group if each.hint)
-    return replace(best, where=where, text=text, hint="; ".join(actions))

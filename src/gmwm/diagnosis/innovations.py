@@ -1,8 +1,7 @@
 """A channel as its checks see it, with the errors of predicting each sample from those before.
 
-Spikes, stuck values and changes of the noise are distinguished from the noise of a sensor where
-that noise is white. An autoregression of the first differences makes it so, whether it was white, a
-random walk or a resonance; outliers are clipped before it is fitted.
+An autoregression of the first differences, with outliers clipped, whitens the noise of a sensor, so
+that spikes, stuck values and changes of the noise stand out.
 """
 
 from __future__ import annotations
@@ -34,18 +33,12 @@ Spans = tuple[tuple[int, int], ...]  # the first sample, and the one after the l
 
 @dataclass(frozen=True, eq=False)
 class Innovations:
-    """Prediction errors of a series.
+    """Prediction errors of a series of n samples."""
 
-    values: (n,), u; 0 where there is none.
-    known: (n,) of bool, whether there is one: not where samples are missing on both sides.
-    scale: (n,), robust standard deviation around each sample, u.
-    rounding: The most that rounding can add to a prediction error, u.
-    """
-
-    values: FloatArray
-    known: BoolArray
-    scale: FloatArray
-    rounding: float
+    values: FloatArray  # (n,), u; 0 where there is none
+    known: BoolArray  # (n,), whether there is one: not where samples on both sides are missing
+    scale: FloatArray  # (n,), robust standard deviation around each sample, u
+    rounding: float  # the most that rounding can add to a prediction error, u
 
     @cached_property
     def level(self) -> float:
@@ -54,46 +47,30 @@ class Innovations:
 
 
 class Held(NamedTuple):
-    """Samples that repeat the one before without being measured.
+    """Samples that repeat the one before without being measured."""
 
-    share, chance: Part of the samples that do, and part that chance explains.
-    is_even: Whether they come at a regular interval.
-    """
-
-    share: float = 0.0
-    chance: float = 0.0
-    is_even: bool = False
+    share: float = 0.0  # of the samples that do
+    chance: float = 0.0  # share that chance explains
+    is_even: bool = False  # whether they come at a regular interval
 
 
 @dataclass(frozen=True, eq=False)
 class Examined:
-    """A channel with its prediction errors and what was found first.
-
-    name, unit, dt: Of the channel; dt in s.
-    values: (n,), samples, NaN where missing.
-    step, smallest: To which the largest and the smallest samples are rounded, u; 0 if not.
-    errors: Prediction errors.
-    events: Spikes and shocks.
-    shocks: Those that do not touch a move of the whole sensor.
-    outliers: Share of outliers spread over the record.
-    tails: Law of the noise if its tails are heavy.
-    usable: (n,) of bool, prediction errors outside events.
-    quiet: (n,), samples, NaN in events too.
-    """
+    """A channel with its prediction errors and what was found first."""
 
     name: str
     unit: str
     dt: float
-    values: FloatArray
-    step: float
-    smallest: float
+    values: FloatArray  # (n,), samples, NaN where missing
+    step: float  # to which the largest samples are rounded, u; 0 if not
+    smallest: float  # to which the smallest are
     errors: Innovations
-    events: Spans
-    shocks: Spans
-    outliers: float
-    tails: Tails | None
-    usable: BoolArray
-    quiet: FloatArray
+    events: Spans  # spikes and shocks
+    shocks: Spans  # those that do not touch a move of the whole sensor
+    outliers: float  # share of outliers spread over the record
+    tails: Tails | None  # law of the noise if its tails are heavy
+    usable: BoolArray  # (n,), prediction errors outside events
+    quiet: FloatArray  # (n,), samples, NaN in events too
     held: Held = field(default_factory=Held)
 
     @property
@@ -127,7 +104,7 @@ def innovations(values: FloatArray, step: float) -> Innovations | None:
     floor = step / np.sqrt(12.0)
     limit = tuning.CLIP * robust_scale(known_of(differences), floor)
     differences[~known] = 0.0
-    coefficients = _autoregression(np.clip(differences, -limit, limit), int(np.sum(known)))
+    coefficients = _prediction_filter(np.clip(differences, -limit, limit), int(np.sum(known)))
     order = coefficients.size - 1
     errors, present = np.zeros(n), np.zeros(n, dtype=bool)
     errors[1:] = np.convolve(coefficients, differences)[: n - 1]
@@ -166,7 +143,7 @@ def robust_scale(values: FloatArray, floor: float) -> float:
     return scale
 
 
-def _autoregression(differences: FloatArray, known: int) -> FloatArray:
+def _prediction_filter(differences: FloatArray, known: int) -> FloatArray:
     """Prediction error filter by the Yule-Walker equations, missing differences being zero."""
     order = min(tuning.ORDER, known // tuning.SAMPLES_PER_COEFFICIENT)
     n = differences.size
@@ -211,8 +188,7 @@ def crosstalk_notices(errors: dict[str, npt.NDArray[np.float32]]) -> list[Notice
     errors: Channel name -> prediction errors in units of their standard deviation, clipped, zero
         where it is unknown, which adds nothing to a sum of products.
     """
-    pairs = list(combinations(errors, 2))
-    notices = []
+    pairs, notices = list(combinations(errors, 2)), []
     for one, other in pairs:
         a, b = errors[one], errors[other]
         n = int(np.count_nonzero((a != 0.0) & (b != 0.0)))

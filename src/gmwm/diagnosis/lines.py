@@ -20,21 +20,14 @@ _EIGENVALUE = 8.0 / 3.0  # largest of the correlation of Hann bins, 1 + 2 (2/3 +
 
 @dataclass(frozen=True)
 class Line:
-    """A periodic line.
+    """A periodic line."""
 
-    frequency: Hz.
-    amplitude: Of a sinusoid of the same power, u.
-    ratio: Density over that of the surroundings, over the width.
-    width: Over which it is smeared, Hz.
-    start, stop: Bins that it takes.
-    """
-
-    frequency: float
-    amplitude: float
-    ratio: float
-    width: float
-    start: int
-    stop: int
+    frequency: float  # Hz
+    amplitude: float  # of a sinusoid of the same power, u
+    ratio: float  # density over that of the surroundings
+    width: float  # over which it is smeared, Hz
+    start: int  # first bin
+    stop: int  # the bin after the last
 
 
 def find_lines(spectrum: Spectrum, smooth: FloatArray) -> tuple[Line, ...]:
@@ -54,7 +47,14 @@ def find_lines(spectrum: Spectrum, smooth: FloatArray) -> tuple[Line, ...]:
     # A filter leaves so little beyond its band that rounding of the computer has peaks there.
     local = np.maximum(local, tuning.LEAST_LINE**2 * float(np.sum(spectrum.density)))
     ratio = spectrum.density / local
-    grid, limits = _limits(last, freedom)
+    # Largest ratios of noise by width, on a grid of degrees of freedom of the background.
+    widths = [2**i for i in range(int(np.log2(max(int(tuning.NARROW * last), 1))) + 1)]
+    grid = np.geomspace(np.min(freedom), np.max(freedom) * 1.001, 12)
+    chance = tuning.FALSE_ALARM / (last * len(widths))
+    limits = {}
+    for width in widths:
+        eigenvalue = _EIGENVALUE if width > 2 else 1.0 + 2.0 / 3.0 * (width - 1)
+        limits[width] = fisher.isf(chance, 2.0 * width / eigenvalue, grid)
     score, best = _scores(ratio, freedom, grid, limits, 0, last)
     lines: list[Line] = []
     for _ in range(tuning.MOST_LINES):
@@ -111,19 +111,6 @@ def _local_background(density: FloatArray, smooth: FloatArray) -> tuple[FloatArr
     # A mean of logarithms of exponential variates has 6/pi^2 of the efficiency.
     freedom = 2.0 * count * (6.0 / np.pi**2) / POWER_INFLATION
     return smooth * np.exp(level), freedom
-
-
-def _limits(bins: int, freedom: FloatArray) -> tuple[FloatArray, dict[int, FloatArray]]:
-    """Grid of degrees of freedom of the background, and largest ratios of noise on it by width."""
-    widest = max(int(tuning.NARROW * bins), 1)
-    widths = [2**i for i in range(int(np.log2(widest)) + 1)]
-    grid = np.geomspace(np.min(freedom), np.max(freedom) * 1.001, 12)
-    chance = tuning.FALSE_ALARM / (bins * len(widths))
-    limits = {}
-    for width in widths:
-        eigenvalue = _EIGENVALUE if width > 2 else 1.0 + 2.0 / 3.0 * (width - 1)
-        limits[width] = fisher.isf(chance, 2.0 * width / eigenvalue, grid)
-    return grid, limits
 
 
 def _scores(

@@ -28,19 +28,13 @@ _LIMIT = {"gyro": tuning.TURNS, "accel": tuning.TILTS * _GRAVITY}
 
 @dataclass(frozen=True)
 class Move:
-    """One stretch that is not static.
+    """One stretch that is not static."""
 
-    start, stop: s.
-    length: The same without missing samples, s.
-    rate: Largest angular rate beyond that at rest, rad/s; 0 without gyros.
-    tilt: Angle between gravity before and after, rad; 0 where either is unknown.
-    """
-
-    start: float
-    stop: float
-    length: float
-    rate: float
-    tilt: float
+    start: float  # s
+    stop: float  # s
+    length: float  # without missing samples, s
+    rate: float  # largest angular rate beyond that at rest, rad/s; 0 without gyros
+    tilt: float  # angle between gravity before and after, rad; 0 where either is unknown
 
     @property
     def is_tilt(self) -> bool:
@@ -56,13 +50,8 @@ class Move:
 class Motion:
     """When a recording moves, and when it does not.
 
-    Attributes
-    ----------
-    moves : tuple of Move
-    static : tuple of (float, float)
-        Begin and end of each static stretch, s.
-    turns_steadily : bool
-        Whether gravity turns at one rate from the first sample to the last.
+    static: Begin and end of each static stretch, s.
+    turns_steadily: Whether gravity turns at one rate from the first sample to the last.
     """
 
     moves: tuple[Move, ...]
@@ -87,18 +76,11 @@ class Motion:
         """Sample intervals that do not touch a move: a move is not a shock."""
         if not self.static:
             return events
-        return tuple(
-            (start, stop)
-            for start, stop in events
-            if not any(move.touches(start, stop, dt) for move in self.moves)
-        )
+        return tuple(e for e in events if not any(m.touches(*e, dt) for m in self.moves))
 
 
 def remembered(examine: Callable[[Recording], T]) -> Callable[[Recording], T]:
-    """Keep what is found of the recording that was examined last: what is done about it asks again.
-
-    It goes with the recording.
-    """
+    """Keep the result for the recording that was examined last, as long as that lives."""
     latest: list[tuple[ref[Recording], T]] = []
 
     @wraps(examine)
@@ -116,19 +98,21 @@ def remembered(examine: Callable[[Recording], T]) -> Callable[[Recording], T]:
 def find_motion(recording: Recording) -> Motion:
     """Find the stretches in which a recording is static.
 
-    Means of a second, of which a running median drops shocks, change within some seconds by more
-    than sensors at rest do (1 deg/s, or 1 deg of gravity), and by more than their own noise does,
-    whose scale is a low quantile of those changes. What lies between two changes is level; it is
-    static if its rate is that of the level nearest to zero. Slow drifts change too little at a
-    time; slow motion is found where gravity turns as the gyros say.
+    Means of a second, without shocks by a running median, move where they change within some
+    seconds by more than sensors at rest do (1 deg/s, or 1 deg of gravity) and by more than their
+    own noise. Between two changes the level is static if its rate is the one nearest to zero. Slow
+    motion is found where gravity turns as the gyros predict.
 
-    Returns: stretches, without moves if it is static, or too short to be examined.
+    Returns: no moves if it is static, or too short to be examined.
     """
     size = max(round(tuning.MOTION_BLOCK / recording.dt), tuning.FEWEST_OF_MOTION)
     whole = ((0.0, recording.duration),)
     if recording.n < tuning.FEWEST_BLOCKS * size:
         return Motion((), whole)
-    means = {sensor: _means(recording, sensor, size) for sensor in SI_UNIT}
+    means = {}
+    for sensor in SI_UNIT:
+        found = [channel.values for channel in _channels(recording, sensor)]
+        means[sensor] = block_means(found, size) if found else np.empty((recording.n // size, 0))
     known = np.flatnonzero(np.all(~np.isnan(np.hstack(list(means.values()))), axis=1))
     if known.size < tuning.FEWEST_BLOCKS:
         return Motion((), whole)
@@ -141,7 +125,8 @@ def find_motion(recording: Recording) -> Motion:
     if turn > 0.0:
         still = []
     elif np.any(changing):
-        still = _still(level["gyro"], _runs(~changing))
+        long = [run for run in runs_of(~changing) if run[1] - run[0] >= tuning.SHORTEST_STATIC]
+        still = _still(level["gyro"], long)
     else:
         still = [] if _never_rests(recording, level["gyro"], size) else [(0, known.size)]
     still = [run for run in still if not _tilts_slowly(level["accel"][slice(*run)])]
@@ -151,7 +136,7 @@ def find_motion(recording: Recording) -> Motion:
     static = tuple((float(begins[a]), float(ends[b - 1])) for a, b in still)
     moves = []
     for (_, last), (first, _) in pairwise([(0, 0), *still, (known.size, known.size)]):
-        if first > last:
+        if first > last:  # a move from one static run to the next
             rate = max(_fastest(level["gyro"], still, slice(last, first)), turn)
             around = slice(max(last - tuning.SHORTEST_STATIC, 0), first + tuning.SHORTEST_STATIC)
             tilt = _angle(level["accel"][around])
@@ -162,25 +147,13 @@ def find_motion(recording: Recording) -> Motion:
 
 def _channels(recording: Recording, sensor: str) -> list[Channel]:
     """Channels of a sensor with most samples present and within the range of sensors."""
-    return [
-        channel
-        for channel in recording.inertial
-        if channel.quantity == sensor and is_moved_with(channel)
-    ]
+    return [c for c in recording.inertial if c.quantity == sensor and is_moved_with(c)]
 
 
 def is_moved_with(channel: Channel) -> bool:
     """Whether motion can be seen in a channel, which needs half of its samples in range."""
     largest = np.fmax.reduce(np.abs(channel.values), initial=0.0)
     return 2 * channel.missing <= channel.n and bool(largest < tuning.LARGEST_OF_SENSOR)
-
-
-def _means(recording: Recording, sensor: str, size: int) -> FloatArray:
-    """Means of blocks, (blocks, axes) in the order of the channels; dead ones are left out."""
-    found = [channel.values for channel in _channels(recording, sensor)]
-    if not found:
-        return np.empty((recording.n // size, 0))
-    return block_means(found, size)
 
 
 def _smooth(means: FloatArray) -> FloatArray:
@@ -221,14 +194,10 @@ def _changing(series: FloatArray, limit: float, least: float) -> BoolArray:
     return found
 
 
-def _runs(chosen: BoolArray) -> list[tuple[int, int]]:
-    """Begin and end of runs that are long enough to know a level."""
-    edges = np.flatnonzero(np.diff(chosen, prepend=False, append=False))
-    return [
-        (int(a), int(b))
-        for a, b in zip(edges[::2], edges[1::2], strict=True)
-        if b - a >= tuning.SHORTEST_STATIC
-    ]
+def runs_of(chosen: BoolArray) -> list[tuple[int, int]]:
+    """Begin and end of each run of marked places."""
+    edges = np.flatnonzero(np.diff(chosen, prepend=False, append=False)).tolist()
+    return list(zip(edges[::2], edges[1::2], strict=True))
 
 
 def _still(rate: FloatArray, runs: list[tuple[int, int]]) -> list[tuple[int, int]]:
@@ -241,9 +210,7 @@ def _still(rate: FloatArray, runs: list[tuple[int, int]]) -> list[tuple[int, int
     return [run for run, far in zip(runs, away, strict=True) if far < tuning.TURNS]
 
 
-def _fastest(
-    rate: FloatArray, still: Sequence[tuple[int, int]], where: slice = slice(None)
-) -> float:
+def _fastest(rate: FloatArray, still: Sequence[tuple[int, int]], where: slice) -> float:
     """Largest angular rate of some blocks, from that of the static ones."""
     if not rate.shape[1]:
         return 0.0
@@ -310,12 +277,10 @@ def moves(recording: Recording) -> Iterator[Notice]:
     tilts = [move for move in motion.moves if move.is_tilt]
     if others:
         rate, tilt = max(move.rate for move in others), max(move.tilt for move in others)
-        verb = "it moves"
+        most = "" if motion.turns_steadily else "up to "
+        verb = f"it tilts by {np.degrees(tilt):.2g} deg" if tilt > tuning.TILTS else "it moves"
         if rate > tuning.TURNS:
-            most = "" if motion.turns_steadily else "up to "
             verb = f"it turns at {most}{readable(rate, 'rad/s')}"
-        elif tilt > tuning.TILTS:
-            verb = f"it tilts by {np.degrees(tilt):.2g} deg"
         values = {"moves": len(others), "rate": rate, "angle": tilt} | ends
         times = _times([(move.start, move.stop) for move in others])
         yield notice("not-static", "", values, severity="bad", hint=hint, verb=verb, times=times)

@@ -41,12 +41,6 @@ def thinned(channel: Channel, found: Repetition) -> Channel:
     return replace(channel, values=values, dt=channel.dt * found.times)
 
 
-def repetition_notice(channel: Channel, found: Repetition) -> Notice:
-    """Say how often each sample comes, and the rate of the channel."""
-    values = {"times": float(found.times), "rate": 1.0 / (channel.dt * found.times)}
-    return notice("repeated-samples", channel.name, values)
-
-
 def interpolation_notice(channel: Channel) -> Notice | None:
     """Say that samples lie on straight lines between others, all over or now and then.
 
@@ -62,10 +56,8 @@ def interpolation_notice(channel: Channel) -> Notice | None:
     if bends.size < tuning.FEWEST_KNOWN:
         return None
     size = float(np.quantile(bends, tuning.BENT))
-    rounding = 4.0 * max(
-        step_size(values[~np.isnan(values)]), float(np.spacing(np.nanmax(np.abs(values))))
-    )
-    limit = max(tuning.STRAIGHT * size, rounding)
+    step = max(step_size(known_of(values)), float(np.spacing(np.nanmax(np.abs(values)))))
+    limit = max(tuning.STRAIGHT * size, 4.0 * step)
     if not limit < tuning.STRAIGHT_AT_MOST * size:
         return None  # steps as large as the noise
     share = float(np.mean(bends <= limit))

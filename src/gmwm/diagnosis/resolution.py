@@ -73,8 +73,9 @@ def widest_step(values: FloatArray, step: float) -> float:
     Returns: ``step`` itself if all are as wide, or if few samples are where they are not. Where the
         smallest values hide the lattice, there is no ``step``, but a wide one.
     """
-    if step == 0.0 and not _comes_again(values):
-        return 0.0
+    part = values[:: -(-values.size // tuning.LEVELS_SAMPLED)]
+    if step == 0.0 and 2 * np.unique(part).size >= part.size:
+        return 0.0  # numbers of few digits come again
     # Stuck values count once, so that none of them is a level for its frequency alone.
     begins = values[np.flatnonzero(np.diff(values, prepend=np.nan) != 0.0)]
     levels, counts = np.unique(begins, return_counts=True)
@@ -89,12 +90,6 @@ def widest_step(values: FloatArray, step: float) -> float:
     order = np.argsort(-nearest[alone], kind="stable")
     have = np.cumsum(counts[alone][order]) >= tuning.FEWEST_WIDE * begins.size
     return float(nearest[alone][order][np.argmax(have)]) if np.any(have) else step
-
-
-def _comes_again(values: FloatArray) -> bool:
-    """Whether samples share levels, as numbers of few digits do and those without steps do not."""
-    part = values[:: -(-values.size // tuning.LEVELS_SAMPLED)]
-    return 2 * np.unique(part).size < part.size
 
 
 def is_coarse(values: FloatArray, step: float) -> bool:
@@ -133,22 +128,24 @@ def rounding(channel: Examined) -> Iterator[Notice]:
         shown += f" ({readable(smallest, unit)} where they are smaller)"
     coarse = noise < step / tuning.COARSE or is_coarse(channel.noise, step)
     ratio = step / noise if noise > 0.0 else np.inf
-    severity: Severity = (
-        "bad" if coarse else "warning" if ratio > 1.0 else "note" if ratio > 0.5 else "good"
-    )
-    hint = {
-        "bad": "the noise below the step cannot be estimated; use a finer range",
-        "warning": "rounding is treated as white noise: true for steps up to twice the noise",
-    }.get(severity, "rounding is treated as white noise: {added:.2g%} of it")
+    severity: Severity = "note" if ratio > 0.5 else "good"
+    hint = "rounding is treated as white noise: {added:.2g%} of it"
+    variant, values = "coarse" if coarse else "", {"lsb": step, "noise": noise}
+    if coarse:
+        severity = "bad"
+        hint = "the noise below the step cannot be estimated; use a finer range"
+    elif ratio > 1.0:
+        severity = "warning"
+        hint = "rounding is treated as white noise: true for steps up to twice the noise"
+    words = {"step": shown, "times": brief(ratio), "shown": readable(noise, unit)}
+    added = {"added": step**2 / 12.0 / (noise**2 + step**2 / 12.0)}
     yield notice(
         "rounding",
         channel.name,
-        {"lsb": step, "noise": noise},
+        values,
         severity=severity,
-        variant="coarse" if coarse else "",
+        variant=variant,
         hint=hint,
-        step=shown,
-        times=brief(ratio),
-        shown=readable(noise, unit),
-        added=step**2 / 12.0 / (noise**2 + step**2 / 12.0),
+        **words,
+        **added,
     )

@@ -10,7 +10,7 @@ from gmwm._core.distributions import norm
 from gmwm._core.text import brief, readable
 from gmwm._core.typing import BoolArray, FloatArray
 from gmwm.diagnosis import tuning
-from gmwm.diagnosis.lines import Line, find_lines, line_notices
+from gmwm.diagnosis.lines import Line, find_lines
 from gmwm.diagnosis.spectrum import Bands, Spectrum, background, bands, spectrum
 from gmwm.issues import Notice, notice
 from gmwm.process import Resonance
@@ -26,18 +26,12 @@ _GAIN = 1e-9  # of the deviance
 
 @dataclass(frozen=True)
 class Bump:
-    """A resonance of second order on a smooth background.
+    """A resonance of second order on a smooth background."""
 
-    frequency: Undamped natural frequency, Hz.
-    damping: Damping ratio: half of the half-power width over the frequency, where that is small.
-    sigma: Standard deviation, u.
-    ratio: Of the density at the peak, background included, to the background.
-    """
-
-    frequency: float
-    damping: float
-    sigma: float
-    ratio: float
+    frequency: float  # undamped natural frequency, Hz
+    damping: float  # damping ratio
+    sigma: float  # standard deviation, u
+    ratio: float  # of the density at the peak, background included, to the background
 
 
 def find_resonances(
@@ -49,8 +43,7 @@ def find_resonances(
     and by half, is a candidate; a second-order Gauss-Markov spectrum on the background is fitted
     around it by Whittle's likelihood, which gives frequency and damping.
 
-    found: Without the lines.
-    smooth: (n // 2 + 1,), background, u^2/Hz.
+    found, smooth: Bands without the lines, and their background at each bin, u^2/Hz.
     left_out: (n // 2 + 1,) of bool, bins of lines.
     """
     height = found.level - found.smooth
@@ -209,10 +202,3 @@ def peaks(values: FloatArray, dt: float) -> tuple[tuple[Line, ...], tuple[Bump, 
         return lines, ()  # a square wave: hardly anything is left to be a background
     rest = bands(power, occupied)
     return lines, find_resonances(power, rest, background(power, rest), occupied)
-
-
-def spectral_notices(
-    name: str, unit: str, lines: tuple[Line, ...], bumps: tuple[Bump, ...]
-) -> list[Notice]:
-    """Say which lines and resonances a channel has."""
-    return [*line_notices(name, unit, lines), *(resonance_notice(name, unit, b) for b in bumps)]

@@ -19,34 +19,22 @@ _LOG_VARIANCE = np.pi**2 / 6.0  # of the logarithm of an exponential variate
 
 @dataclass(frozen=True, eq=False)
 class Bands:
-    """Mean logarithm of the spectrum in bands of equal width in log frequency.
+    """Mean logarithm of the spectrum in J bands of equal width in log frequency."""
 
-    edges: (J + 1,) of int, bins of the spectrum.
-    frequency: (J,), Hz.
-    level: (J,), logarithm of the density.
-    variance: (J,), of ``level``.
-    smooth: (J,), running median of ``level`` over an octave.
-    """
-
-    edges: IntArray
-    frequency: FloatArray
-    level: FloatArray
-    variance: FloatArray
-    smooth: FloatArray
+    edges: IntArray  # (J + 1,), bins of the spectrum
+    frequency: FloatArray  # Hz
+    level: FloatArray  # logarithm of the density
+    variance: FloatArray  # of the level
+    smooth: FloatArray  # running median of the level over an octave
 
 
 @dataclass(frozen=True, eq=False)
 class Spectrum:
-    """One-sided periodogram with a Hann window.
+    """One-sided periodogram with a Hann window."""
 
-    density: (n // 2 + 1,), u^2/Hz.
-    resolution: Distance of the bins, Hz.
-    dt: Sampling interval, s.
-    """
-
-    density: FloatArray
-    resolution: float
-    dt: float
+    density: FloatArray  # (n // 2 + 1,), u^2/Hz
+    resolution: float  # distance of the bins, Hz
+    dt: float  # s
 
     @property
     def frequency(self) -> FloatArray:

@@ -1,11 +1,8 @@
 """Stretches at rest: generalized likelihood ratio on gyros and accelerometers.
 
-The hypothesis of rest is that samples scatter about a constant mean as the sensor's own noise
-does; against any other mean and scatter its log likelihood ratio is, but for constants, the sum
-over the axes of the squared deviations from the mean of a window over the variance of the noise
-(Skog et al., 2010, *IEEE Trans. Biomed. Eng.* 57, 2657-2666, where the gyros have no bias and the
-accelerometers read gravity; here neither is assumed, as biases are unknown). The variance of the
-noise is that of the quietest seconds of the log itself.
+At rest, samples scatter about a constant mean as the sensor's own noise does. The test statistic is
+the variance within a block over that of the noise, summed over the axes (Skog et al., 2010, *IEEE
+Trans. Biomed. Eng.* 57, 2657-2666, but with unknown biases). The quietest seconds give the noise.
 """
 
 from __future__ import annotations
@@ -23,7 +20,7 @@ from gmwm._core.text import brief
 from gmwm._core.typing import BoolArray, FloatArray
 from gmwm._core.units import SI_UNIT, factor
 from gmwm.diagnosis import tuning
-from gmwm.diagnosis.motion import find_motion, is_moved_with, remembered
+from gmwm.diagnosis.motion import find_motion, is_moved_with, remembered, runs_of
 from gmwm.diagnosis.resolution import step_size
 from gmwm.issues import Notice, notice
 from gmwm.readers import Channel, Recording
@@ -73,12 +70,8 @@ class Still:
         """Which stretches are used, and how far they reach."""
         listed = ", ".join(f"{start:.4g} to {stop:.4g}" for start, stop in self.stretches[:8])
         more = f" and {len(self.stretches) - 8} more" if len(self.stretches) > 8 else ""
-        values = {
-            "stretches": len(self.stretches),
-            "total": self.total,
-            "longest": self.longest,
-            "duration": self.duration,
-        }
+        values = {"stretches": len(self.stretches), "total": self.total}
+        values |= {"longest": self.longest, "duration": self.duration}
         listed = f"{listed} s{more}"
         return notice("still-stretches", "", values, listed=listed, timeline=self.timeline)
 
@@ -101,27 +94,25 @@ def find_still(recording: Recording) -> Still:
     blocks = blocks_of(recording)
     if blocks is None:
         return Still((), 0.0, (), recording.duration)
-    channels, size, means, scatter = blocks.channels, blocks.size, blocks.means, blocks.scatter
+    size, means, scatter = blocks.size, blocks.means, blocks.scatter
     gyro, count = blocks.is_gyro, means.shape[0]
     floor = _floor(scatter, size)
     quiet_blocks = _quiet(scatter, floor, size) & ~blocks.loudness.loud
     # A turn may begin between two blocks.
     turns = np.maximum(tuning.TURNS, tuning.BEYOND_WHITE * np.sqrt(floor[gyro] / size))
     quiet_blocks[1:] &= np.all(np.abs(np.diff(means[:, gyro], axis=0)) < turns, axis=1)
-    runs = _runs(quiet_blocks, count, means[:, gyro])
-    runs = _of_one_level(runs, means, floor, channels, size)
+    runs = _of_one_level(_runs(quiet_blocks, means[:, gyro]), blocks, floor)
     quiet = [run for run in runs if run[1] - run[0] >= 2]
     length = blocks.length
     long = [run for run in quiet if (run[1] - run[0]) * length >= tuning.SHORTEST_STILL]
-    shaking = _vibrates(long, channels, scatter, size, recording.dt)
+    shaking = _vibrates(long, blocks)
     vibrating = [run for run, shakes in zip(long, shaking, strict=True) if shakes]
     rest = [run for run in long if run not in vibrating]
     others = [run[1] - run[0] for run in quiet if run not in vibrating]
 
     def times(some: Sequence[tuple[int, int]]) -> tuple[tuple[float, float], ...]:
-        return tuple(
-            (a * length, recording.duration if b == count else b * length) for a, b in some
-        )
+        end = recording.duration
+        return tuple((a * length, end if b == count else b * length) for a, b in some)
 
     longest = max(others, default=0) * length
     return Still(times(rest), longest, times(vibrating), recording.duration)
@@ -177,12 +168,10 @@ def _quiet(scatter: FloatArray, floor: FloatArray, size: int) -> BoolArray:
     return np.asarray((together < most) & (np.max(ratio, axis=1) < tuning.MOST_OF_AXIS))
 
 
-def _runs(quiet: BoolArray, count: int, rate: FloatArray) -> list[tuple[int, int]]:
+def _runs(quiet: BoolArray, rate: FloatArray) -> list[tuple[int, int]]:
     """Begin and end of quiet stretches, a shock in them bridged, a block less at either end."""
-    edges = np.flatnonzero(np.diff(quiet, prepend=False, append=False))
-    runs = [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
     joined: list[tuple[int, int]] = []
-    for a, b in runs:
+    for a, b in runs_of(quiet):
         if joined and a - joined[-1][1] <= tuning.BLOCKS_OF_SHOCK:
             before = joined[-1][1] - joined[-1][0]
             change = np.median(rate[a:b], axis=0) - np.median(rate[slice(*joined[-1])], axis=0)
@@ -191,27 +180,23 @@ def _runs(quiet: BoolArray, count: int, rate: FloatArray) -> list[tuple[int, int
                 joined[-1] = (joined[-1][0], b)
                 continue
         joined.append((a, b))
-    trimmed = [(a + (a > 0), b - (b < count)) for a, b in joined]
+    trimmed = [(a + (a > 0), b - (b < quiet.size)) for a, b in joined]
     return [(a, b) for a, b in trimmed if b > a]
 
 
 def _of_one_level(
-    runs: list[tuple[int, int]],
-    means: FloatArray,
-    floor: FloatArray,
-    channels: Sequence[Channel],
-    size: int,
+    runs: list[tuple[int, int]], blocks: Blocks, floor: FloatArray
 ) -> list[tuple[int, int]]:
     """Runs whose rate is that of the run nearest to zero, and whose means do not sway."""
     if not runs:
         return runs
-    gyro = np.array([channel.quantity == "gyro" for channel in channels])
+    means, gyro = blocks.means, blocks.is_gyro
     levels = [np.nanmedian(means[a:b], axis=0) for a, b in runs]
     least = min(tuning.BLOCKS_OF_FLOOR, max(b - a for a, b in runs))
     sizes = [float(np.linalg.norm(level[gyro])) for level in levels]
     rest = min((i for i, (a, b) in enumerate(runs) if b - a >= least), key=lambda i: sizes[i])
     sways = np.where(gyro, tuning.SWAYING_RATE, tuning.SWAYS * _GRAVITY)
-    limit = np.maximum(sways, tuning.BEYOND_WHITE * np.sqrt(floor / (4 * size)))
+    limit = np.maximum(sways, tuning.BEYOND_WHITE * np.sqrt(floor / (4 * blocks.size)))
     kept = []
     for (a, b), level in zip(runs, levels, strict=True):
         away = np.abs(level - levels[rest])[gyro]
@@ -222,16 +207,11 @@ def _of_one_level(
     return kept
 
 
-def _vibrates(
-    runs: Sequence[tuple[int, int]],
-    channels: Sequence[Channel],
-    scatter: FloatArray,
-    size: int,
-    dt: float,
-) -> list[bool]:
+def _vibrates(runs: Sequence[tuple[int, int]], blocks: Blocks) -> list[bool]:
     """Whether a stretch scatters more than the quietest one, now and then, or in a narrow band."""
     if not runs:
         return []
+    scatter, size = blocks.scatter, blocks.size
     levels = np.array([np.nanmedian(scatter[a:b], axis=0) for a, b in runs])
     # A channel that is dead in the quietest one has no floor to be compared with.
     floor = np.min(levels, axis=0)
@@ -242,7 +222,7 @@ def _vibrates(
         shaken = np.median(scatter[:, alive] / floor[alive], axis=1) > tuning.MOST_OF_FLOOR
         excess |= [bool(np.mean(shaken[a:b]) > tuning.NOW_AND_THEN) for a, b in runs]
     return [
-        bool(loud) or any(_has_band(c.values[a * size : b * size], dt) for c in channels)
+        bool(loud) or any(_has_band(c.values[a * size : b * size], c.dt) for c in blocks.channels)
         for (a, b), loud in zip(runs, excess, strict=True)
     ]
 
@@ -268,17 +248,12 @@ def _has_band(values: FloatArray, dt: float) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class Blocks:
-    """Blocks of a quarter of a second, of the channels that motion can be seen in.
-
-    size: Samples of a block.
-    means, scatter: (blocks, axes), mean and variance of each block, u and u^2; NaN where half is
-        missing.
-    """
+    """Blocks of a quarter of a second, of the channels that motion can be seen in."""
 
     channels: tuple[Channel, ...]
-    size: int
-    means: FloatArray
-    scatter: FloatArray
+    size: int  # samples
+    means: FloatArray  # (blocks, axes), u; NaN where half is missing
+    scatter: FloatArray  # variance within each, u^2
 
     @property
     def length(self) -> float:
@@ -299,16 +274,13 @@ class Blocks:
     @property
     def loud_stretches(self) -> tuple[tuple[float, float], ...]:
         """Begin and end of each, s."""
-        edges = np.flatnonzero(np.diff(self.loudness.loud, prepend=False, append=False))
-        times = (self.length * edges).tolist()
-        return tuple(zip(times[::2], times[1::2], strict=True))
+        return tuple((self.length * a, self.length * b) for a, b in runs_of(self.loudness.loud))
 
 
 def vibration(recording: Recording) -> Iterator[Notice]:
     """Say when a recording vibrates that does not move."""
     blocks = None if find_motion(recording).moves else blocks_of(recording)
-    stretches = blocks.loud_stretches if blocks is not None else ()
-    if blocks is None or not stretches:
+    if blocks is None or not (stretches := blocks.loud_stretches):
         return
     total, ratio = sum(stop - start for start, stop in stretches), blocks.loudness.ratio
     longest = sorted(stretches, key=lambda each: each[0] - each[1])[:_LISTED]
@@ -322,11 +294,7 @@ def vibration(recording: Recording) -> Iterator[Notice]:
 def blocks_of(recording: Recording) -> Blocks | None:
     """The blocks of a recording; None if there are too few, or no channel to be seen in."""
     size = max(round(tuning.STILL_BLOCK * recording.rate), tuning.FEWEST_OF_MOTION)
-    channels = tuple(
-        channel
-        for channel in recording.inertial
-        if channel.is_of_a_sensor and is_moved_with(channel)
-    )
+    channels = tuple(c for c in recording.inertial if c.is_of_a_sensor and is_moved_with(c))
     count = recording.n // size
     if not channels or count < tuning.FEWEST_STILL:
         return None
@@ -349,14 +317,10 @@ def blocks_of(recording: Recording) -> Blocks | None:
 
 @dataclass(frozen=True, eq=False)
 class Loudness:
-    """When some axes scatter more than at their quietest.
+    """When some axes scatter more than at their quietest."""
 
-    loud: (blocks,) of bool.
-    ratio: Largest standard deviation in a loud stretch over that at rest, of any axis.
-    """
-
-    loud: BoolArray
-    ratio: float
+    loud: BoolArray  # (blocks,)
+    ratio: float  # largest standard deviation in a loud stretch over that at rest, of any axis
 
 
 def loudness(scatter: FloatArray, step: FloatArray) -> Loudness:
@@ -428,16 +392,13 @@ def _changes(logs: FloatArray) -> list[int]:
     for a, b in pairwise(edges.tolist()):
         if sign[a]:
             middle = (a + int(np.argmax(np.abs(change[a:b]))) + lag // 2 + 1) * width
-            split = _split(logs, max(ends[-1], middle - lag * width), middle + lag * width)
+            # Where two levels describe a few seconds best.
+            start = max(ends[-1], middle - lag * width)
+            part = logs[start : middle + lag * width]
+            before = np.arange(1, part.size)
+            sums = np.cumsum(part)[:-1]
+            explained = sums**2 / before + (np.sum(part) - sums) ** 2 / (part.size - before)
+            split = start + 1 + int(np.argmax(explained))
             if split > ends[-1]:
                 ends.append(split)
     return [*ends, logs.size]
-
-
-def _split(logs: FloatArray, start: int, stop: int) -> int:
-    """Where two levels describe a few seconds best."""
-    part = logs[start:stop]
-    before = np.arange(1, part.size)
-    sums = np.cumsum(part)[:-1]
-    explained = sums**2 / before + (np.sum(part) - sums) ** 2 / (part.size - before)
-    return start + 1 + int(np.argmax(explained))

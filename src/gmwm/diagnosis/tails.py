@@ -1,16 +1,9 @@
-"""Contamination, or noise of heavy tails.
+"""Outliers all over the record, or noise of heavy tails.
 
-Outliers all over the record are samples that the noise of the sensor did not make: the rest is
-Gaussian without them. They are left out one by one. Independent noise may have heavy tails
-(Laplace, Student) and be as white as any: its wavelet variances are those of white noise, and
-nothing is to be mended. A robust variance of it would be too small at fine levels, where
-coefficients are made of few samples, and right at coarse ones, where the sum of many is Gaussian;
-that looks like a Gauss-Markov process.
-
-The two differ in the body of the distribution. Prediction errors are counted in bins, and the
-better of two smooth laws, Student's t and the exponential power law (Laplace's among them), is
-compared with Gaussian noise of which a part has a larger standard deviation, by likelihood. Each
-has a scale and a shape; the mixture has one parameter more.
+Outliers are left out one by one. White noise of heavy tails (Laplace, Student) stays: a robust
+variance of it would be too small at fine levels only, which looks like a Gauss-Markov process. The
+body of the distribution tells them apart: the better of Student's t and the exponential power law
+is compared, by likelihood in bins, with Gaussian noise of which a part has a larger deviation.
 """
 
 from __future__ import annotations
@@ -48,22 +41,13 @@ def contamination(errors: Innovations, events: Spans) -> float:
     return 0.0 if is_chance or count <= tuning.HARMFUL_OUTLIERS * known else count / known
 
 
-_Survival = Callable[[FloatArray], FloatArray]
-"""Probability beyond, on both sides together."""
-
-
 @dataclass(frozen=True)
 class Tails:
-    """A law of heavy tails.
+    """A law of heavy tails."""
 
-    law: {"student", "power"}, student's t, or the exponential power law.
-    shape: Degrees of freedom, or the exponent: 2 is Gaussian, 1 Laplace.
-    scale: In robust standard deviations.
-    """
-
-    law: str
-    shape: float
-    scale: float
+    law: str  # "student" (Student's t) or "power" (exponential power law)
+    shape: float  # degrees of freedom, or the exponent: 2 is Gaussian, 1 Laplace
+    scale: float  # in robust standard deviations
 
     def beyond(self, distance: FloatArray) -> FloatArray:
         """Probability of a larger absolute value, of distances in robust standard deviations."""
@@ -96,7 +80,11 @@ def heavy_tails(errors: Innovations) -> Tails | None:
     if errors.rounding > tuning.ROUNDING_OF_BODY * errors.level or not errors.level > 0.0:
         return None
     distance = np.abs(errors.values[counted]) / errors.scale[counted]
-    if _clustering(distance) > tuning.CLUSTERED:
+    # Mean correlation of large errors with the next ones.
+    large = (distance > tuning.LARGE).astype(float)
+    large -= np.mean(large)
+    products = [inner(large[lag:], large[:-lag]) for lag in range(1, tuning.LAGS + 1)]
+    if np.mean(products) / inner(large, large) > tuning.CLUSTERED:
         return None
     edges = np.append(
         np.arange(0.0, tuning.FAR, tuning.BIN_OF_BODY),
@@ -104,10 +92,7 @@ def heavy_tails(errors: Innovations) -> Tails | None:
     )
     counts = np.append(np.histogram(distance, edges)[0], np.count_nonzero(distance >= edges[-1]))
     contaminated, _ = _most_likely(_mixture, counts, edges, _MIXTURE_STARTS)
-    found = {
-        law: _most_likely(_with_scale(survival), counts, edges, _STARTS[law])
-        for law, survival in _LAWS.items()
-    }
+    found = {law: _most_likely(_with_scale(law), counts, edges, _STARTS[law]) for law in _LAWS}
     law = max(found, key=lambda name: found[name][0])
     likelihood, (shape, scale) = found[law][0], np.exp(found[law][1])
     if likelihood <= contaminated or shape <= tuning.LEAST_SHAPE[law]:
@@ -115,19 +100,8 @@ def heavy_tails(errors: Innovations) -> Tails | None:
     return Tails(law, float(shape), float(scale))
 
 
-def _clustering(distance: FloatArray) -> float:
-    """Mean correlation of errors beyond two standard deviations with the next eight."""
-    large = (distance > tuning.LARGE).astype(float)
-    large -= np.mean(large)
-    lags = range(1, tuning.LAGS + 1)
-    products = [inner(large[lag:], large[:-lag]) for lag in lags]
-    return float(np.mean(products) / inner(large, large))
-
-
-def _with_scale(
-    survival: Callable[[FloatArray, float, float], FloatArray],
-) -> Callable[[FloatArray, FloatArray], FloatArray]:
-    return lambda x, logs: survival(x, *(float(each) for each in np.exp(logs)))
+def _with_scale(law: str) -> Callable[[FloatArray, FloatArray], FloatArray]:
+    return lambda x, logs: _LAWS[law](x, *(float(each) for each in np.exp(logs)))
 
 
 def _mixture(x: FloatArray, at: FloatArray) -> FloatArray:
