@@ -80,12 +80,7 @@ def wavelet_variance(
     if data_covariance is not None:
         checks.choice("data_covariance", data_covariance, WINDOWS)
     wavelet = "haar" if wavelet == "db1" else wavelet
-    width = known_wavelet(wavelet).width(1)
-    if width > runs.longest:
-        raise InputError(
-            f"{where_of(channel)} has no {width} samples in a row, which {wavelet} needs: "
-            "take a shorter wavelet, e.g. haar"
-        )
+    _check_width(channel, runs, wavelet)
     values = scaled(values, 1.0, -mean)
     levels = Levels.of(values, runs, wavelet, channel.dt)
     moments, driftless = levels.moments(), None
@@ -127,6 +122,15 @@ def wavelet_variance(
         fourth_cumulant=0.0 if robust else fourth_cumulant(values),
         data_covariance=found,
     )
+
+
+def _check_width(channel: Channel, runs: Runs, wavelet: str) -> None:
+    width = known_wavelet(wavelet).width(1)
+    if width > runs.longest:
+        raise InputError(
+            f"{where_of(channel)} has no {width} samples in a row, which {wavelet} needs: "
+            "take a shorter wavelet, e.g. haar"
+        )
 
 
 def _robust_moments(parts: Iterable[FloatArray], efficiency: float) -> FloatArray:
