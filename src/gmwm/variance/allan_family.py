@@ -241,8 +241,14 @@ def deviations(
         found[name] = [m * channel.dt, estimate]
         for probability in (0.5 + 0.5 * confidence, 0.5 - 0.5 * confidence):
             found[name].append(estimate * np.sqrt(dof / bias / chi2.ppf(probability, dof)))
+    times, deviation, lower, upper = (
+        {name: parts[i] for name, parts in found.items()} for i in range(4)
+    )
     return Deviations(
-        *({name: parts[i] for name, parts in found.items()} for i in range(4)),
+        times,
+        deviation,
+        lower,
+        upper,
         n=values.size,
         dt=channel.dt,
         confidence=confidence,

@@ -58,13 +58,7 @@ class Design:
                 )
         self.linear = tuple(i for i, term in enumerate(self.terms) if term.free_scale)
         self.shaped = tuple(i for i, term in enumerate(self.terms) if term.n_shapes)
-        # The functions of `curve`, without lookups that each step would repeat.
-        self._curve_of = [
-            scales.unit_curves(term.process)
-            if term.free_scale
-            else lambda shape, i=i: scales.curve(self.at_shape(i, shape))
-            for i, term in enumerate(self.terms)
-        ]
+        self._curve_of = [self._curve_at(i) for i in range(len(self.terms))]
         self._slopes_of = {
             i: scales.unit_slopes(self.terms[i].process)
             for i in self.shaped
@@ -102,6 +96,13 @@ class Design:
         if known is None or known[0] != shape:
             known = self._last[i] = shape, self._curve_of[i](shape)
         return known[1]
+
+    def _curve_at(self, i: int) -> Callable[[Shape], FloatArray]:
+        """The function of `curve` for one term, without lookups that each step would repeat."""
+        term = self.terms[i]
+        if term.free_scale:
+            return self.scales.unit_curves(term.process)
+        return lambda shape: self.scales.curve(self.at_shape(i, shape))
 
     def grid(self, i: int) -> list[Shape]:
         """Starting shapes of term ``i``, with fixed parameters at their value; see `_cached`."""

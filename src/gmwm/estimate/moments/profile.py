@@ -131,8 +131,10 @@ class Profile:
                 slopes[z.tobytes()] = projected(self.root, columns, x, own, factor)
             return slopes[z.tobytes()]
 
-        tolerances = {"xtol": XTOL, "ftol": FTOL, "gtol": GTOL, "maxfev": _MOST}
-        found = leastsq(lambda z: -at(z)[3], z0, Dfun=jacobian, full_output=True, **tolerances)[0]
+        tolerances = {"xtol": XTOL, "ftol": FTOL, "gtol": GTOL}
+        found = leastsq(
+            lambda z: -at(z)[3], z0, Dfun=jacobian, maxfev=_MOST, full_output=True, **tolerances
+        )[0]
         return self.at(design.unpack(np.clip(found, *bounds), start.shapes))
 
 
