@@ -5,7 +5,6 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from gmwm.variance.analysis import wavelet_variance
 
 from gmwm import GaussMarkov, RandomWalk, WhiteNoise
 from gmwm.calibration.calibration import Calibration
@@ -19,6 +18,7 @@ from gmwm.readers.recording import Recording
 from gmwm.study import turns
 from gmwm.study.rotation import Rotation, crossed_weights
 from gmwm.study.turns import reproduce_rotation, rotate
+from gmwm.variance import wavelet_variance
 
 FACTORS = {"GMWM": 1.0, "lines": 2.0}
 STRETCHES = (6, 8, 7)
