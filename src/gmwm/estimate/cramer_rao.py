@@ -10,14 +10,7 @@ import numpy as np
 
 from gmwm._core import checks
 from gmwm._core.compiled import compiled
-from gmwm._core.documents import (
-    Array,
-    Document,
-    Interval,
-    Samples,
-    Text,
-    check_covariance,
-)
+from gmwm._core.documents import Array, Document, Interval, Samples, Text, check_covariance
 from gmwm._core.frozen import freeze
 from gmwm._core.text import per_cent, wrapped
 from gmwm._core.typing import FloatArray
@@ -40,12 +33,7 @@ from gmwm.estimate.problem import (
     spectral_information,
     weight_root,
 )
-from gmwm.process import (
-    Model,
-    Process,
-    StateSpace,
-    as_model,
-)
+from gmwm.process import Model, Process, StateSpace, as_model
 from gmwm.variance import MIN_SAMPLES
 from gmwm.variance.covariance import dyadic_levels, haar_covariance, mean_covariance
 
@@ -176,7 +164,13 @@ def cramer_rao(model: Process | Model, n: int, dt: float) -> CramerRao:
     """
     model = as_model(model)
     n, dt = checks.samples(n, MIN_SAMPLES), checks.sampling_interval(dt)
-    _check(model)
+    if model.is_open:
+        raise InputError(f"{model!r} has free parameters: a bound needs values")
+    for item in model.parameters:
+        if item.parameter.linear and not (item.value or 0.0) > 0.0:
+            raise InputError(f"{item.key} is zero: leave its process out")
+    if any(term.is_line for term in model.terms):
+        raise InputError("a Sinusoid is a line, not a random process: leave it out")
     coordinates = Coordinates(model.opened())
     processes = tuple(model.terms[term.place] for term in coordinates.terms)
     exact = _is_short(coordinates, processes, n, dt)
@@ -207,16 +201,6 @@ def cramer_rao(model: Process | Model, n: int, dt: float) -> CramerRao:
     return CramerRao(model, int(n), float(dt), ranked, found[0], found[1], exact)
 
 
-def _check(model: Model) -> None:
-    if model.is_open:
-        raise InputError(f"{model!r} has free parameters: a bound needs values")
-    for item in model.parameters:
-        if item.parameter.linear and not (item.value or 0.0) > 0.0:
-            raise InputError(f"{item.key} is zero: leave its process out")
-    if any(term.is_line for term in model.terms):
-        raise InputError("a Sinusoid is a line, not a random process: leave it out")
-
-
 def _is_short(coordinates: Coordinates, processes: Sequence[Process], n: int, dt: float) -> bool:
     """Whether the exact recursion exists (flicker noise has no finite state) and is quick."""
     if not all(process.has_finite_state_space for process in processes):
@@ -236,11 +220,7 @@ def _slope_variance(processes: Sequence[Process], n: int, dt: float) -> float:
 
 
 def _wavelet_information(
-    coordinates: Coordinates,
-    processes: Sequence[Process],
-    n: int,
-    dt: float,
-    slope: Slope | None,
+    coordinates: Coordinates, processes: Sequence[Process], n: int, dt: float, slope: Slope | None
 ) -> FloatArray:
     """Information of the coordinates in the Haar wavelet variances, (d, d).
 

@@ -116,10 +116,8 @@ class Deviations:
     def to_dict(self) -> dict[str, Any]:
         """Everything in JSON types, SI units."""
         parts = ("tau", "deviation", "lower", "upper")
-        return {
-            name: getattr(self, name)
-            for name in ("n", "dt", "name", "quantity", "unit", "confidence")
-        } | {
+        own = ("n", "dt", "name", "quantity", "unit", "confidence")
+        return {name: getattr(self, name) for name in own} | {
             "kinds": {
                 kind: {part: getattr(self, part)[kind].tolist() for part in parts}
                 for kind in self.kinds
@@ -219,7 +217,13 @@ def deviations(
     confidence = checks.share("confidence", confidence, 0.95)
     chosen = _chosen_kinds(kinds)
     averaging = _averaging(tau, channel)
-    slopes = _noise_slopes(values, averaging)
+    slopes: list[int] = []  # powers of the frequency in the spectrum, -4 to 2
+    for m in averaging.astype(int):
+        count = values.size // m
+        if count >= tuning.LEAST_FOR_SLOPE or not slopes:
+            slopes.append(_noise_slope(values[: count * m].reshape(count, m).mean(axis=1)))
+        else:
+            slopes.append(slopes[-1])
     found: dict[str, list[FloatArray]] = {}
     for name, kind in chosen.items():
         longest = kind.longest(values.size)
@@ -284,18 +288,6 @@ def _averaging(tau: str | Sequence[float] | FloatArray, channel: Channel) -> Flo
     return np.unique(np.maximum(np.rint(times / channel.dt), 1.0))
 
 
-def _noise_slopes(values: FloatArray, averaging: FloatArray) -> list[int]:
-    """Power of the frequency in the spectrum, -4 to 2, that each averaging time shows."""
-    slopes: list[int] = []
-    for m in averaging.astype(int):
-        count = values.size // m
-        if count >= tuning.LEAST_FOR_SLOPE or not slopes:
-            slopes.append(_noise_slope(values[: count * m].reshape(count, m).mean(axis=1)))
-        else:
-            slopes.append(slopes[-1])
-    return slopes
-
-
 def _noise_slope(averages: FloatArray) -> int:
     """Riley & Greenhall (2004): from the lag-1 autocorrelation, differenced until it is short."""
     if averages.size < 4:
@@ -318,11 +310,18 @@ def _noise_slope(averages: FloatArray) -> int:
 def _distribution(
     allantools: ModuleType, name: str, n: int, m: FloatArray, slopes: Sequence[int]
 ) -> tuple[FloatArray, FloatArray]:
-    """Equivalent degrees of freedom and bias of the variance at each averaging time."""
+    """Degrees of freedom (Greenhall & Riley 2003) and bias of the variance by averaging time."""
     kind = _KINDS[name]
     pairs = list(zip(m.astype(int).tolist(), slopes, strict=True))
-    dof = np.array([_greenhall(allantools, kind, n, size, slope) for size, slope in pairs])
-    bias = np.ones(m.size)
+    order, dof, bias = kind.differences, np.empty(m.size), np.ones(m.size)
+    for i, (size, slope) in enumerate(pairs):
+        known = max(slope, -order)  # all that allantools has a table for
+        few = (n + 1 - size * order) / size <= order
+        if known == 2 and few and not kind.modified:
+            known = 1  # the paper's sum for 2 is not in allantools
+        dof[i] = allantools.ci.edf_greenhall(
+            known, order, size, n + 1, overlapping=True, modified=kind.modified
+        )
     if name == "total":
         for i, (size, slope) in enumerate(pairs):
             if slope > 0:  # not in the table
@@ -332,16 +331,3 @@ def _distribution(
                 dof[i] = max(dof[i], b * n / size - c)
             bias[i] -= a * size / n
     return np.maximum(dof, tuning.LEAST_DOF_OF_FAMILY), bias
-
-
-def _greenhall(allantools: ModuleType, kind: _Kind, n: int, m: int, slope: int) -> float:
-    """Equivalent degrees of freedom of Greenhall & Riley (2003)."""
-    slope = max(slope, -kind.differences)  # all that allantools has a table for
-    few = (n + 1 - m * kind.differences) / m <= kind.differences
-    if slope == 2 and few and not kind.modified:
-        slope = 1  # the paper's sum for 2 is not in allantools
-    return float(
-        allantools.ci.edf_greenhall(
-            slope, kind.differences, m, n + 1, overlapping=True, modified=kind.modified
-        )
-    )

@@ -79,8 +79,19 @@ class Gaps:
 
     @classmethod
     def of(cls, runs: Runs) -> Gaps:
-        """The gaps between the first and the last sample that exist."""
-        edges = _merge_over_islands(np.stack([runs.edges[:-1, 1], runs.edges[1:, 0]], axis=1))
+        """The gaps between the first and the last sample that exist.
+
+        Those that are separated by very short runs are one.
+        """
+        edges = np.stack([runs.edges[:-1, 1], runs.edges[1:, 0]], axis=1)
+        while edges.shape[0] > 1:
+            length = edges[:, 1] - edges[:, 0]
+            apart = edges[1:, 0] - edges[:-1, 1]
+            one = tuning.ISLAND * apart < np.maximum(length[1:], length[:-1])
+            if not np.any(one):
+                break
+            starts = edges[np.concatenate([[True], ~one]), 0]
+            edges = np.stack([starts, edges[np.concatenate([~one, [True]]), 1]], axis=1)
         octave = np.ceil(np.log2(edges[:, 1] - edges[:, 0])).astype(np.int64)
         return cls(runs, edges, octave, np.zeros(octave.size, dtype=bool))
 
@@ -162,19 +173,6 @@ class Gaps:
         first = np.maximum(runs[own, 0], centre - 2 * m + 1)
         last = np.minimum(runs[own, 1] - 2 * m, centre)
         return np.asarray(np.maximum(last - first + 1, 0) / (2.0 * m))
-
-
-def _merge_over_islands(edges: IntArray) -> IntArray:
-    """Merge gaps that are separated by very short runs."""
-    while edges.shape[0] > 1:
-        length = edges[:, 1] - edges[:, 0]
-        apart = edges[1:, 0] - edges[:-1, 1]
-        one = tuning.ISLAND * apart < np.maximum(length[1:], length[:-1])
-        if not np.any(one):
-            break
-        starts = edges[np.concatenate([[True], ~one]), 0]
-        edges = np.stack([starts, edges[np.concatenate([~one, [True]]), 1]], axis=1)
-    return edges
 
 
 @dataclass(frozen=True, eq=False)

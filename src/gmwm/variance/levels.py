@@ -47,10 +47,14 @@ def pilot_psd(variance: FloatArray, averaging: FloatArray, dt: float) -> PSD:
     knots = np.log(tuning.HAAR_PEAK / averaging)[::-1]  # rising frequency
     places = _Places(x, knots)
     level = np.log(2.0 * variance * averaging)
+    largest = tuning.PILOT_STEEPEST * float(np.log(2.0))
     for _ in range(tuning.PILOT_ITERATIONS):
         implied = weight @ np.exp(places.interpolated(level[::-1]))
         level = level + np.clip(tuning.PILOT_STEP * np.log(variance / implied), -1.0, 1.0)
-        level = _limit_slopes(level)
+        limited = level.tolist()  # within f^-2.5 .. f^2.5 from one level (an octave) to the next
+        for j in range(1, level.size):
+            limited[j] = min(max(limited[j], limited[j - 1] - largest), limited[j - 1] + largest)
+        level = np.array(limited)
 
     def psd(f: FloatArray, sampling: float) -> FloatArray:
         return sampling * np.exp(_Places(np.log(f * sampling), knots).interpolated(level[::-1]))
@@ -100,15 +104,6 @@ class _Places:
         inside += np.repeat(level[self._piece], self._repeats)
         slope = (level[reach] - level[0]) / (self._knots[reach] - self._knots[0])
         return np.asarray(inside + np.clip(slope, -2.0, 0.0) * self._below)
-
-
-def _limit_slopes(level: FloatArray) -> FloatArray:
-    """Keep the density within f^-2.5 .. f^2.5 from one level (an octave) to the next."""
-    largest = tuning.PILOT_STEEPEST * float(np.log(2.0))
-    limited = level.tolist()
-    for j in range(1, level.size):
-        limited[j] = min(max(limited[j], limited[j - 1] - largest), limited[j - 1] + largest)
-    return np.array(limited)
 
 
 _ROW = 1 << FINE
@@ -192,7 +187,11 @@ class Levels:
         m = dyadic_levels(gaps.span)
         if not np.any(gaps.filled(m[-1])):
             return plain
-        gaps = replace(gaps, apart=plain._apart(gaps, dt))
+        between = replace(plain, parts=runs.edges[:, 0])
+        variance = between._pilot_variance(0)
+        known = plain.averaging[: variance.size]
+        psd, longest = pilot_psd(variance, known, dt), float(known[-1])
+        gaps = replace(gaps, apart=levels_apart(gaps, values, between.slope, psd, dt, longest))
         if np.any(gaps.apart):
             parts = np.concatenate([[0], gaps.edges[gaps.apart, 1]])
             plain = replace(plain, parts=parts)
@@ -206,14 +205,6 @@ class Levels:
         first = whole._filled_under(variance, scarcity, gaps, dt)
         variance = np.append(variance, first._pilot_variance(variance.size))
         return whole._filled_under(variance, scarcity, gaps, dt)
-
-    def _apart(self, gaps: Gaps, dt: float) -> BoolArray:
-        """Gaps in which the level changes, judged by the series between them, (G,)."""
-        between = replace(self, parts=self.runs.edges[:, 0])
-        variance = between._pilot_variance(0)
-        known = self.averaging[: variance.size]
-        psd = pilot_psd(variance, known, dt)
-        return levels_apart(gaps, self.values, between.slope, psd, dt, float(known[-1]))
 
     def _pilot_variance(self, start: int) -> FloatArray:
         """Driftless variances of the well-known levels from ``start`` on; the finest always is."""

@@ -327,15 +327,6 @@ def _normalised(matrix: FloatArray) -> tuple[FloatArray, FloatArray]:
     return deviation, matrix / np.outer(deviation, deviation)
 
 
-def _semidefinite(matrix: FloatArray) -> FloatArray:
-    """The matrix without its negative eigenvalues."""
-    values, vectors = np.linalg.eigh(matrix)
-    if values[0] >= 0.0:
-        return matrix
-    root = vectors * np.sqrt(np.maximum(values, 0.0))
-    return np.asarray(root @ root.T)  # a product that is symmetric to the last digit
-
-
 def robust_covariance(
     psd: PSD,
     n: int,
@@ -376,4 +367,8 @@ def robust_covariance(
     # No power of a correlation exceeds its square. Sums over blocks may: pure quantization noise
     # is correlated at single lags, not between them.
     deviation = np.minimum(deviation, spread * np.sqrt(1.0 / efficiency - 1.0))
-    return np.asarray(classical + np.outer(deviation, deviation) * _semidefinite(correlation))
+    values, vectors = np.linalg.eigh(correlation)
+    if values[0] < 0.0:
+        root = vectors * np.sqrt(np.maximum(values, 0.0))
+        correlation = root @ root.T  # a product that is symmetric to the last digit
+    return np.asarray(classical + np.outer(deviation, deviation) * correlation)

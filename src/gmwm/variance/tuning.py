@@ -5,13 +5,11 @@
 LEAST_FOR_SLOPE = 100
 """Averages needed to identify the kind of noise; with fewer, the level before decides."""
 
-LEAST_DOF_OF_FAMILY = 0.5
-"""Degrees of freedom of an interval that says nothing."""
+LEAST_DOF_OF_FAMILY = 0.5  # degrees of freedom of an interval that says nothing
 
 # -- the spectrum implied by wavelet variances ----------------------------------------------------
 
-PILOT_ITERATIONS = 12
-"""Rounds of scaling; the last changes no level by as much as its error."""
+PILOT_ITERATIONS = 12  # rounds of scaling; the last changes no level by as much as its error
 
 PILOT_STEP = 0.8
 """Share of a step, in logarithms: levels share frequencies, and whole steps oscillate."""
@@ -19,8 +17,7 @@ PILOT_STEP = 0.8
 PILOT_STEEPEST = 2.5
 """Power of the frequency from level to level; the steepest process (a random walk) has 2."""
 
-HAAR_PEAK = 0.37
-"""The Haar gain of averaging time tau peaks at f = 0.37/tau."""
+HAAR_PEAK = 0.37  # the Haar gain of averaging time tau peaks at f = 0.37/tau
 
 # -- gaps -----------------------------------------------------------------------------------------
 
@@ -32,23 +29,12 @@ FILLING_REACH = 32
 """Blocks on either side that a filling uses, at least; four lengths of the gap if that is more.
 Farther ones reduce the error of a random walk or of white noise by little."""
 
-GAP_BLOCKS = 64
-"""Most blocks in a gap; longer gaps have blocks of several samples."""
-
-ISLAND = 32
-"""A run shorter than this share (1/32) of a gap beside it is lost with the gap."""
-
-PASSED_OCTAVES = 3
-"""A filling uses samples beyond another gap that is this many octaves shorter."""
-
-APART = 1e-3
-"""Probability that noise has a gap in a series that passes for a change of the level."""
-
-WIDER = 16
-"""A change of the level must also show over stretches 16 times as wide."""
-
-NEIGHBOURHOOD = 128
-"""Half samples within which gaps have correlated errors."""
+GAP_BLOCKS = 64  # most blocks in a gap; longer gaps have blocks of several samples
+ISLAND = 32  # a run shorter than this share (1/32) of a gap beside it is lost with the gap
+PASSED_OCTAVES = 3  # a filling uses samples beyond another gap that is this many octaves shorter
+APART = 1e-3  # probability that noise has a gap in a series that passes for a change of the level
+WIDER = 16  # a change of the level must also show over stretches 16 times as wide
+NEIGHBOURHOOD = 128  # half samples within which gaps have correlated errors
 
 PAIRED_KINDS = 24
 """Kinds of gaps, the most frequent, whose pairs are counted; twice as many change no expected
@@ -64,54 +50,32 @@ PILOT_WINDOWS = 8.0
 DECIDING_WINDOWS = 32.0
 """Windows without overlap that show whether a level can be filled; coarser levels follow it."""
 
-LAGS_PER_AVERAGE = 8
-"""Lags per averaging time at which pairs of coefficients are counted."""
-
-MOST_BLOCKS = 2048
-"""Means of blocks from which a drift is estimated."""
-
-MOST_BLOCKS_WITH_GAPS = 512
-"""The same where some are missing, which needs a dense matrix of them."""
+LAGS_PER_AVERAGE = 8  # lags per averaging time at which pairs of coefficients are counted
+MOST_BLOCKS = 2048  # means of blocks from which a drift is estimated
+MOST_BLOCKS_WITH_GAPS = 512  # the same where some are missing, which needs a dense matrix of them
 
 # -- covariances by lags --------------------------------------------------------------------------
 
 EXACT_SAMPLES = 2048
 """Longest record with lags of single samples; longer records have lags of blocks."""
 
-BLOCKS = 1024
-"""Blocks of a longer record, whose means give its coarse levels."""
+BLOCKS = 1024  # blocks of a longer record, whose means give its coarse levels
 
 BLOCKS_PER_AVERAGE = 8
 """Blocks of the shortest averaging time of these; shorter ones have the spectral integral."""
 
-FOLDS = 2
-"""Aliases on either side of a block's spectrum; the block mean suppresses farther ones."""
-
-LEAST_LAGS = 2048
-"""Lags for other wavelets: memory may be longer than a short record."""
-
-BINS_PER_OCTAVE = 8
-"""Of the smoothed empirical covariance."""
+FOLDS = 2  # aliases on either side of a block's spectrum; the block mean suppresses farther ones
+LEAST_LAGS = 2048  # lags for other wavelets: memory may be longer than a short record
+BINS_PER_OCTAVE = 8  # of the smoothed empirical covariance
 
 # -- covariances of the robust variances ----------------------------------------------------------
 
-ROBUST_REACH = 4
-"""Levels apart that are summed by lags: farther ones add 2^(-3d/2) or less."""
-
-ROBUST_LAGS = 2048
-"""Lags of a grid."""
-
-ROBUST_FIRST_LEVELS = 7
-"""Levels of 1 to 64 samples, on the samples themselves."""
-
-ROBUST_LEVELS_PER_GRID = 3
-"""Levels that share a coarser grid."""
-
-ROBUST_BLOCKS_PER_AVERAGE = 16
-"""Blocks of the finest level of a coarser grid."""
-
-NEGLIGIBLE_POWER = 1e-5
-"""Share of the excess below which powers of the correlation are left out."""
+ROBUST_REACH = 4  # levels apart that are summed by lags: farther ones add 2^(-3d/2) or less
+ROBUST_LAGS = 2048  # lags of a grid
+ROBUST_FIRST_LEVELS = 7  # levels of 1 to 64 samples, on the samples themselves
+ROBUST_LEVELS_PER_GRID = 3  # levels that share a coarser grid
+ROBUST_BLOCKS_PER_AVERAGE = 16  # blocks of the finest level of a coarser grid
+NEGLIGIBLE_POWER = 1e-5  # share of the excess below which powers of the correlation are left out
 
 # -- heavy tails ----------------------------------------------------------------------------------
 
@@ -119,8 +83,7 @@ KURTOSIS_VARIANCE = 27.0
 """n times the variance of the excess kurtosis of n first differences of Gaussian white noise:
 24 sum rho^4."""
 
-LARGEST_KURTOSIS = 5.0
-"""Standard errors of it that Gaussian noise does not reach."""
+LARGEST_KURTOSIS = 5.0  # standard errors of it that Gaussian noise does not reach
 
 # -- streaming ------------------------------------------------------------------------------------
 
@@ -139,8 +102,7 @@ for records with windows over up to half an averaging time; beyond, 256 windows 
 STREAMING_EDGE = 16
 """The first and the last 1/16 of half a window must have a sample, so that gaps lie within it."""
 
-STREAMING_LEAST_EDGE = 4
-"""Least samples of such a part, but for shorter averaging times."""
+STREAMING_LEAST_EDGE = 4  # least samples of such a part, but for shorter averaging times
 
 STREAMING_LEAST = 0.375
 """Least share of the samples of half a window; with half of all samples missing singly, 32 of 64,
@@ -150,20 +112,17 @@ STREAMING_LARGEST_CHANGE = 10.0
 """Largest relative change of a variance by gaps: half of white noise missing singly has 1, so few
 windows may come out at less. Bounded by 1.5, three coarse levels were 11 % too large."""
 
-LONGEST_WITHIN = 0.625
-"""Longest gap within half a window, as a share: the rest of what must exist."""
+LONGEST_WITHIN = 0.625  # longest gap within half a window, as a share: the rest of what must exist
 
 ALIKE = 2.0 / 3.0
 """Sum of the squared autocorrelation of the Haar coefficients of white noise over all lags, in
 averaging times: 2 (1/4 + 1/12)."""
 
-LEAST_OF_BLOCK = 0.5
-"""Share of a block of samples that its mean needs to count."""
+LEAST_OF_BLOCK = 0.5  # share of a block of samples that its mean needs to count
 
 # -- threads and files ----------------------------------------------------------------------------
 
-SAMPLES_PER_THREAD = 1 << 20
-"""Fewer take less time than threads need to begin."""
+SAMPLES_PER_THREAD = 1 << 20  # fewer take less time than threads need to begin
 
 LARGEST_VARIANCE = 1e120
 """In a saved result, u^2: a channel whose spread is beyond 1e60 is not analysed."""

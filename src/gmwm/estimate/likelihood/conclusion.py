@@ -86,8 +86,12 @@ def maximise(
             continue
         value, previous = there, slope
         slope = gradient(objective, moved, scale)
-        inverse = _updated(inverse, moved - z, previous - slope)
-        z = moved
+        step, change, z = moved - z, previous - slope, moved
+        curvature = float(step @ change)
+        if curvature <= 1e-12 * float(np.linalg.norm(step) * np.linalg.norm(change)):
+            continue
+        left = np.eye(z.size) - np.outer(step, change) / curvature
+        inverse = np.asarray(left @ inverse @ left.T + np.outer(step, step) / curvature)
     return Maximum(z, value, False)
 
 
@@ -138,15 +142,6 @@ def gradient(objective: Objective, z: FloatArray, scale: FloatArray) -> FloatArr
         step[i] = _GRADIENT_STEP * min(scale[i], 1.0)
         result[i] = (objective(z + step) - objective(z - step)) / (2.0 * step[i])
     return result
-
-
-def _updated(inverse: FloatArray, moved: FloatArray, change: FloatArray) -> FloatArray:
-    """The BFGS update of an inverse information matrix."""
-    curvature = float(moved @ change)
-    if curvature <= 1e-12 * float(np.linalg.norm(moved) * np.linalg.norm(change)):
-        return inverse
-    left = np.eye(moved.size) - np.outer(moved, change) / curvature
-    return np.asarray(left @ inverse @ left.T + np.outer(moved, moved) / curvature)
 
 
 _CLOSE = 0.02  # twice the error of the profile likelihood

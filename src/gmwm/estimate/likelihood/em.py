@@ -14,7 +14,7 @@ likelihood; its maximum is the root of a cubic (Beach & MacKinnon 1978, *Econome
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
@@ -178,13 +178,6 @@ def expect(
     unknown = seen[:, 1:] @ root - spread[present] @ h
     of_states = np.einsum("i,kij,j->", h, c[present], h)
     count = int(np.sum(present))
-    free = count - regression.beta.size
-    log_likelihood = -0.5 * (
-        free * np.log(2.0 * np.pi)
-        + float(np.sum(np.log(s[present])))
-        + regression.log_determinant
-        + regression.residual
-    )
     return Expectation(
         later=second(last, last, c[1:]),
         cross=second(last, first, d),
@@ -196,7 +189,7 @@ def expect(
         steps=n - 1,
         residual=float(residual @ residual + np.sum(unknown**2) + of_states),
         count=count,
-        log_likelihood=log_likelihood,
+        log_likelihood=regression.log_likelihood(count, float(np.sum(np.log(s[present])))),
     )
 
 
@@ -349,25 +342,18 @@ def _gauss_markov(process: Process, like: Process, m: StateMoments, dt: float) -
                 size = float(loss(delta))
                 return -0.5 * (m.steps * np.log(size) + float(squares(delta)) / variance / size)
 
-        delta = _best_root(condition, log_likelihood, min(delta, _FASTEST))
+        # The root between 0 and 1 of highest likelihood; the present value where there is none.
+        inside = [
+            float(root.real)
+            for root in np.atleast_1d(condition.roots())
+            if abs(root.imag) < 1e-9 * max(abs(root), 1e-300) and _SLOWEST < root.real < _FASTEST
+        ]
+        delta = max([*inside, min(delta, _FASTEST)], key=log_likelihood)
         process = process.with_values(tau=float(-dt / np.log1p(-delta)))
     if sigma is None:
         variance = (float(squares(delta)) / float(loss(delta)) + m.first) / n
         process = process.with_values(sigma=float(np.sqrt(variance)))
     return process
-
-
-def _best_root(
-    condition: Polynomial, log_likelihood: Callable[[float], float], present: float
-) -> float:
-    """The root between 0 and 1 of highest likelihood; the present value where there is none."""
-    roots = condition.roots()
-    inside = [
-        float(root.real)
-        for root in np.atleast_1d(roots)
-        if abs(root.imag) < 1e-9 * max(abs(root), 1e-300) and _SLOWEST < root.real < _FASTEST
-    ]
-    return max([*inside, present], key=log_likelihood)
 
 
 def _conclude(

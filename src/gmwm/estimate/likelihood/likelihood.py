@@ -72,6 +72,18 @@ class Regression:
             float(np.linalg.slogdet(information)[1]),
         )
 
+    def log_likelihood(self, count: int, log_variance: float) -> float:
+        """Diffuse log-likelihood of ``count`` samples; a constant of the regressors is left out.
+
+        log_variance: Sum of the logarithms of the variances of the innovations.
+        """
+        return -0.5 * (
+            (count - self.beta.size) * np.log(2.0 * np.pi)
+            + log_variance
+            + self.log_determinant
+            + self.residual
+        )
+
 
 class Columns:
     """A series and its regressors: a constant and, where the model has one, a ramp.
@@ -153,14 +165,7 @@ class KalmanLikelihood:
     def __call__(self, processes: Sequence[Process]) -> float:
         """Log-likelihood of these processes; a constant of the regressors is left out."""
         innovations, log_variance, count = whitened(self.columns, processes)
-        regression = Regression.of(innovations.T @ innovations)
-        free = count - regression.beta.size
-        return -0.5 * (
-            free * np.log(2.0 * np.pi)
-            + log_variance
-            + regression.log_determinant
-            + regression.residual
-        )
+        return Regression.of(innovations.T @ innovations).log_likelihood(count, log_variance)
 
     def regression(self, processes: Sequence[Process]) -> Regression:
         """Constant and slope under these processes."""

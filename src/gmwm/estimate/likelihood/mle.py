@@ -178,7 +178,14 @@ def _fit(series: Series, climb: Climb, method: str) -> Fit:
         part = coordinates.without(absent)
         top = climb(part, tuple(processes[i] for i in present))
         if not absent and not series.start_is_valid:
-            top = _or_higher(top, series, climb)
+            # From another candidate, if that lies above the top already.
+            likelihood = KalmanLikelihood(series.columns)
+            reached = defined(likelihood, top.processes)
+            places = [_rescaled(point, series) for point in candidates(series)]
+            height, best = max(places, key=lambda place: place[0], default=(-np.inf, ()))
+            if height > reached:
+                other = climb(coordinates, best)
+                top = other if defined(likelihood, other.processes) > reached else top
         for i, process in zip(present, top.processes, strict=True):
             processes[i] = process
         redundant = redundant_term(part, top.processes, top.likelihood)
@@ -196,18 +203,6 @@ def _fit(series: Series, climb: Climb, method: str) -> Fit:
         slope = Slope(*series.columns.slope(regression))
     report = Report(method, top.maximum.value, notices)
     return conclude_likelihood(series, processes, absent, top, slope, report)
-
-
-def _or_higher(top: Top, series: Series, climb: Climb) -> Top:
-    """The top, or the one reached from another candidate that lies above it already."""
-    likelihood = KalmanLikelihood(series.columns)
-    reached = defined(likelihood, top.processes)
-    places = [_rescaled(point, series) for point in candidates(series)]
-    height, best = max(places, key=lambda place: place[0], default=(-np.inf, ()))
-    if not height > reached:
-        return top
-    other = climb(series.coordinates, best)
-    return other if defined(likelihood, other.processes) > reached else top
 
 
 def _rescaled(processes: tuple[Process, ...], series: Series) -> tuple[float, tuple[Process, ...]]:

@@ -16,14 +16,7 @@ from gmwm.estimate.moments.design import Design
 from gmwm.estimate.moments.profile import Point, Profile
 from gmwm.estimate.moments.weights import Weights
 from gmwm.estimate.problem import FittedMoments, Moments, Slope, drift_key, weight_root
-from gmwm.estimate.result import (
-    Comparison,
-    Estimates,
-    Fit,
-    Goodness,
-    conclude,
-    upper_amplitude,
-)
+from gmwm.estimate.result import Comparison, Estimates, Fit, Goodness, conclude, upper_amplitude
 from gmwm.issues import Notice, notice
 from gmwm.process import Model, Process
 from gmwm.variance import WaveletVariance
@@ -124,7 +117,7 @@ def conclude_moments(
 def _jacobian(design: Design, point: Point, curves: FloatArray, absent: list[int]) -> FloatArray:
     """Derivative of the moments by the coordinates of the terms that have an amplitude, (J, d)."""
     amplitudes = design.amplitudes(point.x)
-    slopes = iter((design.shape_derivatives(point.shapes) * amplitudes[design.owners()]).T)
+    slopes = iter((design.shape_derivatives(point.shapes) * amplitudes[design.owners]).T)
     columns = [np.zeros((0, curves.shape[0]))]
     for i, is_amplitude in design.coordinates.owners:
         column = curves[:, i] * amplitudes[i] if is_amplitude else next(slopes)
@@ -168,7 +161,7 @@ def limit_notices(design: Design, point: Point) -> list[Notice]:
     amplitudes = design.amplitudes(point.x)
     at_limit = (z <= low + tuning.SEARCH_MARGIN) | (z >= high - tuning.SEARCH_MARGIN)
     notices = []
-    for k, i in enumerate(design.owners()):
+    for k, i in enumerate(design.owners):
         if amplitudes[i] > 0.0 and at_limit[k]:
             process = design.at_shape(i, point.shapes[i])
             values = {"process": type(process).__name__, "shape": point.shapes[i][0]}

@@ -18,7 +18,7 @@ from gmwm._core.typing import FloatArray, IntArray
 from gmwm.errors import InputError
 from gmwm.estimate import tuning
 from gmwm.estimate.moments.kernels import Shaped
-from gmwm.estimate.problem import Coordinates, Scales, Term, is_plain, shape_of
+from gmwm.estimate.problem import Coordinates, Scales, is_plain, shape_of
 from gmwm.process import Model, Process, Shape, compiled_levels
 
 MOST_SHAPES = 3
@@ -43,6 +43,7 @@ class Design:
     terms: The noise terms.
     linear: Noise terms of free amplitude.
     shaped: Noise terms of which some shape parameter is free.
+    owners: For each element of z, the term it belongs to.
     Raises InputError if the model has no noise, or a process that cannot be fitted in part is fixed
         in part.
     """
@@ -63,7 +64,7 @@ class Design:
             for i in self.shaped
             if self.terms[i].free_scale
         }
-        self._owners = [i for i, is_amplitude in self.coordinates.owners if not is_amplitude]
+        self.owners = [i for i, is_amplitude in self.coordinates.owners if not is_amplitude]
         self._own: dict[Any, Any] = {}
         self._last: dict[int, tuple[Shape, FloatArray]] = {}
         self._parts: dict[tuple[int, ...], Design] = {}
@@ -105,7 +106,19 @@ class Design:
 
     def grid(self, i: int) -> list[Shape]:
         """Starting shapes of term ``i``, with fixed parameters at their value; see `_cached`."""
-        return self._cached("grid", i, lambda: self._new_grid(self.terms[i]))
+        term, own = self.terms[i], shape_of(self.terms[i].process)
+        if not term.n_shapes:
+            return [own]
+
+        def make() -> list[Shape]:
+            shapes = term.process.shape_grid(self.scales.dt, self.scales.n)
+            filled = {
+                tuple(v if free else o for v, o, free in zip(s, own, term.free_shape, strict=True))
+                for s in shapes
+            }
+            return sorted(filled)
+
+        return self._cached("grid", i, make)
 
     def grid_curves(self, i: int) -> FloatArray:
         """Curves of term ``i`` on its grid, (J, G)."""
@@ -142,21 +155,6 @@ class Design:
         if key not in kept:
             kept[key] = make()
         return kept[key]
-
-    def _new_grid(self, term: Term) -> list[Shape]:
-        own = shape_of(term.process)
-        if not term.n_shapes:
-            return [own]
-        shapes = term.process.shape_grid(self.scales.dt, self.scales.n)
-        filled = {
-            tuple(v if free else o for v, o, free in zip(s, own, term.free_shape, strict=True))
-            for s in shapes
-        }
-        return sorted(filled)
-
-    def fixed_shapes(self) -> list[Shape | None]:
-        """The shape of each term, ``None`` where something of it is free."""
-        return [None if term.n_shapes else shape_of(term.process) for term in self.terms]
 
     # -- z <-> shapes -----------------------------------------------------------------------------
 
@@ -217,7 +215,7 @@ class Design:
             lower[s, :size] = [p.lower for p in term.process.shape_parameters]
             upper[s, :size] = [p.upper for p in term.process.shape_parameters]
         first = np.cumsum([0, *counts])[:-1]
-        owners = np.array([self.linear.index(i) for i in self._owners])
+        owners = np.array([self.linear.index(i) for i in self.owners])
         levels = compiled_levels(self.scales.tau, self.scales.dt, frozenset(kinds.tolist()))
         terms = Shaped(kinds, np.array(self.shaped), first, free, lower, upper)
         return Compiled(terms, owners, levels)
@@ -243,14 +241,13 @@ class Design:
 
     def shape_derivatives(self, shapes: Sequence[Shape]) -> FloatArray:
         """Derivative of each term's curve by its own z, at unit free amplitude, (J, z)."""
-        result = np.empty((self.scales.tau.size, len(self._owners)))
+        result = np.empty((self.scales.tau.size, len(self.owners)))
         column = 0
         for i in self.shaped:
             term = self.terms[i]
             closed = self._slopes_of[i](shapes[i]) if term.free_scale else None
             if closed is not None:
-                found = closed[:, term.free_shape]
-                result[:, column : column + term.n_shapes] = found
+                result[:, column : column + term.n_shapes] = closed[:, term.free_shape]
                 column += term.n_shapes
                 continue
             z = term.process.shape_to_free(shapes[i])
@@ -265,20 +262,22 @@ class Design:
                 column += 1
         return result
 
-    def owners(self) -> list[int]:
-        """For each element of z, the term it belongs to."""
-        return self._owners
-
     # -- models -----------------------------------------------------------------------------------
 
     def fitted_processes(self, x: FloatArray, shapes: Sequence[Shape]) -> list[Process]:
-        """The terms with estimated values."""
+        """The terms with estimated values.
+
+        Shapes that came out equal, as those of terms without amplitude do, are moved apart.
+        """
         result: list[Process] = []
-        pairs = zip(self.amplitudes(x), _distinct(self.terms, shapes), strict=True)
-        for i, (amplitude, shape) in enumerate(pairs):
+        seen: set[tuple[type, Shape]] = set()
+        for i, (amplitude, shape) in enumerate(zip(self.amplitudes(x), shapes, strict=True)):
+            term = self.terms[i]
+            while shape and (type(term.process), shape) in seen:
+                shape = (shape[0] * (1.0 + 1e-9), *shape[1:])
+            seen.add((type(term.process), shape))
             process = self.at_shape(i, shape)
-            free = self.terms[i].free_scale
-            result.append(process.with_amplitude(float(amplitude)) if free else process)
+            result.append(process.with_amplitude(float(amplitude)) if term.free_scale else process)
         return result
 
     def fitted_noise(self, x: FloatArray, shapes: Sequence[Shape]) -> Model:
@@ -287,15 +286,3 @@ class Design:
         amplitude = self.amplitudes(x)
         present = [process for process, a in zip(fitted, amplitude, strict=True) if a > 0.0]
         return Model(tuple(present or fitted[:1]))
-
-
-def _distinct(terms: Sequence[Term], shapes: Sequence[Shape]) -> list[Shape]:
-    """Shapes with those moved apart that came out equal, as terms without amplitude do."""
-    seen: set[tuple[type, Shape]] = set()
-    result = []
-    for term, shape in zip(terms, shapes, strict=True):
-        while shape and (type(term.process), shape) in seen:
-            shape = (shape[0] * (1.0 + 1e-9), *shape[1:])
-        seen.add((type(term.process), shape))
-        result.append(shape)
-    return result

@@ -21,7 +21,7 @@ from gmwm.estimate import tuning
 from gmwm.estimate.moments.conclusion import Converged, conclude_moments
 from gmwm.estimate.moments.design import Design
 from gmwm.estimate.moments.profile import Point, Profile, search
-from gmwm.estimate.moments.weights import WEIGHTS, Discrepancy, Reference, Weights, dictionary_fit
+from gmwm.estimate.moments.weights import WEIGHTS, Discrepancy, Weights, dictionary_fit
 from gmwm.estimate.problem import Moments, Scales, Simulation, is_plain
 from gmwm.estimate.result import Fit, Goodness
 from gmwm.process import Model
@@ -112,7 +112,8 @@ class GMWM:
         found = None
         for value in dict.fromkeys(first):
             level.value = value
-            found = _iterate(problem, _first_point(problem, reference, level), level)
+            relaxed = level.added_to(reference.covariance, problem.moments.target)
+            found = _iterate(problem, relaxed, level)
             if found is not None and level.value == 0.0:
                 break
         return found or _under_reference(problem, level)
@@ -168,28 +169,14 @@ class _Problem:
         return search(Profile(self.design, target, self.weights.root(covariance)))
 
 
-@dataclass(frozen=True, eq=False)
-class Iterate:
-    """A point of the iteration, and the covariance of the moments that it minimises under."""
-
-    covariance: FloatArray
-    point: Point
-
-
-def _first_point(problem: _Problem, reference: Reference, level: Discrepancy) -> Iterate:
-    """The minimum under the weights of the reference mixture."""
-    target = problem.moments.target
-    covariance = level.added_to(reference.covariance, target)
-    return Iterate(covariance, problem.search(target, covariance))
-
-
-def _iterate(problem: _Problem, first: Iterate, level: Discrepancy) -> Converged | None:
+def _iterate(problem: _Problem, relaxed: FloatArray, level: Discrepancy) -> Converged | None:
     """Iterate theta -> minimum under the weights that theta implies; ``None`` if it wanders.
 
-    Where it oscillates about the fixed point, the weights are moved by part of the way only
-    (Aitken's relaxation).
+    It starts at the minimum under a covariance ``relaxed``. Where it oscillates about the fixed
+    point, the weights are moved by part of the way only (Aitken's relaxation).
     """
-    design, moments, relaxed, point = problem.design, problem.moments, first.covariance, first.point
+    design, moments = problem.design, problem.moments
+    point = problem.search(moments.target, relaxed)
     part, least = 1.0, np.inf
     curve = design.implied(point.x, point.shapes)
     step = np.zeros_like(curve)

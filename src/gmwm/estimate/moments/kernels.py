@@ -353,12 +353,7 @@ def damped_step(
 
 @compiled()
 def refined(
-    z: FloatArray,
-    bounds: Bounds,
-    terms: Shaped,
-    curves: Curves,
-    problem: Weighted,
-    most: int,
+    z: FloatArray, bounds: Bounds, terms: Shaped, curves: Curves, problem: Weighted, most: int
 ) -> tuple[bool, FloatArray, FloatArray, float]:
     """Local minimum of the profiled problem.
 

@@ -29,7 +29,7 @@ from gmwm.estimate.moments.kernels import (
     projected,
     refined,
 )
-from gmwm.estimate.problem import Scales, objectives_with, solve_nonnegative
+from gmwm.estimate.problem import Scales, objectives_with, shape_of, solve_nonnegative
 from gmwm.process import GaussMarkov, Shape, WhiteNoise
 
 _MOST = 200  # evaluations of a search
@@ -125,21 +125,15 @@ class Profile:
         def jacobian(z: FloatArray) -> FloatArray:
             if z.tobytes() not in slopes:
                 shapes, columns, x, _ = at(z)
-                factor = design.amplitudes(x[: len(design.linear)])[design.owners()]
+                factor = design.amplitudes(x[: len(design.linear)])[design.owners]
                 own = design.shape_derivatives(shapes)
                 slopes.clear()
                 slopes[z.tobytes()] = projected(self.root, columns, x, own, factor)
             return slopes[z.tobytes()]
 
+        tolerances = {"xtol": XTOL, "ftol": FTOL, "gtol": GTOL}
         found = leastsq(
-            lambda z: -at(z)[3],
-            z0,
-            Dfun=jacobian,
-            maxfev=_MOST,
-            full_output=True,
-            xtol=XTOL,
-            ftol=FTOL,
-            gtol=GTOL,
+            lambda z: -at(z)[3], z0, Dfun=jacobian, maxfev=_MOST, full_output=True, **tolerances
         )[0]
         return self.at(design.unpack(np.clip(found, *bounds), start.shapes))
 
@@ -173,7 +167,11 @@ def search(profile: Profile, known: Sequence[Shape | None] | None = None) -> Poi
     known: Shapes to start with, ``None`` for the terms still to be placed.
     """
     design = profile.design
-    shapes = list(known) if known is not None else design.fixed_shapes()
+    shapes: list[Shape | None] = (
+        list(known)
+        if known is not None
+        else [None if term.n_shapes else shape_of(term.process) for term in design.terms]
+    )
     missing = [i for i in design.shaped if shapes[i] is None]
     point = _present(profile, shapes)
     for i in missing:

@@ -150,11 +150,7 @@ class Discrepancy:
         return covariance + np.diag((self.value * target) ** 2)
 
     def update(
-        self,
-        residual: FloatArray,
-        covariance: FloatArray,
-        target: FloatArray,
-        basis: FloatArray,
+        self, residual: FloatArray, covariance: FloatArray, target: FloatArray, basis: FloatArray
     ) -> bool:
         """Estimate anew from residuals (J,) and their covariance; returns whether it changed.
 
@@ -245,7 +241,13 @@ def dictionary(
     Returns: design; atoms, term of the design and its shape; matrix (J, A), wavelet variance of
         each at unit amplitude.
     """
-    return _dictionary(scales, _kinds(extra))
+    design = Design(Model(_kinds(extra)), scales)
+    atoms, columns = [], []
+    for i in design.linear:
+        shapes, curves = design.dense_grid(i)
+        atoms += [(i, shape) for shape in shapes]
+        columns.append(curves)
+    return design, atoms, np.concatenate(columns, axis=1)
 
 
 def _kinds(extra: tuple[Process, ...]) -> tuple[Process, ...]:
@@ -258,20 +260,8 @@ def _kinds(extra: tuple[Process, ...]) -> tuple[Process, ...]:
     return (*TEXTBOOK, *more, *(line.with_values(amplitude=None) for line in lines))
 
 
-def _dictionary(
-    scales: Scales, kinds: tuple[Process, ...]
-) -> tuple[Design, list[tuple[int, Shape]], FloatArray]:
-    design = Design(Model(kinds), scales)
-    atoms, columns = [], []
-    for i in design.linear:
-        shapes, curves = design.dense_grid(i)
-        atoms += [(i, shape) for shape in shapes]
-        columns.append(curves)
-    return design, atoms, np.concatenate(columns, axis=1)
-
-
 def _mixture(wv: WaveletVariance, target: FloatArray, kinds: tuple[Process, ...]) -> Reference:
-    design, atoms, matrix = _dictionary(Scales.of(wv), kinds)
+    design, atoms, matrix = dictionary(Scales.of(wv), kinds)
     covariance, discrepancy = wv.covariance, 0.0
     for _ in range(tuning.REWEIGHTINGS):
         discrepancy = _needed(matrix, target, covariance)

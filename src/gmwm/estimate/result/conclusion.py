@@ -243,27 +243,22 @@ def _bandwidth_notices(model: Model, wv: WaveletVariance) -> list[Notice]:
     for i in filtered:
         term = model.terms[i]
         key = next(p.key for p in model.parameters if p.term == i and p.parameter.role == "shape")
-        bandwidth = _half_power(term, wv.dt)
+        f = np.geomspace(1e-5, 0.5, 2000) / wv.dt
+        density = term.psd(f, wv.dt)
+        below = np.flatnonzero(density < 0.5 * density[0])
+        bandwidth = float(f[-1])  # at which half of the power is left, or half the rate
+        if below.size:
+            part = slice(below[0] - 1, below[0] + 1)
+            bandwidth = float(np.interp(-0.5 * density[0], -density[part], f[part]))
         low = term.psd(np.array([tuning.FOOT * bandwidth]), wv.dt)[0]
         if not low > 0.0:
             continue  # a term of zero amplitude is no filter of the sensor's
         unit, factor = customary_unit("u/sqrt(Hz)", wv.quantity, wv.unit)
-        density = float(np.sqrt(low))
-        values = {"bandwidth": bandwidth, "density": density}
-        words: dict[str, Any] = {"term": term.title(), "size": density * factor, "unit": unit}
+        level = float(np.sqrt(low))
+        values = {"bandwidth": bandwidth, "density": level}
+        words: dict[str, Any] = {"term": term.title(), "size": level * factor, "unit": unit}
         notices.append(notice("sensor-bandwidth", key, values, **words))
     return notices
-
-
-def _half_power(term: Process, dt: float) -> float:
-    """Lowest frequency (Hz) at which half of the power of a low-pass is left, or half the rate."""
-    f = np.geomspace(1e-5, 0.5, 2000) / dt
-    density = term.psd(f, dt)
-    below = np.flatnonzero(density < 0.5 * density[0])
-    if below.size == 0:
-        return float(f[-1])
-    part = slice(below[0] - 1, below[0] + 1)
-    return float(np.interp(-0.5 * density[0], -density[part], f[part]))
 
 
 def missed_level_notices(goodness: Goodness) -> list[Notice]:

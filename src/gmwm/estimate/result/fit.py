@@ -12,14 +12,7 @@ from annotated_types import Ge, Gt, Le, MaxLen
 
 from gmwm._core import checks
 from gmwm._core.distributions import chi2, norm
-from gmwm._core.documents import (
-    Array,
-    Document,
-    OrInfinity,
-    OrNaN,
-    Text,
-    check_covariance,
-)
+from gmwm._core.documents import Array, Document, OrInfinity, OrNaN, Text, check_covariance
 from gmwm._core.frozen import freeze, frozen
 from gmwm._core.tables import frame
 from gmwm._core.text import Printed, bullets, per_cent, wrapped

@@ -108,12 +108,7 @@ def _at_zero(
 
 
 def wavelet_covariance(
-    psd: PSD,
-    n: int,
-    dt: float,
-    name: str,
-    levels: int,
-    lines: Sequence[tuple[float, float]] = (),
+    psd: PSD, n: int, dt: float, name: str, levels: int, lines: Sequence[tuple[float, float]] = ()
 ) -> FloatArray:
     """Covariance of the wavelet variance estimates of a Gaussian series.
 

@@ -324,11 +324,7 @@ def haar_covariance(psd: PSD, n: int, dt: float) -> FloatArray:
 
 
 def line_covariance(
-    lines: tuple[tuple[float, float], ...],
-    psd: PSD,
-    dt: float,
-    m: FloatArray,
-    counts: FloatArray,
+    lines: tuple[tuple[float, float], ...], psd: PSD, dt: float, m: FloatArray, counts: FloatArray
 ) -> FloatArray:
     """Contribution of spectral lines to the covariance: their product with the noise around them.
 

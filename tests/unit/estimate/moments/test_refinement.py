@@ -84,7 +84,7 @@ def test_the_compiled_search_ends_where_minpack_does(model, wv):
     best = search(profile)
     rng = np.random.default_rng(4)
     for _ in range(4):
-        z = design.pack(best.shapes) + 0.3 * rng.standard_normal(len(design.owners()))
+        z = design.pack(best.shapes) + 0.3 * rng.standard_normal(len(design.owners))
         start = profile.at(design.unpack(z, best.shapes))
         compiled = profile._compiled(z, start, profile.design.bounds)
         stepwise = profile._stepwise(z, start, profile.design.bounds)
