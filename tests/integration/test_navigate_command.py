@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 import yaml
 from click.testing import CliRunner
+from gmwm.variance.analysis import wavelet_variance
 
 from gmwm import WhiteNoise
 from gmwm.calibration.calibration import Calibration
@@ -17,7 +18,6 @@ from gmwm.cli.main import cli
 from gmwm.estimate.entrance import fit
 from gmwm.ins.imu.sensors import AXES
 from gmwm.readers.recording import Channel
-from gmwm.variance.analysis import wavelet_variance
 
 MODELS = {"gyro": {"N": "140 deg/h/sqrt(Hz)"}, "accel": {"N": "140 ug/sqrt(Hz)"}}
 STUDY = {

@@ -2,6 +2,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from gmwm.variance.analysis import wavelet_variance
 
 from gmwm import GaussMarkov, RandomWalk, WhiteNoise
 from gmwm.calibration.calibration import Calibration
@@ -13,7 +14,6 @@ from gmwm.readers.recording import Recording
 from gmwm.study import navigation
 from gmwm.study.navigation import Calibrated, aligned, experiment, reproduce_figure
 from gmwm.study.sensor_tables import TABLE_5, TABLE_6
-from gmwm.variance.analysis import wavelet_variance
 
 RATE, N = 20.0, 60_000
 UNITS = {"gyro": "rad/s", "accel": "m/s^2"}

@@ -12,8 +12,7 @@ import gmwm
 from gmwm import InputError
 from gmwm.readers.formats import hdf5 as trial
 from gmwm.readers.formats.arrays import ArrayTable, array_of
-from gmwm.readers.formats.hdf5 import read_mat
-from gmwm.readers.formats.hdf5 import tried
+from gmwm.readers.formats.hdf5 import read_mat, tried
 
 X = np.random.default_rng(1).normal(size=100)
 OF_MATLAB = Path(scipy.io.__file__).parent / "matlab" / "tests" / "data"
