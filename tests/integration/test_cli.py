@@ -20,13 +20,13 @@ from click.testing import CliRunner
 
 import gmwm
 from gmwm import GaussMarkov, RandomWalk, WhiteNoise, cli
-from gmwm._core.notices import Notice
 from gmwm._core.units import SI_UNIT
 from gmwm.calibration.calibration import Calibration
 from gmwm.cli.calibrate import show
 from gmwm.cli.console import progress_bar
 from gmwm.cli.demo import show_truth
 from gmwm.estimate import Fit
+from gmwm.issues import Notice
 from gmwm.process import as_model
 from gmwm.variance.wavelet import WaveletVariance
 from places import GOLDEN

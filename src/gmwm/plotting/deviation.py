@@ -50,23 +50,10 @@ def deviation(
     value, lower, upper: (J,), deviations and the ends of their intervals, in ``unit``.
     interval: Level of the intervals, for the legend.
     """
-    import matplotlib.pyplot as plt
-
-    if ax is None:
-        _, ax = plt.subplots(figsize=(7.0, 4.6), layout="constrained")
+    ax = ax or _new_axes(4.6)
     bars = np.stack([np.maximum(value - lower, 0.0), np.maximum(upper - value, 0.0)])
-    ax.errorbar(
-        tau,
-        value,
-        yerr=bars,
-        fmt="o",
-        color=DATA_COLOUR,
-        markersize=4.5,
-        capsize=2.5,
-        elinewidth=1.0,
-        label=f"data, {interval} interval",
-        zorder=4,
-    )
+    style = {"color": DATA_COLOUR, "markersize": 4.5, "capsize": 2.5, "elinewidth": 1.0}
+    ax.errorbar(tau, value, bars, fmt="o", label=f"data, {interval} interval", zorder=4, **style)
     _label(ax, f"Allan deviation [{unit}]", title)
     return ax
 
@@ -95,10 +82,7 @@ def deviations(
     ax : matplotlib.axes.Axes, optional
         That of `deviation` will do.
     """
-    import matplotlib.pyplot as plt
-
-    if ax is None:
-        _, ax = plt.subplots(figsize=(7.0, 4.6), layout="constrained")
+    ax = ax or _new_axes(4.6)
     shown = [np.asarray(line.get_ydata(), dtype=float) for line in ax.get_lines()]
     places = range(len(kinds)) if places is None else places
     palette = _cycle(max(places) + 1)
@@ -108,18 +92,9 @@ def deviations(
         # Kinds may coincide: open markers and lines, the later the smaller, leave all in view, and
         # bars stand side by side.
         behind = len(kinds) - 1 - i
-        ax.plot(
-            tau,
-            value,
-            color=colour,
-            linewidth=1.2 + 0.6 * behind,
-            marker=marker,
-            markersize=4.0 + 1.8 * behind,
-            markerfacecolor="none",
-            markeredgewidth=1.2,
-            label=label,
-            zorder=3 + 0.1 * i,
-        )
+        (line,) = ax.plot(tau, value, color=colour, label=label, zorder=3 + 0.1 * i)
+        line.set(linewidth=1.2 + 0.6 * behind, marker=marker, markersize=4.0 + 1.8 * behind)
+        line.set(markerfacecolor="none", markeredgewidth=1.2)
         beside = tau * _BESIDE ** (i - 0.5 * (len(kinds) - 1))
         ax.vlines(beside, lower, upper, color=colour, linewidth=1.0, zorder=2)
         shown.append(value)
@@ -129,6 +104,12 @@ def deviations(
     _label(ax, f"deviation [{unit}]", title)
     ax.legend(fontsize="small", framealpha=0.9, title=f"bars: {interval} intervals")
     return ax
+
+
+def _new_axes(height: float) -> Axes:
+    import matplotlib.pyplot as plt
+
+    return plt.subplots(figsize=(7.0, height), layout="constrained")[1]
 
 
 def _label(ax: Axes, value: str, title: str) -> None:
@@ -177,19 +158,10 @@ def straight_lines(ax: Axes, lines: Mapping[str, tuple[float, float, float, floa
     for colour, (label, line) in zip(_cycle(len(lines)), lines.items(), strict=True):
         slope, coefficient, first, last = line
         region = np.array([first, last])
-        ax.plot(
-            ends, coefficient * ends**slope, color=colour, linewidth=1.0, linestyle="--", zorder=2
-        )
-        ax.plot(
-            region,
-            coefficient * region**slope,
-            color=colour,
-            linewidth=4.5,
-            alpha=0.8,
-            solid_capstyle="round",
-            label=label,
-            zorder=3.5,
-        )
+        whole, thick = coefficient * ends**slope, coefficient * region**slope
+        ax.plot(ends, whole, "--", color=colour, linewidth=1.0, zorder=2)
+        (bar,) = ax.plot(region, thick, color=colour, linewidth=4.5, label=label, zorder=3.5)
+        bar.set(alpha=0.8, solid_capstyle="round")
     ax.set_xlim(*ends)
     ax.set_ylim(*limits)
     ax.legend(fontsize="small", framealpha=0.9)
@@ -209,26 +181,18 @@ def residuals(
     residual: (J,), in standard errors; NaN where there is none.
     misfit: (J,), relative difference of the deviations, written in per cent at each stem.
     """
-    import matplotlib.pyplot as plt
-
-    if ax is None:
-        _, ax = plt.subplots(figsize=(7.0, 3.2), layout="constrained")
+    ax = ax or _new_axes(3.2)
     shown = np.isfinite(residual)
     ax.axhspan(-2.0, 2.0, color="#e8eef4", zorder=0)
     ax.axhline(0.0, color=SUM_COLOUR, linewidth=0.8, zorder=1)
     ax.vlines(tau[shown], 0.0, residual[shown], color=COMPONENT_COLOURS[0], linewidth=1.6)
     ax.plot(tau[shown], residual[shown], "o", color=COMPONENT_COLOURS[0], markersize=4.5)
     for time, height, share in zip(tau[shown], residual[shown], misfit[shown], strict=True):
-        ax.annotate(
-            f"{100.0 * share:+.2g}",
-            (time, height),
-            xytext=(0.0, 5.0 if height >= 0.0 else -5.0),
-            textcoords="offset points",
-            ha="center",
-            va="bottom" if height >= 0.0 else "top",
-            fontsize="x-small",
-            color=DATA_COLOUR,
+        away, side = (5.0, "bottom") if height >= 0.0 else (-5.0, "top")
+        text = ax.annotate(
+            f"{100.0 * share:+.2g}", (time, height), (0.0, away), textcoords="offset points"
         )
+        text.set(ha="center", va=side, fontsize="x-small", color=DATA_COLOUR)
     largest = max(float(np.max(np.abs(residual[shown]), initial=0.0)), 2.5)
     if largest > LINEAR_RESIDUAL:
         # Beside a residual of 50 at the finest level those at long times would be flat.
@@ -239,9 +203,8 @@ def residuals(
     ax.set_xscale("log")
     ax.set_xlabel("averaging time [s]")
     ax.set_ylabel("residual [standard errors]")
-    ax.set_title(
-        f"{title}: misfit of the deviation in %" if title else "misfit in %", fontsize="medium"
-    )
+    heading = f"{title}: misfit of the deviation in %" if title else "misfit in %"
+    ax.set_title(heading, fontsize="medium")
     return ax
 
 
@@ -289,13 +252,9 @@ def boxes(
 
 def _panel(ax: Axes, samples: Mapping[str, FloatArray], truth: float) -> None:
     labels, values = list(samples), list(samples.values())
-    ax.boxplot(
-        values,
-        tick_labels=labels,
-        widths=0.6,
-        flierprops={"marker": ".", "markersize": 3, "markeredgecolor": DATA_COLOUR},
-        medianprops={"color": COMPONENT_COLOURS[0], "linewidth": 1.6},
-    )
+    far = {"marker": ".", "markersize": 3, "markeredgecolor": DATA_COLOUR}
+    middle = {"color": COMPONENT_COLOURS[0], "linewidth": 1.6}
+    ax.boxplot(values, tick_labels=labels, widths=0.6, flierprops=far, medianprops=middle)
     ax.axhline(truth, color=COMPONENT_COLOURS[1], linewidth=1.2, linestyle="--", zorder=0)
     spans = [np.quantile(v, [0.001, 0.25, 0.75, 0.999]) for v in values if v.size]
     usual = float(np.median([span[2] - span[1] for span in spans]))
@@ -309,15 +268,10 @@ def _panel(ax: Axes, samples: Mapping[str, FloatArray], truth: float) -> None:
         for count, y, align in ((outside[0], 1.0, "top"), (outside[1], 0.0, "bottom")):
             if count:
                 arrow = "\u2191" if align == "top" else "\u2193"
-                ax.annotate(
-                    f"{count}{arrow}",
-                    (place, y),
-                    xycoords=("data", "axes fraction"),
-                    ha="center",
-                    va=align,
-                    fontsize="small",
-                    color=COMPONENT_COLOURS[1],
+                text = ax.annotate(
+                    f"{count}{arrow}", (place, y), xycoords=("data", "axes fraction")
                 )
+                text.set(ha="center", va=align, fontsize="small", color=COMPONENT_COLOURS[1])
     ax.ticklabel_format(axis="y", style="sci", scilimits=(-2, 3), useMathText=True)
     ax.grid(True, axis="y", color="#dddddd", linewidth=0.6)
     ax.set_axisbelow(True)

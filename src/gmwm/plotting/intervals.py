@@ -27,14 +27,8 @@ def intervals(
     from matplotlib.ticker import FormatStrFormatter, LogLocator, NullFormatter
 
     names = max((list(rows) for rows in panels.values()), key=len)
-    figure, axes = plt.subplots(
-        1,
-        len(panels),
-        figsize=(4.4 * len(panels), 1.2 + 0.38 * len(names)),
-        layout="constrained",
-        squeeze=False,
-        sharey=True,
-    )
+    size, grid = (4.4 * len(panels), 1.2 + 0.38 * len(names)), {"squeeze": False, "sharey": True}
+    figure, axes = plt.subplots(1, len(panels), figsize=size, layout="constrained", **grid)
     axes[0, 0].set_yticks(range(len(names)), names)
     axes[0, 0].set_ylim(len(names) - 0.5, -0.5)
     for ax, (title, rows) in zip(axes[0], panels.items(), strict=True):

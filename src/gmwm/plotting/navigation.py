@@ -6,7 +6,7 @@ Every function draws a figure of its own and returns it; none knows what it draw
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
@@ -25,6 +25,7 @@ _DASHES: tuple[str | tuple[int, tuple[float, ...]], ...] = (
 )
 _PANEL = (3.4, 2.1)  # inches, of one panel among several
 _BESIDE = 3  # panels in a row
+_COMPONENTS = ("north", "east", "down")
 _BAND = "#9ecae1"
 _TRUE = "true track"
 _WIDEST_TITLE = 30  # characters over a panel
@@ -43,31 +44,21 @@ def track(
     outages: The parts of the track without GNSS.
     solutions: Name -> estimated positions during each outage.
     """
-    import matplotlib.pyplot as plt
-
     columns = 1 + min(len(outages), 2)
-    figure, axes = plt.subplots(
-        1, columns, figsize=(4.2 * columns, 4.2), layout="constrained", squeeze=False
-    )
+    figure, axes = _panels(1, columns, (4.2 * columns, 4.2))
     whole = axes[0, 0]
-    whole.plot(truth[:, 0], truth[:, 1], color=DATA_COLOUR, linewidth=0.9, label=_TRUE)
+    whole.plot(*truth.T, color=DATA_COLOUR, linewidth=0.9, label=_TRUE)
     for i, part in enumerate(outages):
         label = "without GNSS" if i == 0 else None
-        whole.plot(part[:, 0], part[:, 1], color=COMPONENT_COLOURS[1], linewidth=2.5, label=label)
+        whole.plot(*part.T, color=COMPONENT_COLOURS[1], linewidth=2.5, label=label)
     whole.set_title("whole track", fontsize="medium")
     for i, ax in enumerate(axes[0, 1:]):
         part = outages[i]
-        ax.plot(part[:, 0], part[:, 1], color=_BAND, linewidth=5.0, label=_TRUE)
+        ax.plot(*part.T, color=_BAND, linewidth=5.0, label=_TRUE)
         for colour, dash, (name, paths) in _styles(solutions):
             path = paths[i]
-            ax.plot(
-                path[:, 0],
-                path[:, 1],
-                color=colour,
-                linestyle=dash,
-                linewidth=1.4,
-                label=literal(name, _IN_LEGEND),
-            )
+            label = literal(name, _IN_LEGEND)
+            ax.plot(*path.T, color=colour, linestyle=dash, linewidth=1.4, label=label)
             ax.plot(*path[-1:].T, marker="o", color=colour, markersize=4)
         ax.set_title(f"outage {i + 1}" if len(outages) > 1 else "outage", fontsize="medium")
     for ax in axes[0]:
@@ -89,25 +80,21 @@ def errors(
     spans: Outages, s.
     labels: Of the d components.
     """
-    import matplotlib.pyplot as plt
-
     d = len(labels)
     blocks = -(-len(panels) // _BESIDE)
     columns = -(-len(panels) // blocks)
-    figure, axes = plt.subplots(
-        blocks * d,
-        columns,
-        figsize=(_PANEL[0] * columns + 0.6, _PANEL[1] * blocks * d),
-        sharex=True,
-        layout="constrained",
-        squeeze=False,
-    )
+    size = _PANEL[0] * columns + 0.6, _PANEL[1] * blocks * d
+    figure, axes = _panels(blocks * d, columns, size, sharex=True)
     top = _largest(panels)
     for place, (name, (time, error, sd)) in enumerate(panels.items()):
         first, column = d * (place // columns), place % columns
         for row, label in enumerate(labels):
             ax = axes[first + row, column]
-            _draw_error(ax, time, error[:, row], sd[:, row], spans)
+            _draw_bands(ax, time, sd[:, row], "predicted")
+            ax.plot(time, error[:, row], color=COMPONENT_COLOURS[1], linewidth=1.4, label="error")
+            for end in (end for span in spans for end in span):
+                ax.axvline(end, color=DATA_COLOUR, linewidth=0.8, linestyle=":")
+            _plain(ax)
             if np.isfinite(top[row]) and top[row] > 0.0:
                 ax.set_ylim(-top[row], top[row])
             if column == 0:
@@ -121,35 +108,12 @@ def errors(
     return figure
 
 
-def _draw_error(
-    ax: Axes,
-    time: FloatArray,
-    error: FloatArray,
-    sd: FloatArray,
-    spans: Sequence[tuple[float, float]],
-) -> None:
-    """One component: its error in the bands of 3 and 1 sigma."""
-    _draw_bands(ax, time, sd, "predicted")
-    ax.plot(time, error, color=COMPONENT_COLOURS[1], linewidth=1.4, label="error")
-    for end in (end for span in spans for end in span):
-        ax.axvline(end, color=DATA_COLOUR, linewidth=0.8, linestyle=":")
-    _plain(ax)
-
-
 def _draw_bands(
     ax: Axes, time: FloatArray, sd: FloatArray, what: str, rasterized: bool = False
 ) -> None:
     for factor, alpha in ((3.0, 0.45), (1.0, 0.9)):
-        ax.fill_between(
-            time,
-            -factor * sd,
-            factor * sd,
-            color=_BAND,
-            alpha=alpha,
-            linewidth=0,
-            label=f"{factor:g} sigma {what}",
-            rasterized=rasterized,
-        )
+        band = ax.fill_between(time, -factor * sd, factor * sd, color=_BAND, linewidth=0)
+        band.set(alpha=alpha, label=f"{factor:g} sigma {what}", rasterized=rasterized)
 
 
 def growth(
@@ -162,43 +126,35 @@ def growth(
         errors and of the predicted ones, (K, d).
     labels: Of the d components.
     """
-    import matplotlib.pyplot as plt
-
     rows, columns = len(labels), len(panels)
-    figure, axes = plt.subplots(
-        rows,
-        columns,
-        figsize=(max(4.6 * columns, 5.6), 2.9 * rows),
-        layout="constrained",
-        squeeze=False,
-        sharex="col",
-    )
+    size = max(4.6 * columns, 5.6), 2.9 * rows
+    figure, axes = _panels(rows, columns, size, sharex="col")
     for column, (title, filters) in enumerate(panels.items()):
-        for row, label in enumerate(labels):
+        for row, quantity in enumerate(labels):
             ax = axes[row, column]
             for behind, (colour, _, (name, (time, rms, predicted))) in zip(
                 reversed(range(len(filters))), _styles(filters), strict=True
             ):
                 # Wider the farther behind: filters that err alike are all seen.
-                ax.plot(
-                    time,
-                    rms[:, row],
-                    color=colour,
-                    linewidth=1.4 + 0.9 * behind,
-                    label=literal(name, _IN_LEGEND),
-                )
+                width, label = 1.4 + 0.9 * behind, literal(name, _IN_LEGEND)
+                ax.plot(time, rms[:, row], color=colour, linewidth=width, label=label)
                 ax.plot(time, predicted[:, row], color=colour, linewidth=1.2, linestyle=":")
             _plain(ax)
             _from_zero(ax, [each[1][:, row] for each in filters.values()])
             if column == 0:
-                ax.set_ylabel(label)
-            if row == 0:
-                ax.set_title(title, fontsize="medium")
-            if row == rows - 1:
-                ax.set_xlabel("time since the outage began [s]")
+                ax.set_ylabel(quantity)
+        axes[0, column].set_title(title, fontsize="medium")
+        axes[-1, column].set_xlabel("time since the outage began [s]")
     axes[0, 0].plot([], [], color=DATA_COLOUR, linestyle=":", label="predicted")
     _legend_above(figure, axes[0, 0])
     return figure
+
+
+def _panels(rows: int, columns: int, size: tuple[float, float], **options: Any) -> Any:
+    """A figure of a size in inches and its axes, (rows, columns)."""
+    import matplotlib.pyplot as plt
+
+    return plt.subplots(rows, columns, figsize=size, layout="constrained", squeeze=False, **options)
 
 
 def literal(text: str, longest: int = 200) -> str:
@@ -243,14 +199,9 @@ def _map(ax: Axes) -> None:
 
 def _legend_above(figure: Figure, ax: Axes, title: str | None = None) -> None:
     """Of one panel, where it hides none."""
-    figure.legend(
-        *ax.get_legend_handles_labels(),
-        fontsize="x-small",
-        ncols=4,
-        title=title,
-        title_fontsize="x-small",
-        loc="outside upper center",
-    )
+    handles, labels = ax.get_legend_handles_labels()
+    style = {"fontsize": "x-small", "title_fontsize": "x-small", "loc": "outside upper center"}
+    figure.legend(handles, labels, ncols=4, title=title, **style)
 
 
 def _plain(ax: Axes) -> None:
@@ -266,9 +217,8 @@ def measured_track(track: FloatArray, fixes: FloatArray, without: FloatArray) ->
     fixes: (k, 2).
     without: (j, 2), part of the track.
     """
-    import matplotlib.pyplot as plt
-
-    figure, ax = plt.subplots(figsize=(6.4, 5.2), layout="constrained")
+    figure, axes = _panels(1, 1, (6.4, 5.2))
+    ax = axes[0, 0]
     _draw_solution(ax, track, fixes, without, "longest time without fixes", 3)
     _legend_above(figure, ax)
     return figure
@@ -277,24 +227,11 @@ def measured_track(track: FloatArray, fixes: FloatArray, without: FloatArray) ->
 def _draw_solution(
     ax: Axes, track: FloatArray, fixes: FloatArray, without: FloatArray, label: str, size: int
 ) -> None:
-    ax.plot(
-        fixes[:, 0],
-        fixes[:, 1],
-        ".",
-        color=DATA_COLOUR,
-        markersize=size,
-        label="fixes",
-        rasterized=len(fixes) > _DENSE,
-    )
-    ax.plot(without[:, 0], without[:, 1], color=COMPONENT_COLOURS[1], linewidth=3.5, label=label)
-    ax.plot(
-        track[:, 0],
-        track[:, 1],
-        color=COMPONENT_COLOURS[0],
-        linewidth=1.1,
-        label="solution",
-        rasterized=len(track) > _DENSE,
-    )
+    (points,) = ax.plot(*fixes.T, ".", color=DATA_COLOUR, markersize=size, label="fixes")
+    ax.plot(*without.T, color=COMPONENT_COLOURS[1], linewidth=3.5, label=label)
+    (line,) = ax.plot(*track.T, color=COMPONENT_COLOURS[0], linewidth=1.1, label="solution")
+    points.set_rasterized(len(fixes) > _DENSE)
+    line.set_rasterized(len(track) > _DENSE)
     _map(ax)
 
 
@@ -317,25 +254,14 @@ def measured_outage(
     fix_time: (e,), s.
     error: (e, 3), fixes less where they were expected, m.
     """
-    import matplotlib.pyplot as plt
-
-    figure, axes = plt.subplots(2, 2, figsize=(7.4, 5.6), layout="constrained")
+    figure, axes = _panels(2, 2, (7.4, 5.6))
     _draw_solution(axes[0, 0], track, fixes, without, "without fixes", 4)
     axes[0, 0].legend(fontsize="x-small")
-    for i, (ax, name) in enumerate(
-        zip((axes[0, 1], axes[1, 0], axes[1, 1]), ("north", "east", "down"), strict=True)
-    ):
-        ax.fill_between(
-            time, -sd[:, i], sd[:, i], color=_BAND, linewidth=0, label="1 sigma predicted"
-        )
-        ax.plot(
-            fix_time,
-            error[:, i],
-            ".",
-            color=COMPONENT_COLOURS[1],
-            markersize=5,
-            label="fix less expected",
-        )
+    band = {"color": _BAND, "linewidth": 0, "label": "1 sigma predicted"}
+    dots = {"color": COMPONENT_COLOURS[1], "markersize": 5, "label": "fix less expected"}
+    for i, (ax, name) in enumerate(zip(axes.flat[1:], _COMPONENTS, strict=True)):
+        ax.fill_between(time, -sd[:, i], sd[:, i], **band)
+        ax.plot(fix_time, error[:, i], ".", **dots)
         ax.set_title(f"{name} [m]", fontsize="medium")
         ax.set_xlabel("s since the last fix")
         _plain(ax)
@@ -349,29 +275,14 @@ def innovations(panels: Mapping[str, tuple[FloatArray, FloatArray, FloatArray]])
     panels: Kind with its unit -> times (K,), s; innovations and expected standard deviations (K,
         3).
     """
-    import matplotlib.pyplot as plt
-
-    figure, axes = plt.subplots(
-        3,
-        len(panels),
-        figsize=(1.4 * _PANEL[0] * len(panels) + 0.6, 3.0 * _PANEL[1]),
-        sharex=True,
-        layout="constrained",
-        squeeze=False,
-    )
+    size = 1.4 * _PANEL[0] * len(panels) + 0.6, 3.0 * _PANEL[1]
+    figure, axes = _panels(3, len(panels), size, sharex=True)
+    dots = {"color": COMPONENT_COLOURS[1], "markersize": 3, "label": "innovation"}
     for column, (title, (time, value, sd)) in enumerate(panels.items()):
-        for row, label in enumerate(("north", "east", "down")):
+        for row, label in enumerate(_COMPONENTS):
             ax = axes[row, column]
             _draw_bands(ax, time, sd[:, row], "expected", rasterized=time.size > _DENSE)
-            ax.plot(
-                time,
-                value[:, row],
-                ".",
-                color=COMPONENT_COLOURS[1],
-                markersize=3,
-                rasterized=time.size > _DENSE,
-                label="innovation",
-            )
+            ax.plot(time, value[:, row], ".", rasterized=time.size > _DENSE, **dots)
             _plain(ax)
             if column == 0:
                 ax.set_ylabel(label)
@@ -392,22 +303,15 @@ def outages_compared(
     panels: Quantity with its unit -> name -> errors, and their root mean square as predicted.
     ratios: What is compared with what -> ratio of the errors, lower and upper end of its interval.
     """
-    import matplotlib.pyplot as plt
-
-    count = len(panels)
-    figure, axes = plt.subplots(
-        count + 1,
-        1,
-        figsize=(7.4, 2.1 * count + 0.9 + 0.25 * len(ratios)),
-        height_ratios=[2.0] * count + [0.4 + 0.25 * len(ratios)],
-        layout="constrained",
-    )
+    count, last = len(panels), 0.4 + 0.25 * len(ratios)
+    size = 7.4, 2.1 * count + 0.5 + last
+    figure, grid = _panels(count + 1, 1, size, height_ratios=[2.0] * count + [last])
+    axes = grid[:, 0]
     for ax, (title, solutions) in zip(axes, panels.items(), strict=False):
         for i, (name, (error, predicted)) in enumerate(solutions.items()):
             colour = COMPONENT_COLOURS[i % len(COMPONENT_COLOURS)]
-            ax.plot(
-                time / 60.0, error, "osD^"[i % 4], color=colour, markersize=3.5, label=literal(name)
-            )
+            marker = "osD^"[i % 4]
+            ax.plot(time / 60.0, error, marker, color=colour, markersize=3.5, label=literal(name))
             ax.axhline(predicted, color=colour, linestyle=_DASHES[i % len(_DASHES)], linewidth=1.1)
         ax.set_ylim(bottom=0.0)
         ax.set_ylabel(title)

@@ -20,10 +20,10 @@ from gmwm.calibration import Calibration
 from gmwm.errors import MissingNameError
 from gmwm.estimate import Estimate, Fit, JointFit
 from gmwm.estimate.result import plain
+from gmwm.filter_numbers import FilterNumbers
 from gmwm.issues import Notice, worst_first
 from gmwm.population import tuning
 from gmwm.population.curves import Difference, Equality
-from gmwm.population.numbers import AxisNumbers, ParameterSpread
 
 if TYPE_CHECKING:
     import pandas
@@ -47,10 +47,66 @@ def _percent(share: float) -> str:
     return per_cent(share) if share < 0.995 else f"a factor of {brief(1.0 + share)}"
 
 
-def _content(estimate: Estimate) -> dict[str, Any]:
-    """An estimate in JSON types; ``None`` for an interval without an end."""
-    content = estimate.to_dict()
-    return {key: plain(v) if isinstance(v, float) else v for key, v in content.items()}
+def _without_nan(value: Any) -> Any:
+    """JSON types without NaN and infinity, which JSON lacks: ``None`` in their place."""
+    if isinstance(value, Mapping):
+        return {key: _without_nan(each) for key, each in value.items()}
+    if isinstance(value, list | tuple):
+        return [_without_nan(each) for each in value]
+    return plain(value) if isinstance(value, float) else value
+
+
+@dataclass(frozen=True)
+class ParameterSpread:
+    """One parameter of the joint model in all recordings.
+
+    joint: Estimate from all recordings together.
+    each: Estimate of the same structure from each compared recording; ``None`` where it has none.
+    spread: Relative standard deviation between recordings beyond their standard errors; NaN where
+        fewer than two determine it, or one has all the weight.
+    p_value: Of the test that it is the same in all of them; NaN likewise.
+    """
+
+    joint: Estimate
+    each: tuple[Estimate | None, ...]
+    spread: float
+    p_value: float
+
+    @property
+    def key(self) -> str:
+        """Name of the parameter."""
+        return self.joint.key
+
+
+@dataclass(frozen=True)
+class AxisNumbers:
+    """N and K of an axis for a filter, for outages up to the horizon.
+
+    each: Recording -> the bound of its own model.
+    joint: The bound of the joint model.
+    covering: One pair of numbers that bounds the models of all recordings.
+    nees: Recording -> normalised error squared that a filter with the covering numbers predicts
+        after the outage; 1 is right, below 1 conservative.
+    upper: Letters that no recording determines -> the largest of their 95 % upper limits.
+    """
+
+    each: Mapping[str, FilterNumbers]
+    joint: FilterNumbers | None
+    covering: FilterNumbers | None
+    nees: Mapping[str, float]
+    upper: Mapping[str, float]
+
+    def value(self, letter: str) -> float:
+        """The covering N or K, or the upper limit where no recording determines it; else NaN."""
+        found = getattr(self.covering, letter) if self.covering is not None else float("nan")
+        return self.upper.get(letter, float("nan")) if found == 0.0 else float(found)
+
+    def inflation(self, letter: str) -> float:
+        """The covering number over that of the joint model; NaN where one is missing."""
+        if self.joint is None or self.covering is None:
+            return float("nan")
+        own = getattr(self.joint, letter)
+        return float(getattr(self.covering, letter) / own) if own > 0.0 else float("nan")
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,33 +202,26 @@ class AxisComparison:
     def to_dict(self) -> dict[str, Any]:
         """In JSON types, SI."""
         equality = self.equality
-        return {
+        content = {
             "state": self.state,
-            "p_value": plain(self.p_value),
+            "p_value": self.p_value,
             "recordings": list(self.fits),
             "left_out": {label: notice.to_dict() for label, notice in self.left_out.items()},
             "differences": [
-                {
-                    "part": d.part,
-                    "shortest_s": d.shortest,
-                    "longest_s": d.longest,
-                    "extent": d.extent,
-                    "sigma": d.sigma,
-                    "resolution": d.resolution,
-                    "ratios": [plain(r) for r in d.ratios.tolist()],
-                    "errors": [plain(r) for r in d.errors.tolist()],
-                }
+                {"part": d.part, "shortest_s": d.shortest, "longest_s": d.longest}
+                | {name: getattr(d, name) for name in ("extent", "sigma", "resolution")}
+                | {name: getattr(d, name).tolist() for name in ("ratios", "errors")}
                 for d in (equality.differences if equality else ())
             ],
             "joint": None if self.joint is None else self.joint.to_dict(),
-            "equality_p": plain(self.joint.equality_p) if self.joint else None,
+            "equality_p": self.joint.equality_p if self.joint else None,
             "parameters": [
                 {
                     "key": each.key,
-                    "joint": _content(each.joint),
-                    "spread": plain(each.spread),
-                    "p_value": plain(each.p_value),
-                    "each": [None if e is None else _content(e) for e in each.each],
+                    "joint": each.joint.to_dict(),
+                    "spread": each.spread,
+                    "p_value": each.p_value,
+                    "each": [None if e is None else e.to_dict() for e in each.each],
                 }
                 for each in self.parameters
             ],
@@ -180,12 +229,13 @@ class AxisComparison:
                 "each": {label: each.row() for label, each in self.numbers.each.items()},
                 "joint": self.numbers.joint.row() if self.numbers.joint else None,
                 "covering": self.numbers.covering.row() if self.numbers.covering else None,
-                "nees": {label: plain(value) for label, value in self.numbers.nees.items()},
+                "nees": dict(self.numbers.nees),
                 "upper_bounds": dict(self.numbers.upper),
-                "inflation": {k: plain(self.numbers.inflation(k)) for k in _UNITS},
+                "inflation": {k: self.numbers.inflation(k) for k in _UNITS},
             },
-            "curve_inflation": plain(self.curve_inflation),
+            "curve_inflation": self.curve_inflation,
         }
+        return dict(_without_nan(content))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -336,11 +386,5 @@ class SensorComparison(Mapping[str, AxisComparison], Printed):
         provenance: Mapping[str, str] | None = None,
     ) -> Path:
         """Write two pages of HTML; see `gmwm.report.write_sensor_comparison_report`."""
-        written: Path = make(
-            "page",
-            self,
-            path,
-            datasheet=datasheet,
-            provenance=provenance,
-        )
+        written: Path = make("page", self, path, datasheet=datasheet, provenance=provenance)
         return written

@@ -11,8 +11,8 @@ import pytest
 
 import gmwm
 from gmwm import Calibration, InputError, RandomWalk, WhiteNoise
-from gmwm._core.notices import Notice
 from gmwm.estimate import estimate
+from gmwm.issues import Notice
 from gmwm.population import labelled, parameter_spreads
 
 ACCEL = WhiteNoise(1e-2) + RandomWalk(5e-3)
@@ -143,6 +143,15 @@ def test_a_comparison_shows_itself(compared, tmp_path):
     assert text.count('<svg viewBox="0 0 380') == 3
     assert 'class="sheet"' in text
     assert not re.search("<script|https?:|url\\(", text)
+
+
+def test_a_number_that_is_not_known_is_null_in_json(compared):
+    axis = compared["gyro_x"]
+    unknown = replace(axis.numbers.covering, predicted=())
+    with_nan = replace(axis, numbers=replace(axis.numbers, covering=unknown))
+    content = json.loads(json.dumps(with_nan.to_dict(), allow_nan=False))
+    assert content["numbers"]["covering"]["nees"] is None
+    assert content["numbers"]["covering"]["N"] == unknown.N
 
 
 def test_the_same_file_twice_is_one_recording(three, compared):

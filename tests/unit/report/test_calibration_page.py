@@ -14,8 +14,8 @@ import yaml
 
 import gmwm
 from gmwm import Channel, InputError, Process, RandomWalk, WhiteNoise, parameter
-from gmwm._core.notices import Notice
 from gmwm.cli.hints import in_options
+from gmwm.issues import Notice
 from gmwm.plotting import COMPONENT_COLOURS
 from gmwm.report import figure as figures, write_report
 from gmwm.report.answer import answer, trust

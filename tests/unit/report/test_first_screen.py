@@ -9,7 +9,7 @@ import pytest
 
 import gmwm
 from gmwm import GaussMarkov, QuantizationNoise, RandomWalk, WhiteNoise
-from gmwm._core.notices import Notice
+from gmwm.issues import Notice
 from gmwm.report.answer import filter_sentence
 from gmwm.report.health import ambiguity, health
 from gmwm.report.length import known_at, length_sentence, parameters_sentence

@@ -13,7 +13,7 @@ import yaml
 import gmwm
 from browser import Browser, needs_chromium
 from gmwm import GaussMarkov, LowPassNoise, RandomWalk, Resonance, Sinusoid, WhiteNoise
-from gmwm._core.notices import Notice
+from gmwm.issues import Notice
 from gmwm.report import write_report
 
 pytestmark = needs_chromium

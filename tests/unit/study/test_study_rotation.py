@@ -14,7 +14,7 @@ from gmwm.estimate.entrance import fit
 from gmwm.ins import car_drive, gnss
 from gmwm.ins.filter.aiding import Outage
 from gmwm.ins.imu.sensors import AXES
-from gmwm.ins.simulation.scenario import Scenario
+from gmwm.ins.simulation.trials import Scenario
 from gmwm.readers.recording import Recording
 from gmwm.study import turns
 from gmwm.study.rotation import Rotation, crossed_weights
