@@ -20,12 +20,9 @@ from .registry import (
     is_text as is_text,
 )
 from .table import label as label, load_columns as load_columns
-from .text import (
-    DATE as DATE,
-    CsvTable as CsvTable,
-    content_size as content_size,
-    seconds_of as seconds_of,
-)
+from .text.cells import DATE as DATE, seconds_of as seconds_of
+from .text.csv_table import CsvTable as CsvTable
+from .text.lines import content_size as content_size
 from .turning import (
     block_means as block_means,
     steady_turn as steady_turn,

@@ -108,7 +108,7 @@ def timing_of(clock: Clock, expected: float | None = None) -> Timing:
         told = None if is_told else hint
         notices.append(notice("rate-unlikely", "", {"rate": rate}, hint=told))
     if kept is not None:
-        jumps = jumps.with_copies(kept, copies)
+        jumps = replace(jumps, rows=kept[jumps.rows], repeated=copies)
     return Timing(rate, jumps, (*notices, *last), found.jitter)
 
 
@@ -260,31 +260,21 @@ def _check_jumps(clock: Clock, found: _Grid, seconds: float) -> None:
             text = f"{place}: the sampling rate goes from {first:.4g} to {then:.4g} Hz"
             raise InputError(text, "rate-changes", "use the part before or after")
     if jumps.are_rounding:
-        text = (
-            f"a step of two intervals, and {jumps.rows.size - 1:,} more such at even distances, "
-            "as if the stamps were rounded too coarsely"
-        )
-        raise clock.error(int(jumps.rows[0]), text)
+        text = f"a step of two intervals, and {jumps.rows.size - 1:,} more such at even distances"
+        raise clock.error(int(jumps.rows[0]), f"{text}, as if the stamps were rounded too coarsely")
     if off_grid > tuning.MOST_OFF_GRID * n and found.uneven is None:
-        text = (
-            f"{off_grid:,} of {n:,} steps are not near a whole number of the usual one of "
-            f"{jumps.interval:.6g}, so that the sampling rate is not known"
-        )
+        usual = f"the usual one of {jumps.interval:.6g}, so that the sampling rate is not known"
+        text = f"{off_grid:,} of {n:,} steps are not near a whole number of {usual}"
         raise clock.error(None, text)
     if jumps.are_bursts:
-        text = (
-            f"every {jumps.rows[1] - jumps.rows[0]} rows the clock steps by {jumps.steps[0]:.3g} "
-            "of the usual steps: rows come in bursts, and stamps say when they were written, not "
-            "when they were sampled"
-        )
-        raise clock.error(None, text)
+        text = f"every {jumps.rows[1] - jumps.rows[0]} rows the clock steps by {jumps.steps[0]:.3g}"
+        why = "rows come in bursts, and stamps say when they were written, not when"
+        raise clock.error(None, f"{text} of the usual steps: {why} they were sampled")
     if jumps.total > n:
         longest = int(np.argmax(jumps.missing))
-        text = (
-            f"the clock jumps by {jumps.missing[longest]:,.6g} sampling intervals, and in "
-            f"all {jumps.total:,.6g} samples are missing where there are {n:,}, more than half of "
-            "the recording"
-        )
+        text = f"the clock jumps by {jumps.missing[longest]:,.6g} sampling intervals, and in all"
+        text += f" {jumps.total:,.6g} samples are missing where there are {n:,}, more than half of"
+        text += " the recording"
         hint = f"use the part before or after, or, {_WAY_OUT}"
         raise clock.error(int(jumps.rows[longest]), text, hint)
 

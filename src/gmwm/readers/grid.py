@@ -58,10 +58,6 @@ class Jumps:
         shortest = np.min(apart[half - 1 :] - apart[: apart.size - half + 1])
         return bool(shortest <= 1.0 + 0.1 * np.median(apart))
 
-    def with_copies(self, kept: IntArray, copies: IntArray) -> Jumps:
-        """The same, numbered by all rows, some of which were kept and the others are copies."""
-        return replace(self, rows=kept[self.rows], repeated=copies)
-
     def spread(self, values: FloatArray) -> FloatArray:
         """Samples (n,) on the even grid: NaN where a row is missing, without copies."""
         if not (self.repeated.size or self.rows.size):

@@ -38,22 +38,19 @@ NUMBERS_OF_SENSORS = frozenset(
     {"id", "i", "inst", "instance"}
     | {f"{what}{end}" for what in ("imu", "sensor", "device", "unit") for end in ("", "id", "_id")}
 )
-# Columns about a sensor other than its samples.
-_OTHER_MEANINGS = frozenset(
-    {"bias", "offset", "std", "sigma", "var", "cov", "covariance", "err", "error", "ref"}
-    | {"reference", "true", "truth", "cmd", "desired", "setpoint", "temp", "temperature"}
-    | {"delta", "mag", "free"}
+_TIME_WORDS = frozenset({"t", "ts", "time", "timestamp", "stamp"})
+# Columns about a sensor, or about a temperature or a voltage, other than its samples.
+_NO_SAMPLES = frozenset(
+    {"bias", "offset", "std", "sigma", "var", "cov", "err", "error", "ref", "reference"}
+    | {"cmd", "desired", "setpoint", "delta"}
 )
+_OTHER_MEANINGS = _NO_SAMPLES | {"covariance", "true", "truth", "temp", "temperature"}
+_OTHER_MEANINGS |= {"mag", "free"}
+_OTHER_AUXILIARY = _NO_SAMPLES | _TIME_WORDS | {"limit", "alarm", "flag", "status", "valid"}
 
 _AUXILIARY_WORDS = dict.fromkeys(
     ("temp", "temperature", "temperatures", "thermometer"), "temperature"
 ) | dict.fromkeys(("voltage", "volt", "volts", "vbat", "vdd", "vcc"), "voltage")
-# Columns about such a quantity other than its samples.
-_OTHER_AUXILIARY = frozenset(
-    {"bias", "offset", "std", "sigma", "var", "cov", "err", "error", "ref", "reference"}
-    | {"cmd", "desired", "setpoint", "delta", "limit", "alarm", "flag", "status", "valid"}
-    | {"t", "ts", "time", "timestamp", "stamp"}
-)
 
 _UNIT_WORDS = {
     word: unit
@@ -67,7 +64,6 @@ _UNIT_WORDS = {
     for word in words.split()
 } | {"g": "g", "mg": "mg", "ug": "ug"}
 
-_TIME_WORDS = frozenset({"t", "ts", "time", "timestamp", "stamp"})
 _BEFORE_TIME = frozenset(
     {"header", "field", "imu", "sensor", "sample", "sampling", "system", "sys", "unix", "utc"}
     | {"gps", "ros", "elapsed", "relative", "boot", "device", "local", "date", "datetime", "iso"}

@@ -178,20 +178,13 @@ def recording_of(table: Table, given: Given) -> Part:
         source=table.source,
         notices=(*table.notices, *roles.notices, *unreadable, *unit_notices, *clock_notices, *odd),
     )
+    is_given, has_layout = isinstance(given.channels, Mapping), isinstance(table, BinaryTable)
     at_rest = rest_notices(
-        recording,
-        unit_of,
-        given.units,
-        are_columns_given=isinstance(given.channels, Mapping),
-        has_layout=isinstance(table, BinaryTable),
+        recording, unit_of, given.units, are_columns_given=is_given, has_layout=has_layout
     )
-    recording = replace(
-        recording,
-        channels=(*recording.channels, *further),
-        notices=(*at_rest, *recording.notices),
-        jitter=timing.jitter if timing else None,
-    )
-    return Part(recording, start)
+    channels, notices = (*recording.channels, *further), (*at_rest, *recording.notices)
+    jitter = timing.jitter if timing else None
+    return Part(replace(recording, channels=channels, notices=notices, jitter=jitter), start)
 
 
 def _stated_rate(table: Table, rate: float | None) -> float | None:

@@ -233,10 +233,9 @@ class Recording(Mapping[str, Channel], Printed):
         parts = self.by_rate()
         if len(parts) > 1:
             rates = " and ".join(f"{part.rate:.6g}" for part in parts)
-            raise InputError(
-                f"{self.source or 'the recording'} has channels at {rates} Hz, and {what} needs "
-                "one rate: choose a topic that has all of them"
-            )
+            text = f"{self.source or 'the recording'} has channels at {rates} Hz"
+            hint = "choose a topic that has all of them"
+            raise InputError(f"{text}, and {what} needs one rate: {hint}")
         return self
 
     @property
@@ -262,19 +261,17 @@ class Recording(Mapping[str, Channel], Printed):
         if start == 0.0 and end == self.duration:
             return self
         if any(each.code == "rate-changes" for each in self.notices):
-            raise InputError(
-                f"{self.source or 'the recording'}: the sampling rate changes, so that a part has "
-                "another rate than the whole: cut the file where it changes"
-            )
+            text = "the sampling rate changes, so that a part has another rate than the whole"
+            hint = "cut the file where it changes"
+            raise InputError(f"{self.source or 'the recording'}: {text}: {hint}")
         if not (start >= 0.0 and (end - start) * self.rate >= tuning.FEWEST_SAMPLES):
             raise InputError(
                 f"{self.source or 'the recording'} lasts {self.duration:.6g} s and has fewer than "
                 f"{tuning.FEWEST_SAMPLES} samples from {start:g} to {end:g} s: give other times"
             )
-        channels = tuple(
-            replace(c, values=c.values[round(start / c.dt) : round(end / c.dt)])
-            for c in self.channels
-        )
+        rows = [slice(round(start / c.dt), round(end / c.dt)) for c in self.channels]
+        pairs = zip(self.channels, rows, strict=True)
+        channels = tuple(replace(c, values=c.values[own]) for c, own in pairs)
         part = notice("part", "", {"start": float(start), "stop": end})
         kept = [each for each in self.notices if each.code != "missing-samples"]
         notices = (*kept, part, *notices_of_gaps(channels))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -170,17 +171,8 @@ def _scale(recording: Recording, force: _Sensor, *, must_show: bool) -> tuple[No
     is_absent = usual < tuning.NO_GRAVITY or force.scatter > tuning.NOISE_OF_GRAVITY * usual
     if is_absent or abs(ratio - 1.0) < tuning.SCALE_AGREES:
         return ()
-    return (
-        notice(
-            "gravity",
-            "accel",
-            values,
-            severity="warning",
-            variant="scale",
-            usual=usual,
-            ratio=ratio,
-        ),
-    )
+    words: dict[str, Any] = {"variant": "scale", "usual": usual, "ratio": ratio}
+    return (notice("gravity", "accel", values, severity="warning", **words),)
 
 
 def _gyro_unit(rate: _Sensor) -> Notice:

@@ -44,9 +44,9 @@ class Table(ABC):
         Raises InputError if a column cannot be read, or holds anything but usable numbers.
         """
 
-    @abstractmethod
     def where(self, row: int) -> str:
         """The place of a row of data, e.g. ``"line 12"``."""
+        return f"row {row} (counted from 0)"
 
     def expected_rows(self) -> float:
         """Number of rows before the file is read; 0 if unknown."""

@@ -201,9 +201,6 @@ class ArrayTable(Table):
             for each in shown:
                 release(each)
 
-    def where(self, row: int) -> str:
-        return f"row {row} (counted from 0)"
-
     def _column(self, index: int, part: slice) -> FloatArray:
         like, place = self.arrays[index].like, f"{self.source}, column {label(self.names, index)}"
         _check_real(place, like.dtype)

@@ -46,9 +46,6 @@ class FrameTable(Table):
                 row += len(part[0]) if part else 0
                 yield found
 
-    def where(self, row: int) -> str:
-        return f"row {row} (counted from 0)"
-
     def _floats(self, column: int, values: Any, first: dict[int, int]) -> FloatArray:
         """Values of a column; stamps less the first one, so that nanoseconds keep their digits."""
         import pyarrow as pa

@@ -70,14 +70,12 @@ def tried(opener: Callable[[Path], ArrayTable], path: Path) -> ArrayTable:
     if "unread" not in found:
         damage = "is damaged, so that its library fails or reads on for too long: save it again"
         raise InputError(**found) if found else InputError(f"{path.name} {damage}")
-    table = opener(path)
-    arrays = tuple(
-        Array(array.like, partial(_rejected, found["unread"][name]))
-        if name in found["unread"]
-        else array
+    table, unread = opener(path), found["unread"]
+    arrays = [
+        Array(array.like, partial(_rejected, unread[name])) if name in unread else array
         for name, array in zip(table.names, table.arrays, strict=True)
-    )
-    return replace(table, arrays=arrays)
+    ]
+    return replace(table, arrays=tuple(arrays))
 
 
 def _rejected(text: str) -> AnyArray:

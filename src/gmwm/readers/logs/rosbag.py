@@ -52,8 +52,6 @@ IMU = Message(
     | {f"accel_{axis} [m/s^2]": LINEAR_ACCELERATION + i for i, axis in enumerate("xyz")},
 )
 
-TEMPERATURE = Message(2, {"temperature [degC]": 0})
-
 COVARIANCE_OF = {"gyro": ANGULAR_VELOCITY + 3, "accel": LINEAR_ACCELERATION + 3}
 """First number of the covariance of each sensor: -1 where the message does not have it."""
 
@@ -153,7 +151,7 @@ _SEEN = 64  # messages from which it is judged what a topic holds
 
 _ROS1, _MCAP, _SQLITE = b"#ROSBAG", b"\x89MCAP", b"SQLite format 3"
 
-_TYPES = {"sensor_msgs/msg/Imu": IMU, "sensor_msgs/msg/Temperature": TEMPERATURE}
+_TYPES = ("sensor_msgs/msg/Imu", "sensor_msgs/msg/Temperature")
 _STAMPS = "time [ns]"
 
 _Record = tuple[Any, int, bytes]
@@ -290,7 +288,7 @@ def open_bag(path: Path, wanted: Wanted) -> tuple[BagTable, ...]:
     for name, count in warmth.items():
         # By the topic if there are several.
         prefix = "" if len(warmth) == 1 else name.strip("/").replace("/", "_") + "_"
-        warm = Message(TEMPERATURE.count, {f"{prefix}temperature [degC]": 0})
+        warm = Message(2, {f"{prefix}temperature [degC]": 0})
         tables.append(table(Topic(name, count), warm, warm.columns))
     return tuple(tables)
 

@@ -34,10 +34,8 @@ _TIME = "time [us]"
 _NO_TIME = 2**31 - 1  # RELATIVE_TIMESTAMP_INVALID of SensorCombined.msg
 _HEAD = 3  # bytes of a message before its content
 _PADDING = (b"\0" * _HEAD, b"\xff" * _HEAD)
-_HINT = (
-    "log sensor_combined, which the default SDLOG_PROFILE has, or the raw FIFO topics (bits 8 and "
-    "9 of SDLOG_PROFILE)"
-)
+_HINT = "log sensor_combined, which the default SDLOG_PROFILE has, or the raw FIFO topics"
+_HINT += " (bits 8 and 9 of SDLOG_PROFILE)"
 _DAMAGE = "is no ULog, or is damaged or cut off: get a whole copy"
 _Columns = dict[str, AnyArray]
 

@@ -103,11 +103,8 @@ class CsvTable(Table):
         pyarrow.default_memory_pool().release_unused()  # Arrow keeps memory for more columns
 
     def _joined(self, columns: Sequence[int], parts: Sequence[Sequence[FloatArray]]) -> Columns:
-        return {
-            column: np.concatenate([part[i] for part in parts])
-            * self.layout.scales.get(column, 1.0)
-            for i, column in enumerate(columns)
-        }
+        scales, own = self.layout.scales, zip(columns, zip(*parts, strict=True), strict=True)
+        return {column: np.concatenate(some) * scales.get(column, 1.0) for column, some in own}
 
     def where(self, row: int) -> str:
         for line, block in blocks(self.path, self.layout.offset, self.layout.line):
@@ -188,30 +185,17 @@ def _parse_with_arrow(
             block = block.replace(b" " + end, end).replace(end + b" ", end)
         block = block.strip(b" ")
     names = [str(i) for i in range(layout.width + layout.trailing)]
-    types = {
-        names[i]: pyarrow.timestamp("ns", tz="UTC" if layout.dates[i] else None)
-        if i in layout.dates
-        else pyarrow.float64()
-        for i in columns
-    }
+    types = {names[i]: pyarrow.float64() for i in columns}
+    for i in set(columns) & set(layout.dates):
+        types[names[i]] = pyarrow.timestamp("ns", tz="UTC" if layout.dates[i] else None)
+    # Blocks of this size gain nothing by threads, and are the same every time without.
+    reading = csv.ReadOptions(column_names=names, use_threads=False)
+    parsing = csv.ParseOptions(delimiter=layout.delimiter, quote_char=False)
+    parsing.ignore_empty_lines = layout.width > 1  # in a single column one is a missing sample
+    converting = csv.ConvertOptions(column_types=types, include_columns=list(types))
+    converting.null_values, converting.decimal_point = _NULLS, layout.decimal
     try:
-        table = csv.read_csv(
-            pyarrow.BufferReader(block),
-            # Blocks of this size gain nothing by threads, and are the same every time without.
-            read_options=csv.ReadOptions(column_names=names, use_threads=False),
-            parse_options=csv.ParseOptions(
-                delimiter=layout.delimiter,
-                quote_char=False,
-                # In a single column a blank line is a missing sample.
-                ignore_empty_lines=layout.width > 1,
-            ),
-            convert_options=csv.ConvertOptions(
-                include_columns=list(types),
-                column_types=types,
-                null_values=_NULLS,
-                decimal_point=layout.decimal,
-            ),
-        )
+        table = csv.read_csv(pyarrow.BufferReader(block), reading, parsing, converting)
     except pyarrow.ArrowInvalid:
         return None
     found: list[FloatArray] = []
