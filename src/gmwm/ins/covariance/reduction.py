@@ -189,8 +189,8 @@ def reduce(
     errors = []
     for outage in scenario.outages:
         at = full.index(outage.end)
-        horizontal = [float(np.hypot(*sd[at, :2])) for sd in deviations]
-        errors.append(ReducedError(outage.duration, *horizontal, float(reduced.nees()[at])))
+        a, b, c, d, e = (float(np.hypot(*sd[at, :2])) for sd in deviations)
+        errors.append(ReducedError(outage.duration, a, b, c, d, e, float(reduced.nees()[at])))
     return Reduction(
         form=form,
         models=best,
