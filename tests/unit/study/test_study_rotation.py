@@ -5,17 +5,13 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from gmwm.variance.analysis import wavelet_variance
 
-from gmwm import GaussMarkov, RandomWalk, WhiteNoise
-from gmwm.calibration.calibration import Calibration
+from gmwm import Calibration, GaussMarkov, RandomWalk, Recording, WhiteNoise, fit, wavelet_variance
 from gmwm.errors import InputError
-from gmwm.estimate.entrance import fit
 from gmwm.ins import car_drive, gnss
 from gmwm.ins.filter.aiding import Outage
-from gmwm.ins.imu.sensors import AXES
+from gmwm.ins.imu import AXES
 from gmwm.ins.simulation.scenario import Scenario
-from gmwm.readers.recording import Recording
 from gmwm.study import turns
 from gmwm.study.rotation import Rotation, crossed_weights
 from gmwm.study.turns import reproduce_rotation, rotate
