@@ -7,7 +7,7 @@ import pytest
 
 import gmwm
 from gmwm import GaussMarkov, RandomWalk, RateRamp, Sinusoid, WhiteNoise
-from gmwm._core.notices import Notice
+from gmwm.issues import Notice
 
 TRUTH = WhiteNoise(1.0) + RandomWalk(0.01)
 UNITS = {"gyro": "rad/s", "accel": "m/s^2"}

@@ -21,8 +21,8 @@ from gmwm import (
     parameter,
 )
 from gmwm._core import checks
-from gmwm._core.notices import Notice
 from gmwm.estimate import METHODS
+from gmwm.issues import Notice
 
 TRUTH = WhiteNoise(0.2) + RandomWalk(0.02)
 MODEL = TRUTH.opened()

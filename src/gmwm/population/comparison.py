@@ -18,7 +18,7 @@ from gmwm._core.text import Printed, brief, bullets, per_cent, wrapped
 from gmwm._core.units import field_units, si_parameter_unit
 from gmwm.calibration import Calibration
 from gmwm.errors import MissingNameError
-from gmwm.estimate import Estimate, Fit, JointFit
+from gmwm.estimate import Fit, JointFit
 from gmwm.estimate.result import plain
 from gmwm.issues import Notice, worst_first
 from gmwm.population import tuning

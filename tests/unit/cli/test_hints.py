@@ -6,10 +6,10 @@ import re
 import numpy as np
 import pytest
 
-from gmwm._core.notices import Notice
 from gmwm.cli.hints import HINTS, with_hint, with_option
 from gmwm.cli.main import cli
 from gmwm.errors import InputError
+from gmwm.issues import Notice
 from gmwm.readers import read
 from places import REPOSITORY
 
