@@ -5,7 +5,7 @@ import pytest
 
 import gmwm
 from gmwm import Channel, QuantizationNoise, RandomWalk, Recording, WhiteNoise
-from gmwm._core.notices import Notice
+from gmwm.issues import Notice
 
 DT = 0.01
 WALK = WhiteNoise(4e-4) + RandomWalk(3e-4)
