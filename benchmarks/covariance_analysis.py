@@ -17,8 +17,7 @@ from gmwm import GaussMarkov, WhiteNoise
 from gmwm.ins.covariance.analysis import covariance_analysis
 from gmwm.ins.filter.aiding import Outage, gnss
 from gmwm.ins.imu.sensors import SensorModels
-from gmwm.ins.simulation.scenario import Scenario, Simulated
-from gmwm.ins.simulation.trials import monte_carlo
+from gmwm.ins.simulation.trials import Scenario, Simulated, monte_carlo
 from gmwm.ins.trajectory.missions import helicopter_mapping
 
 RUNS = 50

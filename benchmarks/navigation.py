@@ -22,8 +22,7 @@ from gmwm.ins.filter.aiding import Aiding, gnss
 from gmwm.ins.filter.filter import Filter, InitialSd, Outputs
 from gmwm.ins.imu.emulation import Imu, emulate
 from gmwm.ins.imu.sensors import AXES, SensorModels
-from gmwm.ins.simulation.scenario import Scenario, Simulated
-from gmwm.ins.simulation.trials import monte_carlo
+from gmwm.ins.simulation.trials import Scenario, Simulated, monte_carlo
 from gmwm.ins.trajectory.missions import helicopter_mapping
 from gmwm.ins.trajectory.trajectory import Trajectory
 

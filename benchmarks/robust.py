@@ -14,9 +14,8 @@ import numpy as np
 
 from gmwm import WhiteNoise
 from gmwm.variance.covariance.haar import dyadic_levels, haar_covariance
-from gmwm.variance.covariance.robust import robust_covariance
 from gmwm.variance.kernels import cumulative, haar_coefficients, haar_moments
-from gmwm.variance.robust import EFFICIENCY, robust_variance
+from gmwm.variance.robust import EFFICIENCY, robust_covariance, robust_variance
 
 SAMPLES = 1_000_000
 REPEATS = 7

@@ -21,6 +21,7 @@ from scipy.spatial.transform import Rotation
 
 import gmwm
 from gmwm import GaussMarkov, Model, RandomWalk, WhiteNoise
+from gmwm.filter_numbers import Chain
 from gmwm.filter_numbers.axes import SensorAxes
 from gmwm.filter_numbers.tuning import KEYFRAME_SD, KEYFRAMES
 from gmwm.ins import SensorModels
@@ -141,7 +142,7 @@ def expected(truth: dict[str, Model], rule: dict[str, tuple[float, float, float]
     """The same after as many keyframes as here."""
     models, result = _models(rule), []
     for axis in SensorAxes.of(truth, DT, TURN_ON).axes:
-        chain = replace(axis.between(1.0), settled=SECONDS - 1.0)
+        chain = replace(Chain.of_poses(axis.quantity, 1.0), settled=SECONDS - 1.0)
         errors = chain.errors(axis.model, models[axis.name], DT, (1.0,), true_sd=axis.bias_sd,
                               believed_sd=rule[axis.name][2])  # fmt: skip
         result.append(float(errors.nees()[0]))

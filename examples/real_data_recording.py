@@ -10,7 +10,7 @@ from scipy.signal import welch
 
 import gmwm
 from gmwm import Channel, Fit, Health, JointFit, Recording
-from gmwm._core.notices import Notice
+from gmwm.issues import Notice
 from gmwm._core.units import SI_UNIT, factor
 
 NUMBERS = (1, 2, 3, 4)

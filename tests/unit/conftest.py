@@ -5,12 +5,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from gmwm._core.notices import Notice
 from gmwm.ins import FilterErrors, MonteCarlo, Outage, SensorModels, car_drive
-from gmwm.ins.filter.solution import Solution
+from gmwm.ins.filter.filter import Solution
 from gmwm.ins.geometry import matrix_from_rpy
 from gmwm.ins.simulation.filter_errors import GROUPS
 from gmwm.ins.simulation.validation import Validation
+from gmwm.issues import Notice
 from gmwm.process import WhiteNoise, as_model
 
 FACTORS = {"right": 1.0, "bold": 3.0, "timid": 0.3}

@@ -104,13 +104,12 @@ def _array_of(value: Any) -> FloatArray:
     if isinstance(value, np.ndarray):
         return value
     rows = value if isinstance(value, list) and value and isinstance(value[0], list) else [value]
-    if not all(isinstance(row, list) and all(map(_is_element, row)) for row in rows):
+    if not all(
+        isinstance(row, list) and all(each is None or checks.is_number(each) for each in row)
+        for row in rows
+    ):
         raise ValueError("not a list of numbers")
     return np.array(value, dtype=float)  # None becomes NaN
-
-
-def _is_element(value: Any) -> bool:
-    return value is None or checks.is_number(value)
 
 
 def _lists_of(array: FloatArray) -> list[Any]:
@@ -192,11 +191,10 @@ class Document:
         """Schema of a field that is a document; that of the class itself has its fields."""
         if cls is _being_adapted.get():
             return handler(source)
-        return plain_schema(cls._restored, lambda document: document.to_dict())
-
-    @classmethod
-    def _restored(cls, value: Any) -> Self:
-        return value if isinstance(value, cls) else cls._rebuilt(value)
+        return plain_schema(
+            lambda value: value if isinstance(value, cls) else cls._rebuilt(value),
+            lambda document: document.to_dict(),
+        )
 
     def to_dict(self) -> dict[str, Any]:
         """Everything, in JSON types; see `from_dict`."""
@@ -295,12 +293,8 @@ def validation_sentence(
     if first["type"] == "missing":
         return f"there is no {place}"
     if first["type"] == "value_error":
-        inner = str(first["ctx"]["error"])
-        return (
-            f"{place}.{inner}"
-            if isinstance(first["ctx"]["error"], InputError)
-            else f"{place}: {inner}"
-        )
+        inner = first["ctx"]["error"]
+        return f"{place}{'.' if isinstance(inner, InputError) else ': '}{inner}"
     return f"{place} = {checks.shown(first['input'])}: {first['msg'][0].lower()}{first['msg'][1:]}"
 
 

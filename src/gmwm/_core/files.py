@@ -30,7 +30,8 @@ def moved_into_place(path: str | os.PathLike[str]) -> Iterator[Path]:
         raise _not_written(target, error) from None
     try:
         yield Path(name)
-        os.chmod(name, 0o666 & ~_umask())
+        os.umask(mask := os.umask(0))
+        os.chmod(name, 0o666 & ~mask)
         os.replace(name, target)
     except OSError as error:
         raise _not_written(target, error) from None
@@ -53,14 +54,12 @@ def written(path: str | os.PathLike[str]) -> Iterator[TextIO]:
 def moved_together(folder: Path) -> Iterator[Path]:
     """A temporary folder to be filled; its files take their places together when all went well.
 
-    What stands in ``folder`` then is of one run: an interrupt comes before or after.
-
     Raises InputError if it cannot be written.
     """
     try:
         with tempfile.TemporaryDirectory(prefix=".gmwm-", dir=folder) as name:
             yield Path(name)
-            with _interrupts_after():
+            with _interrupts_after():  # all files in the folder are of one run
                 for each in sorted(Path(name).iterdir()):
                     os.replace(each, folder / each.name)
     except OSError as error:
@@ -121,9 +120,8 @@ def writable_file(path: str | os.PathLike[str]) -> Path:
 
     Raises InputError if a folder stands there, or none that can be written is around it.
     """
-    file = replaceable(Path(path))
-    _check_new_files(file.parent, file)
-    return file
+    file = Path(path)
+    return _taking_files(file.parent, replaceable(file))
 
 
 def writable_folder(path: Path, names: Iterable[str] = ()) -> Path:
@@ -133,8 +131,7 @@ def writable_folder(path: Path, names: Iterable[str] = ()) -> Path:
     """
     for name in names:
         replaceable(path / name)
-    _check_new_files(next(each for each in (path, *path.parents) if os.path.exists(each)), path)
-    return path
+    return _taking_files(next(p for p in (path, *path.parents) if os.path.exists(p)), path)
 
 
 def replaceable(path: Path) -> Path:
@@ -143,7 +140,8 @@ def replaceable(path: Path) -> Path:
     Raises InputError if a folder stands there.
     """
     if os.path.isdir(path):
-        raise _refused(f"{path}: a folder of that name is in the way", "move it, or ")
+        problem, hint = f"{path}: a folder of that name is in the way", "move it, or "
+        raise InputError(problem, "output", f"{hint}choose another place", {"first": hint})
     return path
 
 
@@ -157,17 +155,17 @@ def output_folder(path: str | os.PathLike[str]) -> Path:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise _not_written(folder, error) from None
-    _check_new_files(folder, folder)
-    return folder
+    return _taking_files(folder, folder)
 
 
-def _check_new_files(folder: Path, output: Path) -> None:
-    """Raise InputError, which names an output, if a folder takes no new file."""
+def _taking_files(folder: Path, output: Path) -> Path:
+    """The output; raises InputError if the folder takes no new file."""
     try:
         with tempfile.TemporaryFile(dir=folder):
             pass
     except OSError as error:
         raise _not_written(output, error) from None
+    return output
 
 
 @contextmanager
@@ -215,14 +213,5 @@ def one_writer(folder: Path) -> Iterator[None]:
 
 
 def _not_written(path: Path, error: OSError) -> InputError:
-    return _refused(f"{path}: cannot be written ({error.strerror})")
-
-
-def _refused(problem: str, first: str = "") -> InputError:
-    return InputError(problem, "output", f"{first}choose another place", {"first": first})
-
-
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask
+    problem = f"{path}: cannot be written ({error.strerror})"
+    return InputError(problem, "output", "choose another place", {"first": ""})

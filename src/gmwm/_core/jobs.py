@@ -15,6 +15,7 @@ from contextvars import ContextVar
 from functools import cache, partial
 from importlib import import_module
 from multiprocessing import current_process
+from operator import call
 from pickle import PicklingError
 from pkgutil import resolve_name
 from queue import SimpleQueue
@@ -43,13 +44,21 @@ PROCESSES = 2
 _LAST_SECONDS = 5.0  # that the end of a thread is waited for, which takes a thousandth of one
 
 
+def _rejected(item: Any) -> Any:
+    raise InputError(
+        f"{ENDED} processes ended at {checks.shown(item)}: they may need more memory than there "
+        "is, use fewer jobs",
+        "worker-lost",
+    )
+
+
 def results(
     work: Work[T, R],
     items: Sequence[T],
     *,
     jobs: int = 1,
     cluster: str | None = None,
-    lost: Work[T, R] | None = None,
+    lost: Work[T, R] = _rejected,
 ) -> Done[T, R]:
     """Do the work of every item, in any order.
 
@@ -60,18 +69,13 @@ def results(
     Raises InputError if no scheduler answers, it has no workers, or an item is lost (code
         "worker-lost").
     """
-    given_up = _rejected if lost is None else lost
     if cluster is not None:
-        return _on_cluster(work, items, cluster, given_up)
-    return _on_this_machine(work, items, jobs, given_up)
+        return _on_cluster(work, items, cluster, lost)
+    return _on_this_machine(work, items, jobs, lost)
 
 
 def extra_workers(jobs: int, items: int) -> int:
-    """How many processes beside this one are of use, of which ``jobs`` are to share the work.
-
-    jobs: -1 for one a core.
-    items: That can be worked on side by side.
-    """
+    """How many processes beside this one help, if ``jobs`` (-1: one a core) share some items."""
     if current_process().name != "MainProcess":  # whoever started it has shared the cores out
         return 0
     cores = os.cpu_count() or 1
@@ -107,17 +111,11 @@ def worker_pool(others: int, first: str) -> Iterator[None]:
     finally:
         _pool.reset(token)
         pool.shutdown(kill_workers=True)
-        _joined([each for each in threads() if each not in before])
-
-
-def _joined(started: Iterable[Thread]) -> None:
-    """Wait for the threads that fed a pool, which the pool does not.
-
-    They give its semaphores back; where this process ended meanwhile, a warning of leaks was shown.
-    """
-    for each in started:
-        if each.name == "QueueFeederThread":
-            each.join(_LAST_SECONDS)
+        # The threads that fed the pool give its semaphores back, which the pool does not wait for:
+        # if this process ended meanwhile, it would warn of leaks.
+        for each in threads():
+            if each not in before and each.name == "QueueFeederThread":
+                each.join(_LAST_SECONDS)
 
 
 def during_startup(work: Callable[[], object]) -> None:
@@ -172,14 +170,6 @@ def shared(work: Work[T, R], items: Iterable[T]) -> Iterator[tuple[T, R]]:
             yield item, work(item)
         else:
             yield item, future.result()[1]
-
-
-def _rejected(item: Any) -> Any:
-    raise InputError(
-        f"{ENDED} processes ended at {checks.shown(item)}: they may need more memory than there "
-        "is, use fewer jobs",
-        "worker-lost",
-    )
 
 
 def _on_this_machine(
@@ -256,7 +246,7 @@ def _on_cluster(work: Work[T, R], items: Sequence[T], address: str, lost: Work[T
                 raise InputError(
                     f"the Dask scheduler at {address!r} has no workers: start some"
                 ) from None
-            futures = {client.submit(_applied, sent, item, pure=False): item for item in left}
+            futures = {client.submit(call, sent, item, pure=False): item for item in left}
             for future in as_completed(futures):
                 item = futures[future]
                 try:
@@ -272,10 +262,6 @@ def _on_cluster(work: Work[T, R], items: Sequence[T], address: str, lost: Work[T
         raise InputError(
             f"the workers of the Dask cluster at {address!r} end before their work: see their logs"
         )
-
-
-def _applied(work: Work[T, R], item: T) -> R:
-    return work(item)
 
 
 def _client(address: str) -> Any:

@@ -67,37 +67,23 @@ def held() -> float:
 
 
 def require(needed: float, what: str) -> None:
-    """Reject what needs more than the budget.
-
-    needed: Bytes.
-    what: For the message: the file.
-    Raises InputError with the code "memory".
-    """
+    """Raise InputError with the code "memory" if a file needs more bytes than the budget."""
     allowed = budget()
     if needed > allowed:
+        size, most = (f"{count / (1 << 30):.3g} GB" for count in (needed, allowed))
         raise InputError(
-            f"{what} needs about {_gigabytes(needed)} of memory, and {_gigabytes(allowed)} may be "
-            "used",
+            f"{what} needs about {size} of memory, and {most} may be used",
             "memory",
             f"read fewer columns with channels=, cut it into parts, or set {VARIABLE} (GB) if "
             "there is more",
         )
 
 
-def _gigabytes(count: float) -> str:
-    return f"{count / (1 << 30):.3g} GB"
-
-
-def _installed() -> int:
-    """Bytes of the machine."""
-    with suppress(OSError, ValueError, AttributeError):  # AttributeError: not on Windows
-        return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
-    return _WHERE_UNKNOWN
-
-
 def _available() -> int:
     """Bytes that the system says it can give, of a container no more than its limit."""
-    found = _installed()
+    found = _WHERE_UNKNOWN
+    with suppress(OSError, ValueError, AttributeError):  # AttributeError: not on Windows
+        found = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     with suppress(OSError, ValueError, IndexError, StopIteration):
         lines = Path("/proc/meminfo").read_text().splitlines()
         found = next(int(each.split()[1]) for each in lines if each.startswith("MemAvail")) << 10

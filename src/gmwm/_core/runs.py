@@ -80,7 +80,7 @@ def do_runs(
 class _Store:
     """Finished runs, and the files that hold them; a file appears whole or not at all.
 
-    folder: ``None`` keeps nothing on disk.
+    folder: None keeps nothing on disk.
     study: In JSON types; kept in every file.
     """
 
@@ -90,21 +90,6 @@ class _Store:
         self._unsaved: list[int] = []
         self._since = monotonic()
         self._next = 0
-
-    def open(self, folder: Path, earlier: Earlier) -> None:
-        """Take what the folder holds."""
-        parts = sorted(folder.glob("part-*.npz"))
-        if parts and earlier == "refuse":
-            raise InputError(
-                f"{folder} holds runs of an earlier study: resume it, or give another folder",
-                "earlier-runs",
-            )
-        for part in parts:
-            if earlier == "replace":
-                part.unlink()
-            else:
-                self._read(part)
-                self._next = int(part.stem.rpartition("-")[2]) + 1
 
     def add(self, run: int, values: Mapping[str, Any]) -> None:
         """Keep a run; runs are written every few seconds."""
@@ -130,7 +115,9 @@ class _Store:
         self._unsaved = []
         self._since = monotonic()
 
-    def _read(self, part: Path) -> None:
+    def read(self, part: Path) -> None:
+        """Take the runs of a file, and write after it."""
+        self._next = int(part.stem.rpartition("-")[2]) + 1
         try:
             study, runs, values = _content(part)
         except Exception as error:  # numpy, zipfile and zlib raise a dozen types
@@ -190,7 +177,17 @@ def _store(folder: Path | None, study: Mapping[str, Any], earlier: Earlier) -> I
         return
     with folder_to_fill(folder), one_writer(folder):
         try:
-            store.open(folder, earlier)
+            parts = sorted(folder.glob("part-*.npz"))
+            if parts and earlier == "refuse":
+                raise InputError(
+                    f"{folder} holds runs of an earlier study: resume it, or give another folder",
+                    "earlier-runs",
+                )
+            for part in parts:
+                if earlier == "replace":
+                    part.unlink()
+                else:
+                    store.read(part)
             yield store
         finally:
             store.save()

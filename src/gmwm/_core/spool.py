@@ -22,10 +22,7 @@ _LEFT_FREE = 64 << 20  # bytes of the disk: other programs need some
 
 
 class Spool:
-    """Rows of numbers in a temporary file, which vanishes with the last array of it.
-
-    width: Numbers in a row.
-    """
+    """Rows of some numbers in a temporary file, which vanishes with the last array of it."""
 
     def __init__(self, width: int) -> None:
         # It has to outlive this call: the arrays lie in it.

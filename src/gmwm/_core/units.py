@@ -97,10 +97,8 @@ def _quantity(text: str) -> pint.Quantity[Any]:
 
 @lru_cache(maxsize=512)
 def factor(unit: str, si_unit: str) -> float:
-    """How many ``si_unit`` one ``unit`` is.
+    """How many ``si_unit`` one ``unit`` is, such as rad/s one deg/s.
 
-    unit, si_unit: Two units of the same dimension, such as ``"deg/s"`` and ``"rad/s"``.
-    Returns: what a number in ``unit`` is multiplied by to have it in ``si_unit``.
     Raises InputError if a unit is unknown or the two do not measure the same thing.
     """
     known = _USUAL.get(si_unit, {}).get(unit)
@@ -152,12 +150,7 @@ AUXILIARY = ("temperature", "voltage", "clock")
 
 @dataclass(frozen=True)
 class AuxiliaryUnit:
-    """A unit of an auxiliary quantity.
-
-    quantity: One of `AUXILIARY`.
-    unit: In which channels of the quantity are kept: degC, V, s.
-    scale, offset: Multiply by the one, then add the other, to have a number in ``unit``.
-    """
+    """A unit of a quantity of `AUXILIARY`; times scale, plus offset it is in ``unit``, as kept."""
 
     quantity: str
     unit: str
@@ -192,11 +185,7 @@ def auxiliary_unit(text: str) -> AuxiliaryUnit | None:
 
 @dataclass(frozen=True)
 class FieldUnit:
-    """A unit in which the field quotes a parameter.
-
-    unit: As printed, e.g. ``"deg/sqrt(h)"``.
-    per_si: Multiply the SI value by this to have it in ``unit``.
-    """
+    """A unit in which the field quotes a parameter, and how many of it one SI unit is."""
 
     unit: str
     per_si: float
@@ -228,11 +217,9 @@ def si_parameter_unit(parameter_unit: str, quantity: str | None) -> str:
 
 
 def field_units(parameter_unit: str, quantity: str | None) -> tuple[FieldUnit, ...]:
-    """The units in which the field quotes a parameter; empty where SI is what people use.
+    """The units in which the field quotes a parameter, the customary one first; empty for SI.
 
     parameter_unit: With the placeholder ``u``, e.g. ``"u/sqrt(Hz)"``.
-    quantity: {"gyro", "accel", None}.
-    Returns: units, the customary one first.
     """
     names = _FIELD_UNITS.get((quantity or "", parameter_unit), ())
     si_unit = si_parameter_unit(parameter_unit, quantity).replace(" s", "*s")
@@ -240,12 +227,7 @@ def field_units(parameter_unit: str, quantity: str | None) -> tuple[FieldUnit, .
 
 
 def customary_unit(parameter_unit: str, quantity: str | None, unit: str) -> tuple[str, float]:
-    """The unit in which the field quotes a parameter, and how many of it one SI unit is.
-
-    parameter_unit: With the placeholder ``u``, e.g. ``"u/sqrt(Hz)"``.
-    quantity: {"gyro", "accel", None}.
-    unit: The channel's own, which is used where the field has none.
-    """
+    """The first of `field_units` and its value per SI unit; else as written for the channel."""
     known = field_units(parameter_unit, quantity)
     if known:
         return known[0].unit, known[0].per_si
@@ -255,10 +237,7 @@ def customary_unit(parameter_unit: str, quantity: str | None, unit: str) -> tupl
 def shown_unit(quantity: str | None, unit: str, units: str) -> tuple[str, float]:
     """The unit in which a plot shows a channel, and how many of it one SI unit is.
 
-    quantity: {"gyro", "accel", None}.
-    unit: The channel's own.
-    units: {"field", "si"}.
-    Raises InputError if ``units`` is anything else.
+    Raises InputError if ``units`` is neither "field" nor "si".
     """
     if units not in ("field", "si"):
         raise InputError(f"units = {units!r}: give 'field' or 'si'")

@@ -202,9 +202,7 @@ def offered_terms(found: Health, channel: str, chosen: Collection[str]) -> tuple
 
 
 def with_outcomes(
-    notices: Sequence[Notice],
-    models: Mapping[str, Model],
-    offered: Mapping[str, Sequence[Process]],
+    notices: Sequence[Notice], models: Mapping[str, Model], offered: Mapping[str, Sequence[Process]]
 ) -> tuple[Notice, ...]:
     """Notices with what became of the lines and resonances among them.
 
@@ -212,10 +210,7 @@ def with_outcomes(
     offered: Channel name -> terms that its model might have had.
     """
     return tuple(
-        replace(
-            notice,
-            hint=_outcome(notice, models[notice.where], offered.get(notice.where, ())),
-        )
+        replace(notice, hint=_outcome(notice, models[notice.where], offered.get(notice.where, ())))
         if notice.code in ("line", "resonance") and notice.where in models
         else notice
         for notice in notices

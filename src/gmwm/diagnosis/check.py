@@ -7,7 +7,7 @@ notices in `gmwm.issues`.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 
@@ -16,33 +16,17 @@ import numpy.typing as npt
 
 from gmwm._core.jobs import one_blas_thread, shared
 from gmwm._core.spool import moved, release, scaled
+from gmwm._core.text import readable
 from gmwm._core.typing import Progress, known_of
-from gmwm.diagnosis import tuning
-from gmwm.diagnosis.channel import Examined
+from gmwm.diagnosis import repeats, samples, tuning
 from gmwm.diagnosis.copies import Copy, copied_rows, find_copies
-from gmwm.diagnosis.drift import drift, variance
+from gmwm.diagnosis.drift import drift, temperature_notices, variance
 from gmwm.diagnosis.events import event, find_events, with_single_outliers
 from gmwm.diagnosis.health import ChannelHealth, Health
-from gmwm.diagnosis.innovations import innovations
+from gmwm.diagnosis.innovations import Examined, crosstalk_notices, innovations
 from gmwm.diagnosis.motion import Motion, find_motion, moves
-from gmwm.diagnosis.pairs import crosstalk_notices, temperature_notices
-from gmwm.diagnosis.repeats import (
-    held_or_stuck,
-    held_samples,
-    interpolation_notice,
-    repetition,
-    repetition_notice,
-    thinned,
-)
 from gmwm.diagnosis.resolution import rounding, step_size, widest_step
 from gmwm.diagnosis.resonances import peaks, spectral_notices
-from gmwm.diagnosis.samples import (
-    cut_off_or_abrupt_end,
-    dead_notice,
-    gap_notices,
-    length,
-    repeated_value,
-)
 from gmwm.diagnosis.still import vibration
 from gmwm.diagnosis.tails import contamination, heavy_tails, outliers_or_tails
 from gmwm.issues import Notice, Severity, notice, worst_first
@@ -57,25 +41,12 @@ def clock(recording: Recording) -> Iterator[Notice]:
         yield notice("clock", "", {"jitter": jitter}, severity=severity)
 
 
-OF_RECORDING: tuple[Callable[[Recording], Iterator[Notice]], ...] = (
-    length,
-    moves,
-    clock,
-    copied_rows,
-    vibration,
-)
+OF_RECORDING = (samples.length, moves, clock, copied_rows, vibration)
 """Checks of a whole recording of one rate."""
 
-CHECKS: tuple[Callable[[Examined], Iterator[Notice]], ...] = (
-    held_or_stuck,
-    cut_off_or_abrupt_end,
-    repeated_value,
-    event,
-    outliers_or_tails,
-    rounding,
-    variance,
-    drift,
-)
+_OF_SAMPLES = (repeats.held_or_stuck, samples.cut_off_or_abrupt_end, samples.repeated_value)
+
+CHECKS = (*_OF_SAMPLES, event, outliers_or_tails, rounding, variance, drift)
 """Checks of a channel; those of its spectrum come last (`spectral_notices`)."""
 
 
@@ -127,11 +98,9 @@ def health(recording: Recording, *, progress: Progress | None = None) -> Health:
     notices = [one for one in recording.notices if one.code != "missing-samples"]
     notices += [one for check in OF_RECORDING for one in check(recording)]
     found = _channels_found(recording, progress)
-    between = gap_notices(recording.inertial, recording.dt)
-    between += crosstalk_notices(
-        {name: one.errors for name, one in found.items() if one.errors is not None}
-    )
-    between += temperature_notices(recording)
+    errors = {name: one.errors for name, one in found.items() if one.errors is not None}
+    between = samples.gap_notices(recording.inertial, recording.dt)
+    between += crosstalk_notices(errors) + temperature_notices(recording)
     notices = worst_first(notices + [one for one in between if not one.where])
     is_static = not find_motion(recording).moves
     for name, one in found.items():
@@ -194,47 +163,46 @@ def _without_copies(channel: Channel, copies: Sequence[Copy], motion: Motion) ->
 
 def _at_own_rate(channel: Channel, motion: Motion) -> _Found:
     """Examine a channel at its own rate, where each sample is written several times."""
-    found = repetition(channel)
+    found = repeats.repetition(channel)
     if found is None:
-        straight = interpolation_notice(channel) if channel.is_of_a_sensor else None
+        straight = repeats.interpolation_notice(channel) if channel.is_of_a_sensor else None
         if straight is None:
             return _examined(channel, motion)
         if straight.code == "interpolated":
             return _Found([straight])
         one = _examined(channel, motion)
         return replace(one, notices=[straight, *one.notices])
-    one = _examined(thinned(channel, found), motion)
+    one = _examined(repeats.thinned(channel, found), motion)
     events = tuple(
         (found.first + start * found.times, min(found.first + stop * found.times, channel.n))
         for start, stop in one.facts.events
     )
     facts = replace(one.facts, events=events, repetition=found, held=0.0)
+    values = {"times": float(found.times), "rate": 1.0 / (channel.dt * found.times)}
     # Its prediction errors have no partners of the same time in other channels.
-    return _Found([repetition_notice(channel, found), *one.notices], facts)
+    return _Found([notice("repeated-samples", channel.name, values), *one.notices], facts)
 
 
 def _examined(channel: Channel, motion: Motion) -> _Found:
     """Run all checks of a channel."""
-    values = np.asarray(channel.values, dtype=float)
+    name, values = channel.name, np.asarray(channel.values, dtype=float)
     if channel.missing == channel.n:
         return _Found([])
-    unusable = _unusable(channel)
-    if unusable is not None:
-        return _Found([unusable])
+    if channel.is_constant:
+        shown = readable(channel.mean, channel.unit, digits=6)
+        return _Found([notice("dead", name, {"value": channel.mean}, shown=shown)])
+    if infinite := int(np.count_nonzero(np.isinf(values))):
+        return _Found([notice("infinite", name, count=infinite)])
+    if not channel.is_of_a_sensor:
+        return _Found([notice("size", name, {"spread": channel.spread}, unit=channel.unit)])
     present = known_of(values)
     smallest = step_size(present)
     step = widest_step(present, smallest)
     del present
     examined = _with_errors(channel, values, step, smallest, motion)
     if examined is None:
-        few = notice(
-            "length",
-            channel.name,
-            severity="warning",
-            variant="few",
-            hint="record longer",
-            fewest=tuning.FEWEST_KNOWN,
-        )
+        hint, fewest = "record longer", tuning.FEWEST_KNOWN
+        few = notice("length", name, severity="warning", variant="few", hint=hint, fewest=fewest)
         return _Found([few], ChannelHealth(lsb=step))
     notices = [one for check in CHECKS for one in check(examined)]
     held, events, level = examined.held, examined.events, examined.scatter
@@ -244,7 +212,7 @@ def _examined(channel: Channel, motion: Motion) -> _Found:
     lines, bumps = peaks(quiet, channel.dt)
     if any(one.code == "rounding" and one.severity == "bad" for one in notices):
         bumps = ()  # steps that come and go as the level passes them make bumps of their own
-    notices += spectral_notices(channel.name, channel.unit, lines, bumps)
+    notices += spectral_notices(name, channel.unit, lines, bumps)
     facts = ChannelHealth(
         lines=tuple((line.frequency, line.amplitude) for line in lines),
         resonances=tuple((bump.frequency, bump.damping) for bump in bumps),
@@ -255,19 +223,6 @@ def _examined(channel: Channel, motion: Motion) -> _Found:
         noise=level,
     )
     return _Found(notices, facts, standardized)
-
-
-def _unusable(channel: Channel) -> Notice | None:
-    """Say why there is nothing to examine in a channel, if so."""
-    dead = dead_notice(channel)
-    if dead is not None:
-        return dead
-    infinite = int(np.count_nonzero(np.isinf(channel.values)))
-    if infinite:
-        return notice("infinite", channel.name, count=infinite)
-    if not channel.is_of_a_sensor:
-        return notice("size", channel.name, {"spread": channel.spread}, unit=channel.unit)
-    return None
 
 
 def _with_errors(
@@ -304,7 +259,7 @@ def _with_errors(
         usable=usable,
         quiet=quiet,
     )
-    return replace(found, held=held_samples(found))
+    return replace(found, held=repeats.held_samples(found))
 
 
 def _standardized(channel: Examined) -> npt.NDArray[np.float32] | None:

@@ -1,4 +1,4 @@
-"""Slow changes: of the level, and of the size of the noise."""
+"""Slow changes of the level, by themselves or with the temperature, and of the noise."""
 
 from __future__ import annotations
 
@@ -7,12 +7,13 @@ from itertools import pairwise
 
 import numpy as np
 
-from gmwm._core.distributions import chi2, fisher, norm
+from gmwm._core.distributions import chi2, fisher, norm, student
 from gmwm._core.text import brief, readable
 from gmwm._core.typing import FloatArray, inner
 from gmwm.diagnosis import tuning
-from gmwm.diagnosis.channel import Examined
+from gmwm.diagnosis.innovations import Examined
 from gmwm.issues import Notice, Severity, notice
+from gmwm.readers import Recording
 
 
 def part_means(values: FloatArray, parts: int = tuning.PARTS, least: float = 0.5) -> FloatArray:
@@ -33,14 +34,14 @@ def drift(channel: Examined) -> Iterator[Notice]:
     drift only where a random walk would hardly have it: 99.9 % of random walks change by less than
     20 times the root mean square of what the line leaves (200,000 simulated).
     """
-    name, unit, values = channel.name, channel.unit, channel.quiet
-    size = values.size // tuning.PARTS
+    name, unit, quiet = channel.name, channel.unit, channel.quiet
+    size = quiet.size // tuning.PARTS
     if size < 2 * tuning.SHORT_MEAN:
         return
-    means = part_means(values)
+    means = part_means(quiet)
     place = np.arange(tuning.PARTS) - 0.5 * (tuning.PARTS - 1)
     known = ~np.isnan(means)
-    short = part_means(values, values.size // tuning.SHORT_MEAN)
+    short = part_means(quiet, quiet.size // tuning.SHORT_MEAN)
     steps = np.diff(short)
     steps = steps[~np.isnan(steps)]
     if np.count_nonzero(known) < tuning.PARTS / 2 or steps.size < tuning.PARTS:
@@ -61,22 +62,16 @@ def drift(channel: Examined) -> Iterator[Notice]:
     wanders = ratio**2 > fisher.isf(tuning.FALSE_ALARM, freedom, 2.0 / 3.0 * steps.size)
     if not (wanders or ramp):
         return
-    numbers = {"wander": wander, "white": white, "change": change}
+    values = {"wander": wander, "white": white, "change": change}
     if ramp:
         shown = (readable(change, unit, sign=True), readable(wander, unit))
         hint = "add a RateRamp to the model, or leave out the warm-up"
         yield notice(
-            "drift", name, numbers, severity="warning", variant="ramp", hint=hint, shown=shown
+            "drift", name, values, severity="warning", variant="ramp", hint=hint, shown=shown
         )
         return
-    yield notice(
-        "drift",
-        name,
-        numbers,
-        length=size * channel.dt,
-        shown=readable(wander, unit),
-        times=brief(ratio),
-    )
+    level, times, length = readable(wander, unit), brief(ratio), size * channel.dt
+    yield notice("drift", name, values, length=length, shown=level, times=times)
 
 
 def variance(channel: Examined) -> Iterator[Notice]:
@@ -87,16 +82,14 @@ def variance(channel: Examined) -> Iterator[Notice]:
     """
     if channel.step > 2.0 * channel.scatter:
         return  # noise below the step is seen only when the level is between two steps
-    found = _change(channel)
-    values = _unsteadiness(channel)
-    if values is None:
-        if found is not None:
-            yield found
-        return
-    low, high = (readable(values[each], channel.unit) for each in ("quiet", "loud"))
-    before = f"{found.text}; " if found is not None else ""
-    values = {**(found.values if found is not None else {}), **values}
-    yield notice("variance", channel.name, values, before=before, low=low, high=high)
+    found, values = _change(channel), _unsteadiness(channel)
+    if values is not None:
+        low, high = (readable(values[each], channel.unit) for each in ("quiet", "loud"))
+        before, known = (f"{found.text}; ", found.values) if found is not None else ("", {})
+        values = {**known, **values}
+        yield notice("variance", channel.name, values, before=before, low=low, high=high)
+    elif found is not None:
+        yield found
 
 
 def _change(channel: Examined) -> Notice | None:
@@ -135,30 +128,18 @@ def _change(channel: Examined) -> Notice | None:
     if abs(np.log(second / first)) > error and abs(growth) > tuning.CHANGE:
         severity: Severity = "warning" if abs(growth) > tuning.LARGE_CHANGE else "note"
         hint = "the model is an average: use the part that is like the use"
-        return notice(
-            "variance",
-            channel.name,
-            numbers,
-            severity=severity,
-            variant="half",
-            hint=hint,
-            growth=abs(growth),
-            word="larger" if growth > 0.0 else "smaller",
-        )
-    if is_loud:
-        start = loudest * errors.values.size // tuning.TENTHS * channel.dt
+        words = {"growth": abs(growth), "word": "larger" if growth > 0.0 else "smaller"}
+        variant = "half"
+    elif is_loud:
+        severity, variant = "warning", "tenth"
         hint = "look for people or machines then, and leave it out if it is not the sensor"
-        return notice(
-            "variance",
-            channel.name,
-            numbers,
-            severity="warning",
-            variant="tenth",
-            hint=hint,
-            growth=jump,
-            start=start,
-        )
-    return None
+        start = loudest * errors.values.size // tuning.TENTHS * channel.dt
+        words = {"growth": jump, "start": start}
+    else:
+        return None
+    return notice(
+        "variance", channel.name, numbers, severity=severity, variant=variant, hint=hint, **words
+    )
 
 
 def _unsteadiness(channel: Examined) -> dict[str, float] | None:
@@ -189,7 +170,11 @@ def _unsteadiness(channel: Examined) -> dict[str, float] | None:
     square *= square
     kurt = inner(square, square) / (square.size * float(np.mean(square)) ** 2) - 3.0
     del square
-    by_chance = [_long_run_variance(each, memory) for each in (bounded, squares)]
+    # Variance of long means times their length.
+    by_chance = [
+        0.5 * memory * float(np.mean(np.diff(_means(each, memory)) ** 2))
+        for each in (bounded, squares)
+    ]
     if min(by_chance) <= 0.0:
         return None
     found = {"excess": tuning.UNSTEADY}
@@ -212,11 +197,51 @@ def _unsteadiness(channel: Examined) -> dict[str, float] | None:
     return found if "part" in found else None
 
 
-def _long_run_variance(values: FloatArray, memory: int) -> float:
-    """Variance of long means times their length, from differences of neighbouring means."""
-    return 0.5 * memory * float(np.mean(np.diff(_means(values, memory)) ** 2))
-
-
 def _means(values: FloatArray, length: int) -> FloatArray:
     """Means of parts of a length."""
     return np.asarray(values[: values.size // length * length].reshape(-1, length).mean(axis=1))
+
+
+def temperature_notices(recording: Recording) -> list[Notice]:
+    """Find channels that follow a temperature channel, each with the one it follows most closely.
+
+    Changes from one of 64 parts of the record to the next are correlated: what only drifts in
+    the same direction does not count.
+    """
+    thermometers = [c for c in recording.values() if c.quantity == "temperature"]
+    if recording.n < tuning.PARTS * tuning.SHORTEST_PART or not thermometers:
+        return []
+    pairs = len(thermometers) * len(recording.inertial)
+    # Thermometers are often slower than the other sensors.
+    warmer = {c.name: np.diff(part_means(c.values, least=0.0)) for c in thermometers}
+    notices = []
+    for channel in recording.inertial:
+        step = np.diff(part_means(channel.values))
+        found = [
+            (size, r, slope, thermometer)
+            for thermometer in thermometers
+            for size, r, slope in _correlation(warmer[thermometer.name], step, pairs)
+        ]
+        if found:
+            _, r, slope, thermometer = max(found, key=lambda one: one[0])
+            values = {"correlation": r, "slope": slope}
+            per = f"{readable(slope, channel.unit)} per {thermometer.unit or 'unit'}"
+            notices.append(
+                notice("temperature", channel.name, values, name=thermometer.name, per=per)
+            )
+    return notices
+
+
+def _correlation(
+    warmer: FloatArray, step: FloatArray, pairs: int
+) -> list[tuple[float, float, float]]:
+    """Student's t, correlation and slope, if there is a correlation."""
+    known = ~np.isnan(warmer + step)
+    n = int(np.count_nonzero(known))
+    if n < tuning.FEWEST_PARTS or np.std(warmer[known]) == 0.0 or np.std(step[known]) == 0.0:
+        return []
+    r = float(np.corrcoef(warmer[known], step[known])[0, 1])
+    size = abs(r) * np.sqrt((n - 2) / max(1.0 - r**2, 1e-12))
+    if size <= student.isf(0.5 * tuning.FALSE_ALARM / pairs, n - 2):
+        return []
+    return [(float(size), r, float(np.polyfit(warmer[known], step[known], 1)[0]))]

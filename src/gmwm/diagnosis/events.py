@@ -10,8 +10,7 @@ from gmwm._core.distributions import norm
 from gmwm._core.text import readable
 from gmwm._core.typing import FloatArray
 from gmwm.diagnosis import tuning
-from gmwm.diagnosis.channel import Examined, Spans
-from gmwm.diagnosis.innovations import Innovations, innovations, running_scale
+from gmwm.diagnosis.innovations import Examined, Innovations, Spans, innovations, running_scale
 from gmwm.diagnosis.tails import Tails
 from gmwm.issues import Notice, notice
 
@@ -34,8 +33,13 @@ def find_events(errors: Innovations, tails: Tails | None = None) -> Spans:
     beyond = np.abs(errors.values) - errors.rounding
     known = max(int(np.count_nonzero(errors.known)), 1)
     chance = tuning.FALSE_ALARM / known
-    limit = float(norm.isf(0.5 * chance)) if tails is None else tails.distance(chance)
-    longest = np.inf if tails is None else _longest_chain(tails, known)
+    if tails is None:
+        limit, longest = float(norm.isf(0.5 * chance)), np.inf
+    else:  # the longest chain of weak errors that independent samples have with little chance
+        one = float(tails.beyond(np.array([tuning.RINGING]))[0])
+        next_is_close = -np.expm1(tuning.JOINED * np.log1p(-one))
+        limit = tails.distance(chance)
+        longest = 1.0 + float(np.log(tuning.FALSE_ALARM / (known * one)) / np.log(next_is_close))
     weak = np.flatnonzero(beyond > tuning.RINGING * errors.scale)
     if weak.size == 0 or (tails is None and not np.any(beyond > limit * errors.scale)):
         return ()
@@ -54,13 +58,6 @@ def find_events(errors: Innovations, tails: Tails | None = None) -> Spans:
             start = found.pop()[0]
         found.append((start, stop))
     return tuple(found)
-
-
-def _longest_chain(tails: Tails, known: int) -> float:
-    """Weak errors, each close to the last, that independent samples have with little chance."""
-    one = float(tails.beyond(np.array([tuning.RINGING]))[0])
-    next_is_close = -np.expm1(tuning.JOINED * np.log1p(-one))
-    return 1.0 + float(np.log(tuning.FALSE_ALARM / (known * one)) / np.log(next_is_close))
 
 
 def with_single_outliers(
@@ -115,8 +112,7 @@ def _level(values: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 def event(channel: Examined) -> Iterator[Notice]:
     """Say when the events are, how large and how long."""
-    values, events = channel.values, channel.shocks
-    dt, scatter = channel.dt, channel.scatter
+    values, events, dt, scatter = channel.values, channel.shocks, channel.dt, channel.scatter
     if not events:
         return
     clean = np.array(values)
@@ -139,45 +135,29 @@ def event(channel: Examined) -> Iterator[Notice]:
         "samples": float(samples),
         "variance_share": float(share),
     }
+    name, variant = channel.name, "many" if len(events) > 1 else ""
     if 2 * samples > known:
-        hint = "look at what is done to them between the sensor and the file"
-        yield notice(
-            "event",
-            channel.name,
-            numbers,
-            severity="bad",
-            variant="most",
-            hint=hint,
-            part=samples / known,
-        )
+        hint, part = "look at what is done to them between the sensor and the file", samples / known
+        yield notice("event", name, numbers, severity="bad", variant="most", hint=hint, part=part)
         return
     others = ""
     if 1 < len(events) <= _LISTED + 1:
         times = ", ".join(f"{a * dt:.6g}" for i, (a, _) in enumerate(events) if i != largest)
         others = f" (others at {times} s)"
     # The variance of n samples is known to its (2/n)^(1/2)-th part.
-    is_harmful = share > np.sqrt(2.0 / known)
-    hint = "too small to change the variance; Health.masked leaves it out"
-    yield notice(
-        "event",
-        channel.name,
-        numbers,
-        severity="warning" if is_harmful else "note",
-        variant="many" if len(events) > 1 else "",
-        hint=None if is_harmful else hint,
-        shown=readable(heights[largest], channel.unit, sign=True),
-        others=others,
-    )
+    shown = readable(heights[largest], channel.unit, sign=True)
+    words = {"variant": variant, "shown": shown, "others": others}
+    if share > np.sqrt(2.0 / known):
+        yield notice("event", name, numbers, severity="warning", **words)
+    else:
+        words["hint"] = "too small to change the variance; Health.masked leaves it out"
+        yield notice("event", name, numbers, severity="note", **words)
 
 
 def _height(values: FloatArray, clean: FloatArray, start: int, stop: int) -> tuple[float, float]:
     """Largest departure from the level beside the event, and the sum of squares."""
-    beside = np.concatenate(
-        [
-            clean[max(start - tuning.BESIDE_EVENT, 0) : start],
-            clean[stop : stop + tuning.BESIDE_EVENT],
-        ]
-    )
+    reach = tuning.BESIDE_EVENT
+    beside = np.append(clean[max(start - reach, 0) : start], clean[stop : stop + reach])
     beside = beside[~np.isnan(beside)]
     inside = values[start:stop]
     inside = inside[~np.isnan(inside)]

@@ -1,4 +1,4 @@
-"""Errors of predicting each sample from those before it.
+"""A channel as its checks see it, with the errors of predicting each sample from those before.
 
 Spikes, stuck values and changes of the noise are distinguished from the noise of a sensor where
 that noise is white. An autoregression of the first differences makes it so, whether it was white, a
@@ -7,20 +7,29 @@ random walk or a resonance; outliers are clipped before it is fitted.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
-from itertools import pairwise
+from itertools import combinations, pairwise
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 from scipy.linalg import solve_toeplitz
 
+from gmwm._core.distributions import norm
 from gmwm._core.spool import moved
 from gmwm._core.typing import BoolArray, FloatArray, inner, known_of
 from gmwm.diagnosis import tuning
+from gmwm.issues import Notice, Severity, notice
+
+if TYPE_CHECKING:
+    from gmwm.diagnosis.tails import Tails
 
 _CLIPPED = 0.99892  # variance of the normal distribution within tuning.CLIP
 _NORMAL_MAD = 1.482602  # standard deviation over median absolute value
 _ROUNDS = 20
+
+Spans = tuple[tuple[int, int], ...]  # the first sample, and the one after the last
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,6 +51,65 @@ class Innovations:
     def level(self) -> float:
         """Usual standard deviation, u."""
         return float(np.median(self.scale[self.known]))
+
+
+class Held(NamedTuple):
+    """Samples that repeat the one before without being measured.
+
+    share, chance: Part of the samples that do, and part that chance explains.
+    is_even: Whether they come at a regular interval.
+    """
+
+    share: float = 0.0
+    chance: float = 0.0
+    is_even: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Examined:
+    """A channel with its prediction errors and what was found first.
+
+    name, unit, dt: Of the channel; dt in s.
+    values: (n,), samples, NaN where missing.
+    step, smallest: To which the largest and the smallest samples are rounded, u; 0 if not.
+    errors: Prediction errors.
+    events: Spikes and shocks.
+    shocks: Those that do not touch a move of the whole sensor.
+    outliers: Share of outliers spread over the record.
+    tails: Law of the noise if its tails are heavy.
+    usable: (n,) of bool, prediction errors outside events.
+    quiet: (n,), samples, NaN in events too.
+    """
+
+    name: str
+    unit: str
+    dt: float
+    values: FloatArray
+    step: float
+    smallest: float
+    errors: Innovations
+    events: Spans
+    shocks: Spans
+    outliers: float
+    tails: Tails | None
+    usable: BoolArray
+    quiet: FloatArray
+    held: Held = field(default_factory=Held)
+
+    @property
+    def scatter(self) -> float:
+        """Usual standard deviation of what cannot be predicted of a sample, u."""
+        return self.errors.level
+
+    @cached_property
+    def present(self) -> FloatArray:
+        """Samples in their order, none missing."""
+        return known_of(self.values)
+
+    @cached_property
+    def noise(self) -> FloatArray:
+        """Samples outside events in their order, none missing."""
+        return known_of(self.quiet)
 
 
 def innovations(values: FloatArray, step: float) -> Innovations | None:
@@ -132,3 +200,30 @@ def running_scale(errors: FloatArray, floor: float) -> FloatArray:
     padded = np.pad(np.array(scales), 2, mode="reflect" if blocks > 2 else "edge")
     smooth = np.median(np.lib.stride_tricks.sliding_window_view(padded, 5), axis=1)
     return np.repeat(smooth, np.diff(edges))
+
+
+def crosstalk_notices(errors: dict[str, npt.NDArray[np.float32]]) -> list[Notice]:
+    """Find pairs of channels whose prediction errors are correlated.
+
+    The correlation of two white series has the variance 1/n, whatever the spectra of the channels
+    were; one that matters is above 0.05.
+
+    errors: Channel name -> prediction errors in units of their standard deviation, clipped, zero
+        where it is unknown, which adds nothing to a sum of products.
+    """
+    pairs = list(combinations(errors, 2))
+    notices = []
+    for one, other in pairs:
+        a, b = errors[one], errors[other]
+        n = int(np.count_nonzero((a != 0.0) & (b != 0.0)))
+        if n < tuning.FEWEST_KNOWN:
+            continue
+        r = inner(a, b) / np.sqrt(inner(a, a) * inner(b, b))
+        if abs(r) * np.sqrt(n) <= norm.isf(0.5 * tuning.FALSE_ALARM / len(pairs)):
+            continue
+        if abs(r) > tuning.CORRELATED:
+            severity: Severity = "warning" if abs(r) > tuning.STRONGLY_CORRELATED else "note"
+            values = {"correlation": r, "samples": float(n), "channels": f"{one}, {other}"}
+            both = f"{one} and {other}"
+            notices.append(notice("crosstalk", "", values, severity=severity, both=both))
+    return notices

@@ -62,10 +62,8 @@ def find_lines(spectrum: Spectrum, smooth: FloatArray) -> tuple[Line, ...]:
         if score[k] <= 1.0:
             break
         line = _measured(spectrum, local, k, int(best[k]))
-        wide = line.width > max(
-            tuning.NARROW * line.frequency, tuning.UNRESOLVED * spectrum.resolution
-        )
-        if not wide:
+        widest = max(tuning.NARROW * line.frequency, tuning.UNRESOLVED * spectrum.resolution)
+        if not line.width > widest:
             lines.append(line)
         # What it takes, and half of that on both sides, is noise from here on.
         margin = (line.stop - line.start) // 2
@@ -81,31 +79,17 @@ def line_notices(name: str, unit: str, lines: tuple[Line, ...]) -> list[Notice]:
     families = _families(lines)
     notices = []
     for main, harmonics in families[: tuning.NAMED_LINES]:
-        values = {
-            "frequency": main.frequency,
-            "amplitude": main.amplitude,
-            "ratio": main.ratio,
-            "width": main.width,
-            "harmonics": float(len(harmonics)),
-        }
+        values = {key: getattr(main, key) for key in ("frequency", "amplitude", "ratio", "width")}
+        values["harmonics"] = float(len(harmonics))
         at = ", ".join(f"{line.frequency:.4g}" for line in harmonics)
-        also = f", with harmonics at {at} Hz" if harmonics else ""
-        amplitude, times = readable(main.amplitude, unit), brief(main.ratio, 3)
-        notices.append(
-            notice(
-                "line", name, values, severity="warning", shown=amplitude, times=times, also=also
-            )
-        )
-    rest = families[tuning.NAMED_LINES :]
-    if rest:
-        strongest = rest[0][0]
-        values = {
-            "count": float(len(rest)),
-            "frequency": strongest.frequency,
-            "amplitude": strongest.amplitude,
-        }
-        amplitude = readable(strongest.amplitude, unit)
-        notices.append(notice("line", name, values, variant="weak", hint="", shown=amplitude))
+        words = {"also": f", with harmonics at {at} Hz" if harmonics else ""}
+        words |= {"shown": readable(main.amplitude, unit), "times": brief(main.ratio, 3)}
+        notices.append(notice("line", name, values, severity="warning", **words))
+    if rest := families[tuning.NAMED_LINES :]:
+        main, count = rest[0][0], float(len(rest))
+        values = {"count": count, "frequency": main.frequency, "amplitude": main.amplitude}
+        shown = readable(main.amplitude, unit)
+        notices.append(notice("line", name, values, variant="weak", hint="", shown=shown))
     return notices
 
 
@@ -116,11 +100,8 @@ def _local_background(density: FloatArray, smooth: FloatArray) -> tuple[FloatArr
     """
     k = np.arange(density.size)
     reach = np.maximum(tuning.BESIDE_LINE, (tuning.BESIDE_LINE_FRACTION * k).astype(int))
-    low, high = (
-        np.maximum(k - reach, tuning.FIRST_BIN // 2),
-        np.minimum(k + reach + 1, density.size - 1),
-    )
-    low = np.minimum(low, high - 1)
+    high = np.minimum(k + reach + 1, density.size - 1)
+    low = np.minimum(np.maximum(k - reach, tuning.FIRST_BIN // 2), high - 1)
     count = high - low
     logs = np.log(np.maximum(density / smooth, np.finfo(float).tiny)) + np.euler_gamma
     level = np.zeros(density.size)
@@ -153,13 +134,7 @@ def _scores(
     start: int,
     stop: int,
 ) -> tuple[FloatArray, IntArray]:
-    """Largest ratio to the limit over all widths, and the width that has it, of some bins.
-
-    ratio: (n // 2 + 1,), density over background.
-    freedom: (n // 2 + 1,), degrees of freedom of the background.
-    grid, limits: (K,) and dict, see `_limits`.
-    start, stop: Bins.
-    """
+    """Largest ratio to the limit over all widths, and the width that has it, of some bins."""
     last = ratio.size - 1
     widths = np.array(list(limits))
     low, high = max(start - int(widths[-1]), 0), min(stop + int(widths[-1]), last)

@@ -9,8 +9,8 @@ import numpy as np
 
 from gmwm._core.typing import known_of
 from gmwm.diagnosis import tuning
-from gmwm.diagnosis.channel import Examined, Held
 from gmwm.diagnosis.health import Repetition
+from gmwm.diagnosis.innovations import Examined, Held
 from gmwm.diagnosis.resolution import step_size
 from gmwm.diagnosis.samples import is_dithered, stuck
 from gmwm.issues import Notice, Severity, notice

@@ -10,7 +10,7 @@ from gmwm._core.distributions import norm
 from gmwm._core.text import brief, readable
 from gmwm._core.typing import FloatArray, inner
 from gmwm.diagnosis import tuning
-from gmwm.diagnosis.channel import Examined
+from gmwm.diagnosis.innovations import Examined
 from gmwm.issues import Notice, Severity, notice
 
 _SMALLEST = 1e-9  # of the range: what is smaller is the rounding of floating point

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 
 import numpy as np
 
@@ -59,18 +59,17 @@ def find_resonances(
         return ()
     median_error = 0.5 * np.pi * np.mean(found.variance) / min(25, count)
     limit = norm.isf(tuning.FALSE_ALARM / count) * np.sqrt(found.variance + median_error)
-    excess = np.where(
-        (height > np.maximum(limit, np.log(tuning.LEAST_PEAK)))
-        & (found.edges[:-1] >= tuning.SLOWEST_BIN),
-        height,
-        0.0,
-    )
+    stands_out = height > np.maximum(limit, np.log(tuning.LEAST_PEAK))
+    excess = np.where(stands_out & (found.edges[:-1] >= tuning.SLOWEST_BIN), height, 0.0)
     bumps: list[Bump] = []
     for _ in range(2 * tuning.MOST_RESONANCES):
         j = int(np.argmax(excess))
         if excess[j] <= 0.0 or len(bumps) == tuning.MOST_RESONANCES:
             break
-        start, stop = _sides(height, j)
+        low = np.flatnonzero(height[:j] < height[j] / 3.0)
+        high = np.flatnonzero(height[j + 1 :] < height[j] / 3.0)
+        start = int(low[-1]) + 1 if low.size else 0
+        stop = j + 1 + int(high[0]) if high.size else count
         excess[start:stop] = 0.0
         if start == 0 or stop == count:
             continue  # no peak: the spectrum only rises towards its end
@@ -82,23 +81,8 @@ def find_resonances(
 
 def resonance_notice(name: str, unit: str, bump: Bump) -> Notice:
     """Say where it is, how damped and how high."""
-    values = {
-        "frequency": bump.frequency,
-        "damping": bump.damping,
-        "ratio": bump.ratio,
-        "sigma": bump.sigma,
-    }
-    return notice(
-        "resonance", name, values, times=brief(bump.ratio), shown=readable(bump.sigma, unit)
-    )
-
-
-def _sides(height: FloatArray, j: int) -> tuple[int, int]:
-    """Bands around j that are higher than a third of it."""
-    low = np.flatnonzero(height[:j] < height[j] / 3.0)
-    high = np.flatnonzero(height[j + 1 :] < height[j] / 3.0)
-    start = int(low[-1]) + 1 if low.size else 0
-    return start, j + 1 + int(high[0]) if high.size else height.size
+    times, shown = brief(bump.ratio), readable(bump.sigma, unit)
+    return notice("resonance", name, asdict(bump), times=times, shown=shown)
 
 
 def _same(bump: Bump, other: Bump) -> bool:
@@ -115,18 +99,13 @@ def _fitted(
     f, power, weight = _points(spectrum, left_out, start, stop)
     level = float(np.interp(centre, spectrum.frequency, smooth))
     power = power / level
-    place = np.log(f / centre)
-
-    starts = (
-        np.array([0.0, np.log(damping), np.log(np.expm1(height)), 0.0, 0.0, 0.0])
-        for damping in tuning.DAMPING_STARTS
-    )
-    free, _ = min(
-        (_scored(start, f, power, weight, centre, spectrum.dt) for start in starts),
-        key=lambda result: result[1],
-    )
+    fits = []
+    for damping in tuning.DAMPING_STARTS:
+        first = np.array([0.0, np.log(damping), np.log(np.expm1(height)), 0.0, 0.0, 0.0])
+        fits.append(_scored(first, f, power, weight, centre, spectrum.dt))
+    free, _ = min(fits, key=lambda result: result[1])
     unit = _unit(free, centre, spectrum.dt)
-    bottom = float(np.interp(unit.frequency, f, _floor(free, place)))
+    bottom = float(np.interp(unit.frequency, f, _floor(free, np.log(f / centre))))
     peak = float(np.exp(free[2]))
     ratio = (bottom + peak) / bottom
     if ratio < tuning.LEAST_PEAK or not tuning.NARROWEST <= unit.damping <= tuning.WIDEST:
@@ -215,10 +194,8 @@ def peaks(values: FloatArray, dt: float) -> tuple[tuple[Line, ...], tuple[Bump, 
     dt: s.
     Returns: None of a series that is too short, or of which more than half is missing.
     """
-    if (
-        values.size < tuning.FEWEST_OF_SPECTRUM
-        or np.count_nonzero(~np.isnan(values)) < values.size / 2
-    ):
+    known = np.count_nonzero(~np.isnan(values))
+    if values.size < tuning.FEWEST_OF_SPECTRUM or known < values.size / 2:
         return (), ()
     power = spectrum(values, dt)
     if not np.any(power.density > 0.0):

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
+from scipy.special import erf
 
 from gmwm._core.distributions import binom
 from gmwm._core.text import brief, readable
-from gmwm._core.typing import BoolArray, FloatArray, IntArray
+from gmwm._core.typing import FloatArray, IntArray
 from gmwm.diagnosis import tuning
-from gmwm.diagnosis.channel import Examined
+from gmwm.diagnosis.innovations import Examined
 from gmwm.issues import Notice, Severity, notice
 from gmwm.readers import Channel, Missing, Recording
 
@@ -37,11 +38,10 @@ def gap_notices(channels: Sequence[Channel], dt: float) -> list[Notice]:
             hint = "too few are left: record again" if share < 1.0 else "check cable and columns"
         elif share > tuning.MUCH_MISSING:
             severity = "warning"
-        variant = "all" if share == 1.0 else ""
-        one = notice(
-            "gap", channel.name, values, severity=severity, variant=variant, hint=hint, n=channel.n
+        name, variant, n = channel.name, "all" if share == 1.0 else "", channel.n
+        found.append(
+            notice("gap", name, values, severity=severity, variant=variant, hint=hint, n=n)
         )
-        found.append(one)
     if len(found) == len(channels) > 1 and all(one.values == found[0].values for one in found):
         return [replace(found[0], where="")]
     return found
@@ -50,24 +50,11 @@ def gap_notices(channels: Sequence[Channel], dt: float) -> list[Notice]:
 def length(recording: Recording) -> Iterator[Notice]:
     """Say how long a recording is, and whether that is short."""
     n, rate = recording.n, recording.rate
-    is_short = n / rate < tuning.LONG_RECORD
-    yield notice(
-        "length",
-        "",
-        {"duration": n / rate, "rate": rate},
-        severity="note" if is_short else "good",
-        variant="short" if is_short else "",
-        hint=None if is_short else "",
-        n=n,
-    )
-
-
-def dead_notice(channel: Channel) -> Notice | None:
-    """Say that a channel never changes."""
-    if channel.missing == channel.n or not channel.is_constant:
-        return None
-    value = readable(channel.mean, channel.unit, digits=6)
-    return notice("dead", channel.name, {"value": channel.mean}, shown=value)
+    values = {"duration": n / rate, "rate": rate}
+    if n / rate < tuning.LONG_RECORD:
+        yield notice("length", "", values, severity="note", variant="short", n=n)
+    else:
+        yield notice("length", "", values, severity="good", hint="", n=n)
 
 
 def is_dithered(values: FloatArray, step: float) -> bool:
@@ -76,7 +63,8 @@ def is_dithered(values: FloatArray, step: float) -> bool:
     values: (n,), samples in their order, none missing.
     step: To which they are rounded, u; 0 if they are not.
     """
-    free = _outside_runs(_run_lengths(values))
+    lengths = _run_lengths(values)
+    free = np.repeat(lengths < tuning.LONG_RUN, lengths)
     free = free[1:] & free[:-1]
     count = np.count_nonzero(free)
     if count < tuning.LONG_RUN:
@@ -94,11 +82,6 @@ def _run_lengths(values: FloatArray) -> IntArray:
     return np.diff(changes, prepend=0, append=values.size)
 
 
-def _outside_runs(lengths: IntArray) -> BoolArray:
-    """Whether each sample lies outside the long runs of equal ones."""
-    return np.repeat(lengths < tuning.LONG_RUN, lengths)
-
-
 def stuck(channel: Examined) -> Iterator[Notice]:
     """Find runs of equal samples longer than rounding explains.
 
@@ -108,25 +91,30 @@ def stuck(channel: Examined) -> Iterator[Notice]:
     somewhere in n samples therefore has a probability below n times the L-th power.
     """
     errors, series = channel.errors, channel.present
-    present = ~np.isnan(channel.values)
     if not is_dithered(series, channel.step):
         return
-    lengths = _run_lengths(series)
-    kept = present.copy()
-    kept[present] = _outside_runs(lengths)
-    kept &= errors.known
+    present, lengths = ~np.isnan(channel.values), _run_lengths(series)
+    kept = errors.known.copy()
+    kept[present] &= np.repeat(lengths < tuning.LONG_RUN, lengths)
     scale = 0.0
     if np.any(kept):
         usual = np.median(errors.scale[kept], overwrite_input=True)
         scale = float(np.sqrt(usual * np.std(errors.values[kept])))
-    longest = _longest_by_chance(series.size, channel.step, scale)
+    longest = 3  # equal numbers of a file with few digits
+    noise = np.sqrt(max(scale**2 - channel.step**2 / 12.0, 1e-3 * scale**2))
+    same = float(erf(channel.step / (2.0**1.5 * noise))) if noise > 0.0 else 1.0
+    if same >= 1.0:
+        return
+    if same > 0.0:
+        chance = np.log(tuning.FALSE_ALARM / series.size)
+        longest = max(int(np.ceil(chance / np.log(same))) + 1, longest)
     stuck = np.flatnonzero(lengths > longest)
     if not stuck.size:
         return
     worst = int(stuck[np.argmax(lengths[stuck])])
     total = int(np.sum(lengths[stuck]))
     start = int(np.sum(lengths[:worst]))
-    numbers = {
+    values = {
         "count": float(stuck.size),
         "longest": float(lengths[worst]),
         "time": float(np.flatnonzero(present)[start]) * channel.dt,
@@ -134,29 +122,9 @@ def stuck(channel: Examined) -> Iterator[Notice]:
         "samples": float(total),
     }
     severity: Severity = "bad" if total > tuning.MUCH_MISSING * series.size else "warning"
-    yield notice(
-        "stuck",
-        channel.name,
-        numbers,
-        severity=severity,
-        variant="often" if stuck.size > 1 else "",
-        shown=readable(numbers["value"], channel.unit, digits=5),
-        chance=longest,
-    )
-
-
-def _longest_by_chance(n: int, step: float, scale: float) -> int:
-    """Longest run of equal samples that noise of some standard deviation has by chance."""
-    from scipy.special import erf
-
-    noise = np.sqrt(max(scale**2 - step**2 / 12.0, 1e-3 * scale**2))
-    same = float(erf(step / (2.0**1.5 * noise))) if noise > 0.0 else 1.0
-    if same >= 1.0:
-        return n
-    fewest = 3  # equal numbers of a file with few digits
-    if same <= 0.0:
-        return fewest
-    return max(int(np.ceil(np.log(tuning.FALSE_ALARM / n) / np.log(same))) + 1, fewest)
+    shown = {"shown": readable(values["value"], channel.unit, digits=5)}
+    variant, name = "often" if stuck.size > 1 else "", channel.name
+    yield notice("stuck", name, values, severity=severity, variant=variant, chance=longest, **shown)
 
 
 def cut_off_or_abrupt_end(channel: Examined) -> Iterator[Notice]:
@@ -197,15 +165,10 @@ def _cut_off(channel: Examined) -> Iterator[Notice]:
         return
     count = sum(ends.values())
     of_noise = sum(np.count_nonzero(np.abs(channel.noise - end) <= half * step) for end in ends)
-    is_harmful = of_noise > tuning.FALSE_ALARM * values.size
+    severity: Severity = "bad" if of_noise > tuning.FALSE_ALARM * values.size else "warning"
     numbers = {"samples": float(count), "share": count / values.size}
-    yield notice(
-        "saturation",
-        channel.name,
-        numbers | {"lowest": lowest, "highest": highest},
-        severity="bad" if is_harmful else "warning",
-        ends=" and ".join(readable(end, channel.unit, digits=5) for end in ends),
-    )
+    numbers |= {"lowest": lowest, "highest": highest}
+    yield notice("saturation", channel.name, numbers, severity=severity, ends=_ends(channel, ends))
 
 
 def _abrupt_end(channel: Examined) -> Iterator[Notice]:
@@ -244,13 +207,14 @@ def _abrupt_end(channel: Examined) -> Iterator[Notice]:
             density += near.size / values.size / width * float(np.std(values))
     if not found:
         return
-    yield notice(
-        "abrupt-end",
-        channel.name,
-        {"lowest": min(found), "highest": max(found), "density": density},
-        severity="bad" if density > tuning.HARMFUL_END else "warning",
-        ends=" and ".join(readable(end, channel.unit, digits=5) for end in sorted(found)),
-    )
+    severity: Severity = "bad" if density > tuning.HARMFUL_END else "warning"
+    numbers = {"lowest": min(found), "highest": max(found), "density": density}
+    ends = _ends(channel, sorted(found))
+    yield notice("abrupt-end", channel.name, numbers, severity=severity, ends=ends)
+
+
+def _ends(channel: Examined, ends: Iterable[float]) -> str:
+    return " and ".join(readable(end, channel.unit, digits=5) for end in ends)
 
 
 def repeated_value(channel: Examined) -> Iterator[Notice]:
@@ -274,15 +238,15 @@ def repeated_value(channel: Examined) -> Iterator[Notice]:
         yield from _cut_towards_zero(channel)
         return
     value, count = float(levels[most]), int(np.count_nonzero(values == levels[most]))
-    share = count / values.size
-    yield notice(
-        "value-repeated",
-        channel.name,
-        {"value": value, "samples": float(count), "share": share},
-        severity="bad" if share > tuning.MUCH_REPEATED else "warning",
-        shown=readable(value, channel.unit, digits=5),
-        times=brief(counts[most] / near),
-    )
+    shown, times = readable(value, channel.unit, digits=5), brief(counts[most] / near)
+    yield _repeated(channel, value, count, shown=shown, times=times)
+
+
+def _repeated(channel: Examined, value: float, count: float, **words: str) -> Notice:
+    share = float(count) / channel.present.size
+    values = {"value": value, "samples": float(count), "share": share}
+    severity: Severity = "bad" if share > tuning.MUCH_REPEATED else "warning"
+    return notice("value-repeated", channel.name, values, severity=severity, **words)
 
 
 def _cut_towards_zero(channel: Examined) -> Iterator[Notice]:
@@ -303,9 +267,5 @@ def _cut_towards_zero(channel: Examined) -> Iterator[Notice]:
     error = np.sqrt(1.0 / zeros + 2.0 / one + 0.5 / two)
     if np.log(zeros * two / one**2) - 3.0 * error < np.log(tuning.CUT_TO_ZERO):
         return
-    numbers = {"value": 0.0, "samples": float(zeros), "share": zeros / values.size}
     hint = "round to the nearest step before the conversion to integers"
-    severity: Severity = "bad" if numbers["share"] > tuning.MUCH_REPEATED else "warning"
-    yield notice(
-        "value-repeated", channel.name, numbers, severity=severity, variant="cut", hint=hint
-    )
+    yield _repeated(channel, 0.0, zeros, variant="cut", hint=hint)

@@ -98,16 +98,19 @@ def bands(spectrum: Spectrum, left_out: BoolArray | None = None) -> Bands:
     counts = np.add.reduceat(used, edges[:-1])[: edges.size - 1]
     counts[-1] -= np.sum(used[edges[-1] :])
     kept = counts >= 0.5 * np.diff(edges)
-    if not np.all(kept):
-        # A band that is nearly all line takes the level of its neighbours.
-        places = np.arange(kept.size)
-        level = np.interp(places, places[kept], sums[kept] / counts[kept])
-        counts = np.where(kept, counts, 0.5 * np.diff(edges))
-    else:
-        level = sums / counts
+    # A band that is nearly all line takes the level of its neighbours.
+    places = np.arange(kept.size)
+    level = np.interp(places, places[kept], sums[kept] / counts[kept])
+    counts = np.where(kept, counts, 0.5 * np.diff(edges))
     middle = np.sqrt(edges[:-1] * (edges[1:] - 1.0)) * spectrum.resolution
     variance = _LOG_VARIANCE * POWER_INFLATION / counts
-    return Bands(edges, middle, level, variance, _running_median(level))
+    # Running median over an octave; beyond the ends the curve goes on turned by 180 degrees.
+    reach = min(_HALF_OCTAVE, level.size - 1)
+    before = 2.0 * np.median(level[:3]) - level[reach:0:-1]
+    after = 2.0 * np.median(level[-3:]) - level[-2 : -reach - 2 : -1]
+    longer = np.concatenate([before, level, after])
+    windows = np.lib.stride_tricks.sliding_window_view(longer, 2 * reach + 1)
+    return Bands(edges, middle, level, variance, np.asarray(np.median(windows, axis=1)))
 
 
 def background(spectrum: Spectrum, found: Bands) -> FloatArray:
@@ -120,20 +123,8 @@ def _edges(last: int) -> IntArray:
     """Bins at which bands begin: a 24th of an octave, but eight bins at least."""
     edges = [4]
     while edges[-1] < last:
-        width = max(
-            tuning.FEWEST_IN_BAND, round(edges[-1] * (2.0 ** (1.0 / tuning.BANDS_PER_OCTAVE) - 1.0))
-        )
-        edges.append(edges[-1] + width)
+        width = round(edges[-1] * (2.0 ** (1.0 / tuning.BANDS_PER_OCTAVE) - 1.0))
+        edges.append(edges[-1] + max(tuning.FEWEST_IN_BAND, width))
     if edges[-1] > last:
         edges.pop()
     return np.array(edges)
-
-
-def _running_median(level: FloatArray) -> FloatArray:
-    """Median over an octave; beyond the ends the curve goes on turned by 180 degrees."""
-    reach = min(_HALF_OCTAVE, level.size - 1)
-    before = 2.0 * np.median(level[:3]) - level[reach:0:-1]
-    after = 2.0 * np.median(level[-3:]) - level[-2 : -reach - 2 : -1]
-    longer = np.concatenate([before, level, after])
-    windows = np.lib.stride_tricks.sliding_window_view(longer, 2 * reach + 1)
-    return np.asarray(np.median(windows, axis=1))

@@ -24,8 +24,7 @@ from scipy.optimize import brentq, minimize
 from gmwm._core.distributions import binom, gennorm, norm, student
 from gmwm._core.typing import FloatArray, inner
 from gmwm.diagnosis import tuning
-from gmwm.diagnosis.channel import Examined, Spans
-from gmwm.diagnosis.innovations import Innovations
+from gmwm.diagnosis.innovations import Examined, Innovations, Spans
 from gmwm.issues import Notice, notice
 
 _NOISE = 2.0 * float(norm.sf(tuning.FAR))  # share of Gaussian noise beyond

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
-from gmwm._core.tables import plain_table
+from gmwm._core.tables import cell, plain_table
 from gmwm._core.units import si_parameter_unit
 from gmwm.export.imu import Axis, ImuNumbers, Triad
 
@@ -75,7 +75,15 @@ def below(imu: ImuNumbers, convention: str) -> list[str]:
             "shared: for all axes of a sensor, which this file holds; the others: of each axis by "
             "itself, which it does not hold"
         )
-        if any(_is_traded(triad) for triad in imu.triads):
+        has_more = (
+            getattr(axis, letter) > 1.0005 * getattr(triad, letter)
+            for triad in imu.triads
+            if triad.shared_nees is not None
+            for axis in triad.axes
+            for letter in "NK"
+            if letter not in axis.upper
+        )
+        if any(has_more):
             texts.append(
                 "where an axis has more of N or K than all share it has less of the other: use N "
                 "and K as a pair, neither pair is overconfident"
@@ -120,11 +128,13 @@ def _table(imu: ImuNumbers, triad: Triad) -> list[str]:
         rows.append(["shared", *_values(triad, upper, keys), *[""] * 2 * len(times)])
     for axis in triad.axes:
         row = [plain(axis.name), *_values(axis, axis.upper, keys)]
+        together = (shared or {}).get(axis.name, {})
         for time in times:
-            row += [] if shared is None else [_nees(shared.get(axis.name, {}), time)]
-            row.append(_nees(axis.nees, time))
+            own = axis.nees.get(time)
+            row += [cell(own, 3)] if shared is None else [cell(together.get(time), 3), cell(own, 3)]
         rows.append(row)
-    units = ", ".join(f"{key} [{_unit(unit, triad.quantity)}]" for key, unit in columns)
+    units = ", ".join(f"{key} [{si_parameter_unit(u, triad.quantity)}]" for key, u in columns)
+    units = units.replace("rad/s/s/", "rad/s^2/").replace("m/s^2/s/", "m/s^3/")
     title = f"{triad.quantity}: {units}"
     title += "; NEES" if shared is not None and times else ""
     return [*wrapped(title), *plain_table(heads, rows).splitlines()]
@@ -134,22 +144,3 @@ def _values(of: Axis | Triad, upper: frozenset[str], keys: Sequence[str]) -> lis
     """Numbers as they are shown; upper limits have a sign before them."""
     values = {key: of.initial_sd if key == "start" else getattr(of, key) for key in keys}
     return [f"{'< ' if key in upper else ''}{value:.3e}" for key, value in values.items()]
-
-
-def _nees(found: Mapping[float, float], time: float) -> str:
-    return f"{found[time]:.3g}" if time in found else "-"
-
-
-def _is_traded(triad: Triad) -> bool:
-    """Whether an axis has more of one number than all share, and less of the other."""
-    return triad.shared_nees is not None and any(
-        getattr(axis, letter) > 1.0005 * getattr(triad, letter)
-        for axis in triad.axes
-        for letter in "NK"
-        if letter not in axis.upper
-    )
-
-
-def _unit(unit: str, quantity: str) -> str:
-    text = si_parameter_unit(unit, quantity)
-    return text.replace("rad/s/s/", "rad/s^2/").replace("m/s^2/s/", "m/s^3/")

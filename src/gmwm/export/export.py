@@ -15,11 +15,8 @@ from gmwm._core.files import writable_file
 from gmwm.calibration import Calibration
 from gmwm.errors import InputError
 from gmwm.export.keys import Keys, Pair, entries
-from gmwm.export.programs.gtsam import Gtsam, GtsamCpp
-from gmwm.export.programs.json_files import Basalt, Glim
+from gmwm.export.programs.filters import Basalt, Glim, Gtsam, GtsamCpp, KfGins, Ros
 from gmwm.export.programs.keyed import KEYED
-from gmwm.export.programs.kfgins import KfGins
-from gmwm.export.programs.ros import Ros
 from gmwm.export.programs.simulators import Gazebo, GnssInsSim, Matlab, PyIns
 from gmwm.export.programs.state_space import StateSpaceFile
 from gmwm.export.target import Target

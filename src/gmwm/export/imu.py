@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -114,23 +114,25 @@ class Triad:
 
     def xyz(self) -> tuple[Axis, ...]:
         """Axes x, y, z; one that was not calibrated has the largest numbers of the others."""
-        by_letter = dict(zip(_letters([axis.name for axis in self.axes]), self.axes, strict=True))
-        tau = _common_tau(self.axes)
-        moved = [axis.moved(tau) if axis.tau > 0.0 else axis for axis in self.axes]
-        largest = Axis(
-            "",
-            self.N,
-            self.K,
-            max(axis.sigma for axis in moved),
-            tau,
-            self.initial_sd,
-            rate=self.rate,
-            upper=frozenset().union(*(axis.upper for axis in self.axes)),
-        )
+        ends = [axis.name[-1:].lower() for axis in self.axes]
+        is_named = set(ends) <= set(LETTERS) and len(set(ends)) == len(ends)
+        letters = ends if is_named else LETTERS[: len(ends)]
+        by_letter = dict(zip(letters, self.axes, strict=True))
+        known = [axis.tau for axis in self.axes if axis.tau > 0.0]
+        # To this correlation time all can be moved at the least cost to the one it costs most.
+        tau = float(np.sqrt(min(known) * max(known))) if known else float("nan")
+        sigma = max((a.moved(tau) if a.tau > 0.0 else a).sigma for a in self.axes)
+        upper = frozenset().union(*(axis.upper for axis in self.axes))
+        values = (self.N, self.K, sigma, tau, self.initial_sd)
+        largest = Axis("", *values, rate=self.rate, upper=upper)
         return tuple(
             by_letter.get(letter, replace(largest, name=f"{self.quantity}_{letter}"))
             for letter in LETTERS
         )
+
+    def listed(self, value: Callable[[Axis], float]) -> str:
+        """A value of each axis as a list of Python, YAML or JSON."""
+        return f"[{', '.join(f'{value(axis):.6e}' for axis in self.xyz())}]"
 
 
 @dataclass(frozen=True)
@@ -168,27 +170,8 @@ class ImuNumbers:
 
     @property
     def rate(self) -> float:
-        """The higher of the two sensors' rates, Hz, at which a common message is sent.
-
-        Raises
-        ------
-        InputError
-            If it is not known.
-        """
+        """The higher of the two sensors' rates, Hz; raises InputError if it is not known."""
         rate = max(self.gyro.rate, self.accel.rate)
         if not rate > 0.0:
             raise InputError(NO_RATE)
         return rate
-
-
-def _common_tau(axes: Sequence[Axis]) -> float:
-    """The correlation time to which all can be moved at the least cost to the one it costs most."""
-    known = [axis.tau for axis in axes if axis.tau > 0.0]
-    return float(np.sqrt(min(known) * max(known))) if known else float("nan")
-
-
-def _letters(names: Sequence[str]) -> list[str]:
-    """The axis of each channel: the last letter of its name, or its place."""
-    ends = [name[-1:].lower() for name in names]
-    named = set(ends) <= set(LETTERS) and len(set(ends)) == len(ends)
-    return ends if named else list(LETTERS[: len(names)])

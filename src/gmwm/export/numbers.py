@@ -118,8 +118,8 @@ def imu_of(
     calibrations = [each for each in given if isinstance(each, Calibration)]
     fits = {name: fit for each in calibrations for name, fit in each.items()}
     axes = {
-        name: axis_of(name, one, _rate(source, each, name), fits.get(name), tau)
-        for source, each in zip(given, numbers, strict=True)
+        name: axis_of(name, one, each.rate, fits.get(name), tau)
+        for each in numbers
         for name, one in each.items()
     }
     gyro, accel = (_triad(quantity, numbers, axes, form) for quantity in SENSORS)
@@ -127,25 +127,11 @@ def imu_of(
         gyro, accel = (_with_shared(t, given, numbers, fits, form) for t in (gyro, accel))
     if outlook is None:
         outlook = _outlook(calibrations) if len(calibrations) == len(given) else {}
-    return ImuNumbers(
-        gyro=gyro,
-        accel=accel,
-        form=form,
-        horizon=horizons[0],
-        method=next(one.method for each in numbers for one in each.values()),
-        sources=tuple(map(_source, numbers)),
-        outlook=outlook,
-        remarks=_remarks(given, numbers),
-        cautions=_remarks(given, numbers, cautions=True),
-        topic=_topic(calibrations),
-    )
-
-
-def _rate(source: Any, numbers: SensorNumbers, name: str) -> float:
-    """Sampling rate of a channel, Hz."""
-    if isinstance(source, Calibration) and not source.has_one_rate:
-        return 1.0 / source[name].wv.dt
-    return numbers.rate
+    method = next(one.method for each in numbers for one in each.values())
+    about = (tuple(map(_source, numbers)), outlook)
+    remarks = (_remarks(given, numbers), _remarks(given, numbers, cautions=True))
+    topic = _topic(calibrations)
+    return ImuNumbers(gyro, accel, form, horizons[0], method, *about, *remarks, topic)
 
 
 def _triad(
@@ -204,19 +190,12 @@ def axis_of(
 ) -> Axis:
     """An axis by its numbers; consumers reject zeros, so upper limits of its fit replace them."""
     sigma, own = (values[0] if values else float("nan") for values in (numbers.sigma, numbers.tau))
-    axis = Axis(
-        name,
-        numbers.N,
-        numbers.K,
-        sigma,
-        own,
-        numbers.initial_sd,
-        dict(numbers.nees),
-        rate,
-        notices=numbers.notices,
-    )
+    values = (numbers.N, numbers.K, sigma, own, numbers.initial_sd, dict(numbers.nees))
+    axis = Axis(name, *values, rate, notices=numbers.notices)
     if fitted is None:
         return axis
+    if not rate > 0.0:  # channels of several rates
+        axis = replace(axis, rate=1.0 / fitted.wv.dt)
     if axis.N <= 0.0:
         axis = replace(axis, N=noise_density(fitted).value, upper=axis.upper | {"N"})
     if "K" in numbers.form and axis.K <= 0.0:

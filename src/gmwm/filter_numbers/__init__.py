@@ -20,13 +20,13 @@ from gmwm.filter_numbers.budget import (
     per_si as per_si,
     root_sum as root_sum,
 )
-from gmwm.filter_numbers.certificate import (
+from gmwm.filter_numbers.certify import (
     CONSUMERS as CONSUMERS,
     Cause as Cause,
     Certificate as Certificate,
     Check as Check,
+    certify as certify,
 )
-from gmwm.filter_numbers.certify import certify as certify
 from gmwm.filter_numbers.imperfections import Imperfections as Imperfections, Motion as Motion
 from gmwm.filter_numbers.propagation import Chain as Chain, ChainErrors as ChainErrors
 from gmwm.filter_numbers.reduce import reduce as reduce

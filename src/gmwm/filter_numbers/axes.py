@@ -86,10 +86,6 @@ class AxisModel:
         is_heading = self.quantity == "gyro" and self.name.endswith("_z")
         return Chain.usual("" if is_heading else self.quantity)
 
-    def between(self, keyframe: float) -> Chain:
-        """The filter of relative poses, an interval (s) apart."""
-        return Chain.of_poses(self.quantity, keyframe)
-
 
 @dataclass(frozen=True, eq=False)
 class SensorAxes:
@@ -190,7 +186,6 @@ def given_outages(outages: Sequence[float]) -> list[float]:
 
 
 def _axis(name: str, item: object, dt: float | None, bias_sd: Sd) -> AxisModel:
-    fit = item if isinstance(item, Fit) else None
     if not isinstance(item, Process | Model | Fit):
         raise InputError(f"{name}: {checks.shown(item)} is not an error model")
     model = item.model if isinstance(item, Fit) else as_model(item)
@@ -200,6 +195,7 @@ def _axis(name: str, item: object, dt: float | None, bias_sd: Sd) -> AxisModel:
             f"{name or 'the model'} has free parameters ({', '.join(missing)}): give them a "
             "value, or estimate them with gmwm.fit"
         )
+    fit = item if isinstance(item, Fit) else None
     if fit is not None:
         step, quantity = fit.wv.dt, fit.wv.quantity or ""
     else:

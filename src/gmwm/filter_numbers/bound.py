@@ -137,7 +137,14 @@ def bound_of(
     for axis, target, found, best in zip(group, problem.targets, errors, tight, strict=True):
         notices = list(target.notices)
         notices += _overconfidence(axis, model, sd, horizon) if target.notices else []
-        notices += [] if best is None else _looseness(found[0], best)
+        if best is not None and found[0].tightness > tuning.LOOSE:
+            values = {"tightness": found[0].tightness, "with_state": best.tightness}
+            is_worth = best.tightness <= found[0].tightness / tuning.WORTH_A_STATE
+            hint = f"use {TIGHTEST} where the filter has a state for it" if is_worth else ""
+            time = found[0].time
+            notices.append(
+                notice("loose-form", "", values, hint=hint, time=time, tightest=TIGHTEST)
+            )
         notices += covered_terms_notices(axis, target, model, problem.targets)
         notices += fit_notices(axis, level)
         about = (form, model, horizon, sd, "bound", found, tuple(notices), axis.quantity, stderr)
@@ -186,11 +193,7 @@ def predicted(
 
 
 def judged(source: One | Several, numbers: FilterNumbers) -> FilterNumbers:
-    """The same numbers with the predictions where an error model is the truth.
-
-    source: The error model of the axis; as a mapping, with its name.
-    numbers: Of any origin; the times of its predictions are kept.
-    """
+    """The same numbers with the predictions where an error model is the truth, at their times."""
     axis = SensorAxes.of(source, None, 0.0).axes[0]
     times = [each.time for each in numbers.predicted]
     found = predicted(axis, axis.chain, numbers.model, numbers.initial_sd, times)
@@ -207,20 +210,11 @@ def _overconfidence(axis: AxisModel, model: Model, sd: float, horizon: float) ->
     worst = max(unaided(tuning.SUSPECT))
     if worst[0] <= tuning.OPTIMISTIC:  # not NaN, where nothing is predicted
         usual = axis.chain
-        (pose, *_), fixed = (
-            chain.errors(
-                axis.model,
-                model,
-                axis.dt,
-                [horizon],
-                true_sd=axis.bias_sd,
-                believed_sd=sd,
-                every_fix=chain is usual,
-            ).nees()
-            for chain in (axis.between(horizon), usual)
-        )
+        given, starts = (axis.model, model, axis.dt, [horizon]), (axis.bias_sd, sd)
+        poses = Chain.of_poses(axis.quantity, horizon).errors(*given, *starts)
+        fixed = usual.errors(*given, *starts, every_fix=True).nees()
         worst = max(
-            (float(pose), horizon, f"between keyframes every {horizon:g} s"),
+            (float(poses.nees()[0]), horizon, f"between keyframes every {horizon:g} s"),
             (float(np.max(fixed[:-1])), 0.0, f"with a fix every {usual.interval:g} s"),
             *unaided(tuning.EARLY),
         )
@@ -230,23 +224,10 @@ def _overconfidence(axis: AxisModel, model: Model, sd: float, horizon: float) ->
     return [notice("optimistic", "", {"nees": nees, "time": time}, variant="bound", when=when)]
 
 
-def _looseness(found: Predicted, best: Predicted) -> list[Notice]:
-    """How conservative a form is, and whether another is worth its state."""
-    if found.tightness <= tuning.LOOSE:
-        return []
-    values = {"tightness": found.tightness, "with_state": best.tightness}
-    is_worth = best.tightness <= found.tightness / tuning.WORTH_A_STATE
-    hint = f"use {TIGHTEST} where the filter has a state for it" if is_worth else ""
-    return [notice("loose-form", "", values, hint=hint, time=found.time, tightest=TIGHTEST)]
-
-
 def covered_terms_notices(
     axis: AxisModel, target: RequiredSpectrum, model: Model, sharing: Sequence[RequiredSpectrum]
 ) -> list[Notice]:
-    """The terms that N and K cover beside white noise and a random walk, where they are needed.
-
-    sharing: Spectra of the axes that share the numbers; needs of another axis are not explained.
-    """
+    """The terms that N and K cover beside white noise and a random walk, where they are needed."""
     f = target.frequencies(tuning.POINTS)
     need, believed = target.psd(f), model.psd(f, axis.dt)
     alike = np.minimum(need / believed, believed / need)

@@ -168,8 +168,6 @@ class ErrorBudget:
             and quantity in (None, row.quantity)
         ]
 
-    # -- looks ------------------------------------------------------------------------------------
-
     def __str__(self) -> str:
         lines = [
             "Error (1 sigma) after free inertial coasting, level and not manoeuvring, from",
@@ -357,7 +355,18 @@ def error_budget(
         )
     steps = {name: _interval(name, item, dt) for name, item in known.items()}
     longest = max(steps.values())
-    chosen = _checked(times, longest)
+    try:
+        rising = np.unique(np.asarray(times, dtype=float))
+    except (TypeError, ValueError):
+        rising = np.zeros(0)
+    if rising.size == 0 or not np.all(np.isfinite(rising)):
+        raise InputError(f"times = {times!r}: give numbers of seconds, e.g. (1, 60)")
+    if rising[0] < longest * (1.0 - 1e-6):
+        raise InputError(
+            f"a coasting time of {rising[0]:g} s is shorter than the sampling interval of "
+            f"{longest:g} s: give longer times"
+        )
+    chosen = tuple(rising.tolist())
     first = chosen[0] if len(chosen) > 1 else max(0.01 * chosen[0], min(longest, chosen[0]))
     grid = tuple(np.geomspace(first, chosen[-1], _CURVE_POINTS).tolist())
     rows: list[ErrorRow] = []
@@ -392,22 +401,6 @@ def _interval(name: str, item: Process | Model | Fit, dt: float | None) -> float
     if not (np.isfinite(dt) and dt > 0.0):
         raise InputError(f"dt = {dt!r}: give a positive sampling interval in seconds")
     return float(dt)
-
-
-def _checked(times: Sequence[float], dt: float) -> tuple[float, ...]:
-    """Rising coasting times; raises InputError if there are none, or one is shorter than dt."""
-    try:
-        values = np.unique(np.asarray(times, dtype=float))
-    except (TypeError, ValueError):
-        values = np.zeros(0)
-    if values.size == 0 or not np.all(np.isfinite(values)):
-        raise InputError(f"times = {times!r}: give numbers of seconds, e.g. (1, 60)")
-    if values[0] < dt * (1.0 - 1e-6):
-        raise InputError(
-            f"a coasting time of {values[0]:g} s is shorter than the sampling interval of {dt:g} "
-            "s: give longer times"
-        )
-    return tuple(values.tolist())
 
 
 def _channel_rows(

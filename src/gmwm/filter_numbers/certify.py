@@ -3,24 +3,31 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
-from typing import Any
+from dataclasses import asdict, dataclass, replace
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import numpy as np
+from annotated_types import MaxLen, MinLen
 
 from gmwm._core import checks
+from gmwm._core.documents import Document, NoneIs, NotNegative, Text
+from gmwm._core.tables import cell, frame, plain_table
+from gmwm._core.text import Printed, bullets, wrapped
 from gmwm._core.units import SI_UNIT
 from gmwm.errors import InputError
 from gmwm.filter_numbers import tuning
 from gmwm.filter_numbers.axes import AxisModel, One, Sd, SensorAxes, Several, given_outages
 from gmwm.filter_numbers.bound import bound_of
-from gmwm.filter_numbers.certificate import Cause, Certificate, Check
 from gmwm.filter_numbers.imperfections import Imperfections, Motion
-from gmwm.filter_numbers.result import FilterNumbers, SensorNumbers
+from gmwm.filter_numbers.propagation import Chain
+from gmwm.filter_numbers.result import FilterNumbers, SensorNumbers, shown_unit
 from gmwm.ins import SensorModels, covariance_analysis, loiter_with_outages
 from gmwm.issues import Notice, notice
 from gmwm.process import Model, Process, RandomWalk, WhiteNoise, as_model
 from gmwm.readers import Recording
+
+if TYPE_CHECKING:
+    import pandas
 
 Given = FilterNumbers | SensorNumbers | Mapping[str, Any]
 """Numbers of all axes, or by axis or kind (gyro, accel): `FilterNumbers`, a model, or N and K."""
@@ -28,6 +35,158 @@ Given = FilterNumbers | SensorNumbers | Mapping[str, Any]
 _GRAVITY = 9.80665
 _INTEGRALS = {1: "angle", 2: "position", 3: "position by tilt"}
 _SHOWN = {1: ("deg", float(np.degrees(1.0))), 2: ("m", 1.0), 3: ("m", _GRAVITY)}
+
+
+CONSUMERS = {
+    "free": f"Without aiding, after {tuning.SETTLING:g} s of fixes every {tuning.FIX_INTERVAL:g} s",
+    "outage": "INS/GNSS filter, at the end of an outage",
+    "keyframes": "Relative pose between keyframes",
+}
+"""Users of the numbers."""
+
+_OrNaN = Annotated[NotNegative, NoneIs(float("nan"))]
+
+
+@dataclass(frozen=True)
+class Check:
+    """Predicted error beside the true one.
+
+    consumer: {"free", "outage", "keyframes"}.
+    where: The channel, or "horizontal".
+    quantity: Of the error.
+    time: Without aiding, s.
+    true, believed: Standard deviations.
+    nees: Normalised error squared per degree of freedom: of all integrals of a channel, or of the
+        position.
+    """
+
+    consumer: Text
+    where: Text
+    quantity: Text
+    unit: Text
+    time: NotNegative
+    true: _OrNaN
+    believed: _OrNaN
+    nees: _OrNaN
+
+
+@dataclass(frozen=True)
+class Cause:
+    """A cause of larger numbers of a kind of sensor.
+
+    quantity: {"gyro", "accel", ""}.
+    N, K: That dominate with it, for all axes, u/sqrt(Hz) and u/s/sqrt(Hz).
+    N_factor, K_factor: Of "error model" and "all together", over the numbers in use; of the others,
+        over those of the error model.
+    """
+
+    quantity: Text
+    name: Text
+    N: _OrNaN
+    K: _OrNaN
+    N_factor: _OrNaN
+    K_factor: _OrNaN
+
+
+@dataclass(frozen=True, repr=False)
+class Certificate(Document, Printed):
+    """How consistent a filter will be with given numbers, and why.
+
+    Attributes
+    ----------
+    numbers : SensorNumbers
+        In use.
+    recommended : SensorNumbers
+        With which a filter is never overconfident about the error model.
+    checks : tuple of Check
+    causes : tuple of Cause
+    notices : tuple of Notice
+    """
+
+    SCHEMA: ClassVar[str] = "gmwm.certificate"
+
+    numbers: SensorNumbers
+    recommended: SensorNumbers
+    checks: Annotated[tuple[Check, ...], MinLen(1), MaxLen(10_000)]
+    causes: Annotated[tuple[Cause, ...], MaxLen(1000)]
+    notices: tuple[Notice, ...] = ()
+
+    def of(self, consumer: str) -> tuple[Check, ...]:
+        """The checks of a consumer; see `CONSUMERS`."""
+        return tuple(check for check in self.checks if check.consumer == consumer)
+
+    @property
+    def worst(self) -> Check:
+        """The check with the largest NEES."""
+        return max(self.checks, key=lambda check: check.nees)
+
+    def __repr__(self) -> str:
+        worst = self.worst
+        return (
+            f"<Certificate of {self.numbers.source or 'numbers'}: NEES up to {worst.nees:.3g}, "
+            f"{worst.where} after {worst.time:g} s>"
+        )
+
+    def __str__(self) -> str:
+        return self.text()
+
+    def text(self, units: str = "field") -> str:
+        """The text of `print`, numbers in data-sheet units or, with ``"si"``, in SI.
+
+        Raises
+        ------
+        InputError
+            If the units are neither.
+        """
+        lines = [f"Numbers in use: {self.numbers.source or 'given'}"]
+        for consumer, title in CONSUMERS.items():
+            rows = []
+            for c in self.of(consumer):
+                about = [c.where, f"{c.quantity} [{c.unit}]", f"{c.time:g}"]
+                rows.append([*about, cell(c.true), cell(c.believed), cell(c.nees, 3)])
+            if rows:
+                heads = ["", "", "time [s]", "true", "believed", "NEES/dof"]
+                lines += ["", title, plain_table(heads, rows)]
+        for quantity in dict.fromkeys(cause.quantity for cause in self.causes):
+            lines += ["", *self._covered(quantity, units)]
+        if self.causes:
+            time = self.recommended.horizon
+            note = (
+                f"Each row below the first has N and K for {time:g} s without aiding that are "
+                "never overconfident for the error model together with the row's cause. The "
+                "factors are over those in use, and over those of the error model alone. Use N "
+                "and K as a pair: a factor can be below 1."
+            )
+            lines += ["", *wrapped(note)]
+        lines += bullets(self.notices)
+        return "\n".join([*lines, "", "Recommended: " + self.recommended.text(units)])
+
+    def _covered(self, quantity: str, units: str) -> list[str]:
+        """The table of causes of a kind of sensor: the first is in use, the second the model."""
+        causes = [cause for cause in self.causes if cause.quantity == quantity]
+        (N, n_scale), (K, k_scale) = (shown_unit(letter, quantity, units) for letter in "NK")
+        rows = [
+            [
+                cause.name,
+                cell(cause.N, scale=n_scale),
+                cell(cause.K, scale=k_scale),
+                *(
+                    cell(value / by if by > 0.0 else float("inf"), 3)
+                    for other in causes[:2]
+                    for value, by in ((cause.N, other.N), (cause.K, other.K))
+                ),
+            ]
+            for cause in causes
+        ]
+        over = [f"{letter} over\n{what}" for what in ("in use", "model") for letter in "NK"]
+        return [
+            f"{quantity or 'axis'}, all axes: N [{N}] and K [{K}] have to cover",
+            plain_table(["", "N", "K", *over], rows),
+        ]
+
+    def to_frame(self) -> pandas.DataFrame:
+        """A table of the checks; needs pandas."""
+        return frame((asdict(check) for check in self.checks), tuple(Check.__annotations__))
 
 
 def certify(
@@ -104,11 +263,7 @@ def certify(
 
 
 def _in_use(given: Given, axis: AxisModel, horizon: float, start: float) -> FilterNumbers:
-    """The numbers of one axis in use.
-
-    horizon, start: s, and standard deviation of the bias at the start (u), of numbers without.
-    Raises InputError if there are none for this axis.
-    """
+    """The numbers of one axis in use; those without a horizon (s) or start (u) get the given."""
     item: Any = given
     kind = axis.quantity or axis.name
     if isinstance(given, Mapping):
@@ -145,7 +300,7 @@ def _of_axis(
     result = []
     for consumer, chain, ends in (
         ("free", axis.chain, times),
-        ("keyframes", axis.between(keyframe), (keyframe,)),
+        ("keyframes", Chain.of_poses(axis.quantity, keyframe), (keyframe,)),
     ):
         errors = chain.worse(
             axis.model, believed.model, axis.dt, ends, axis.bias_sd, believed.initial_sd

@@ -8,7 +8,6 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from gmwm._core import checks
-from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.filter_numbers import tuning
 from gmwm.process import GaussMarkov, Process, WhiteNoise
@@ -57,7 +56,12 @@ class Motion:
                     f"{motion.source}: has no {kind} channel: give a recording of both"
                 )
             sizes.append(float(np.sqrt(np.mean([np.nanvar(values) for values in found]))))
-            memories += [_memory(values, 1.0 / motion.rate) for values in found]
+            for values in found:  # time after which the autocorrelation has fallen to 1/e
+                x = np.nan_to_num(values - np.nanmean(values))
+                correlation = np.fft.irfft(np.abs(np.fft.rfft(x, 2 * x.size)) ** 2)[: x.size]
+                below = np.flatnonzero(correlation < np.exp(-1.0) * correlation[0])
+                lag = float(below[0] if below.size else x.size)
+                memories.append(lag * (1.0 / motion.rate))
         return cls(sizes[0], sizes[1], float(np.median(memories)))
 
 
@@ -127,12 +131,3 @@ class Imperfections:
         if quantity == "accel" and rectified > 0.0:
             found["vibration rectification"] = GaussMarkov(rectified, tuning.VIBRATION_MEMORY)
         return found
-
-
-def _memory(values: FloatArray, dt: float) -> float:
-    """Time after which the autocorrelation of a series has fallen to 1/e, s."""
-    x = np.nan_to_num(values - np.nanmean(values))
-    spectrum = np.abs(np.fft.rfft(x, 2 * x.size)) ** 2
-    correlation = np.fft.irfft(spectrum)[: x.size]
-    below = np.flatnonzero(correlation < np.exp(-1.0) * correlation[0])
-    return float(below[0] if below.size else x.size) * dt

@@ -37,41 +37,21 @@ ComplexArray = npt.NDArray[np.complex128]
 def integral_rms(
     process: Process, times: Sequence[float], dt: float, *, known_start: bool
 ) -> FloatArray:
-    """Root mean square of the first, second and third integral of a process from zero to ``t``.
+    """Root mean square of the first, second and third integral of a process from zero to t, (3, T).
 
-    Parameters
-    ----------
-    process : Process
-        With all parameters given.
-    times : sequence of float
-        Seconds, each at least ``dt``.
-    dt : float
-        Sampling interval, s.
-    known_start : bool
-        Whether the states of the process are known at time zero: their initial covariance is then
-        zero, and the past of flicker noise is known. The phase of a line is known in neither case,
-        and a process that has a spectrum only is treated alike in both. Otherwise the process
-        starts as `Process.simulate` starts it: stationary, or at zero where it is not.
+    times: Seconds, each at least ``dt``.
+    known_start: Whether the states at time zero are known: their initial covariance is then zero,
+        and the past of flicker noise is known. The phase of a line is known in neither case, and a
+        process that has a spectrum only is treated alike in both. Otherwise the process starts as
+        `Process.simulate` starts it.
+    Returns: u s, u s^2 and u s^3. A deterministic drift counts by its absolute value.
+    Raises InputError if the process is known by simulation only, or its spectrum rises too fast
+        towards zero frequency.
 
-    Returns
-    -------
-    (3, T) ndarray
-        In u s, u s^2 and u s^3. A deterministic drift counts by its absolute value.
-
-    Raises
-    ------
-    InputError
-        If the process is known by simulation only, or its spectrum rises too fast towards zero
-        frequency.
-
-    Notes
-    -----
     With flicker noise S(f) = B^2/(2 pi f) of known past, the integral of order m is the
     Riemann-Liouville process of index m + 1/2 (Mandelbrot & Van Ness 1968, *SIAM Review* 10,
-    422-437): its variance is B^2 t^(2m) / (2m Gamma(m + 1/2)^2).
-
-    A spectrum is looked at in steps of some 1/(16 t): what has a narrower peak should give its
-    ``state_space``, or its line in ``lines``.
+    422-437): its variance is B^2 t^(2m) / (2m Gamma(m + 1/2)^2). A spectrum is looked at in steps
+    of some 1/(16 t): a narrower peak needs a ``state_space``, or a line in ``lines``.
     """
     t = np.asarray(times, dtype=float)
     if isinstance(process, BiasInstability):
@@ -90,9 +70,6 @@ def integral_rms(
     except InputError:
         return _from_spectrum(process, t, dt)
     return _from_states(form, t, dt, known=known_start and not process.lines())
-
-
-# -- by states ------------------------------------------------------------------------------------
 
 
 def _from_states(form: StateSpace, t: FloatArray, dt: float, *, known: bool) -> FloatArray:
@@ -123,9 +100,6 @@ def _steps(t: FloatArray, dt: float) -> tuple[list[int], FloatArray]:
     return [int(n) for n in whole], rest
 
 
-# -- by the spectrum ------------------------------------------------------------------------------
-
-
 def _from_spectrum(process: Process, t: FloatArray, dt: float) -> FloatArray:
     """2 int S(f) |G(f)|^2 df with the gain G of each integral, less G(0) for a start at zero."""
     # The rule by which a simulation decides whether it starts at zero.
@@ -151,9 +125,8 @@ def _from_spectrum(process: Process, t: FloatArray, dt: float) -> FloatArray:
                 "budget: give the process a state_space"
             )
         for place, amplitude in lines:
-            line = _squared_gain(
-                np.array([place]), np.ones(1), count, rest, dt, False, moment[:, i]
-            )
+            about = (count, rest, dt, False, moment[:, i])
+            line = _squared_gain(np.array([place]), np.ones(1), *about)
             variance += 0.5 * amplitude**2 * line[:, 0]
         result[:, i] = np.sqrt(variance + (process.drift_rate() * moment[:, i]) ** 2)
     return result

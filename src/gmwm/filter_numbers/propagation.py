@@ -80,9 +80,9 @@ class Chain:
         believed: Model,
         dt: float,
         times: Sequence[float],
-        *,
         true_sd: float = 0.0,
         believed_sd: float = 0.0,
+        *,
         every_fix: bool = False,
     ) -> ChainErrors:
         """Predicted and true errors of the integrals after some times without aiding.
@@ -142,8 +142,7 @@ class Chain:
     ) -> ChainErrors:
         """Elementwise worst of the errors of a chain and, of one integral, of its gain."""
         whole, *others = (
-            each.errors(truth, believed, dt, times, true_sd=true_sd, believed_sd=believed_sd)
-            for each in self.judged
+            each.errors(truth, believed, dt, times, true_sd, believed_sd) for each in self.judged
         )
         for gained in others:
             least = tuning.HIDDEN * np.maximum(whole.nees(), 1.0)[:, None, None]

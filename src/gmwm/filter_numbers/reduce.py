@@ -129,7 +129,7 @@ class _Search:
     is_relative: bool
 
     def chain(self, axis: AxisModel) -> Chain:
-        return axis.between(self.times[-1]) if self.is_relative else axis.chain
+        return Chain.of_poses(axis.quantity, self.times[-1]) if self.is_relative else axis.chain
 
     def required(self, group: Sequence[AxisModel]) -> tuple[RequiredSpectrum, ...]:
         longest = self.times[-1]

@@ -7,17 +7,16 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from annotated_types import MaxLen, MinLen
-from pydantic import Field
 
 from gmwm._core import checks
-from gmwm._core.documents import Document, NoneIs, NotNegative, Positive, Rate, Text, plain_schema
+from gmwm._core.documents import Document, NoneIs, NotNegative, Positive, Rate, Text
 from gmwm._core.frozen import freeze
 from gmwm._core.tables import cell, frame, plain_table
 from gmwm._core.text import WIDTH, Printed, bullets, wrapped
 from gmwm._core.units import SI_UNIT, field_units, si_parameter_unit
 from gmwm.errors import MissingNameError
 from gmwm.issues import Notice
-from gmwm.process import Model, model_from_list
+from gmwm.process import Model
 
 if TYPE_CHECKING:
     import pandas
@@ -33,21 +32,10 @@ UNITS = ("field", "si")
 
 _UNITS = {"N": "u/sqrt(Hz)", "K": "u/s/sqrt(Hz)", "sigma": "u", "tau": "s", "initial_sd": "u"}
 _NAN = float("nan")
-
-
-def _alias(key: str) -> Any:
-    """Mark of a field that has another key in documents."""
-    return Field(validation_alias=key, serialization_alias=key)
-
-
-class _StoredTerms:
-    """Mark of a model in a document: the list of its terms."""
-
-    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> Any:
-        def read(value: Any) -> Model:
-            return value if isinstance(value, Model) else model_from_list(value)
-
-        return plain_schema(read, lambda model: [term.to_dict() for term in model.terms])
+_PREDICTION = (
+    "NEES: predicted, per degree of freedom, after a time without aiding; sd: predicted over true "
+    "standard deviation then."
+)
 
 
 @dataclass(frozen=True)
@@ -95,10 +83,11 @@ class FilterNumbers(Document, Printed):
     """
 
     SCHEMA: ClassVar[str] = "gmwm.axis-numbers"
+    KEYS: ClassVar[Mapping[str, str]] = {"horizon": "horizon_s"}
 
     form: Text
-    model: Annotated[Model, _StoredTerms()]
-    horizon: Annotated[Positive, _alias("horizon_s")]
+    model: Model
+    horizon: Positive
     initial_sd: NotNegative
     method: Text
     predicted: Annotated[tuple[Predicted, ...], MaxLen(100)] = ()
@@ -213,15 +202,16 @@ class SensorNumbers(Mapping[str, FilterNumbers], Document, Printed):
     """
 
     SCHEMA: ClassVar[str] = "gmwm.filter-numbers"
+    KEYS: ClassVar[Mapping[str, str]] = {
+        "axes": "channels",
+        "rate": "rate_hz",
+        "duration": "duration_s",
+    }
 
-    axes: Annotated[Mapping[Text, FilterNumbers], MinLen(1), MaxLen(10_000), _alias("channels")]
+    axes: Annotated[Mapping[Text, FilterNumbers], MinLen(1), MaxLen(10_000)]
     source: Text = ""
-    rate: Annotated[Rate, NoneIs(_NAN), _alias("rate_hz")] = _NAN
-    duration: Annotated[
-        Positive,
-        NoneIs(_NAN),
-        Field(validation_alias="duration_s", serialization_alias="duration_s"),
-    ] = _NAN
+    rate: Annotated[Rate, NoneIs(_NAN)] = _NAN
+    duration: Annotated[Positive, NoneIs(_NAN)] = _NAN
     shared: bool = False
 
     def __post_init__(self) -> None:
@@ -282,13 +272,7 @@ class SensorNumbers(Mapping[str, FilterNumbers], Document, Printed):
         for quantity in dict.fromkeys(each.quantity for each in self.values()):
             lines += ["", *_tables(self.of(quantity), quantity, units)]
         if first.predicted:
-            lines += [
-                "",
-                *wrapped(
-                    "NEES: predicted, per degree of freedom, after a time without aiding; sd: "
-                    "predicted over true standard deviation then."
-                ),
-            ]
+            lines += ["", *wrapped(_PREDICTION)]
         if first.form != "N+GM":
             lines += wrapped("N and the slow terms belong together: use them as a pair.")
         places: dict[str, list[str]] = {}

@@ -12,13 +12,20 @@ from .filter.aiding import (
     gnss as gnss,
     standstills as standstills,
 )
-from .filter.filter import InitialSd as InitialSd, navigate as navigate
+from .filter.filter import (
+    FilterInnovations as FilterInnovations,
+    InitialSd as InitialSd,
+    Solution as Solution,
+    navigate as navigate,
+)
 from .filter.mechanization import integrate as integrate
-from .filter.solution import FilterInnovations as FilterInnovations, Solution as Solution
 from .imu.emulation import Imu as Imu, emulate as emulate
 from .imu.preintegration import Preintegration as Preintegration, preintegrate as preintegrate
-from .imu.recorded import Recorded as Recorded
-from .imu.sensors import SensorErrors as SensorErrors, SensorModels as SensorModels
+from .imu.sensors import (
+    Recorded as Recorded,
+    SensorErrors as SensorErrors,
+    SensorModels as SensorModels,
+)
 from .logs.comparison import (
     Comparison as Comparison,
     Outcome as Outcome,
@@ -35,14 +42,18 @@ from .simulation.consistency import (
     innovation_test as innovation_test,
     over_time as over_time,
 )
-from .simulation.filter_errors import FilterErrors as FilterErrors
-from .simulation.outage_errors import difference as difference, spread as spread
-from .simulation.scenario import (
+from .simulation.filter_errors import (
+    FilterErrors as FilterErrors,
+    difference as difference,
+    spread as spread,
+)
+from .simulation.trials import (
     Experiment as Experiment,
+    MonteCarlo as MonteCarlo,
     Scenario as Scenario,
     Simulated as Simulated,
+    monte_carlo as monte_carlo,
 )
-from .simulation.trials import MonteCarlo as MonteCarlo, monte_carlo as monte_carlo
 from .simulation.validation import Validation as Validation
 from .spec.experiment import experiment_from as experiment_from
 from .trajectory.manoeuvres import (
@@ -52,11 +63,11 @@ from .trajectory.manoeuvres import (
     Straight as Straight,
     Turn as Turn,
     perform as perform,
+    through as through,
 )
 from .trajectory.missions import (
     car_drive as car_drive,
     fixed_wing_loiter as fixed_wing_loiter,
     helicopter_mapping as helicopter_mapping,
 )
-from .trajectory.routes import through as through
 from .trajectory.trajectory import NavState as NavState, Trajectory as Trajectory

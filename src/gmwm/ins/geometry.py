@@ -86,13 +86,10 @@ def radii_along(lat: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def ned_difference(lla: FloatArray, reference: FloatArray) -> FloatArray:
-    """Points minus reference points in metres to the north, east and down.
+    """Points minus reference points, (n, 3) or (3,), in metres to the north, east and down.
 
-    lla: (n, 3) or (3,), latitude, longitude, rad, and height, m.
-    reference: (n, 3) or (3,), the points to be subtracted.
-    Returns: (n, 3) or (3,), m, the shorter way across the date line. Radii of curvature are those
-        half-way, so that the error is of third order in the distance: about 1 mm over 10 km at
-        middle latitudes.
+    The shorter way across the date line. Radii of curvature are those half-way: the error is of
+    third order in the distance, about 1 mm over 10 km at middle latitudes.
     """
     lla, reference = np.asarray(lla, dtype=float), np.asarray(reference, dtype=float)
     half_way = 0.5 * (lla + reference)
@@ -111,11 +108,9 @@ def ned_difference(lla: FloatArray, reference: FloatArray) -> FloatArray:
 
 
 def offset(lla: FloatArray, ned: FloatArray) -> FloatArray:
-    """Points moved by some metres to the north, east and down: `ned_difference` turned round.
+    """Points, (n, 3) or (3,), moved by metres to the north, east and down.
 
-    lla: (n, 3) or (3,), latitude, longitude, rad, and height, m.
-    ned: (n, 3) or (3,), m.
-    Returns: (n, 3) or (3,), latitude, longitude and height; the longitude may pass 180 deg.
+    The inverse of `ned_difference`; the longitude may pass 180 deg.
     """
     lla, ned = np.asarray(lla, dtype=float), np.asarray(ned, dtype=float)
     h = lla[..., 2] - 0.5 * ned[..., 2]
@@ -155,11 +150,7 @@ def angles(C: FloatArray) -> tuple[float, float, float]:
 
 @compiled()
 def rotation_coefficients(square: float) -> tuple[float, float, float]:
-    """Factors of a rotation by an angle of which the square is given.
-
-    square: Square of the angle a, rad^2.
-    Returns: sin(a) / a; (1 - cos(a)) / a^2; (a - sin(a)) / a^3.
-    """
+    """sin(a) / a, (1 - cos(a)) / a^2 and (a - sin(a)) / a^3 of an angle's square, rad^2."""
     if square < _SERIES_BELOW:
         # Products with constants: divisions would take most of the time.
         sine = 1.0 + square * (_S1 + square * (_S2 + square * (_S3 + square * _S4)))
@@ -181,10 +172,7 @@ def turn_body(C: FloatArray, x: float, y: float, z: float) -> None:
 
 @compiled()
 def rotate(C: FloatArray, x: float, y: float, z: float, sine: float, cosine: float) -> None:
-    """Turn the body by a rotation vector of which the `rotation_coefficients` are known.
-
-    Rodrigues' formula, e.g. Groves (2013), ch. 5.
-    """
+    """Turn the body by a rotation vector with known `rotation_coefficients` (Rodrigues)."""
     for i in range(3):
         a, b, c = C[i, 0], C[i, 1], C[i, 2]
         # A row times [r cross] is the row cross r.
@@ -261,11 +249,7 @@ def matrix_from_rpy(rpy: FloatArray) -> FloatArray:
 
 
 def rpy_from_matrix(matrices: FloatArray) -> FloatArray:
-    """Roll, pitch and yaw of matrices C_bn.
-
-    matrices: (..., 3, 3).
-    Returns: (..., 3), rad; roll and yaw in [-pi, pi], roll 0 where the pitch is +-90 deg.
-    """
+    """Roll, pitch and yaw, (..., 3), rad, of matrices C_bn, (..., 3, 3); see `angles`."""
     flat = np.ascontiguousarray(matrices, dtype=float).reshape(-1, 3, 3)
     result = np.empty((len(flat), 3))
     _all_angles(flat, result)
@@ -273,11 +257,7 @@ def rpy_from_matrix(matrices: FloatArray) -> FloatArray:
 
 
 def matrix_from_rotation_vector(vectors: FloatArray) -> FloatArray:
-    """Rotation matrices exp([v cross]) of rotation vectors.
-
-    vectors: (..., 3), axis times angle, rad.
-    Returns: (..., 3, 3).
-    """
+    """Rotation matrices exp([v cross]), (..., 3, 3), of rotation vectors, (..., 3), rad."""
     flat = np.ascontiguousarray(vectors, dtype=float).reshape(-1, 3)
     result = np.empty((len(flat), 3, 3))
     _exponentials(flat, result)

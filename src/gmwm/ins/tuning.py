@@ -1,18 +1,9 @@
-"""Constants of navigation that change answers, each with its source or its reason.
-
-Constants of the Earth stand in `gmwm.ins.geometry`; those that only keep arithmetic safe, and words
-of file formats, stand where they are used.
-"""
+"""Constants of navigation that change answers, each with its source or its reason."""
 
 import math
 
-# -- the filter -----------------------------------------------------------------------------------
-
 COVARIANCE_STEP = 0.1
 """s between steps of the covariance: short against a manoeuvre and the time between fixes."""
-
-STANDSTILL = 1e-3
-"""m/s, below which the vehicle of a simulated trajectory stands."""
 
 POSITION_SD = (1.0, 1.0, 1.5)
 """m north, east and down, for fixes without their own: a good receiver in the open."""
@@ -32,32 +23,20 @@ BAROMETER = (10.0, 3600.0)
 """m and s: drift of a barometric height set at the start, and its correlation time: weather changes
 the pressure by some hPa, 8 m each, in hours."""
 
-# -- verdicts -------------------------------------------------------------------------------------
-
 CONTRADICTED = 0.001
 """Probability below which a filter is called inconsistent, or its innovations contradict it."""
 
 CONFIDENCE = 0.95
 """Confidence of bands and intervals."""
 
-# -- validations ----------------------------------------------------------------------------------
-
 SETTLED = 0.25
 """Fraction of the trajectory after which the filter with GNSS is judged."""
-
-KEPT_EPOCHS = 300
-"""Number of epochs of a run whose errors are kept, besides outages: a figure shows no more."""
-
-OUTAGE_EPOCHS = 1.0
-"""s between epochs that are kept in an outage."""
 
 BOOTSTRAP_DRAWS = 4000
 """Draws of the runs for intervals of 95 %: 100 draws lie beyond each end."""
 
 BIAS_WINDOW = 60.0
 """s over which a recording is averaged to measure its slow errors: an outage of a minute."""
-
-# -- reduced models -------------------------------------------------------------------------------
 
 SETTLING = 120.0
 """s before the first outage and between them, for the filter to settle."""
@@ -78,8 +57,3 @@ LINEAR_TILT, LINEAR_HEADING = math.radians(5.0), math.radians(25.0)
 """rad, true attitude errors (1 sigma) at the end of an outage, beyond which covariance analysis
 warns. 40 simulated runs of a loiter with the true model: NEES of the nine navigation errors 0.94 to
 1.20 up to 4.1 and 22 deg, 2.1 at 10 and 45 deg."""
-
-# -- studies --------------------------------------------------------------------------------------
-
-LEAST_NUMBER, LARGEST_NUMBER = 1e-60, 1e60
-"""Range of numbers in a study, SI: beyond it, powers overflow or vanish."""

@@ -12,16 +12,25 @@ import numpy as np
 
 from gmwm._core import checks
 from gmwm._core.distributions import chi2
-from gmwm._core.typing import Progress
-from gmwm.calibration import Calibration, calibrate
+from gmwm._core.typing import FloatArray, Progress
+from gmwm.calibration import Calibration, calibrate, noise_density, random_walk
 from gmwm.errors import InputError, printable
 from gmwm.estimate import Fit, JointFit
+from gmwm.estimate.problem import Scales
+from gmwm.estimate.result import between
+from gmwm.filter_numbers import FilterNumbers, bound
 from gmwm.issues import Notice, notice
 from gmwm.population import tuning
-from gmwm.population.comparison import AxisComparison, SensorComparison
+from gmwm.population.comparison import (
+    AxisComparison,
+    AxisNumbers,
+    ParameterSpread,
+    SensorComparison,
+)
 from gmwm.population.curves import Equality
-from gmwm.population.numbers import axis_numbers, curve_inflation, joint_fit, parameter_spreads
+from gmwm.process import Process
 from gmwm.readers import Recording, is_frame
+from gmwm.selection import select
 
 _LONGEST_LABEL = 28  # characters
 
@@ -64,7 +73,18 @@ def compare(
     curve are called close: with a million samples a change of temperature shows.
     """
     horizon = checks.positive("horizon", horizon, "give the longest outage in seconds")
-    calibrations, notices = _different(_labelled(sources))
+    single = isinstance(sources, str | os.PathLike | Calibration | Recording) or is_frame(sources)
+    if single or not isinstance(sources, Mapping | Iterable):
+        raise InputError(
+            f"{checks.shown(sources)} is not a list of recordings: give two calibrations or more"
+        )
+    if isinstance(sources, Mapping):
+        named = {printable(str(label)): _calibration(each) for label, each in sources.items()}
+    else:
+        given = list(sources)
+        paths = [each if isinstance(each, str | os.PathLike) else "" for each in given]
+        named = labelled([_calibration(each) for each in given], paths)
+    calibrations, notices = _different(named)
     names = dict.fromkeys(n for each in calibrations.values() for n in (*each, *each.skipped))
     members = {name: _members(name, calibrations) for name in names}
     for name, (_, out) in members.items():
@@ -79,35 +99,29 @@ def compare(
     tests = {name: Equality.of(list(members[name][0].values())) for name in shared}
     p_values = _holm({name: test.p_value for name, test in tests.items()})
     axes = {}
+    tell = progress or (lambda *_: None)
     for done, name in enumerate(names):
-        if progress is not None:
-            progress(done, len(names), name)
-        test = tests.get(name)
-        p_value = p_values.get(name, float("nan"))
-        axes[name], found = _axis(name, members[name], (test, p_value), horizon)
+        tell(done, len(names), name)
+        tested = tests.get(name), p_values.get(name, float("nan"))
+        axes[name], found = _axis(name, members[name], tested, horizon)
         notices += found
-    if progress is not None:
-        progress(len(names), len(names), "")
-    notices += [_curves_notice(axis) for axis in axes.values() if axis.state in ("close", "differ")]
-    notices.append(_few_recordings(len(calibrations)))
+    tell(len(names), len(names), "")
+    for name, axis in axes.items():
+        if axis.state in ("close", "differ"):
+            values: dict[str, Any] = {"p_value": axis.p_value}
+            for worst in axis.main[:1]:
+                values |= {"extent": worst.extent, "sigma": worst.sigma, "tau": worst.longest}
+            notices.append(notice(f"curves-{axis.state}", name, values, sentence=axis.sentence))
+    # How well so many recordings know their spread.
+    dof = len(calibrations) - 1
+    tails = 0.5 - 0.5 * tuning.SPREAD, 0.5 + 0.5 * tuning.SPREAD
+    high, low = (float(np.sqrt(dof / chi2.ppf(tail, dof))) for tail in tails)
+    spread = {"recordings": len(calibrations), "factor": high}
+    notices.append(notice("few-recordings", values=spread, low=low))
     return SensorComparison(calibrations, axes, horizon, tuple(notices))
 
 
 # -- what is compared -----------------------------------------------------------------------------
-
-
-def _labelled(sources: Any) -> dict[str, Calibration]:
-    """Calibrations by the name of the recording."""
-    single = isinstance(sources, str | os.PathLike | Calibration | Recording) or is_frame(sources)
-    if single or not isinstance(sources, Mapping | Iterable):
-        raise InputError(
-            f"{checks.shown(sources)} is not a list of recordings: give two calibrations or more"
-        )
-    if isinstance(sources, Mapping):
-        return {printable(str(label)): _calibration(each) for label, each in sources.items()}
-    given = list(sources)
-    paths = [each if isinstance(each, str | os.PathLike) else "" for each in given]
-    return labelled([_calibration(each) for each in given], paths)
 
 
 def _calibration(source: Any) -> Calibration:
@@ -140,9 +154,17 @@ def labelled(
     wanted = list(names)
     for name in set(names):
         same = [place for place, each in enumerate(names) if each == name]
-        if len(same) > 1:
-            for place, part in zip(same, _different_parts([paths[k] for k in same]), strict=True):
-                wanted[place] = printable(part[-_LONGEST_LABEL:]) or name
+        if len(same) == 1:
+            continue
+        parts = [
+            list(PurePath(paths[k]).with_suffix("").parts) if str(paths[k]) else [] for k in same
+        ]
+        for end in (0, -1):
+            while all(parts) and len({each[end] for each in parts}) == 1:
+                for each in parts:
+                    each.pop(end)
+        for place, part in zip(same, map("/".join, parts), strict=True):
+            wanted[place] = printable(part[-_LONGEST_LABEL:]) or name
     found: dict[str, Calibration] = {}
     for name, calibration in zip(wanted, calibrations, strict=True):
         label, copy = name, 2
@@ -150,16 +172,6 @@ def labelled(
             label, copy = f"{name} ({copy})", copy + 1
         found[label] = calibration
     return found
-
-
-def _different_parts(paths: Sequence[str | os.PathLike[str]]) -> list[str]:
-    """Each path without the folders at its beginning and end that all have."""
-    parts = [list(PurePath(path).with_suffix("").parts) if str(path) else [] for path in paths]
-    for end in (0, -1):
-        while all(parts) and len({each[end] for each in parts}) == 1:
-            for each in parts:
-                each.pop(end)
-    return ["/".join(each) for each in parts]
 
 
 def _different(given: Mapping[str, Calibration]) -> tuple[dict[str, Calibration], list[Notice]]:
@@ -197,20 +209,15 @@ def _members(
         elif name not in each:
             out[label] = notice("channel-missing")
         else:
-            bad = [n for n in each[name].notices if _is_not_noise(n)]
+            # What makes a curve other than noise alone.
+            bad = [n for n in each[name].notices if n.severity == "bad" and n.issue.topic != "fit"]
+            bad = [n for n in bad if n.issue.lacks not in ("", "units_agree")]
             if bad:
                 out[label] = notice("not-noise", values={"reason": bad[0].code}, bad=bad[0].text)
             else:
                 fits[label] = each[name]
     unlike = _unlike(fits)
     return {k: fit for k, fit in fits.items() if k not in unlike}, out | unlike
-
-
-def _is_not_noise(reported: Notice) -> bool:
-    """Whether a fit with this notice has a curve that is not noise alone."""
-    issue = reported.issue
-    is_of_the_data = issue.topic != "fit" and issue.lacks not in ("", "units_agree")
-    return reported.severity == "bad" and is_of_the_data
 
 
 def _unlike(fits: Mapping[str, Fit]) -> dict[str, Notice]:
@@ -251,35 +258,23 @@ def _axis(
 ) -> tuple[AxisComparison, list[Notice]]:
     """A channel: its fits, recordings left out, test and p-value, made into a comparison."""
     (fits, out), (test, p_value) = members, tested
-    notices: list[Notice] = []
-    joint = None
-    if len(fits) > 1:
-        found = joint_fit(list(fits.values()))
-        if isinstance(found, JointFit):
-            joint = found
-        else:
-            notices.append(found)
+    found = joint_fit(list(fits.values())) if len(fits) > 1 else None
+    joint = found if isinstance(found, JointFit) else None
+    notices = [found] if isinstance(found, Notice) else []
     numbers, problems = axis_numbers(name, fits, joint, horizon)
     notices += problems
     for label, fit in fits.items():
         codes = ", ".join(n.code for n in fit.notices if n.severity == "bad")
         if codes:
-            invalid = notice(
-                "fit-not-valid",
-                name,
-                {"reasons": codes},
-                variant="compared",
-                hint="the curve is compared all the same",
-            )
+            values, hint = {"reasons": codes}, "the curve is compared all the same"
+            invalid = notice("fit-not-valid", name, values, variant="compared", hint=hint)
             notices.append(replace(invalid, source=label))
     inflation = float("nan")
     if joint and test and test.tau.size:
         inflation = curve_inflation(list(fits.values()), joint, float(test.tau[-1]))
     rows = parameter_spreads(joint) if joint else ()
-    return (
-        AxisComparison(name, fits, out, test, p_value, joint, rows, numbers, inflation),
-        notices,
-    )
+    axis = AxisComparison(name, fits, out, test, p_value, joint, rows, numbers, inflation)
+    return axis, notices
 
 
 def _holm(p_values: Mapping[str, float]) -> dict[str, float]:
@@ -292,17 +287,101 @@ def _holm(p_values: Mapping[str, float]) -> dict[str, float]:
     return adjusted
 
 
-def _curves_notice(axis: AxisComparison) -> Notice:
-    values = {"p_value": axis.p_value}
-    if axis.main:
-        worst = axis.main[0]
-        values |= {"extent": worst.extent, "sigma": worst.sigma, "tau": worst.longest}
-    return notice(f"curves-{axis.state}", axis.name, values, sentence=axis.sentence)
+def joint_fit(fits: Sequence[Fit]) -> JointFit | Notice:
+    """The model selected for all recordings of a channel, or why there is none."""
+    dt = fits[0].wv.dt
+    # Rates may differ by as much as clocks do; averaging times are taken as those of the first.
+    curves = [
+        wv if wv.dt == dt else replace(wv, dt=dt, tau=wv.tau * (dt / wv.dt))
+        for wv in (fit.wv for fit in fits)
+    ]
+    # The largest line and the largest resonance, with a free amplitude.
+    largest: dict[str, tuple[float, Process]] = {}
+    for term in (term for fit in fits for term in fit.model.terms):
+        size = term.linear_parameter
+        if size is not None and "frequency" in term.values:
+            kind, amplitude = type(term).__name__, term.values[size.name] or 0.0
+            if kind not in largest or amplitude > largest[kind][0]:
+                largest[kind] = amplitude, term.with_values(**{size.name: None})
+    try:
+        extra = tuple(largest[kind][1] for kind in sorted(largest))
+        found = select(curves, extra=extra).fit
+    except InputError as error:
+        return notice("no-joint-model", fits[0].wv.name, error=error)
+    assert isinstance(found, JointFit)
+    return found
 
 
-def _few_recordings(count: int) -> Notice:
-    """How well so many recordings know their spread."""
-    dof = count - 1
-    tails = 0.5 - 0.5 * tuning.SPREAD, 0.5 + 0.5 * tuning.SPREAD
-    high, low = (float(np.sqrt(dof / chi2.ppf(tail, dof))) for tail in tails)
-    return notice("few-recordings", values={"recordings": count, "factor": high}, low=low)
+def parameter_spreads(joint: JointFit) -> tuple[ParameterSpread, ...]:
+    """The parameters of a joint fit, one by one."""
+    parts = [{each.key: each for each in part.estimates} for part in joint.parts]
+    found = []
+    for own in joint.estimates:
+        each = tuple(part.get(own.key) for part in parts)
+        known = [e for e in each if e is not None and e.kind == "estimated" and e.stderr]
+        spread = p_value = float("nan")
+        if len(known) > 1:
+            values, errors = np.array([[e.value, e.stderr or np.nan] for e in known]).T
+            if np.all(values > 0.0):
+                spread, p_value = between(np.log(values), (errors / values) ** 2.0)
+            else:
+                spread, p_value = between(values, errors**2.0)
+                spread /= abs(float(np.mean(values)) or 1.0)
+        found.append(ParameterSpread(own, each, spread, p_value))
+    return tuple(found)
+
+
+def axis_numbers(
+    name: str, fits: Mapping[str, Fit], joint: Fit | None, horizon: float
+) -> tuple[AxisNumbers, tuple[Notice, ...]]:
+    """Filter numbers of a channel from its fits by recording, and what could not be found."""
+    each: dict[str, FilterNumbers] = {}
+    notices = []
+    for label, fit in fits.items():
+        try:
+            each[label] = bound(fit, horizon=horizon)
+        except InputError as error:
+            notices.append(replace(notice("no-numbers", name, error=error), source=label))
+    if not each:
+        return AxisNumbers({}, None, None, {}, {}), tuple(notices)
+    whole = covering = None
+    nees: dict[str, float] = {}
+    try:
+        whole = None if joint is None else bound(joint, horizon=horizon)
+        # The end of a name tells `bound` whether a gyro turns the heading.
+        group = {f"{place} {name}": fits[label] for place, label in enumerate(each)}
+        found = bound(group, horizon=horizon, shared=True)
+        covering = next(iter(found.values()))
+        own = (numbers.nees[horizon] for numbers in found.values())
+        nees = dict(zip(each, own, strict=True))
+    except InputError as error:
+        notices.append(notice("no-numbers", name, error=error))
+    upper: dict[str, float] = {}
+    for letter, level in (("N", noise_density), ("K", random_walk)):
+        if covering is None or getattr(covering, letter) > 0.0:
+            continue
+        for fit in fits.values():
+            try:
+                upper[letter] = max(level(fit).value, upper.get(letter, 0.0))
+            except InputError:
+                continue  # this recording gives no limit
+    return AxisNumbers(each, whole, covering, nees, upper), tuple(notices)
+
+
+def curve_inflation(fits: Sequence[Fit], joint: Fit, longest: float) -> float:
+    """Factor on the joint model's amplitudes that covers the curves of all recordings.
+
+    The largest ratio, at least one, of the Allan deviation of a recording's own model to that of
+    the joint model, from 0.1 s (or ten samples) to ``longest`` (s); NaN if there is no such time.
+    """
+    low = max(tuning.FINEST_TIME, tuning.FINEST_SAMPLES * joint.wv.dt)
+    tau = joint.wv.tau[(joint.wv.tau >= low) & (joint.wv.tau <= longest)]
+    if tau.size == 0:
+        return float("nan")
+
+    def variance(fit: Fit) -> FloatArray:
+        scales = replace(Scales.of(fit.wv), tau=tau)
+        return np.sum([scales.curve(t) for t in fit.model.terms if not t.is_drift], axis=0)
+
+    ratios = np.array([variance(fit) for fit in fits]) / variance(joint)
+    return float(max(1.0, np.sqrt(np.max(ratios))))

@@ -18,12 +18,12 @@ from gmwm._core.text import Printed, brief, bullets, per_cent, wrapped
 from gmwm._core.units import field_units, si_parameter_unit
 from gmwm.calibration import Calibration
 from gmwm.errors import MissingNameError
-from gmwm.estimate import Fit, JointFit
+from gmwm.estimate import Estimate, Fit, JointFit
 from gmwm.estimate.result import plain
+from gmwm.filter_numbers import FilterNumbers
 from gmwm.issues import Notice, worst_first
 from gmwm.population import tuning
 from gmwm.population.curves import Difference, Equality
-from gmwm.population.numbers import AxisNumbers, ParameterSpread
 
 if TYPE_CHECKING:
     import pandas
@@ -54,6 +54,59 @@ def _without_nan(value: Any) -> Any:
     if isinstance(value, list | tuple):
         return [_without_nan(each) for each in value]
     return plain(value) if isinstance(value, float) else value
+
+
+@dataclass(frozen=True)
+class ParameterSpread:
+    """One parameter of the joint model in all recordings.
+
+    joint: Estimate from all recordings together.
+    each: Estimate of the same structure from each compared recording; ``None`` where it has none.
+    spread: Relative standard deviation between recordings beyond their standard errors; NaN where
+        fewer than two determine it, or one has all the weight.
+    p_value: Of the test that it is the same in all of them; NaN likewise.
+    """
+
+    joint: Estimate
+    each: tuple[Estimate | None, ...]
+    spread: float
+    p_value: float
+
+    @property
+    def key(self) -> str:
+        """Name of the parameter."""
+        return self.joint.key
+
+
+@dataclass(frozen=True)
+class AxisNumbers:
+    """N and K of an axis for a filter, for outages up to the horizon.
+
+    each: Recording -> the bound of its own model.
+    joint: The bound of the joint model.
+    covering: One pair of numbers that bounds the models of all recordings.
+    nees: Recording -> normalised error squared that a filter with the covering numbers predicts
+        after the outage; 1 is right, below 1 conservative.
+    upper: Letters that no recording determines -> the largest of their 95 % upper limits.
+    """
+
+    each: Mapping[str, FilterNumbers]
+    joint: FilterNumbers | None
+    covering: FilterNumbers | None
+    nees: Mapping[str, float]
+    upper: Mapping[str, float]
+
+    def value(self, letter: str) -> float:
+        """The covering N or K, or the upper limit where no recording determines it; else NaN."""
+        found = getattr(self.covering, letter) if self.covering is not None else float("nan")
+        return self.upper.get(letter, float("nan")) if found == 0.0 else float(found)
+
+    def inflation(self, letter: str) -> float:
+        """The covering number over that of the joint model; NaN where one is missing."""
+        if self.joint is None or self.covering is None:
+            return float("nan")
+        own = getattr(self.joint, letter)
+        return float(getattr(self.covering, letter) / own) if own > 0.0 else float("nan")
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,16 +208,9 @@ class AxisComparison:
             "recordings": list(self.fits),
             "left_out": {label: notice.to_dict() for label, notice in self.left_out.items()},
             "differences": [
-                {
-                    "part": d.part,
-                    "shortest_s": d.shortest,
-                    "longest_s": d.longest,
-                    "extent": d.extent,
-                    "sigma": d.sigma,
-                    "resolution": d.resolution,
-                    "ratios": d.ratios.tolist(),
-                    "errors": d.errors.tolist(),
-                }
+                {"part": d.part, "shortest_s": d.shortest, "longest_s": d.longest}
+                | {name: getattr(d, name) for name in ("extent", "sigma", "resolution")}
+                | {name: getattr(d, name).tolist() for name in ("ratios", "errors")}
                 for d in (equality.differences if equality else ())
             ],
             "joint": None if self.joint is None else self.joint.to_dict(),
@@ -340,11 +386,5 @@ class SensorComparison(Mapping[str, AxisComparison], Printed):
         provenance: Mapping[str, str] | None = None,
     ) -> Path:
         """Write two pages of HTML; see `gmwm.report.write_sensor_comparison_report`."""
-        written: Path = make(
-            "page",
-            self,
-            path,
-            datasheet=datasheet,
-            provenance=provenance,
-        )
+        written: Path = make("page", self, path, datasheet=datasheet, provenance=provenance)
         return written

@@ -25,11 +25,9 @@ from gmwm.calibration import Calibration
 from gmwm.errors import InputError, MissingNameError, printable
 from gmwm.issues import Notice, notice
 from gmwm.population import tuning
-from gmwm.population.paths import OUTPUTS, Paths, recordings
-from gmwm.population.spread import Spread, Structures, spreads_of, structures_of
-from gmwm.population.store import Index, Listed, Store, opened_store, read_index
-from gmwm.population.task import Task
-from gmwm.population.tolerance import needed_units
+from gmwm.population.spread import Spread, Structures, needed_units, spreads_of, structures_of
+from gmwm.population.store import Index, Listed, Store, opened_store
+from gmwm.population.task import OUTPUTS, Paths, Task, recordings
 from gmwm.population.unit import DERIVED, SCHEMA, Row, Unit, rows_of
 from gmwm.process import Model, Process
 
@@ -134,9 +132,8 @@ class Fleet(Mapping[str, Calibration | Notice]):
         for axis in self.structures:
             if axis.different:
                 usual, units = next(iter(axis.counts)), sum(axis.counts.values())
-                number = f"{axis.counts[usual]} of {units}"
-                text = f"{number} units are {usual}, {axis.different} have another structure"
-                apart.append(f"{axis.channel}: {text}")
+                text = f"{axis.counts[usual]} of {units} units are {usual}"
+                apart.append(f"{axis.channel}: {text}, {axis.different} have another structure")
             if axis.invalid:
                 apart.append(f"{axis.channel}: not valid in {_some(axis.invalid)}")
         apart += [
@@ -190,8 +187,13 @@ class Fleet(Mapping[str, Calibration | Notice]):
         InputError
             If the folder holds no finished fleet, or one of its files is damaged.
         """
-        index = read_index(Path(folder))
-        store = Store(Path(folder), index.options)
+        path = Path(folder, OUTPUTS[-1])
+        if not path.exists():
+            raise InputError(
+                f"{path.parent} holds no {path.name}: give the folder of a fleet, or resume it"
+            )
+        index = Index.load(path)
+        store = Store(path.parent, index.options)
         units = {each.path: store.load(each) for each in index.units}
         return cls(units, index.horizon_s, index.options, index.notices)
 
@@ -272,22 +274,20 @@ def fleet(
         if store is not None:
             kept = {item.path: store.kept(item) for item in items}
             units = {path: unit for path, unit in kept.items() if unit is not None}
-        if progress is not None:
-            progress(len(units), len(items), "")
+        tell = progress or (lambda *_: None)
+        tell(len(units), len(items), "")
         todo = [item for item in items if item.path not in units]
         with closing(results(task, todo, jobs=jobs, cluster=cluster, lost=task.lost)) as found:
             for item, unit in found:
                 if store is not None:
                     store.save(unit)
                 units[item.path] = unit
-                if progress is not None:
-                    progress(len(units), len(items), "")
+                tell(len(units), len(items), "")
         units = {item.path: units[item.path] for item in items}
         notices = _notices(units.values())
         if store is not None:
             names = {item.name for item in items}
-            others = [each.stem for each in store.calibrations if each.stem not in names]
-            if others:
+            if others := [each.stem for each in store.calibrations if each.stem not in names]:
                 values = {"units": len(others)}
                 notices.append(notice("left-over", values=values, names=_some(others)))
         made = Fleet(units, task.horizon, task.options, tuple(notices))
@@ -311,9 +311,9 @@ def _notices(units: Collection[Unit]) -> list[Notice]:
         same.setdefault(unit.digest or unit.path, []).append(unit.name)
     hint = "each is counted; leave copies out"
     for names in (names for names in same.values() if len(names) > 1):
-        values, shown = {"units": len(names)}, _some(names)
+        words: dict[str, Any] = {"hint": hint, "names": _some(names)}
         notices.append(
-            notice("same-recording", "", values, variant="fleet", hint=hint, names=shown)
+            notice("same-recording", values={"units": len(names)}, variant="fleet", **words)
         )
     done = {unit.name: unit.result for unit in units if isinstance(unit.result, Calibration)}
     return notices + (_differences(done) if done else [])

@@ -16,8 +16,7 @@ from gmwm._core.files import folder_to_fill, one_writer, written
 from gmwm.calibration import Calibration
 from gmwm.errors import InputError, printable
 from gmwm.issues import Notice
-from gmwm.population.paths import Item
-from gmwm.population.task import digest_of
+from gmwm.population.task import Item, digest_of
 from gmwm.population.unit import Number, Unit
 
 
@@ -54,10 +53,7 @@ class Index(Document):
 
 @dataclass(frozen=True)
 class Store:
-    """Calibrations of a fleet on disk.
-
-    options: See `gmwm.population.task.Task.options`.
-    """
+    """Calibrations of a fleet on disk; for the options see `Task.options`."""
 
     folder: Path
     options: Mapping[str, Any]
@@ -95,16 +91,12 @@ class Store:
             return unit
         if origin.path != printable(item.path):
             raise InputError(
-                f"{path} is of {origin.path}, not of {item.path}: give another folder",
-                "other-runs",
+                f"{path} is of {origin.path}, not of {item.path}: give another folder", "other-runs"
             )
         return None
 
     def load(self, listed: Listed) -> Unit:
-        """A unit of the index.
-
-        Raises InputError if its file is damaged or missing.
-        """
+        """A unit of the index; raises InputError if its file is damaged or missing."""
         if listed.failed is not None:
             return Unit(listed.path, listed.name, listed.failed)
         return self._load(Item(listed.path, listed.name))[1]
@@ -150,14 +142,3 @@ def opened_store(folder: Path, options: Mapping[str, Any], resume: bool) -> Iter
                 "earlier-runs",
             )
         yield store
-
-
-def read_index(folder: Path) -> Index:
-    """The index in the folder of a finished fleet.
-
-    Raises InputError if there is none, or it is damaged.
-    """
-    path = folder / "fleet.json"
-    if not path.exists():
-        raise InputError(f"{folder} holds no {path.name}: give the folder of a fleet, or resume it")
-    return Index.load(path)

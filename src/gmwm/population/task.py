@@ -1,15 +1,18 @@
-"""How every unit of a fleet is calibrated, on this machine or another."""
+"""Which recordings a fleet has, and how each is calibrated, on this machine or another."""
 
 from __future__ import annotations
 
+import glob
 import hashlib
 import json
 import os
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from inspect import signature
+from itertools import count
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from gmwm import filter_numbers
 from gmwm._core import checks
@@ -17,13 +20,26 @@ from gmwm._core.files import opened
 from gmwm._core.jobs import ENDED
 from gmwm._core.memory import OUT_OF_MEMORY
 from gmwm.calibration import SCREENING, calibrate, floor, noise_density, random_walk
-from gmwm.errors import InputError
+from gmwm.errors import InputError, printable
 from gmwm.estimate import Fit
 from gmwm.issues import Notice
-from gmwm.population.paths import Item
 from gmwm.population.unit import DERIVED, Number, Unit
 from gmwm.process import Model, as_model
-from gmwm.readers import Recording, read
+from gmwm.readers import read
+
+OUTPUTS = ("calibrations", "fleet.parquet", "fleet.html", "fleet.json")
+"""What a fleet writes into its folder."""
+
+_LONGEST_NAME = 100  # characters: file systems take more, with an ending
+
+Paths = str | os.PathLike[str] | Iterable[str | os.PathLike[str]]
+
+
+class Item(NamedTuple):
+    """A recording to calibrate, and the name of its unit."""
+
+    path: str
+    name: str
 
 
 @dataclass(frozen=True)
@@ -122,8 +138,14 @@ class Task:
             )
         before, digest = _state(item.path), digest_of(item.path)
         recording = read(item.path, **self.reading).part(self.start, self.stop)
+        models = {}
+        for name in (channel.name for channel in recording.inertial):
+            keys = [key for key in (name, name.partition("_")[0], "") if key in self.models]
+            if keys:
+                models[name] = self.models[keys[0]]
+        model = models if self.models else None
         calibration = calibrate(
-            recording, self._models(recording), screening=self.screening, still=self.still, jobs=1
+            recording, model, screening=self.screening, still=self.still, jobs=1
         )
         if _state(item.path) != before:
             raise InputError(
@@ -132,16 +154,6 @@ class Task:
             )
         numbers = {name: _numbers(fit, self.horizon) for name, fit in calibration.items()}
         return Unit(item.path, item.name, calibration, numbers, digest)
-
-    def _models(self, recording: Recording) -> dict[str, Model] | None:
-        if not self.models:
-            return None
-        found = {}
-        for name in (channel.name for channel in recording.inertial):
-            keys = [key for key in (name, name.partition("_")[0], "") if key in self.models]
-            if keys:
-                found[name] = self.models[keys[0]]
-        return found
 
 
 def _failed(item: Item, code: str, text: str) -> Unit:
@@ -158,10 +170,7 @@ def _state(path: str) -> list[tuple[int, int]]:
 
 
 def digest_of(path: str) -> str:
-    """SHA-256 of a file, or of the files of a folder such as a bag of ROS 2.
-
-    Raises InputError if it cannot be read.
-    """
+    """SHA-256 of a file, or of the files of a folder such as a bag of ROS 2."""
     try:
         if not os.path.isdir(path):
             with opened(path) as stream:
@@ -190,3 +199,88 @@ def _numbers(fit: Fit, horizon: float) -> dict[str, Number]:
     low = floor(fit)
     found["floor_B"] = Number(low.bias_instability, None, not low.falls)
     return {name: found[name] for name in DERIVED if name in found}
+
+
+# -- recordings ------------------------------------------------------------------------------------
+
+
+def recordings(paths: Paths, folder: Path | None) -> list[Item]:
+    """Every recording that paths and patterns name, once, in their order.
+
+    paths: A path that exists is taken as it is, brackets and all; ``**`` in a pattern stands for
+        any folders.
+    folder: Folder of the outputs, which are no recordings.
+    Raises InputError if there are none, or a pattern matches nothing.
+    """
+    try:
+        given: list[Any] = [paths] if isinstance(paths, str | os.PathLike) else list(paths)
+    except TypeError:
+        raise InputError(f"{checks.shown(paths)} is no path: give paths of recordings") from None
+    found: dict[str, str] = {}
+    for each in given:
+        text = os.fspath(each) if isinstance(each, str | os.PathLike) else None
+        if not isinstance(text, str) or "\0" in text:
+            raise InputError(f"{checks.shown(each)} is no path: give paths of recordings as text")
+        for path in _matching(text, folder):
+            found.setdefault(os.path.realpath(path), path)
+    if not found:
+        raise InputError("there is no recording: give one path at least")
+    kept = list(found.values())
+    return [Item(path, name) for path, name in zip(kept, _names(kept), strict=True)]
+
+
+def _matching(text: str, folder: Path | None) -> list[str]:
+    if not glob.has_magic(text) or os.path.lexists(text):
+        return [text]
+    found = sorted(glob.glob(text, recursive=True))
+    if folder is not None:  # the folder of the outputs and the outputs are no recordings
+        own = Path(os.path.realpath(folder))
+        outputs = {own / name for name in OUTPUTS}
+        places = [Path(os.path.realpath(path)) for path in found]
+        found = [
+            path
+            for path, place in zip(found, places, strict=True)
+            if place != own and outputs.isdisjoint((place, *place.parents))
+        ]
+    # ``**`` names the folders on the way too; the folder of a bag is a recording.
+    on_the_way = {str(above) for path in found for above in Path(path).parents}
+    found = [
+        path
+        for path in found
+        if path.rstrip(os.sep) not in on_the_way
+        or os.path.isfile(os.path.join(path, "metadata.yaml"))
+    ]
+    if not found:
+        raise InputError(f"no file matches {printable(text)[:200]!r}: check the pattern")
+    return found
+
+
+def _names(paths: Sequence[str]) -> list[str]:
+    """Short names that differ in more than the case of letters.
+
+    The name of the file without its ending; where that is not enough, with its ending and folders;
+    where that is not enough, with a number.
+    """
+
+    def repeated(names: Sequence[str]) -> list[bool]:
+        counts = Counter(name.lower() for name in names)
+        return [counts[name.lower()] > 1 for name in names]
+
+    whole = [Path(os.path.abspath(path)).parts for path in paths]
+    names = [Path(parts[-1].removesuffix(".gz")).stem for parts in whole]
+    for depth in range(1, max(map(len, whole)) + 1):
+        names = [
+            "-".join(part.strip(os.sep) for part in parts[-depth:]) if is_repeated else name
+            for name, parts, is_repeated in zip(names, whole, repeated(names), strict=True)
+        ]
+    # Every file system takes them, and they fit into a line.
+    for i, name in enumerate(names):
+        plain = [c if c.isprintable() and c not in '/\\:*?"<>|' else "_" for c in name]
+        names[i] = "".join(plain).strip(" .")[-_LONGEST_NAME:] or "unit"
+    taken = {name.lower() for name in names}
+    for i, is_repeated in enumerate(repeated(names)):
+        if is_repeated:
+            numbered = (f"{names[i]}-{k}" for k in count(i + 1))
+            names[i] = next(each for each in numbered if each.lower() not in taken)
+            taken.add(names[i].lower())
+    return names

@@ -37,11 +37,7 @@ Row = dict[str, Any]
 
 @dataclass(frozen=True)
 class Number:
-    """A number derived from a fit.
-
-    value: SI.
-    found: Else it is an upper limit: the 95 % one, or the end of a curve that is still falling.
-    """
+    """A number derived from a fit, SI; an upper limit if not ``found``."""
 
     value: NotNegative
     stderr: NotNegative | None
@@ -124,9 +120,4 @@ def _parameters(
         known = {"kind": "bound", "upper": number.value}
         if number.found:
             known = {"kind": "derived", "value": number.value, "stderr": number.stderr}
-        yield {
-            **own,
-            "parameter": key,
-            **known,
-            "unit": si_parameter_unit(DERIVED[key], quantity),
-        }
+        yield {**own, "parameter": key, **known, "unit": si_parameter_unit(DERIVED[key], quantity)}

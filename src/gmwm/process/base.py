@@ -12,7 +12,7 @@ import numpy as np
 from gmwm._core import checks
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
-from gmwm.process import spectral, synthesis
+from gmwm.process import spectral
 from gmwm.process.parameter import Parameter
 from gmwm.process.state_space import StateSpace
 
@@ -388,7 +388,7 @@ class Process:
         generator in the same way whatever its parameters are: the same random numbers then give
         series that change smoothly with the parameters.
         """
-        return synthesis.from_psd(self.psd, n, dt, rng)
+        return spectral.from_psd(self.psd, n, dt, rng)
 
     # -- for the estimator ------------------------------------------------------------------------
 

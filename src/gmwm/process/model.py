@@ -58,21 +58,32 @@ class Model:
     terms: tuple[Process, ...]
 
     def __init__(self, terms: tuple[Process, ...]) -> None:
-        terms = _in_order(tuple(terms))
-        if not terms:
+        ordered = list(terms)
+        if not ordered:
             raise InputError("a model needs at least one process")
-        _check_distinct(terms)
-        object.__setattr__(self, "terms", terms)
+        for kind in {type(term) for term in terms if term.ordered_by}:
+            places = [i for i, term in enumerate(terms) if type(term) is kind]
+            keys = {i: terms[i].values[kind.ordered_by] for i in places}
+            if None not in keys.values():
+                ranked = sorted(places, key=lambda i: keys[i] or 0.0)
+                for place, source in zip(places, ranked, strict=True):
+                    ordered[place] = terms[source]
+        _check_distinct(tuple(ordered))
+        object.__setattr__(self, "terms", tuple(ordered))
 
     def __setattr__(self, name: str, value: object) -> None:
         raise AttributeError("a Model does not change: make a new one")
 
-    # -- parameters -------------------------------------------------------------------------------
-
     @cached_property
     def parameters(self) -> tuple[ModelParameter, ...]:
-        """All parameters, term by term."""
-        return _number(self.terms)
+        """All parameters, term by term; keys with _1, _2, ... where several would share one."""
+        keys = [term.prefix + p.name for term in self.terms for p in term.parameters]
+        numbered = iter(numbered_names(keys, "_"))
+        return tuple(
+            ModelParameter(next(numbered), index, p, term.values[p.name])
+            for index, term in enumerate(self.terms)
+            for p in term.parameters
+        )
 
     @property
     def params(self) -> dict[str, float | None]:
@@ -108,8 +119,6 @@ class Model:
     def opened(self) -> Model:
         """A copy with every parameter open."""
         return self.with_params(dict.fromkeys(self.params))
-
-    # -- moments ----------------------------------------------------------------------------------
 
     def psd(self, f: FloatArray, dt: float) -> FloatArray:
         """Two-sided spectral density (u^2/Hz) at ``f`` (Hz), without lines; see `Process.psd`."""
@@ -175,8 +184,6 @@ class Model:
     @classmethod
     def __get_pydantic_core_schema__(cls, source: Any, handler: Any) -> Any:
         return plain_schema(model_from_list, lambda model: [t.to_dict() for t in model.terms])
-
-    # -- looks ------------------------------------------------------------------------------------
 
     def title(self) -> str:
         """Its terms in a few words: ``white noise + 2 Gauss-Markov``."""
@@ -260,19 +267,6 @@ def model_from_list(content: Sequence[Mapping[str, Any]]) -> Model:
     return Model(tuple(terms))
 
 
-def _in_order(terms: tuple[Process, ...]) -> tuple[Process, ...]:
-    """Terms of a kind that has an order sorted within their places, where all are known."""
-    ordered = list(terms)
-    for kind in {type(term) for term in terms if term.ordered_by}:
-        places = [i for i, term in enumerate(terms) if type(term) is kind]
-        keys = {i: terms[i].values[kind.ordered_by] for i in places}
-        if None not in keys.values():
-            ranked = sorted(places, key=lambda i: keys[i] or 0.0)
-            for place, source in zip(places, ranked, strict=True):
-                ordered[place] = terms[source]
-    return tuple(ordered)
-
-
 def _check_distinct(terms: tuple[Process, ...]) -> None:
     seen: set[Any] = set()
     for term in terms:
@@ -288,17 +282,6 @@ def _check_distinct(terms: tuple[Process, ...]) -> None:
         seen.add(kind)
         if None not in shape.values():
             seen.add((kind, *shape.values()))
-
-
-def _number(terms: tuple[Process, ...]) -> tuple[ModelParameter, ...]:
-    """Keys: prefix and name, with _1, _2, ... where several terms would share one."""
-    keys = [term.prefix + p.name for term in terms for p in term.parameters]
-    numbered = iter(numbered_names(keys, "_"))
-    return tuple(
-        ModelParameter(next(numbered), index, p, term.values[p.name])
-        for index, term in enumerate(terms)
-        for p in term.parameters
-    )
 
 
 def simulate(

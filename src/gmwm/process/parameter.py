@@ -57,13 +57,7 @@ class Parameter:
         return (self.linear and value == 0.0) or self.lower < value < self.upper
 
     def checked(self, value: Any, owner: str) -> float:
-        """The value as a number in the parameter's range.
-
-        Raises
-        ------
-        InputError
-            If it is none; ``owner`` is the name of the process.
-        """
+        """The value as a number in the range; raises InputError if it is none."""
         where = f"{owner}: {self.name}"
         try:
             number = float("x" if isinstance(value, str) else value)

@@ -24,6 +24,7 @@ from functools import lru_cache, wraps
 
 import numpy as np
 import numpy.typing as npt
+from scipy import fft
 from scipy.special import expit
 
 from gmwm._core.typing import FloatArray
@@ -348,3 +349,33 @@ def _check_stationary(filters: Wavelet, weights: GainWeights, density: FloatArra
         f"the spectrum rises like f^-{slope:.3g} towards zero frequency, too fast for the "
         f"{moments} vanishing moment{'s'[: moments != 1]} of wavelet {filters.name!r}: {hint}"
     )
+
+
+def circulant(spectrum: FloatArray, n: int, rng: np.random.Generator) -> FloatArray:
+    """First ``n`` samples of a periodic Gaussian series (Davies & Harte 1987, *Biometrika* 74, 95).
+
+    spectrum: (N/2 + 1,), non-negative eigenvalues of its circulant covariance matrix at frequencies
+        0, 1/N, ..., 1/2 cycles per sample.
+    """
+    size = 2 * (spectrum.size - 1)
+    transformed = fft.rfft(rng.standard_normal(size)) * np.sqrt(spectrum)
+    return np.asarray(fft.irfft(transformed, size)[:n])
+
+
+def from_psd(psd: PSD, n: int, dt: float, rng: np.random.Generator) -> FloatArray:
+    """A Gaussian series from its power spectral density.
+
+    The spectrum is sampled at multiples of 1/(4 n dt), so the autocovariance is right up to what
+    is left of it beyond lag 3 n. A spectrum that grows without bound towards zero frequency is
+    simulated through its first differences and starts at zero.
+    """
+    size = fft.next_fast_len(4 * n, real=True)
+    size += size % 2
+    frequency = np.arange(size // 2 + 1) / size
+    frequency[0] = 1e-4 / size
+    spectrum = evaluated(psd, frequency / dt, dt) / dt
+    if spectrum[0] <= 2.0 * spectrum[1]:
+        return circulant(spectrum, n, rng)
+    difference = spectrum * 4.0 * np.sin(np.pi * frequency) ** 2
+    path = np.cumsum(circulant(difference, n, rng))
+    return np.asarray(path - path[0])

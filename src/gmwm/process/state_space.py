@@ -8,7 +8,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gmwm._core.compiled import compiled
 from gmwm._core.typing import FloatArray
+
+_BLOCK = 100_000  # samples: the noise of more would fill the memory
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,3 +128,57 @@ def numbered_names(names: Sequence[str], joint: str = " ") -> list[str]:
         seen[name] += 1
         result.append(f"{name}{joint}{seen[name]}" if total[name] > 1 else name)
     return result
+
+
+@compiled()
+def first_order(innovation: FloatArray, phi: float, scale: float, start: float) -> None:
+    """In place: x[0] = start * e[0], x[k] = phi x[k-1] + scale * e[k]."""
+    state = start * innovation[0]
+    innovation[0] = state
+    for k in range(1, innovation.size):
+        state = phi * state + scale * innovation[k]
+        innovation[k] = state
+
+
+@compiled()
+def _propagate(
+    transition: FloatArray,
+    noise_root: FloatArray,
+    output: FloatArray,
+    state: FloatArray,
+    noise: FloatArray,
+    series: FloatArray,
+) -> None:
+    p = state.size
+    following = np.empty(p)
+    for k in range(series.size):
+        total = 0.0
+        for i in range(p):
+            total += output[i] * state[i]
+        series[k] = total
+        for i in range(p):
+            value = 0.0
+            for j in range(p):
+                value += transition[i, j] * state[j] + noise_root[i, j] * noise[k, j]
+            following[i] = value
+        state[:] = following
+
+
+def _root(covariance: FloatArray) -> FloatArray:
+    """A square root of a positive semi-definite matrix."""
+    values, vectors = np.linalg.eigh(covariance)
+    return np.asarray(vectors * np.sqrt(np.maximum(values, 0.0)))
+
+
+def from_state_space(form: StateSpace, n: int, rng: np.random.Generator) -> FloatArray:
+    """A series of the model ``form``."""
+    state = form.initial_mean + _root(form.initial_covariance) @ rng.standard_normal(form.n_states)
+    root = _root(form.process_noise)
+    series = np.empty(n)
+    for start in range(0, n, _BLOCK):
+        part = series[start : start + _BLOCK]
+        noise = rng.standard_normal((part.size, form.n_states))
+        _propagate(form.transition, root, form.output, state, noise, part)
+    if form.measurement_noise > 0.0:
+        series += np.sqrt(form.measurement_noise) * rng.standard_normal(n)
+    return series

@@ -14,17 +14,9 @@ from gmwm.issues import Notice, notice
 from gmwm.readers import tuning
 from gmwm.readers.grid import Change, Jumps, Uneven, find_change, find_jumps, place_uneven
 
-UNITS = {
-    86400.0: "days",
-    3600.0: "hours",
-    60.0: "minutes",
-    1.0: "seconds",
-    1e-3: "milliseconds",
-    1e-6: "microseconds",
-    1e-9: "nanoseconds",
-}
-"""Names of units of time, by their seconds."""
-
+# Names of units of time, by their seconds.
+UNITS = {86400.0: "days", 3600.0: "hours", 60.0: "minutes", 1.0: "seconds"}
+UNITS |= {1e-3: "milliseconds", 1e-6: "microseconds", 1e-9: "nanoseconds"}
 _SHORT = dict(zip(UNITS, ("days", "h", "min", "s", "ms", "us", "ns"), strict=True))
 _WAY_OUT = "if the samples are evenly spaced all the same, give rate= and time=False"
 _SHORTEST_SHOWN = 1e-3  # s; less is given in microseconds
@@ -34,22 +26,16 @@ _DAY = 86400.0
 
 @dataclass(frozen=True)
 class Clock:
-    """Time stamps of a recording.
+    """Time stamps of a recording."""
 
-    source, column: File and column, for messages, ``"column 't'"``.
-    stamps: (n,), in a unit of ``seconds``.
-    seconds: The unit; None if the header states none that is known.
-    own_unit: The unit as the header states it.
-    where: Row -> its place in the file.
-    same: Row numbers in an order -> whether each has the samples of the one before.
-    """
-
+    # source, column: file and column, for messages, ``"column 't'"``.
     source: str
     column: str
-    stamps: FloatArray
-    seconds: float | None
-    own_unit: str
-    where: Callable[[int], str]
+    stamps: FloatArray  # (n,), in a unit of ``seconds``
+    seconds: float | None  # the unit; None if the header states none that is known
+    own_unit: str  # the unit as the header states it
+    where: Callable[[int], str]  # row -> its place in the file
+    # Row numbers in an order -> whether each has the samples of the one before.
     same: Callable[[IntArray], BoolArray]
 
     def error(self, row: int | None, text: str, hint: str = _WAY_OUT) -> InputError:
@@ -60,18 +46,13 @@ class Clock:
 
 @dataclass(frozen=True)
 class Timing:
-    """What time stamps say.
+    """What time stamps say."""
 
-    rate: Hz, as the stamps have it.
-    jumps: Where rows are missing.
-    notices: The rate, its unit, the jitter, the jumps, and what else is uneven.
-    jitter: Standard deviation of the steps, as a share of a step.
-    """
-
-    rate: float
-    jumps: Jumps
+    rate: float  # Hz, as the stamps have it
+    jumps: Jumps  # where rows are missing
+    # The rate, its unit, the jitter, the jumps, and what else is uneven.
     notices: tuple[Notice, ...]
-    jitter: float
+    jitter: float  # standard deviation of the steps, as a share of a step
 
 
 def agree(rate: float, other: float) -> bool:
@@ -83,10 +64,9 @@ def timing_of(clock: Clock, expected: float | None = None) -> Timing:
     """Sampling rate over the whole recording, and the jumps.
 
     Stamps without a unit are seconds where that gives the rate of an inertial sensor; for others a
-    rate is asked for. With an expected rate, the unit is the one that fits it, or where the header
-    states a unit that is unknown here, whatever makes it fit.
+    rate is asked for. With an expected rate (Hz), the unit is the one that fits it, or where the
+    header states a unit that is unknown here, whatever makes it fit.
 
-    expected: Rate that the user or the file states, Hz.
     Raises InputError if a stamp is missing, most are far from any even clock, the clock was set
         back, more than half of the rows are missing, or the stamps contradict the expected rate.
     """
@@ -94,8 +74,7 @@ def timing_of(clock: Clock, expected: float | None = None) -> Timing:
     if missing.size:
         text = f"no time stamp{_others(missing.size)}"
         raise clock.error(int(missing[0]), text, f"remove such lines, or, {_WAY_OUT}")
-    last: list[Notice] = []
-    copies = _copies(clock)
+    last, copies = list[Notice](), _copies(clock)
     kept = np.delete(np.arange(clock.stamps.size), copies) if copies.size else None
     if kept is not None:
         rows, where = kept, clock.where
@@ -218,15 +197,13 @@ def _grid(clock: Clock) -> _Grid:
 
 
 def _are_in_turns(stamps: FloatArray, steps: FloatArray) -> bool:
-    """Whether short and long steps alternate, so that the usual step is not the interval.
-
-    A long step of about twice the short one may as well be one of three samples that is lost.
-    """
+    """Whether short and long steps alternate, so that the usual step is not the interval."""
     pairs = stamps[2:] - stamps[:-2]
     usual = median(pairs)
     if abs(2.0 * median(steps) / usual - 1.0) < tuning.UNLIKE_STEPS:
         return False
     short, long = median(steps[steps < 0.5 * usual]), median(steps[steps > 0.5 * usual])
+    # A long step of about twice the short one may as well be one of three samples that is lost.
     if abs(long / short - 2.0) < tuning.OFF_GRID:
         return False
     return bool(np.mean(np.abs(pairs / usual - 1.0) < 0.1) > tuning.MOST_IN_TURNS)
@@ -251,8 +228,6 @@ def without_unit(
 ) -> InputError | None:
     """What stamps without a unit may be; None if they are seconds of a sensor.
 
-    source, column: For the message, ``"column 't'"``.
-    step: Usual step.
     expected: Rate that is stated but fits no unit, Hz.
     """
     if tuning.LEAST_STEP <= step < tuning.LARGEST_STEP or not step > 0.0:
@@ -281,12 +256,9 @@ def _check_jumps(clock: Clock, found: _Grid, seconds: float) -> None:
     if found.change is not None:
         first, then = (rate / seconds for rate in found.change.rates)
         if max(first / then, then / first) > tuning.SHARP_CHANGE:
-            raise InputError(
-                f"{clock.source}, {clock.column}, near {clock.where(found.change.row)}: the "
-                f"sampling rate goes from {first:.4g} to {then:.4g} Hz",
-                "rate-changes",
-                "use the part before or after",
-            )
+            place = f"{clock.source}, {clock.column}, near {clock.where(found.change.row)}"
+            text = f"{place}: the sampling rate goes from {first:.4g} to {then:.4g} Hz"
+            raise InputError(text, "rate-changes", "use the part before or after")
     if jumps.are_rounding:
         text = (
             f"a step of two intervals, and {jumps.rows.size - 1:,} more such at even distances, "

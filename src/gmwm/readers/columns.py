@@ -13,8 +13,7 @@ from gmwm.issues import Notice, notice
 from gmwm.readers.names import AXES, CANONICAL, TIME, bare, meaning
 from gmwm.readers.table import Table, label
 
-Reference = str | int
-"""A column's name, or its index counted from 0."""
+Reference = str | int  # a column's name, or its index counted from 0
 
 _EXAMPLE = 'channels={"gyro_x": 0, "accel_x": 3}'
 _EXAMPLES = {"gyro": "deg/s", "accel": "g"}
@@ -32,28 +31,19 @@ class Given:
 
     def __post_init__(self) -> None:
         units = self.units
-        if not isinstance(units, Mapping) or not all(
-            isinstance(each, str) for each in units.values()
-        ):
-            raise InputError(
-                f"units = {checks.shown(units)}: give that of each sensor, e.g. "
-                'units={"gyro": "deg/s", "accel": "g"}'
-            )
+        if not (isinstance(units, Mapping) and all(isinstance(u, str) for u in units.values())):
+            hint = 'give that of each sensor, e.g. units={"gyro": "deg/s", "accel": "g"}'
+            raise InputError(f"units = {checks.shown(units)}: {hint}")
 
 
 @dataclass(frozen=True)
 class AuxiliaryColumn:
-    """A column of temperatures, voltages or time stamps of another clock.
+    """A column of temperatures, voltages or time stamps of another clock."""
 
-    name: Name of its channel.
-    quantity: One of `AUXILIARY`.
-    unit: Unit in the file; None if unknown.
-    """
-
-    name: str
+    name: str  # name of its channel
     index: int
-    quantity: str
-    unit: AuxiliaryUnit | None
+    quantity: str  # one of `AUXILIARY`
+    unit: AuxiliaryUnit | None  # unit in the file; None if unknown
 
     def __str__(self) -> str:
         return f"{self.name!r} ({self.quantity}{'' if self.unit else ', unit unknown'})"
@@ -61,18 +51,12 @@ class AuxiliaryColumn:
 
 @dataclass(frozen=True)
 class Roles:
-    """What the columns are.
+    """What the columns are."""
 
-    channels: Name of a gyro's or accelerometer's channel -> index of its column.
-    auxiliary: Other channels that are kept.
-    time: Index of the column of time stamps.
-    notices: Auxiliary columns, and columns that are not used.
-    """
-
-    channels: dict[str, int]
-    auxiliary: tuple[AuxiliaryColumn, ...]
-    time: int | None
-    notices: tuple[Notice, ...]
+    channels: dict[str, int]  # name of a gyro's or accelerometer's channel -> index of its column
+    auxiliary: tuple[AuxiliaryColumn, ...]  # other channels that are kept
+    time: int | None  # index of the column of time stamps
+    notices: tuple[Notice, ...]  # auxiliary columns, and columns that are not used
 
     @property
     def columns(self) -> tuple[int, ...]:
@@ -86,8 +70,6 @@ def roles_of(table: Table, given: Given) -> Roles:
 
     The caller decides first, then the columns' names, then their number; the units decide what one
     or three columns without names are.
-
-    Raises InputError if it cannot be decided, or no channel is a gyro's or an accelerometer's.
     """
     names, channels = table.names, given.channels
     time: int | None = None
@@ -105,11 +87,9 @@ def roles_of(table: Table, given: Given) -> Roles:
             known = {time, *stamps}
             rest = [i for i in range(len(names)) if i not in known]
             if not rest or (any(names[i] for i in rest) and not table.tentative):
-                raise InputError(
-                    f"{table.source}: no column is known as a gyro's or an accelerometer's, "
-                    f"{_listed(table)}: say which is which, e.g. {_EXAMPLE}",
-                    "channel-unknown",
-                )
+                text = f"{table.source}: no column is known as a gyro's or an accelerometer's"
+                hint = f"{_listed(table)}: say which is which, e.g. {_EXAMPLE}"
+                raise InputError(f"{text}, {hint}", "channel-unknown")
             chosen, stamp = _by_number(table, rest, bool(known - {None}), given.units)
             stamps = [stamp] if stamp is not None else stamps
         chosen = _only(table, chosen, channels)
@@ -135,24 +115,16 @@ def roles_of(table: Table, given: Given) -> Roles:
         count = {"count": len(ignored)}
         notices.append(notice("columns-not-used", "", count, listed=", ".join(ignored)))
     if not chosen:
-        raise InputError(
-            f"{table.source}: every channel is auxiliary: name one of a gyro or an accelerometer, "
-            'e.g. channels={"gyro_x": 1}',
-            "channel-unknown",
-        )
+        hint = 'name one of a gyro or an accelerometer, e.g. channels={"gyro_x": 1}'
+        raise InputError(f"{table.source}: every channel is auxiliary: {hint}", "channel-unknown")
     return Roles(chosen, tuple(auxiliary), time, tuple(notices))
 
 
 def find_column(table: Table, reference: Reference, what: str) -> int:
-    """Index of a column that the user names.
-
-    what: What it is for, in messages.
-    Raises InputError if there is no such column, or more than one.
-    """
+    """Index of a column that the user names; ``what`` it is for, in messages."""
     if isinstance(reference, bool) or not isinstance(reference, str | int):
-        raise InputError(
-            f"{what} = {reference!r} is not a column: give its name or its index counted from 0"
-        )
+        hint = "give its name or its index counted from 0"
+        raise InputError(f"{what} = {reference!r} is not a column: {hint}")
     index = reference if isinstance(reference, int) else None
     if isinstance(reference, str):
         for known in (table.names, [bare(name) for name in table.names]):
@@ -167,9 +139,8 @@ def find_column(table: Table, reference: Reference, what: str) -> int:
                         f"the one for {what}, counted from 0: {', '.join(map(str, found))}"
                     )
         if not (reference.isascii() and reference.isdigit()):
-            raise InputError(
-                f"{table.source} has no column {reference!r} for {what}: {_listed(table)}"
-            )
+            text = f"{table.source} has no column {reference!r} for {what}"
+            raise InputError(f"{text}: {_listed(table)}")
         index = int(reference)
     if index is None or not 0 <= index < len(table.names):
         raise InputError(
@@ -189,17 +160,14 @@ def _listed(table: Table, most: int = 12) -> str:
 
 
 def _named_channels(table: Table) -> dict[str, int]:
-    found: dict[str, int] = {}
-    roles = [meaning(name).role for name in table.names]
+    found, roles = dict[str, int](), [meaning(name).role for name in table.names]
     for channel in CANONICAL:
         indices = [i for i, role in enumerate(roles) if role == channel]
         if len(indices) > 1:
             names = " and ".join(label(table.names, i) for i in indices[:2])
-            raise InputError(
-                f"{table.source}: columns {names} may both be {channel}: choose one, "
-                f'e.g. channels={{"{channel}": {indices[0]}}}',
-                "channel-unknown",
-            )
+            text = f"{table.source}: columns {names} may both be {channel}: choose one"
+            example = f'channels={{"{channel}": {indices[0]}}}'
+            raise InputError(f"{text}, e.g. {example}", "channel-unknown")
         if indices:
             found[channel] = indices[0]
     return found
@@ -215,11 +183,8 @@ def _by_number(
     if len(rest) == len(CANONICAL):
         return dict(zip(CANONICAL, rest, strict=True)), stamp
     if len(rest) not in (1, len(AXES)):
-        raise InputError(
-            f"{table.source} has {len(table.names)} columns without names that are known: say "
-            f"which is which, e.g. {_EXAMPLE}",
-            "channel-unknown",
-        )
+        text = f"{table.source} has {len(table.names)} columns without names that are known"
+        raise InputError(f"{text}: say which is which, e.g. {_EXAMPLE}", "channel-unknown")
     sensors = [sensor for sensor in SI_UNIT if sensor in units]
     if len(sensors) != 1:
         raise InputError(
@@ -239,15 +204,10 @@ def _only(table: Table, found: dict[str, int], names: Collection[str] | None) ->
     wanted = {names} if isinstance(names, str) else set(names)
     for name in wanted:
         if name not in found and not any(name == each.partition("_")[0] for each in found):
-            raise InputError(
-                f"{table.source} has no channel {name!r}: it has {', '.join(found)}",
-                "channel-unknown",
-            )
-    return {
-        name: column
-        for name, column in found.items()
-        if not wanted.isdisjoint((name, name.partition("_")[0]))
-    }
+            text = f"{table.source} has no channel {name!r}: it has {', '.join(found)}"
+            raise InputError(text, "channel-unknown")
+    sensors = {name: name.partition("_")[0] for name in found}
+    return {n: column for n, column in found.items() if not wanted.isdisjoint((n, sensors[n]))}
 
 
 def _given_auxiliary(
@@ -269,10 +229,7 @@ def _given_auxiliary(
 
 
 def _found_auxiliary(
-    table: Table,
-    used: Collection[int | None],
-    chosen: Mapping[str, int],
-    units: Mapping[str, str],
+    table: Table, used: Collection[int | None], chosen: Collection[str], units: Mapping[str, str]
 ) -> list[AuxiliaryColumn]:
     """Columns without another use that are auxiliary by their names."""
     found: list[AuxiliaryColumn] = []
@@ -305,19 +262,13 @@ def channel_units(
     units: Units that the user gave, by sensor or by channel; the latter goes first.
     unknown_rate: Says what is wrong with the sampling rate, which is then asked for at once.
     Returns: units, by channel; notices of units that the user did not give.
-    Raises InputError if a unit is missing, unknown, or not one of what the channel measures; or the
-        rate is missing.
     """
     known = (*roles.channels, *(column.name for column in roles.auxiliary))
     for key in units:
         if key not in SI_UNIT and key not in known:
-            raise InputError(
-                f"units has {key!r}, which is neither gyro nor accel nor a channel: the channels "
-                f"are {', '.join(known)}"
-            )
-    found: dict[str, str] = {}
-    from_header: dict[str, str] = {}
-    overruled: dict[str, str] = {}
+            text = f"units has {key!r}, which is neither gyro nor accel nor a channel"
+            raise InputError(f"{text}: the channels are {', '.join(known)}")
+    found, from_header, overruled = dict[str, str](), dict[str, str](), dict[str, str]()
     missing: dict[str, str] = {}  # one channel of each sensor stands for the others
     for channel, column in roles.channels.items():
         in_header = meaning(table.names[column]).unit
@@ -340,20 +291,16 @@ def channel_units(
     rate = unknown_rate() if missing or roles.time is None else None
     if missing or rate is not None:
         raise _incomplete(table.source, missing, rate)
-    notices = []
+    notices, origin = [], table.origin
     if from_header:
         listed = "; ".join(
             f"{', '.join(name for name, u in from_header.items() if u == unit)} in {unit}"
             for unit in dict.fromkeys(from_header.values())
         )
-        notices.append(
-            notice("units-from-names", "", from_header, origin=table.origin, listed=listed)
-        )
+        notices.append(notice("units-from-names", "", from_header, origin=origin, listed=listed))
     if overruled:
         listed = "; ".join(f"{name} in {text}" for name, text in overruled.items())
-        notices.append(
-            notice("units-contradicted", "", overruled, origin=table.origin, listed=listed)
-        )
+        notices.append(notice("units-contradicted", "", overruled, origin=origin, listed=listed))
     return found, tuple(notices)
 
 
@@ -370,10 +317,7 @@ def _same(unit: str, other: str) -> bool:
 
 
 def _incomplete(source: str, missing: Mapping[str, str], rate: InputError | None) -> InputError:
-    """One error that asks for everything that the file and the user leave out.
-
-    missing: Sensor, or channel of another name -> channel without a unit.
-    """
+    """One error that asks for the rate and for the units of ``missing`` sensors or channels."""
     if rate is not None and not missing:
         return rate
     text = f"does not give the unit of {' and '.join(missing.values())}"

@@ -11,29 +11,21 @@ from gmwm._core.spool import alike, release
 from gmwm._core.typing import BoolArray, FloatArray, IntArray, median
 from gmwm.readers import tuning
 
-_NONE = np.empty(0, dtype=np.int64)
-
 
 @dataclass(frozen=True)
 class Jumps:
-    """Where a clock jumps forward because rows are missing, and which rows are copies.
+    """Where a clock jumps forward because rows are missing, and which rows are copies."""
 
-    rows: (k,), first row after each jump.
-    steps: (k,), how far the clock goes there, in sampling intervals; 1 would be no jump.
-    missing: (k,), whole number of rows that are missing there, one or more.
-    interval: Sampling interval, in the unit of the stamps.
-    repeated: (r,), rows that repeat one before them.
-    """
-
-    rows: IntArray
+    rows: IntArray  # (k,), first row after each jump
+    # (k,), how far the clock goes there, in sampling intervals; 1 would be no jump.
     steps: FloatArray
-    missing: FloatArray
-    interval: float
-    repeated: IntArray = field(default_factory=_NONE.copy)
+    missing: FloatArray  # (k,), whole number of rows that are missing there, one or more
+    interval: float  # sampling interval, in the unit of the stamps
+    # (r,), rows that repeat one before them.
+    repeated: IntArray = field(default_factory=lambda: np.empty(0, dtype=np.int64))
 
     @property
     def total(self) -> float:
-        """Number of rows that are missing."""
         return float(np.sum(self.missing))
 
     @property
@@ -90,11 +82,7 @@ class Jumps:
 
 @dataclass(frozen=True)
 class Change:
-    """A change of the sampling rate.
-
-    row: Its place, to within a part of the recording.
-    rates: Before and after, in rows per unit of the stamps.
-    """
+    """A change of the sampling rate near a row; rates are in rows per unit of the stamps."""
 
     row: int
     rates: tuple[float, float]
@@ -106,7 +94,6 @@ def find_change(stamps: FloatArray) -> Change | None:
     Both the median and the mean of the steps, without jumps, must differ: rounded stamps change
     the median from part to part, a few missing rows the mean.
 
-    stamps: (n,), increasing.
     Returns: the largest change from one part to the next; or, if the rate comes and goes, so that
         the parts before and after differ by less than half as much, from or to the extreme part.
     """
@@ -140,10 +127,8 @@ def find_jumps(stamps: FloatArray) -> Jumps:
     """Jumps of a clock without short steps.
 
     How many rows are missing is judged from the stamps of some rows before and after the jump,
-    so that one late stamp, which a short step follows, makes no gap.
-
-    stamps: (n,), increasing.
-    Returns: jumps; their sampling interval is the slope of a robust line through the stamps.
+    so that one late stamp, which a short step follows, makes no gap. The sampling interval is the
+    slope of a robust line through the stamps.
     """
     steps = np.diff(stamps)
     usual = np.mean(steps[steps <= tuning.USUAL_STEP * median(steps)])
@@ -186,19 +171,13 @@ def _advance(stamps: FloatArray, rows: IntArray, interval: float) -> FloatArray:
 
 @dataclass(frozen=True)
 class Uneven:
-    """Uneven stamps on an even grid: jitter, bursts, late stamps.
-
-    late: (m,), how far each different stamp is after the grid, in sampling intervals.
-    last: (m,), last row that has the stamp.
-    burst: Rows that have one stamp, usually.
-    jitter: Standard deviation of the steps without losses, in sampling intervals.
-    """
+    """Uneven stamps on an even grid: jitter, bursts, late stamps."""
 
     jumps: Jumps
-    late: FloatArray
-    last: IntArray
-    burst: int
-    jitter: float
+    late: FloatArray  # (m,), how far each different stamp is after the grid, in sampling intervals
+    last: IntArray  # (m,), last row that has the stamp
+    burst: int  # rows that have one stamp, usually
+    jitter: float  # standard deviation of the steps without losses, in sampling intervals
 
 
 def place_uneven(stamps: FloatArray) -> Uneven | int | None:
@@ -207,10 +186,11 @@ def place_uneven(stamps: FloatArray) -> Uneven | int | None:
     The stamp of several rows is taken as that of the last of them. Rows are lost where the stamps
     are later from then on; a host that stalls catches up again, and loses none.
 
-    stamps: (n,).
     Returns: the row from which on stamps are earlier, where a clock was set back; None if most
         stamps are far from any even grid.
     """
+    from scipy import ndimage
+
     last = np.flatnonzero(np.diff(stamps, append=np.nan) != 0.0)
     sizes = np.diff(last, prepend=-1)
     if np.max(sizes) > min(tuning.MOST_OF_ONE_STAMP, max(stamps.size // 8, 16)):
@@ -238,7 +218,10 @@ def place_uneven(stamps: FloatArray) -> Uneven | int | None:
         number = last + np.cumsum(lost)
         interval = interval_of(time, number, np.zeros(last.size, dtype=bool))
     late = time / interval - number
-    late -= _slow_part(late)
+    # Slow wander of the clock: the median drops what a stall delays, the mean its own noise.
+    size = tuning.STAMPS_OF_WANDER
+    calm = ndimage.median_filter(late, min(size, late.size) | 1, mode="nearest")
+    late -= ndimage.uniform_filter1d(calm, size, mode="nearest")
     if not median(np.abs(late)) <= tuning.MOST_UNEVEN:
         return None
     usual = (lost[1:] == 0) & (sizes[1:] == np.median(sizes))
@@ -282,15 +265,6 @@ def _early(late: FloatArray) -> FloatArray:
     return np.asarray(np.partition(late, place, axis=-1)[..., place])
 
 
-def _slow_part(late: FloatArray) -> FloatArray:
-    """Slow wander of a clock: the median drops what a stall delays, the mean its own noise."""
-    from scipy import ndimage
-
-    size = tuning.STAMPS_OF_WANDER
-    calm = ndimage.median_filter(late, min(size, late.size) | 1, mode="nearest")
-    return np.asarray(ndimage.uniform_filter1d(calm, size, mode="nearest"))
-
-
 def interval_of(stamps: FloatArray, number: IntArray, starts: BoolArray) -> float:
     """Sampling interval: slope of the robust line through the stamps over their sample numbers.
 
@@ -299,8 +273,6 @@ def interval_of(stamps: FloatArray, number: IntArray, starts: BoolArray) -> floa
     jitter. From independent errors of the stamps of s intervals the slope has a relative error of
     ``s sqrt(12 / n^3)``, the slope from the first to the last stamp ``s sqrt(2) / n``.
 
-    stamps: (n,).
-    number: (n,).
     starts: (n,), where a part begins whose clock has an offset of its own.
     """
     edges = [0, *np.flatnonzero(starts), stamps.size]

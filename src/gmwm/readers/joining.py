@@ -14,8 +14,7 @@ from gmwm.readers.names import CANONICAL, bare, meaning
 from gmwm.readers.recording import Channel, Recording, notices_of_gaps
 from gmwm.readers.table import Table
 
-_SAMPLE = 0.5
-"""Samples by which two clocks may part over a recording and count as one."""
+_SAMPLE = 0.5  # by which two clocks may part over a recording and count as one
 
 
 @dataclass(frozen=True)
@@ -39,27 +38,24 @@ def has_sensors(table: Table) -> bool:
 def shares(
     tables: Sequence[Table], channels: Mapping[str, str | int] | Iterable[str] | None
 ) -> list[tuple[Table, Collection[str] | None]]:
-    """Which of the channels that the caller names are in which table; those without any go.
-
-    Raises InputError if columns are assigned, which needs one table, or a channel is in none.
-    """
+    """Which of the channels that the caller names are in which table; those without any go."""
     source = tables[0].source
     if channels is None:
         return [(table, None) for table in tables]
     if isinstance(channels, Mapping):
-        raise InputError(
-            f"{source}: columns are given for channels, and {len(tables)} topics are read: name "
-            'the channels alone, e.g. channels=["gyro"], or choose one topic'
-        )
+        text = f"{source}: columns are given for channels, and {len(tables)} topics are read"
+        hint = 'name the channels alone, e.g. channels=["gyro"], or choose one topic'
+        raise InputError(f"{text}: {hint}")
     wanted = [channels] if isinstance(channels, str) else list(channels)
     found: list[tuple[Table, Collection[str] | None]] = []
+    known = set[str]()
     for table in tables:
         roles = {role for name in table.names if (role := meaning(name).role) in CANONICAL}
         sensors = {str(role).partition("_")[0] for role in roles}
         own = [name for name in wanted if name in roles | sensors]
         if own:
             found.append((table, own))
-    known = {name for _, own in found for name in own or ()}
+            known.update(own)
     for name in wanted:
         if name not in known:
             raise InputError(f"{source} has no channel {name!r} in what is read", "channel-unknown")
@@ -67,26 +63,28 @@ def shares(
 
 
 def joined(parts: Sequence[Part]) -> Recording:
-    """Parts cut to the time that they have in common.
-
-    Raises InputError if they have no such time, or hold the same channel.
-    """
+    """Parts cut to the time that they have in common."""
     first = parts[0].recording
     if len(parts) == 1:
         return first
     start, stop = max(part.start for part in parts), min(part.stop for part in parts)
     if not stop > start:
-        raise InputError(
-            f'{first.source}: its topics have no time in common: choose one, or clock="log"',
-            "topics-apart",
-        )
-    channels: list[Channel] = []
-    for part in parts:
-        channels += _cut(part, start, stop)
+        text = f'{first.source}: its topics have no time in common: choose one, or clock="log"'
+        raise InputError(text, "topics-apart")
+    channels = [channel for part in parts for channel in _cut(part, start, stop)]
     names = [channel.name for channel in channels]
     if len(set(names)) < len(names):
         raise InputError(f"{first.source}: two topics have the same channels: choose one", "topic")
-    channels = _aligned(channels)
+    # Clocks that are the same within half a sample get one rate and length.
+    dt, n = channels[0].dt, channels[0].n
+    for i, channel in enumerate(channels):
+        if abs(channel.dt / dt - 1.0) * channel.n < _SAMPLE and abs(channel.n - n) <= 1:
+            channels[i] = replace(channel, dt=dt, values=channel.values[:n])
+    shortest = min(channel.n for channel in channels if channel.dt == dt)
+    channels = [
+        replace(channel, values=channel.values[:shortest]) if channel.dt == dt else channel
+        for channel in channels
+    ]
     notices: list[Notice] = []
     for each in (each for part in parts for each in part.recording.notices):
         if each.code != "missing-samples" and each not in notices:
@@ -113,35 +111,14 @@ def _cut(part: Part, start: float, stop: float) -> list[Channel]:
         round((start - part.start) * recording.rate), round((stop - part.start) * recording.rate)
     )
     if rows.stop - rows.start < tuning.FEWEST_SAMPLES:
-        raise InputError(
-            f"{recording.source}: its topics have {stop - start:.3g} s in common, fewer than "
-            f"{tuning.FEWEST_SAMPLES} samples: choose one, or record longer",
-            "topics-apart",
-        )
+        common = f"{recording.source}: its topics have {stop - start:.3g} s in common"
+        hint = f"fewer than {tuning.FEWEST_SAMPLES} samples: choose one, or record longer"
+        raise InputError(f"{common}, {hint}", "topics-apart")
     return [replace(channel, values=channel.values[rows]) for channel in recording.channels]
 
 
-def _aligned(channels: Sequence[Channel]) -> list[Channel]:
-    """Channels of clocks that are the same within half a sample get one rate and length."""
-    first = channels[0]
-    result = []
-    for channel in channels:
-        apart = abs(channel.dt / first.dt - 1.0) * channel.n
-        if apart < _SAMPLE and abs(channel.n - first.n) <= 1:
-            channel = replace(channel, dt=first.dt, values=channel.values[: first.n])
-        result.append(channel)
-    shortest = min(channel.n for channel in result if channel.dt == first.dt)
-    return [
-        replace(channel, values=channel.values[:shortest]) if channel.dt == first.dt else channel
-        for channel in result
-    ]
-
-
 def with_temperature(part: Part, table: Table) -> Part:
-    """A thermometer beside the sensors, at their rate.
-
-    Between its stamps it is interpolated; before the first and after the last it is missing.
-    """
+    """A thermometer beside the sensors, interpolated at their rate between its stamps."""
     recording, columns = part.recording, range(len(table.names))
     time = next((i for i in columns if meaning(table.names[i]).role == "time"), None)
     channels: list[Channel] = []
@@ -162,13 +139,8 @@ def with_temperature(part: Part, table: Table) -> Part:
                 )
                 name = bare(table.names[column])
                 channels.append(Channel(name, values, recording.dt, "temperature", "degC"))
-        names = ", ".join(channel.name for channel in channels)
+        names, first = ", ".join(channel.name for channel in channels), recording.names[0]
         count = {"count": stamps.size}
-        first = recording.names[0]
         told = notice("temperature-interpolated", "", count, listed=names, first=first)
-    wider = replace(
-        recording,
-        channels=(*recording.channels, *channels),
-        notices=(*recording.notices, told),
-    )
-    return replace(part, recording=wider)
+    wider, notices = (*recording.channels, *channels), (*recording.notices, told)
+    return replace(part, recording=replace(recording, channels=wider, notices=notices))

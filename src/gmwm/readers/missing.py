@@ -24,15 +24,11 @@ _ODD = np.array([*_CODES, *_ENDS])
 
 @dataclass(frozen=True)
 class Missing:
-    """How many samples of a series are missing.
+    """How many samples of a series are missing."""
 
-    n: Samples, missing ones included.
-    samples: Missing samples.
-    gaps, longest: Runs of missing samples, and the length of the longest.
-    """
-
-    n: int = 0
-    samples: int = 0
+    n: int = 0  # samples, missing ones included
+    samples: int = 0  # missing samples
+    # gaps, longest: runs of missing samples, and the length of the longest.
     gaps: int = 0
     longest: int = 0
 
@@ -73,7 +69,6 @@ def without_sentinels(
     and largest integers of 16, 24, 32 or 64 bit, if far outside all others; and numbers that come
     again and again, exactly, with nothing between them and the others: motion passes through.
 
-    name: Channel.
     values: (n,), in the unit of the file; NaN where one is missing.
     largest: Magnitude beyond the range of any sensor, in the same unit.
     where: Row -> its place in the file.
@@ -105,10 +100,10 @@ def without_sentinels(
     clean = scaled(values, 1.0)
     clean[gone] = np.nan
     is_bad = gone.size > tuning.MOST_SENTINELS * values.size
-    notices = []
-    beyond = [i for i in np.flatnonzero(chosen).tolist() if abs(numbers[i]) > largest]
-    others = [i for i in np.flatnonzero(chosen).tolist() if i not in beyond]
-    for group in [[i] for i in others] + ([beyond] if beyond else []):
+    severity: Severity = "bad" if is_bad else "warning"
+    notices, which_chosen = [], np.flatnonzero(chosen).tolist()
+    beyond = [i for i in which_chosen if abs(numbers[i]) > largest]
+    for group in [*([i] for i in which_chosen if i not in beyond), *([beyond] if beyond else [])]:
         rows = far[np.isin(which, group)]
         number = float(numbers[group[int(np.argmax(np.abs(numbers[group])))]])
         data = {"count": rows.size, "value": number, "row": int(rows[0])}
@@ -118,7 +113,6 @@ def without_sentinels(
             "meaning": _meaning(number, largest) or "far from all others with nothing between",
             "place": where(int(rows[0])),
         }
-        severity: Severity = "bad" if is_bad else "warning"
         notices.append(notice("sentinel", name, data, severity=severity, **words))
     return clean, notices
 

@@ -18,10 +18,7 @@ from gmwm.errors import InputError
 
 AXES = ("x", "y", "z")
 CANONICAL = tuple(f"{sensor}_{axis}" for sensor in ("gyro", "accel") for axis in AXES)
-"""Names of the channels, in the order of a recording."""
-
-TIME = "time"
-"""Role of a column of time stamps."""
+TIME = "time"  # role of a column of time stamps
 
 _SENSOR_WORDS = {
     word: sensor
@@ -36,12 +33,11 @@ _SENSOR_WORDS = {
 # These mean a sensor only where nothing stands before them.
 _SENSOR_LETTERS = {"g": "gyro", "w": "gyro", "a": "accel", "f": "accel"}
 
+# Columns that say which of several sensors a row is of.
 NUMBERS_OF_SENSORS = frozenset(
     {"id", "i", "inst", "instance"}
     | {f"{what}{end}" for what in ("imu", "sensor", "device", "unit") for end in ("", "id", "_id")}
 )
-"""Names of columns that say which of several sensors a row is of."""
-
 # Columns about a sensor other than its samples.
 _OTHER_MEANINGS = frozenset(
     {"bias", "offset", "std", "sigma", "var", "cov", "covariance", "err", "error", "ref"}
@@ -49,14 +45,9 @@ _OTHER_MEANINGS = frozenset(
     | {"delta", "mag", "free"}
 )
 
-_AUXILIARY_WORDS = {
-    word: quantity
-    for quantity, words in {
-        "temperature": "temp temperature temperatures thermometer",
-        "voltage": "voltage volt volts vbat vdd vcc",
-    }.items()
-    for word in words.split()
-}
+_AUXILIARY_WORDS = dict.fromkeys(
+    ("temp", "temperature", "temperatures", "thermometer"), "temperature"
+) | dict.fromkeys(("voltage", "volt", "volts", "vbat", "vdd", "vcc"), "voltage")
 # Columns about such a quantity other than its samples.
 _OTHER_AUXILIARY = frozenset(
     {"bias", "offset", "std", "sigma", "var", "cov", "err", "error", "ref", "reference"}
@@ -72,14 +63,9 @@ _UNIT_WORDS = {
         "deg/h": "dph degh degph deghr degperhr degperh",
         "mdeg/s": "mdps mdegs mdegps",
         "m/s^2": "mss ms2 mps2 mpss mpers2 msec2",
-        "g": "g",
-        "mg": "mg",
-        "ug": "ug",
     }.items()
     for word in words.split()
-}
-
-_BY_UNIT = ("temperature", "voltage")
+} | {"g": "g", "mg": "mg", "ug": "ug"}
 
 _TIME_WORDS = frozenset({"t", "ts", "time", "timestamp", "stamp"})
 _BEFORE_TIME = frozenset(
@@ -111,43 +97,35 @@ _POWER = re.compile(r"(?<=[A-Za-z])(?:\^|\*\*)?(-?[1-3])")
 
 @dataclass(frozen=True)
 class Meaning:
-    """What a name says.
+    """What a name says."""
 
-    role: One of `CANONICAL`, `TIME`, "temperature", "voltage", or ``None`` for anything else.
-    unit: Its unit, if the name has one that is understood.
-    seconds: For a time column, its unit in seconds.
-    stated: For a time column, what stands in brackets after its name, understood or not.
-    """
-
+    # One of `CANONICAL`, `TIME`, "temperature", "voltage", or ``None`` for anything else.
     role: str | None
-    unit: str | None = None
-    seconds: float | None = None
-    stated: str = ""
+    unit: str | None = None  # its unit, if the name has one that is understood
+    seconds: float | None = None  # for a time column, its unit in seconds
+    stated: str = ""  # for a time column, what stands in brackets after its name, understood or not
 
 
 def stated_seconds(source: str, name: str) -> float | None:
-    """Unit of a time column in seconds, ``None`` if its name states none.
-
-    Raises InputError if the name states a unit that is not one of time.
-    """
+    """Unit of a time column in seconds, ``None`` if its name states none; rejects other units."""
     found = meaning(name)
     if found.stated and found.seconds is None:
-        raise InputError(
-            f"{source}, column {name!r}: {found.stated!r} is not a known unit of time: write s, "
-            "ms, us, ns, min, h or days in the header, or give the sampling rate, rate=100",
-            "time-unit",
-        )
+        text = f"{source}, column {name!r}: {found.stated!r} is not a known unit of time"
+        hint = "write s, ms, us, ns, min, h or days in the header, or give the sampling rate"
+        raise InputError(f"{text}: {hint}, rate=100", "time-unit")
     return found.seconds
 
 
 @lru_cache(maxsize=4096)
 def meaning(name: str) -> Meaning:
-    """Interpret the name of a column.
-
-    name: As written in the file, e.g. ``"gyro_x [deg/s]"`` or ``"#timestamp [ns]"``.
-    """
+    """Interpret the name of a column, e.g. ``"gyro_x [deg/s]"`` or ``"#timestamp [ns]"``."""
     plain = unicodedata.normalize("NFKC", name.replace("²", "^2")).replace("μ", "u")
-    base, bracket = _split_brackets(plain)
+    base, bracket = plain, ""
+    if found := _BRACKETS.search(plain):
+        base, bracket = plain[: found.start()], found.group(1).strip()
+    if bracket in ("0", "1", "2"):  # acc[0] is an axis; PX4's gyro_rad[0] holds rates all the same
+        base = f"{re.sub(r'gyro_rad$', 'gyro_rad_s', base)}_{AXES[int(bracket)]}"
+        bracket = ""
     words = [word.lower() for word in re.findall(r"[A-Za-z0-9]+", _CAMEL_HUMP.sub("_", base))]
     return (
         _as_time(words, bracket)
@@ -168,19 +146,6 @@ def of_dates(name: str) -> str:
     words = re.findall(r"[A-Za-z]+", plain.lower())
     is_vague = not plain or (bool(words) and words[-1] in _BEFORE_TIME)
     return f"{plain} time [s]".lstrip() if is_vague else f"{plain} [s]"
-
-
-def _split_brackets(name: str) -> tuple[str, str]:
-    """Part ``ax [g]`` into name and unit; an index such as ``acc[0]`` is an axis."""
-    found = _BRACKETS.search(name)
-    if not found:
-        return name, ""
-    base, inside = name[: found.start()], found.group(1).strip()
-    if inside in ("0", "1", "2"):
-        # PX4's gyro_rad[0] holds rates all the same.
-        base = re.sub(r"gyro_rad$", "gyro_rad_s", base)
-        return f"{base}_{AXES[int(inside)]}", ""
-    return base, inside
 
 
 def _as_time(words: Sequence[str], bracket: str) -> Meaning | None:
@@ -225,7 +190,8 @@ def _as_auxiliary(words: Sequence[str], bracket: str) -> Meaning | None:
         return None  # "T [degC]" is one, "time of temp" is not
     found = auxiliary_unit(bracket)
     if found is not None:
-        return Meaning(found.quantity, bracket) if found.quantity in _BY_UNIT else None
+        is_known = found.quantity in ("temperature", "voltage")
+        return Meaning(found.quantity, bracket) if is_known else None
     quantities = [_AUXILIARY_WORDS.get(word.rstrip("0123456789")) for word in words]
     quantity = next((quantity for quantity in quantities if quantity), None)
     if quantity is None:
@@ -274,8 +240,7 @@ def _sensor(words: Sequence[str]) -> str | None:
 def _unit(text: str) -> str | None:
     """The unit in a header, if it is one of an angular rate or a specific force."""
     cleaned = re.sub(r"\bsec\b", "s", text.replace("°", "deg"))
-    if cleaned == "G":
-        cleaned = "g"
+    cleaned = "g" if cleaned == "G" else cleaned
     if len(cleaned) > 24 or not _UNIT_IN_HEADER.fullmatch(cleaned):
         return None
     unit = _POWER.sub(r"^\1", cleaned)

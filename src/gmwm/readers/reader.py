@@ -17,24 +17,9 @@ from gmwm._core.typing import BoolArray, FloatArray, IntArray, known_of
 from gmwm._core.units import SI_UNIT, factor, quantity_of
 from gmwm.errors import InputError
 from gmwm.issues import Notice, notice
-from gmwm.readers import tuning
-from gmwm.readers.clock import (
-    Clock,
-    Timing,
-    agree,
-    is_time_of_day,
-    seconds_of_day,
-    timing_of,
-    without_unit,
-)
-from gmwm.readers.columns import (
-    AuxiliaryColumn,
-    Given,
-    Reference,
-    Roles,
-    channel_units,
-    roles_of,
-)
+from gmwm.readers import clock as clocks, tuning
+from gmwm.readers.clock import Clock, Timing
+from gmwm.readers.columns import AuxiliaryColumn, Given, Reference, Roles, channel_units, roles_of
 from gmwm.readers.formats.binary import BinaryTable, layout_of
 from gmwm.readers.joining import Part, has_sensors, joined, shares, with_temperature
 from gmwm.readers.missing import without_sentinels
@@ -151,11 +136,7 @@ read.__doc__ = str(read.__doc__).replace("FORMATS", ", ".join(f'``"{name}"``' fo
 
 
 def recording_of(table: Table, given: Given) -> Part:
-    """The recording of a table, and the time of its first sample.
-
-    Raises InputError if a column, a unit, the rate or enough samples are missing, or they
-    contradict each other.
-    """
+    """The recording of a table, and the time of its first sample."""
     stated = _stated_rate(table, given.rate)
     roles = roles_of(table, given)
     _check_one_sensor(table, roles)
@@ -168,8 +149,8 @@ def recording_of(table: Table, given: Given) -> Part:
     start, odd = 0.0, list[Notice]()
     if roles.time is not None:
         seconds = meaning(table.names[roles.time]).seconds
-        if seconds in (None, 1.0) and is_time_of_day(arrays[roles.time]):
-            arrays[roles.time] = seconds_of_day(arrays[roles.time])
+        if seconds in (None, 1.0) and clocks.is_time_of_day(arrays[roles.time]):
+            arrays[roles.time] = clocks.seconds_of_day(arrays[roles.time])
             odd.append(notice("time-of-day"))
         start = float(arrays[roles.time][0]) * (seconds or 1.0)
     for name, index in roles.channels.items():
@@ -177,9 +158,7 @@ def recording_of(table: Table, given: Given) -> Part:
         arrays[index], found = without_sentinels(name, arrays[index], largest, table.where)
         odd += found
     timing = None if roles.time is None else _timing(table, roles.time, arrays, stated)
-    rate = stated or (
-        timing.rate if timing else 0.0
-    )  # without one, it was asked for with the units
+    rate = stated or (timing.rate if timing else 0.0)  # or it was asked for with the units
     if timing is not None:
         # One column at a time: its short form goes before the next one is made longer.
         arrays = {column: timing.jumps.spread(arrays.pop(column)) for column in list(arrays)}
@@ -222,11 +201,9 @@ def _stated_rate(table: Table, rate: float | None) -> float | None:
     rate = float(rate)
     if not (0.0 < rate < math.inf and 1.0 / rate < math.inf):
         raise InputError(f"rate = {rate!r}: give a positive sampling rate in Hz", "rate")
-    if table.rate is not None and not agree(rate, table.rate):
-        raise InputError(
-            f"{table.source} states a rate of {table.rate:.6g} Hz, not {rate:.6g} Hz: leave out "
-            "the rate to use that of the file"
-        )
+    if table.rate is not None and not clocks.agree(rate, table.rate):
+        text = f"{table.source} states a rate of {table.rate:.6g} Hz, not {rate:.6g} Hz"
+        raise InputError(f"{text}: leave out the rate to use that of the file")
     return rate
 
 
@@ -243,35 +220,26 @@ def _check_one_sensor(table: Table, roles: Roles) -> None:
         several = np.unique(numbers).size
         turns = np.count_nonzero(np.diff(numbers))
         if 1 < several <= tuning.MOST_SENSORS and turns > tuning.IN_TURNS * numbers.size:
-            raise InputError(
-                f"{table.source}, {table.column(index)}: rows of {several} sensors come in "
-                "turns: keep those of one",
-                "several-sensors",
-            )
+            text = f"{table.source}, {table.column(index)}: rows of {several} sensors come in turns"
+            raise InputError(f"{text}: keep those of one", "several-sensors")
 
 
 def _unknown_rate(table: Table, time: int | None, stated: float | None) -> InputError | None:
     """What to ask for if the rate is not known: the rate, or the unit of the time stamps."""
-    if stated is not None:
-        return None
-    if time is None:
+    if time is None and stated is None:
         problem = f"{table.source} has no time column and no rate was given"
         return InputError(problem, "rate", "give it in Hz, e.g. rate=100", {"rate": 100.0})
-    if meaning(table.names[time]).seconds is not None:
+    if time is None or stated is not None or meaning(table.names[time]).seconds is not None:
         return None
     steps = np.diff(table.load([time])[time])
-    if not steps.size:
-        return None  # too few samples is what is wrong then
-    return without_unit(table.source, table.column(time), float(np.median(steps)))
+    usual = float(np.median(steps)) if steps.size else 0.0  # too few samples are reported later
+    return clocks.without_unit(table.source, table.column(time), usual)
 
 
 def _load(
     table: Table, roles: Roles
 ) -> tuple[dict[int, FloatArray], list[AuxiliaryColumn], list[Notice]]:
-    """Columns, auxiliary columns among them, and a notice if some of these are left out.
-
-    An auxiliary column is left out if it cannot be read or has another length.
-    """
+    """Columns; auxiliary ones that cannot be read or have another length are left out."""
     wanted = {*roles.columns, *(column.index for column in roles.auxiliary)}
     kept, notices = list(roles.auxiliary), list[Notice]()
     try:
@@ -294,10 +262,9 @@ def _load(
     most = max(n - int(np.count_nonzero(np.isnan(arrays[i]))) for i in roles.channels.values())
     if most < tuning.FEWEST_SAMPLES:
         of_any = "" if most == n else " of any channel"
-        raise InputError(
-            f"{table.source} has {most} samples{of_any} where at least "
-            f"{tuning.FEWEST_SAMPLES} are needed: record longer"
-        )
+        text = f"{table.source} has {most} samples{of_any}"
+        least = f"at least {tuning.FEWEST_SAMPLES} are needed"
+        raise InputError(f"{text} where {least}: record longer")
     return arrays, kept, notices
 
 
@@ -314,17 +281,11 @@ def _timing(
             found[1:] &= (values[1:] == values[:-1]) | both
         return found
 
-    found = meaning(table.names[time])
-    clock = Clock(
-        table.source,
-        table.column(time),
-        arrays[time],
-        found.seconds,
-        found.stated,
-        table.where,
-        same,
+    found, column = meaning(table.names[time]), table.column(time)
+    unit = (found.seconds, found.stated)
+    timing = clocks.timing_of(
+        Clock(table.source, column, arrays[time], *unit, table.where, same), stated
     )
-    timing = timing_of(clock, stated)
     if stated is None:
         return timing
     return replace(timing, notices=(*timing.notices, notice("rate-stated", "", {"rate": stated})))

@@ -82,8 +82,7 @@ class Channel:
     def spread(self) -> float:
         """Largest less smallest of the samples that are there, u; zero if none is."""
         values = np.asarray(checks.unmasked(self.values), dtype=float)
-        # fmin and fmax pass over NaN.
-        lowest = np.fmin.reduce(values, initial=np.inf)
+        lowest = np.fmin.reduce(values, initial=np.inf)  # passes over NaN
         return max(float(np.fmax.reduce(values, initial=-np.inf) - lowest), 0.0)
 
     @property
@@ -211,23 +210,14 @@ class Recording(Mapping[str, Channel], Printed):
         kinds = dict.fromkeys((channel.dt, channel.n) for channel in self.inertial)
         if len(kinds) < 2:
             return (self,)
-        return tuple(
-            replace(
-                self,
-                channels=tuple(
-                    channel
-                    for channel in self.channels
-                    if channel.is_auxiliary or (channel.dt, channel.n) == kind
-                ),
-            )
-            for kind in kinds
-        )
+
+        def channels(kind: tuple[float, int]) -> tuple[Channel, ...]:
+            return tuple(c for c in self.channels if c.is_auxiliary or (c.dt, c.n) == kind)
+
+        return tuple(replace(self, channels=channels(kind)) for kind in kinds)
 
     def of_one_rate(self, what: str) -> Recording:
-        """The recording, if all channels of its sensors have one sampling rate.
-
-        Raises InputError if they have several, which ``what`` does not work with.
-        """
+        """The recording, if its sensors have one sampling rate, which ``what`` needs."""
         parts = self.by_rate()
         if len(parts) > 1:
             rates = " and ".join(f"{part.rate:.6g}" for part in parts)
@@ -275,9 +265,8 @@ class Recording(Mapping[str, Channel], Printed):
         for channel in self.channels:
             if channel.name == name:
                 return channel
-        raise MissingNameError(
-            f"the recording has no channel {name!r}: it has {', '.join(self.names)}"
-        )
+        names = ", ".join(self.names)
+        raise MissingNameError(f"the recording has no channel {name!r}: it has {names}")
 
     def __iter__(self) -> Iterator[str]:
         return iter(self.names)
@@ -295,9 +284,8 @@ class Recording(Mapping[str, Channel], Printed):
 
     def __str__(self) -> str:
         head = f"{self.source or 'recording'}: {self._size}"
-        return "\n".join(
-            [head, *(f"  {channel}" for channel in self.channels), *map(str, self.notices)]
-        )
+        channels = (f"  {channel}" for channel in self.channels)
+        return "\n".join([head, *channels, *map(str, self.notices)])
 
 
 def auxiliary_channel(name: str, values: FloatArray, dt: float, unit: AuxiliaryUnit) -> Channel:
@@ -314,10 +302,8 @@ def _series(name: str, values: FloatArray) -> FloatArray:
         raise InputError(f"channel {name!r} has shape {series.shape}: give one series of samples")
     infinite = np.flatnonzero(np.isinf(series))
     if infinite.size:
-        raise InputError(
-            f"channel {name!r} is infinite at index {infinite[0]}: give a number, or NaN if the "
-            "sample is missing"
-        )
+        where = f"channel {name!r} is infinite at index {infinite[0]}"
+        raise InputError(f"{where}: give a number, or NaN if the sample is missing")
     return series
 
 
@@ -332,7 +318,5 @@ def require_recording(given: Any) -> None:
         path = checks.shown(os.fspath(given))
         raise InputError(f"{path} is a path: read it first, gmwm.read({path}, rate=..., units=...)")
     if not isinstance(given, Recording):
-        raise InputError(
-            f"{checks.shown(given)} is not a recording: give what gmwm.read returns, or make one "
-            "with Recording.from_arrays"
-        )
+        hint = "give what gmwm.read returns, or make one with Recording.from_arrays"
+        raise InputError(f"{checks.shown(given)} is not a recording: {hint}")

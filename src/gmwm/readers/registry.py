@@ -19,52 +19,34 @@ from gmwm.errors import InputError
 if TYPE_CHECKING:
     from gmwm.readers.table import Table
 
-CLOCKS = ("header", "log")
-"""Stamps of messages: those of their headers, or the times at which they were recorded."""
+CLOCKS = ("header", "log")  # stamps of messages: of their headers, or of when they were recorded
 
 
 @dataclass(frozen=True)
 class Wanted:
-    """What the caller asks of a file.
+    """What the caller asks of a file."""
 
-    topics: Topics of a log to read; by default the only one of an IMU, or one of gyros and one of
-        accelerometers.
-    clock: Which of `CLOCKS` counts.
-    by_channel: Whether channels are named, all of which one sensor may have.
-    damaged: Whether the rest of a damaged file is used.
-    """
-
-    topics: Sequence[str] = ()
-    clock: str = "header"
-    by_channel: bool = False
-    damaged: bool = False
+    topics: Sequence[str] = ()  # by default the only one of an IMU, or one of each sensor
+    clock: str = "header"  # which of `CLOCKS` counts
+    by_channel: bool = False  # whether channels are named, all of which one sensor may have
+    damaged: bool = False  # whether the rest of a damaged file is used
 
 
 @dataclass(frozen=True)
 class Format:
     """A kind of file.
 
-    title: What messages call such files.
     opener: Function of a path and `Wanted` that gives tables, as "module:name" in this room; it
         asks for the libraries of an extra that it needs by `gmwm.readers.table.library`.
-    suffixes: Endings of its files.
-    magic: Bytes that its files begin with.
-    is_log: Whether there may be several topics of messages to choose from.
-    has_clocks: Whether messages have the stamp of their header and that of their recording.
     """
 
     name: str
-    title: str
+    title: str  # what messages call such files
     opener: str
     suffixes: tuple[str, ...] = ()
-    magic: tuple[bytes, ...] = ()
-    is_log: bool = False
-    has_clocks: bool = False
-
-    def open(self, path: Any, wanted: Wanted) -> Sequence[Table]:
-        """Tables of a file; several if its sensors have rates of their own."""
-        tables: Sequence[Table] = resolve_name(f"gmwm.readers.{self.opener}")(path, wanted)
-        return tables
+    magic: tuple[bytes, ...] = ()  # bytes that its files begin with
+    is_log: bool = False  # whether there may be several topics of messages to choose from
+    has_clocks: bool = False  # whether messages have stamps of their header and of their recording
 
 
 _TEXT = Format("text", "CSV and other delimited text (plain or .gz)", "text.csv_table:open_text")
@@ -72,7 +54,7 @@ _FRAME = Format("a table in memory", "tables in memory", "formats.frame:open_fra
 
 FORMATS = (
     _TEXT,
-    Format("numpy", "NPY and NPZ", "formats.numpy_file:open_numpy", (".npy", ".npz")),
+    Format("numpy", "NPY and NPZ", "formats.arrays:open_numpy", (".npy", ".npz")),
     # By content before by name: a MAT file of version 7.3 is one of HDF5 behind 512 bytes.
     Format("hdf5", "HDF5", "formats.hdf5:open_hdf5", (".h5", ".hdf5", ".hdf"),
            (b"\x89HDF\r\n\x1a\n", b"MATLAB 7.3")),
@@ -91,18 +73,13 @@ FORMATS = (
 """All formats of files; a file of no other format is text."""
 
 NAMES = tuple(each.name for each in FORMATS)
-"""Names of the formats, as ``format`` of `gmwm.read` has them."""
-
 READABLE = f"gmwm reads {', '.join(each.title for each in FORMATS)}"
-"""For messages about files of another kind."""
 
 
 def open_tables(data: Any, wanted: Wanted, name: str | None = None) -> Sequence[Table]:
-    """Open a file or a table in memory, whatever it is.
+    """Open a file or a table in memory, whatever it is; sensors with own rates are own tables.
 
     name: One of `NAMES`, in place of what the first bytes and the name of the file show.
-    Returns: several tables if the sensors have rates of their own.
-    Raises InputError if it cannot be used.
     """
     if wanted.clock not in CLOCKS:
         raise InputError(f"clock = {wanted.clock!r}: give one of {', '.join(CLOCKS)}")
@@ -116,7 +93,9 @@ def open_tables(data: Any, wanted: Wanted, name: str | None = None) -> Sequence[
         raise InputError(f"{source} has no topics: topic is for bags and flight logs, leave it out")
     if wanted.clock != CLOCKS[0] and not found.has_clocks:
         raise InputError(f"{source} has one clock: clock is for bags, leave it out")
-    return found.open(data if found is _FRAME else Path(data), wanted)
+    opener = resolve_name(f"gmwm.readers.{found.opener}")
+    tables: Sequence[Table] = opener(data if found is _FRAME else Path(data), wanted)
+    return tables
 
 
 def is_frame(data: object) -> bool:

@@ -20,10 +20,7 @@ _GRAVITY = factor("g", SI_UNIT["accel"])
 _DEGREE = factor("deg/s", SI_UNIT["gyro"])
 _ACCEL_UNITS = ("m/s^2", "g", "mg", "ug", "cm/s^2")
 _GYRO_UNITS = ("deg/s", "rad/s", "deg/h", "mdeg/s", "mrad/s")
-_LEAST_COUNT = {
-    "gyro": _DEGREE,
-    "accel": 1.0,
-}  # 1 deg/s and 1 m/s^2: no sensor's last bit is larger
+_LEAST_COUNT = {"gyro": _DEGREE, "accel": 1.0}  # no sensor's last bit is larger
 
 
 def rest_notices(
@@ -34,17 +31,14 @@ def rest_notices(
     are_columns_given: bool,
     has_layout: bool,
 ) -> tuple[Notice, ...]:
-    """Notices where means or noise contradict the units or the columns.
+    """Notices where means or noise contradict the units or the columns; InputError if not given.
 
-    An accelerometer without gravity is fine (gravity may have been subtracted), and so is a gyro
-    that turns.
+    An accelerometer without gravity is fine (it may have been subtracted), and so is a gyro that
+    turns.
 
     unit_of: Unit of each channel in the file.
     given: Units that the user gave, by channel or sensor.
-    are_columns_given: Whether the user said which column is which channel.
     has_layout: Whether the scales are those of a binary layout, where gravity has to show.
-    Raises InputError if the unit of the accelerometer, the columns or the layout are wrong, and
-        the user did not give them.
     """
     rate, force = _Sensor.of(recording, unit_of, "gyro"), _Sensor.of(recording, unit_of, "accel")
     swapped = _swapped(recording.source, rate, force, are_columns_given)
@@ -52,7 +46,11 @@ def rest_notices(
         return swapped
     counts = _counts(recording, unit_of)
     are_counts = {each.where for each in counts}
-    others = (*_gravity(recording, force, given, has_layout), *_gyro(rate))
+    others = [*_gravity(recording, force, given, has_layout)]
+    if rate is not None and not _is_plausible(rate.density, rate.size):
+        others.append(_gyro_unit(rate))
+    elif rate is not None and rate.size - tuning.SURE_MEAN * rate.size_error >= tuning.USUAL_BIAS:
+        others.append(notice("mean-rate", "gyro", {"mean": rate.size}, size=rate.size / _DEGREE))
     rest = [each for each in others if each.severity == "bad" or each.where not in are_counts]
     return (*counts, *rest)
 
@@ -78,9 +76,8 @@ class _Sensor:
         self.usual = median(lengths) if lengths.size else self.size
         fast, slow = _noise_of(axes), _noise_of(means.T)
         self.scatter = float(np.max(fast))
-        self.density = float(
-            np.max(np.minimum(fast * math.sqrt(dt), slow * math.sqrt(second * dt)))
-        )
+        densities = np.minimum(fast * math.sqrt(dt), slow * math.sqrt(second * dt))
+        self.density = float(np.max(densities))
         self.size_error = self.scatter * math.sqrt(len(axes) / axes[0].size)
 
     @classmethod
@@ -155,12 +152,8 @@ def _gravity(
     hint = f"check the unit: all accelerometer values are off by {_GRAVITY / force.size:.4g}"
     found = notice("gravity", "accel", values, variant="unit", hint=hint, in_file=in_file)
     if not is_given:
-        raise InputError(
-            f"{recording.source}: {found.text}",
-            "accel-unit-missing",
-            f'give the unit, units={{"accel": "{likely[0]}"}}',
-            {"unit": likely[0]},
-        )
+        hint, unit = f'give the unit, units={{"accel": "{likely[0]}"}}', {"unit": likely[0]}
+        raise InputError(f"{recording.source}: {found.text}", "accel-unit-missing", hint, unit)
     return (found,)
 
 
@@ -168,12 +161,9 @@ def _scale(recording: Recording, force: _Sensor, *, must_show: bool) -> tuple[No
     """A length that is gravity in no unit, and too large for an accelerometer without gravity."""
     values, usual, ratio = {"norm": force.size}, force.usual, force.usual / _GRAVITY
     if must_show and not 0.5 < ratio < 2.0:
-        raise InputError(
-            f"{recording.source}: the accelerometer reads {usual:.4g} m/s^2, {ratio:.3g} times "
-            "gravity: the file has another layout",
-            "layout",
-            'give the layout of this file, or units={"accel": "m/s^2"} if there is no gravity',
-        )
+        text = f"the accelerometer reads {usual:.4g} m/s^2, {ratio:.3g} times gravity"
+        hint = 'give the layout of this file, or units={"accel": "m/s^2"} if there is no gravity'
+        raise InputError(f"{recording.source}: {text}: the file has another layout", "layout", hint)
     if _is_gravity(force.size * recording.rate, tuning.GRAVITY_SURE):
         hint = "divide the increments, and those of the gyro, by the sampling interval"
         return (notice("gravity", "", values, variant="increments", hint=hint, usual=usual),)
@@ -193,34 +183,18 @@ def _scale(recording: Recording, force: _Sensor, *, must_show: bool) -> tuple[No
     )
 
 
-def _gyro(rate: _Sensor | None) -> tuple[Notice, ...]:
-    """Noise or a mean rate that no gyro has at rest, or a mean rate that few have."""
-    if rate is None:
-        return ()
-    if not _is_plausible(rate.density, rate.size):
-        return (_gyro_unit(rate),)
-    if rate.size - tuning.SURE_MEAN * rate.size_error < tuning.USUAL_BIAS:
-        return ()
-    return (notice("mean-rate", "gyro", {"mean": rate.size}, size=rate.size / _DEGREE),)
-
-
 def _gyro_unit(rate: _Sensor) -> Notice:
     """Noise or a mean rate that is too large, and the units in which it is not."""
-    ratios = {
-        unit: factor(unit, SI_UNIT["gyro"]) / factor(rate.unit, SI_UNIT["gyro"])
-        for unit in _GYRO_UNITS
-    }
+    used = factor(rate.unit, SI_UNIT["gyro"])
+    ratios = {unit: factor(unit, SI_UNIT["gyro"]) / used for unit in _GYRO_UNITS}
     likely = [
         unit
         for unit, ratio in ratios.items()
         if ratio < 0.9 and _is_plausible(rate.density * ratio, rate.size * ratio)
     ]
     # Units that differ by less than gyros do cannot be told apart.
-    near = [
-        unit
-        for unit in likely
-        if abs(math.log(ratios[unit] / ratios[likely[0]])) < math.log(tuning.UNITS_APART)
-    ]
+    first, apart = ratios[likely[0]] if likely else 1.0, math.log(tuning.UNITS_APART)
+    near = [unit for unit in likely if abs(math.log(ratios[unit] / first)) < apart]
     values: dict[str, object] = {"density": rate.density, "mean": rate.size, "unit": rate.unit}
     explained = ""
     if near:

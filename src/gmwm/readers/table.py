@@ -19,33 +19,23 @@ from gmwm.errors import InputError
 from gmwm.issues import Notice, notice
 from gmwm.readers import tuning
 
-LARGEST = 1e150
-"""Magnitudes from here on are rejected like infinities: their squares overflow."""
-
-Columns = dict[int, FloatArray]
-"""Index of a column -> its values, NaN where a sample is missing."""
+LARGEST = 1e150  # magnitudes from here on are rejected like infinities: their squares overflow
+Columns = dict[int, FloatArray]  # index of a column -> its values, NaN where a sample is missing
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Table(ABC):
-    """Columns of equal length.
+    """Columns of equal length."""
 
-    source: Name of the file, for messages.
-    names: One for each column, as written in the file; ``""`` where a column has none.
-    rate: Sampling rate that the file states, Hz.
-    tentative: Whether the names come from a comment and may be something else.
-    notices: What was noticed while opening and reading the file.
-    stamps: What messages call the time stamps, where they are no column of the file.
-    origin: What says the units, for messages.
-    """
-
-    source: str
+    source: str  # name of the file, for messages
+    # One for each column, as written in the file; ``""`` where a column has none.
     names: tuple[str, ...]
-    rate: float | None = None
-    tentative: bool = False
+    rate: float | None = None  # sampling rate that the file states, Hz
+    tentative: bool = False  # whether the names come from a comment and may be something else
+    # What was noticed while opening and reading the file.
     notices: list[Notice] = field(default_factory=list)
-    stamps: str = ""
-    origin: str = "the names of the columns"
+    stamps: str = ""  # what messages call the time stamps, where they are no column of the file
+    origin: str = "the names of the columns"  # what says the units, for messages
 
     @abstractmethod
     def segments(self, columns: Sequence[int], rows: int) -> Iterator[Columns]:
@@ -67,10 +57,7 @@ class Table(ABC):
         return self.stamps or f"column {label(self.names, index)}"
 
     def load(self, columns: Sequence[int]) -> Columns:
-        """Read some columns, by their indices, each once, into memory.
-
-        Raises InputError, with the code "memory" if there is not enough.
-        """
+        """Read some columns, each once, into memory; rejected with "memory" if it is too small."""
         samples, held = self.expected_rows() * len(columns), 0
         memory.require(tuning.BYTES_PER_SAMPLE * samples, self.source)
         allowed = memory.budget()
@@ -81,7 +68,11 @@ class Table(ABC):
                 held += values.size
             if tuning.BYTES_PER_SAMPLE * held > allowed:
                 memory.require(tuning.BYTES_PER_SAMPLE * max(samples, held), self.source)
-        return {column: _joined(parts.pop(column)) for column in columns}
+
+        def joined(some: list[FloatArray]) -> FloatArray:
+            return some[0] if len(some) == 1 else np.concatenate([np.zeros(0), *some])
+
+        return {column: joined(parts.pop(column)) for column in columns}
 
     def check_usable(self, column: int, values: FloatArray, first: int) -> None:
         """Reject infinite values and those too large for use; ``first`` is the row of the first."""
@@ -97,10 +88,7 @@ class Table(ABC):
 
 
 def load_columns(table: Table, columns: Sequence[int]) -> Columns:
-    """Read some columns; those of a long file are kept on disk and mapped.
-
-    A file is long if it needs more than `gmwm._core.memory.held`.
-    """
+    """Read some columns; those of a file beyond `gmwm._core.memory.held` are mapped from disk."""
     try:
         with memory.limited(memory.held()):
             return table.load(columns)
@@ -117,12 +105,6 @@ def load_columns(table: Table, columns: Sequence[int]) -> Columns:
     return {column: spool.array()[:, 0] for column, spool in spools.items()}
 
 
-def _joined(parts: list[FloatArray]) -> FloatArray:
-    if len(parts) == 1:
-        return parts[0]
-    return np.concatenate(parts) if parts else np.zeros(0)
-
-
 def label(names: Sequence[str], index: int) -> str:
     """How messages call a column: its name, or its place if it has none."""
     return repr(names[index]) if names[index] else f"{index} (counted from 0)"
@@ -136,11 +118,9 @@ def usable(values: FloatArray) -> bool:
 
 
 def damage_notice(source: str, what: str, is_taken: bool | None) -> Notice:
-    """Notice about a damaged file, the rest of which is used.
+    """Notice about a damaged file, the rest of which is used, or else rejected.
 
-    what: What is wrong, and where.
     is_taken: Whether the caller asks for the rest; None if it cannot be asked for.
-    Raises InputError, with the code "damaged" if it can be asked for, unless it is.
     """
     if is_taken is None:
         raise InputError(f"{source} {what}: get a whole copy")
@@ -154,11 +134,7 @@ def damage_notice(source: str, what: str, is_taken: bool | None) -> Notice:
 def damage_named(
     source: str, say: str | Callable[[Exception], str] = "is damaged or cut off: save it again"
 ) -> Iterator[None]:
-    """Turn whatever a library raises about a file into one sentence.
-
-    source: Name of the file.
-    say: End of the sentence, or exception -> end of the sentence.
-    """
+    """Turn whatever a library raises about a file into one sentence, which ends as ``say``."""
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # numpy's, about headers of old versions
@@ -171,22 +147,15 @@ def damage_named(
         raise InputError(f"{source} cannot be read: check its permissions") from error
     except Exception as error:  # libraries raise a dozen types for damaged bytes
         if isinstance(error, ValueError) and "object" in str(error).lower():
-            raise InputError(
-                f"{source} holds Python objects, which are not loaded: save arrays of numbers"
-            ) from error
+            text = f"{source} holds Python objects, which are not loaded"
+            raise InputError(f"{text}: save arrays of numbers") from error
         raise InputError(f"{source} {say if isinstance(say, str) else say(error)}") from error
 
 
 def library(module: str, extra: str, source: str) -> ModuleType:
-    """Import a library of an extra of this package.
-
-    source: The file that needs it.
-    Raises InputError with the command that installs it, if it is absent.
-    """
+    """Import a library of an extra of this package, which a file needs."""
     try:
         return import_module(module)
     except ImportError as error:
-        needed = module.partition(".")[0]
-        raise InputError(
-            f"{source} needs {needed}, which is not installed: pip install 'gmwm[{extra}]'", "extra"
-        ) from error
+        text = f"{source} needs {module.partition('.')[0]}, which is not installed"
+        raise InputError(f"{text}: pip install 'gmwm[{extra}]'", "extra") from error

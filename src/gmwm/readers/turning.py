@@ -8,40 +8,31 @@ from dataclasses import dataclass
 import numpy as np
 
 from gmwm._core.typing import FloatArray, known_of, median
-from gmwm.readers import tuning
 from gmwm.readers.names import AXES
 from gmwm.readers.recording import Recording
 
 _ROWS = 1 << 16  # at a time
+_LEAST_CONE = 0.01  # rad by which gravity leaves its mean where a sensor turns; at rest, 0.3 deg
+_LAGS, _FEWEST_LAGS = (1, 4, 16), 20  # blocks between which changes count; how many at least
 
 
 @dataclass(frozen=True)
 class TurningGravity:
-    """Changes of the specific force against those that the angular rate explains.
+    """Changes of the specific force against those that the angular rate explains."""
 
-    factor: Least-squares factor of the predicted changes: 1 for a sensor that is turned.
-    explained: Share of the squared changes that the prediction explains: zero for noise.
-    change: Root mean square of the predicted changes, m/s^2.
-    """
-
-    factor: float
-    explained: float
-    change: float
+    factor: float  # least-squares factor of the predicted changes: 1 for a sensor that is turned
+    explained: float  # share of the squared changes that the prediction explains: zero for noise
+    change: float  # root mean square of the predicted changes, m/s^2
 
 
-def _triad(recording: Recording, sensor: str) -> list[FloatArray] | None:
-    """Samples of three axes; None if one is missing."""
+def _triad(recording: Recording, sensor: str) -> list[FloatArray]:
+    """Samples of three axes; none if one is missing."""
     names = [f"{sensor}_{axis}" for axis in AXES]
-    if not all(name in recording for name in names):
-        return None
-    return [recording[name].values for name in names]
+    return [recording[name].values for name in names] if set(names) <= set(recording) else []
 
 
 def block_means(axes: Sequence[FloatArray], size: int) -> FloatArray:
-    """Means of blocks of ``size`` samples; NaN where three quarters of one are missing.
-
-    Returns: (n // size, axes).
-    """
+    """Means (n // size, axes) of blocks; NaN where three quarters of one are missing."""
 
     def means(values: FloatArray) -> FloatArray:
         rows = values[: values.size // size * size].reshape(-1, size)
@@ -65,7 +56,7 @@ def turning_gravity(recording: Recording, size: int, parts: int = 1) -> TurningG
     Returns: None if an axis is missing or nothing changes.
     """
     rate, force = _triad(recording, "gyro"), _triad(recording, "accel")
-    if rate is None or force is None or recording.n < 4 * size:
+    if not (rate and force) or recording.n < 4 * size:
         return None
     # The same means of the integral as of the force: both changes are filtered alike.
     predicted = np.diff(_integral_means(rate, force, size) * -recording.dt, axis=0)
@@ -109,20 +100,16 @@ def steady_turn(recording: Recording, size: int) -> float:
 
     The constant w of da/dt = -w x a by least squares, from changes over several times. It counts if
     it explains most of the changes and turns by a radian in all, which noise and drifts do not.
-
-    size: Samples of the blocks whose means are compared.
     """
     force = _triad(recording, "accel")
-    if force is None:
-        return 0.0
-    means = block_means(force, size)
+    means = block_means(force, size) if force else np.full((1, 1), np.nan)
     if np.all(np.any(np.isnan(means), axis=1)):
         return 0.0
     wander = np.linalg.norm(means - np.nanmean(means, axis=0), axis=1)
-    if not np.nanmax(wander) > tuning.LEAST_CONE * np.linalg.norm(np.nanmean(means, axis=0)):
+    if not np.nanmax(wander) > _LEAST_CONE * np.linalg.norm(np.nanmean(means, axis=0)):
         return 0.0
-    for lag in tuning.LAGS_OF_TURN:
-        if means.shape[0] < tuning.FEWEST_TURNING * lag:
+    for lag in _LAGS:
+        if means.shape[0] < _FEWEST_LAGS * lag:
             break
         change = means[lag:] - means[:-lag]
         known = ~np.any(np.isnan(change), axis=1)

@@ -3,9 +3,8 @@
 from gmwm.variance.allan_family import Deviations as Deviations, deviations as deviations
 from gmwm.variance.covariance.haar import haar_covariance as haar_covariance
 from gmwm.variance.gaps import Runs as Runs
+from gmwm.variance.levels import pilot_psd as pilot_psd
 from gmwm.variance.modwt import Modwt as Modwt, imodwt as imodwt, modwt as modwt
-from gmwm.variance.pilot import pilot_psd as pilot_psd
-from gmwm.variance.pooled import PooledVariance as PooledVariance
 from gmwm.variance.series import (
     MIN_SAMPLES as MIN_SAMPLES,
     as_channel as as_channel,
@@ -13,4 +12,7 @@ from gmwm.variance.series import (
     wavelet_variance as wavelet_variance,
 )
 from gmwm.variance.streaming import StreamingVariance as StreamingVariance
-from gmwm.variance.wavelet import WaveletVariance as WaveletVariance
+from gmwm.variance.wavelet import (
+    PooledVariance as PooledVariance,
+    WaveletVariance as WaveletVariance,
+)

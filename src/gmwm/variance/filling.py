@@ -36,9 +36,8 @@ from gmwm._core.typing import BoolArray, FloatArray, IntArray
 from gmwm.process import PSD, haar_gain, quadrature
 from gmwm.variance import tuning
 from gmwm.variance.covariance.lags import block_density
-from gmwm.variance.gap_kernels import fill, neighbours
 from gmwm.variance.gaps import Gaps, window_count
-from gmwm.variance.kernels import accumulate, cumulative
+from gmwm.variance.kernels import accumulate, cumulative, fill, neighbours
 
 _REACH = 256.0  # blocks: what the frequencies resolve
 _LOWEST = 2.0**-26  # cycles per block

@@ -18,7 +18,7 @@ import numpy as np
 from gmwm._core.documents import Array, check_covariance
 from gmwm._core.typing import BoolArray, FloatArray, IntArray
 from gmwm.variance import tuning
-from gmwm.variance.gap_kernels import pairs_at_lag
+from gmwm.variance.kernels import pairs_at_lag
 
 
 @dataclass(frozen=True)

@@ -19,8 +19,8 @@ from gmwm import (
     Recording,
     WhiteNoise,
 )
-from gmwm._core.notices import Notice
 from gmwm.calibration import Stopwatch, tuning
+from gmwm.issues import Notice
 from marks import slow
 from places import SHARED
 

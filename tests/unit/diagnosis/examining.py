@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from gmwm.diagnosis.channel import Examined
-from gmwm.diagnosis.innovations import Innovations
+from gmwm.diagnosis.innovations import Examined, Innovations
 
 
 def examined(

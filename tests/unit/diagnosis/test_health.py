@@ -7,8 +7,8 @@ import pytest
 
 import gmwm
 from gmwm import Health, InputError
-from gmwm._core.notices import SEVERITIES, Notice
 from gmwm.diagnosis.resonances import peaks
+from gmwm.issues import SEVERITIES, Notice
 from places import SHARED
 
 ADIS = SHARED / "data/adis16405"

@@ -16,11 +16,11 @@ from gmwm import (
     Sinusoid,
     WhiteNoise,
 )
-from gmwm._core.notices import Notice
 from gmwm.diagnosis import gathered
 from gmwm.diagnosis.lines import find_lines, line_notices
 from gmwm.diagnosis.spectrum import background, bands, spectrum
 from gmwm.diagnosis.tuning import FALSE_ALARM
+from gmwm.issues import Notice
 from gmwm.process import as_model
 
 DT = 0.01

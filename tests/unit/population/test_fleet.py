@@ -13,7 +13,7 @@ import pytest
 import gmwm
 from fleets import QUICK
 from gmwm import Calibration, Fleet, InputError, Model, RandomWalk, WhiteNoise
-from gmwm._core.notices import Notice
+from gmwm.issues import Notice
 from gmwm.population import DERIVED, SCHEMA, Item, Number, Task, task as tasks
 
 READING = ("rate", "units")

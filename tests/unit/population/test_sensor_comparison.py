@@ -11,8 +11,8 @@ import pytest
 
 import gmwm
 from gmwm import Calibration, InputError, RandomWalk, WhiteNoise
-from gmwm._core.notices import Notice
 from gmwm.estimate import estimate
+from gmwm.issues import Notice
 from gmwm.population import labelled, parameter_spreads
 
 ACCEL = WhiteNoise(1e-2) + RandomWalk(5e-3)

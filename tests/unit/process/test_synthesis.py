@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from gmwm import GaussMarkov, QuantizationNoise, RandomWalk, RateRamp, Resonance, WhiteNoise
-from gmwm.process import synthesis
+from gmwm.process import spectral, state_space
 from gmwm.process.state_space import StateSpace, block_diagonal
 
 PARTS = [
@@ -46,37 +46,37 @@ def test_the_output_variance_is_that_of_the_recursion():
 
 def test_a_series_is_that_of_its_recursion_in_any_block(monkeypatch):
     form = StateSpace.stack([*PARTS[1:4]])
-    series = synthesis.from_state_space(form, 50, np.random.default_rng(1))
+    series = state_space.from_state_space(form, 50, np.random.default_rng(1))
     rng = np.random.default_rng(1)
-    root = synthesis._root(form.process_noise)
+    root = state_space._root(form.process_noise)
     np.testing.assert_allclose(root @ root.T, form.process_noise, atol=1e-12)
-    state = synthesis._root(form.initial_covariance) @ rng.standard_normal(form.n_states)
+    state = state_space._root(form.initial_covariance) @ rng.standard_normal(form.n_states)
     noise = rng.standard_normal((50, form.n_states))
     for k in range(50):
         assert series[k] == pytest.approx(form.output @ state)
         state = form.transition @ state + root @ noise[k]
-    monkeypatch.setattr(synthesis, "_BLOCK", 7)
-    again = synthesis.from_state_space(form, 50, np.random.default_rng(1))
+    monkeypatch.setattr(state_space, "_BLOCK", 7)
+    again = state_space.from_state_space(form, 50, np.random.default_rng(1))
     np.testing.assert_allclose(again, series)
 
 
 def test_a_first_order_recursion_starts_with_its_own_scale():
     innovation = np.array([2.0, 1.0, -1.0])
-    synthesis.first_order(innovation, 0.5, 3.0, 10.0)
+    state_space.first_order(innovation, 0.5, 3.0, 10.0)
     np.testing.assert_allclose(innovation, [20.0, 13.0, 3.5])
 
 
 def test_a_ramp_begins_at_zero_and_measurement_noise_is_added():
-    ramp = synthesis.from_state_space(RateRamp(0.3).state_space(0.5), 4, np.random.default_rng(1))
+    ramp = state_space.from_state_space(RateRamp(0.3).state_space(0.5), 4, np.random.default_rng(1))
     np.testing.assert_allclose(ramp, 0.15 * np.arange(4))
-    white = synthesis.from_state_space(StateSpace.white(9.0), 20_000, np.random.default_rng(2))
+    white = state_space.from_state_space(StateSpace.white(9.0), 20_000, np.random.default_rng(2))
     assert np.std(white) == pytest.approx(3.0, rel=0.02)
 
 
 @pytest.mark.parametrize("process", [WhiteNoise(2.0), GaussMarkov(1.0, 3.0), RandomWalk(2.0)])
 def test_a_series_of_a_spectrum_has_its_covariances(process):
     rng, n = np.random.default_rng(3), 64
-    series = np.array([synthesis.from_psd(process.psd, n, 0.5, rng) for _ in range(1500)])
+    series = np.array([spectral.from_psd(process.psd, n, 0.5, rng) for _ in range(1500)])
     if isinstance(process, RandomWalk):
         np.testing.assert_array_equal(series[:, 0], 0.0)
         expected = 4.0 * 0.5 * np.array([10, 30, 60])
@@ -92,7 +92,7 @@ def test_eigenvalues_of_a_circle_are_the_power_of_its_series():
     rng = np.random.default_rng(4)
     power = np.zeros(5)
     for _ in range(1500):
-        power += np.abs(np.fft.rfft(synthesis.circulant(spectrum, 8, rng))) ** 2 / 8 / 1500
+        power += np.abs(np.fft.rfft(spectral.circulant(spectrum, 8, rng))) ** 2 / 8 / 1500
     np.testing.assert_allclose(power, spectrum, rtol=0.12, atol=1e-20)
 
 

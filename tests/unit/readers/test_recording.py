@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from gmwm import Channel, InputError, Recording
-from gmwm._core.notices import Notice
+from gmwm.issues import Notice
 from places import GOLDEN
 
 UNUSED = Notice("columns-not-used", "note", "", "column not used: 'temp'")

@@ -11,7 +11,7 @@ from gmwm.errors import InputError
 from gmwm.ins import car_drive, gnss
 from gmwm.ins.filter.aiding import Outage
 from gmwm.ins.imu import AXES
-from gmwm.ins.simulation.scenario import Scenario
+from gmwm.ins.simulation import Scenario
 from gmwm.study import turns
 from gmwm.study.rotation import Rotation, crossed_weights
 from gmwm.study.turns import reproduce_rotation, rotate

@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from gmwm.variance.gap_kernels import fill, neighbours
 from gmwm.variance.gaps import Gaps, Runs, window_centres, window_count
-from gmwm.variance.kernels import cumulative
+from gmwm.variance.kernels import cumulative, fill, neighbours
 from gmwm.variance.stream_kernels import (
     COUNT,
     FINE,

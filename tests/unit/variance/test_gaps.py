@@ -18,7 +18,6 @@ from gmwm import (
 )
 from gmwm.estimate import estimate
 from gmwm.variance.filling import Filling
-from gmwm.variance.gap_kernels import pairs_at_lag
 from gmwm.variance.gaps import (
     Gaps,
     Runs,
@@ -27,7 +26,7 @@ from gmwm.variance.gaps import (
     window_centres,
     window_count,
 )
-from gmwm.variance.kernels import cumulative
+from gmwm.variance.kernels import cumulative, pairs_at_lag
 from marks import slow
 
 

@@ -6,7 +6,7 @@ import pytest
 from gmwm import RandomWalk, WhiteNoise, wavelet_variance
 from gmwm.process.spectral import haar_variance
 from gmwm.variance import PooledVariance
-from gmwm.variance.pilot import pilot_psd
+from gmwm.variance.levels import pilot_psd
 
 DT, M = 0.01, 2.0 ** np.arange(14)
 

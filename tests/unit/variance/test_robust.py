@@ -12,13 +12,15 @@ from scipy.stats import binom, chi2, norm
 import gmwm
 from gmwm.errors import InputError
 from gmwm.variance.covariance.haar import dyadic_levels, haar_counts, haar_covariance
-from gmwm.variance.covariance.robust import (
+from gmwm.variance.kernels import cumulative, haar_coefficients
+from gmwm.variance.robust import (
+    consistency,
     excess_series,
     pair_shares,
     robust_covariance,
+    robust_variance,
+    tuning_constant,
 )
-from gmwm.variance.kernels import cumulative, haar_coefficients
-from gmwm.variance.robust import consistency, robust_variance, tuning_constant
 from marks import slow
 from places import SHARED
 

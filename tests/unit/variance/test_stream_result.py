@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from gmwm.variance import tuning
-from gmwm.variance.stream_result import effects, unmasked
+from gmwm.variance.streaming import effects, unmasked
 
 J = 12
 M = 2.0 ** np.arange(J)

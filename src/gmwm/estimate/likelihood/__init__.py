@@ -1,5 +1,6 @@
 """Maximum likelihood, exact, by the spectrum or by expectation-maximization."""
 
+from gmwm.estimate.likelihood.conclusion import regular_inverse as regular_inverse
 from gmwm.estimate.likelihood.em import EM as EM
 from gmwm.estimate.likelihood.kalman import filtered as filtered
 from gmwm.estimate.likelihood.likelihood import (
@@ -11,4 +12,3 @@ from gmwm.estimate.likelihood.likelihood import (
     whitened as whitened,
 )
 from gmwm.estimate.likelihood.mle import MLE as MLE, Whittle as Whittle
-from gmwm.estimate.likelihood.scoring import regular_inverse as regular_inverse

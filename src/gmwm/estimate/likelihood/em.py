@@ -26,9 +26,11 @@ from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.estimate import tuning
 from gmwm.estimate.likelihood.conclusion import (
+    Maximum,
     Report,
     Top,
     conclude_likelihood,
+    observed_information,
     redundant_term,
 )
 from gmwm.estimate.likelihood.kalman import smooth
@@ -36,12 +38,11 @@ from gmwm.estimate.likelihood.likelihood import (
     Columns,
     KalmanLikelihood,
     Regression,
+    Series,
     arrays_of,
     objective_of,
     stacked,
 )
-from gmwm.estimate.likelihood.scoring import Maximum, observed_information
-from gmwm.estimate.likelihood.series import Series
 from gmwm.estimate.problem import Slope, spectral_information
 from gmwm.estimate.result import Fit
 from gmwm.issues import notice

@@ -16,26 +16,24 @@ from gmwm.estimate.likelihood.conclusion import (
     Report,
     Top,
     conclude_likelihood,
+    deviations,
+    gradient,
+    maximise,
+    observed_information,
     redundant_term,
+    regular_inverse,
 )
 from gmwm.estimate.likelihood.likelihood import (
     Columns,
     KalmanLikelihood,
+    Objective,
     Regression,
+    Series,
     WhittleLikelihood,
     defined,
     objective_of,
     whitened,
 )
-from gmwm.estimate.likelihood.scoring import (
-    Objective,
-    deviations,
-    gradient,
-    maximise,
-    observed_information,
-    regular_inverse,
-)
-from gmwm.estimate.likelihood.series import Series
 from gmwm.estimate.moments import Design
 from gmwm.estimate.problem import (
     Coordinates,

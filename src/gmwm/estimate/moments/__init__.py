@@ -7,12 +7,13 @@ from gmwm.estimate.moments.profile import (
     Profile as Profile,
     compile_search as compile_search,
     compile_steps as compile_steps,
+    search as search,
 )
-from gmwm.estimate.moments.reference import (
+from gmwm.estimate.moments.weights import (
     TEXTBOOK as TEXTBOOK,
     Reference as Reference,
+    Weights as Weights,
     dictionary as dictionary,
     dictionary_fit as dictionary_fit,
+    suffices as suffices,
 )
-from gmwm.estimate.moments.start import search as search
-from gmwm.estimate.moments.weights import Weights as Weights, suffices as suffices

@@ -20,10 +20,8 @@ from gmwm.errors import InputError
 from gmwm.estimate import tuning
 from gmwm.estimate.moments.conclusion import Converged, conclude_moments
 from gmwm.estimate.moments.design import Design
-from gmwm.estimate.moments.profile import Point, Profile
-from gmwm.estimate.moments.reference import Reference, dictionary_fit
-from gmwm.estimate.moments.start import search
-from gmwm.estimate.moments.weights import WEIGHTS, Discrepancy, Weights
+from gmwm.estimate.moments.profile import Point, Profile, search
+from gmwm.estimate.moments.weights import WEIGHTS, Discrepancy, Reference, Weights, dictionary_fit
 from gmwm.estimate.problem import Moments, Scales, Simulation, is_plain
 from gmwm.estimate.result import Fit, Goodness
 from gmwm.process import Model

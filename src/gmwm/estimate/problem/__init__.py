@@ -11,7 +11,10 @@ from gmwm.estimate.problem.information import (
 from gmwm.estimate.problem.moments import (
     FittedMoments as FittedMoments,
     Moments as Moments,
+    Scales as Scales,
+    Simulation as Simulation,
     chi_square as chi_square,
+    is_plain as is_plain,
     weight_root as weight_root,
 )
 from gmwm.estimate.problem.nonnegative import (
@@ -36,9 +39,4 @@ from gmwm.estimate.problem.ramp import (
     gls_slope as gls_slope,
     ols_slope as ols_slope,
     slope_p_value as slope_p_value,
-)
-from gmwm.estimate.problem.scales import (
-    Scales as Scales,
-    Simulation as Simulation,
-    is_plain as is_plain,
 )

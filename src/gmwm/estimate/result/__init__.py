@@ -4,13 +4,19 @@ from gmwm.estimate.result.conclusion import (
     Comparison as Comparison,
     Estimates as Estimates,
     conclude as conclude,
+    estimate_notices as estimate_notices,
+    misfit_notices as misfit_notices,
+    missed_level_notices as missed_level_notices,
 )
 from gmwm.estimate.result.estimate import (
     Estimate as Estimate,
     InUnit as InUnit,
     Region as Region,
+    confidence_interval as confidence_interval,
     estimates_of as estimates_of,
+    quantile_above_zero as quantile_above_zero,
     slope_name as slope_name,
+    upper_amplitude as upper_amplitude,
 )
 from gmwm.estimate.result.fit import (
     METHOD_NAMES as METHOD_NAMES,
@@ -19,18 +25,8 @@ from gmwm.estimate.result.fit import (
     plain as plain,
 )
 from gmwm.estimate.result.goodness import Goodness as Goodness
-from gmwm.estimate.result.intervals import (
-    confidence_interval as confidence_interval,
-    quantile_above_zero as quantile_above_zero,
-    upper_amplitude as upper_amplitude,
-)
 from gmwm.estimate.result.joint import (
     JointFit as JointFit,
     between as between,
     fit_joint as fit_joint,
-)
-from gmwm.estimate.result.remarks import (
-    estimate_notices as estimate_notices,
-    misfit_notices as misfit_notices,
-    missed_level_notices as missed_level_notices,
 )

@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Annotated, Any, ClassVar, Literal
 
+import numpy as np
 from annotated_types import Ge, Le
+from scipy.optimize import brentq
+from scipy.special import gammaincinv, lambertw, ndtr, ndtri
 
+from gmwm._core.distributions import student as t
 from gmwm._core.documents import Positive, Text
 from gmwm._core.units import field_units, si_parameter_unit
-from gmwm.process import Model
+from gmwm.estimate import tuning
+from gmwm.estimate.problem import Coordinates, Scales, information_with
+from gmwm.process import Model, Parameter, Process
+from gmwm.variance import WaveletVariance
 
 Kind = Literal["estimated", "bound", "fixed", "undefined"]
 
@@ -155,3 +162,147 @@ class Region:
 def slope_name(slope: float) -> str:
     """A slope of the Allan deviation as people write it: -1, -1/2, 0, +1/2, +1."""
     return f"{'+' if slope > 0.0 else ''}{Fraction(slope)}"
+
+
+_NO_GROWTH = 1e-6
+_EXACT = 1e-12  # relative error
+_LEAST_QUANTILE = 1e-9  # of a chi-square: keeps the limit of a level without information finite
+_NEGLIGIBLE = 1e-3  # of an upper limit: an amplitude that changes no standard error
+
+
+def confidence_interval(
+    parameter: Parameter,
+    value: float,
+    error: float,
+    level: float,
+    *,
+    growth: float = 0.0,
+    slope_dof: float = np.inf,
+) -> tuple[float, float]:
+    """Interval that stays in the parameter's range: lower and upper end.
+
+    For a positive parameter it holds the values that the estimate does not contradict with the
+    standard error that they would have themselves (Wilson 1927, *JASA* 22, 209-212), where the
+    relative standard error is proportional to ``value^k``; deviations are those of the logarithm.
+    The quantiles are Student's t for the degrees of freedom that the relative error stands for: a
+    variance known to a relative error of r has 2/r^2 of them, and no fewer than three are taken, as
+    the tails of t are then heavier than those of a variance's logarithm.
+
+    value, error: Estimate and standard error.
+    level: Probability, between 0 and 1.
+    growth: The exponent k, of positive parameters.
+    slope_dof: Degrees of freedom of the standard error of a ramp's slope.
+    """
+    if parameter.lower == 0.0 and value > 0.0:
+        relative = error / value
+        if relative > tuning.UNDETERMINED:
+            return 0.0, parameter.upper
+        power = parameter.power if parameter.linear else 1
+        dof = 2.0 / max(power * relative, _EXACT) ** 2
+        width = relative * float(t.ppf(0.5 + 0.5 * level, max(dof, tuning.FEWEST_DOF)))
+        low, high = (np.exp(_end(sign * width, growth)) for sign in (-1.0, 1.0))
+        return float(value * low), min(float(value * high), parameter.upper)
+    dof = slope_dof if parameter.role == "slope" else np.inf
+    half_width = float(t.ppf(0.5 + 0.5 * level, max(dof, 1.0))) * error
+    return max(value - half_width, parameter.lower), min(value + half_width, parameter.upper)
+
+
+def _end(width: float, growth: float) -> float:
+    """The x with x = width exp(growth x).
+
+    A standard error that grows faster than the deviation leaves no end, but the power law does not
+    hold that far. Then it is the largest deviation that has one, or that of the power of the
+    parameter whose standard error is constant, whichever is farther.
+    """
+    steepness = growth * width
+    if abs(steepness) < _NO_GROWTH:
+        return width
+    if steepness <= np.exp(-1.0):
+        return float(-lambertw(-steepness).real / growth)
+    constant = -np.log1p(-steepness) if steepness < 1.0 else np.inf
+    return float(max(1.0, constant) / growth)
+
+
+def quantile_above_zero(centre: float, deviation: float) -> float:
+    """95 % quantile of N(centre, deviation^2) restricted to positive values."""
+    tail = ndtr(centre / deviation) * (1.0 - tuning.UPPER_LEVEL)
+    return centre - deviation * float(ndtri(tail))
+
+
+def upper_amplitude(
+    coordinates: Coordinates,
+    processes: Sequence[Process],
+    term: int,
+    estimate: tuple[float, float, float],
+    wv: WaveletVariance,
+) -> float:
+    """95 % upper limit of a term's amplitude, in the power that the spectrum is linear in.
+
+    The larger the true value, the more its estimate varies: a random walk that can hardly be seen
+    shows in few degrees of freedom. So the limit is the amplitude whose own estimate lies below the
+    one found in 5 % of records: with the standard error of a vanishing amplitude, and beside it the
+    spread of a chi-square with the degrees of freedom by which the amplitude raises that error. It
+    does not exceed the amplitude that explains all of the variance at any level.
+
+    coordinates: Of the terms that have an amplitude, and this one.
+    processes: These terms with values.
+    term: Index of the term.
+    estimate: The amplitude without the restriction to positive values, its standard error, and the
+        amplitude at which that standard error holds.
+    wv: The data.
+    """
+    centre, deviation, at = estimate
+    most = _all_of_the_variance(processes[term], wv)
+    plain = min(quantile_above_zero(centre, deviation), most)
+    if not (np.isfinite(plain) and plain > 0.0 and all(p.has_spectrum() for p in processes)):
+        return plain
+    owners = coordinates.owners
+    kept = [k for k, (i, is_amplitude) in enumerate(owners) if i != term or is_amplitude]
+    place = kept.index(owners.index((term, True)))
+    present = [p.with_amplitude(plain) if i == term else p for i, p in enumerate(processes)]
+    information_at = information_with(coordinates, present, term, wv.n, wv.dt)
+
+    def error(amplitude: float) -> float:
+        """Standard error of the amplitude where it is the true one, at the present shape."""
+        information = information_at(amplitude)[np.ix_(kept, kept)]
+        scale = 1.0 / np.sqrt(np.maximum(np.diag(information), 1e-300))
+        inverse = np.linalg.pinv(information * np.outer(scale, scale), rcond=1e-10)
+        variance = inverse[place, place]
+        return float(amplitude * scale[place] * np.sqrt(variance)) if variance > 0.0 else np.nan
+
+    vanishing, there = (error(max(value, _NEGLIGIBLE * plain)) for value in (0.0, at))
+    if not (np.isfinite(vanishing * there) and vanishing > 0.0 and there > 0.0):
+        return plain
+    least = deviation * vanishing / there
+    # An estimate that does not use all information shows it in fewer degrees of freedom too.
+    efficiency = float(np.clip((there / deviation) ** 2, tuning.LEAST_EFFICIENCY, 1.0))
+
+    def excess(log_amplitude: float) -> float:
+        amplitude = float(np.exp(log_amplitude))
+        growth = max(error(amplitude) ** 2 - vanishing**2, 0.0) / amplitude**2 / efficiency
+        below = 0.0
+        if growth > 0.0:
+            dof = 2.0 / growth
+            below = 1.0 - 2.0 * float(gammaincinv(0.5 * dof, 1.0 - tuning.UPPER_LEVEL)) / dof
+        spread = np.hypot(least, amplitude * below / ndtri(tuning.UPPER_LEVEL))
+        return amplitude - quantile_above_zero(centre, float(spread))
+
+    # Terms that stand in for each other leave their amplitudes open, but not beyond the data.
+    if most <= plain or excess(np.log(plain)) >= 0.0:
+        return plain
+    if excess(np.log(most)) <= 0.0:
+        return most
+    return float(np.exp(brentq(excess, np.log(plain), np.log(most))))
+
+
+def _all_of_the_variance(process: Process, wv: WaveletVariance) -> float:
+    """Smallest 95 % upper limit over the levels of an amplitude that explains all of the variance.
+
+    Levels whose variance is not positive, as happens across gaps, are left out.
+    """
+    alone = Scales.of(wv).curve(process.with_amplitude(1.0))
+    tail = (1.0 - tuning.UPPER_LEVEL) / wv.tau.size
+    quantile = np.maximum(2.0 * gammaincinv(0.5 * wv.dof, tail), _LEAST_QUANTILE)
+    upper = wv.dof * wv.variance / quantile
+    known = (alone > 0.0) & (wv.variance > 0.0)
+    return float(np.min(upper[known] / alone[known], initial=np.inf))

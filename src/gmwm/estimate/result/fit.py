@@ -27,9 +27,15 @@ from gmwm._core.typing import FloatArray
 from gmwm._core.units import shown_unit
 from gmwm.errors import InputError, MissingNameError
 from gmwm.estimate.problem import FittedMoments, Scales, drift_key, error_growth
-from gmwm.estimate.result.estimate import HEAD, Estimate, Region, estimates_of, slope_name
+from gmwm.estimate.result.estimate import (
+    HEAD,
+    Estimate,
+    Region,
+    confidence_interval,
+    estimates_of,
+    slope_name,
+)
 from gmwm.estimate.result.goodness import Goodness
-from gmwm.estimate.result.intervals import confidence_interval
 from gmwm.issues import CATALOGUE, Notice
 from gmwm.process import Model
 from gmwm.variance import WaveletVariance
@@ -182,7 +188,7 @@ class Fit(Document, Printed):
     def interval(self, level: float = 0.95) -> dict[str, tuple[float, float]]:
         """Confidence intervals that stay in the parameters' ranges.
 
-        See `gmwm.estimate.result.intervals.confidence_interval`. An amplitude that is not
+        See `gmwm.estimate.result.estimate.confidence_interval`. An amplitude that is not
         significantly above zero has the interval from zero to its 95 % upper limit.
 
         Parameters

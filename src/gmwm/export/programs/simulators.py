@@ -1,40 +1,25 @@
 """Simulators: Gazebo, pyins, gnss-ins-sim and MATLAB's ``imuSensor``.
 
-``gz-sensors/src/GaussianNoiseModel.cc``, ``GaussianNoiseModel::ApplyImpl``: a sample has white
-noise of ``stddev``, and a bias b' = exp(-dt/tau) b + n with var n = s^2 tau/2 (1 - exp(-2 dt/tau))
-where s is ``dynamic_bias_stddev``: stationary variance s^2 tau/2. The bias starts at
-``bias_stddev`` (``Load``).
-
-``pyins/inertial_sensor.py``, ``EstimationModel.__init__`` and ``Parameters.apply``: ``noise`` and
-``bias_walk`` are root densities; a walk needs a positive ``bias_sd``.
-
-``gnss_ins_sim/pathgen/pathgen.py``, ``bias_drift``: b' = (1 - dt/tau) b + sd sqrt(1 - exp(-2
-dt/tau)) n from zero; white samples without a finite correlation time. Units in
-``gnss_ins_sim/sim/imu_model.py``, ``IMU.__init__``.
-
-MATLAB (Navigation Toolbox, Sensor Fusion and Tracking Toolbox): ``NoiseType`` "single-sided" has
-samples of standard deviation NoiseDensity sqrt(f), and a walk by RandomWalk/sqrt(f) a sample: N and
-K as here. The default, "double-sided", halves the white variance and doubles that of the walk
-(manual of imuSensor, Algorithms; the example "Inertial Sensor Noise Analysis Using Allan Variance"
-sets "single-sided" for the same reason).
+Each class names the file and function of the program that define what its values mean.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from math import sqrt
 
-from gmwm.export.imu import Axis, ImuNumbers, Triad
+from gmwm.export.imu import Axis, ImuNumbers
 from gmwm.export.keys import ARW, DEG_H, MemoryKeys
 from gmwm.export.target import ImuFile
 
 
 class Gazebo(ImuFile):
-    """Noise of each axis as SDF."""
+    """Noise of each axis as SDF.
 
-    name = "gazebo"
-    title = "Gazebo"
-    file = "the imu element of a sensor in SDF"
+    The bias is b' = exp(-dt/tau) b + n with var n = s^2 tau/2 (1 - exp(-2 dt/tau)), s being
+    ``dynamic_bias_stddev``: its stationary variance is s^2 tau/2.
+    """
+
+    name, title, file = "gazebo", "Gazebo", "the imu element of a sensor in SDF"
     convention = (
         "stddev N sqrt(f), dynamic_bias_stddev sigma sqrt(2/tau), "
         "dynamic_bias_correlation_time tau, of each axis, with f the update_rate of the sensor"
@@ -68,9 +53,7 @@ class Gazebo(ImuFile):
 class PyIns(ImuFile):
     """Estimation models of the inertial sensors."""
 
-    name = "pyins"
-    title = "pyins"
-    file = "estimation models of the inertial sensors"
+    name, title, file = "pyins", "pyins", "estimation models of the inertial sensors"
     convention = (
         "N and K of each axis, continuous time; a walk counts only where bias_sd is positive"
     )
@@ -86,20 +69,21 @@ class PyIns(ImuFile):
         for name, triad in (("gyro_model", imu.gyro), ("accel_model", imu.accel)):
             lines += [
                 f"{name} = EstimationModel(",
-                f"    noise={_three(triad, lambda axis: axis.N)},",
-                f"    bias_walk={_three(triad, lambda axis: axis.K)},",
-                f"    bias_sd={_three(triad, start)},  # add the bias at switch-on",
+                f"    noise={triad.listed(lambda axis: axis.N)},",
+                f"    bias_walk={triad.listed(lambda axis: axis.K)},",
+                f"    bias_sd={triad.listed(start)},  # add the bias at switch-on",
                 ")",
             ]
         return lines
 
 
 class GnssInsSim(ImuFile):
-    """The IMU's error model as a Python dictionary."""
+    """The IMU's error model as a Python dictionary.
 
-    name = "gnss-ins-sim"
-    title = "gnss-ins-sim"
-    file = "the IMU's error model"
+    The bias is b' = (1 - dt/tau) b + sd sqrt(1 - exp(-2 dt/tau)) n from zero.
+    """
+
+    name, title, file = "gnss-ins-sim", "gnss-ins-sim", "the IMU's error model"
     convention = (
         "N, sigma and tau of each axis; its process starts at zero, and without a correlation "
         "time it is white"
@@ -125,24 +109,27 @@ class GnssInsSim(ImuFile):
         gyro, accel = imu.triads
         rows = (
             ("gyro_b", "[0.0, 0.0, 0.0]", "deg/h"),
-            ("gyro_arw", _three(gyro, lambda axis: axis.N / ARW), "deg/sqrt(h)"),
-            ("gyro_b_stability", _three(gyro, lambda axis: axis.sigma / DEG_H), "deg/h"),
-            ("gyro_b_corr", _three(gyro, lambda axis: axis.tau), "s"),
+            ("gyro_arw", gyro.listed(lambda axis: axis.N / ARW), "deg/sqrt(h)"),
+            ("gyro_b_stability", gyro.listed(lambda axis: axis.sigma / DEG_H), "deg/h"),
+            ("gyro_b_corr", gyro.listed(lambda axis: axis.tau), "s"),
             ("accel_b", "[0.0, 0.0, 0.0]", "m/s^2"),
-            ("accel_vrw", _three(accel, lambda axis: 60.0 * axis.N), "m/s/sqrt(h)"),
-            ("accel_b_stability", _three(accel, lambda axis: axis.sigma), "m/s^2"),
-            ("accel_b_corr", _three(accel, lambda axis: axis.tau), "s"),
+            ("accel_vrw", accel.listed(lambda axis: 60.0 * axis.N), "m/s/sqrt(h)"),
+            ("accel_b_stability", accel.listed(lambda axis: axis.sigma), "m/s^2"),
+            ("accel_b_corr", accel.listed(lambda axis: axis.tau), "s"),
         )
         lines = [f'    "{key}": np.array({value}),  # {unit}' for key, value, unit in rows]
         return ["import numpy as np", "", "imu_err = {", *lines, "}"]
 
 
 class Matlab(ImuFile):
-    """Parameters of ``imuSensor``."""
+    """Parameters of ``imuSensor``.
 
-    name = "matlab"
-    title = "MATLAB"
-    file = "gyroparams and accelparams of imuSensor"
+    "single-sided" has samples of standard deviation NoiseDensity sqrt(f), and a walk by
+    RandomWalk/sqrt(f) a sample: N and K as here. The default, "double-sided", halves the white
+    variance and doubles that of the walk.
+    """
+
+    name, title, file = "matlab", "MATLAB", "gyroparams and accelparams of imuSensor"
     convention = (
         "N and K of each axis with NoiseType single-sided; releases before R2022b have no "
         "NoiseType and the default's scale: multiply NoiseDensity by sqrt(2), divide "
@@ -172,7 +159,3 @@ class Matlab(ImuFile):
             f"imu = imuSensor('accel-gyro', 'SampleRate', {imu.rate:.9g}, ...",
             "    'Gyroscope', gyro, 'Accelerometer', accel);",
         ]
-
-
-def _three(triad: Triad, value: Callable[[Axis], float]) -> str:
-    return f"[{', '.join(f'{value(axis):.6e}' for axis in triad.xyz())}]"

@@ -34,9 +34,7 @@ Matrices = dict[str, FloatArray]
 class StateSpaceFile(Target):
     """Needs one sensor at least and holds any model; a form makes the numbers of that form."""
 
-    name = "state-space"
-    title = "state space"
-    file = "matrices by channel, JSON or NPZ"
+    name, title, file = "state-space", "state space", "matrices by channel, JSON or NPZ"
     convention = (
         "discrete x[k+1] = F x[k] + G w[k], y[k] = H x[k] + v[k], covariances Q of w and R of v; "
         "continuous dx/dt = F x + G w, y = H x + v, densities Q and R; start: mean x0, covariance "

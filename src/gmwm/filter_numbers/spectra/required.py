@@ -68,22 +68,9 @@ class RequiredSpectrum:
                 size = readable(constant, unit)
                 notices.append(notice("ramp-as-constant", "", values, label=label, size=size))
             elif term.is_line:
-                for f, amplitude in term.lines():
-                    values = {"frequency": f, "amplitude": amplitude}
-                    slow = f < passing
-                    severity: Severity = "warning" if slow else "note"
-                    variant, size = "slow" if slow else "", readable(amplitude, unit)
-                    notices.append(
-                        notice(
-                            "line-left-out",
-                            "",
-                            values,
-                            severity=severity,
-                            variant=variant,
-                            label=label,
-                            size=size,
-                        )
-                    )
+                notices += [
+                    _line(label, f, amplitude, f < passing, unit) for f, amplitude in term.lines()
+                ]
             else:
                 band = _frequencies([term], floor, nyquist, tuning.PEAK_DECADE, tuning.PEAK_POINTS)
                 density = evaluated(term.psd, band, dt)
@@ -101,24 +88,13 @@ class RequiredSpectrum:
                 f"the spectrum of {model!r} rises as f^-{slope:.2g} towards zero frequency, more "
                 "than that of a random walk: no form dominates it"
             )
-        target = cls(
-            tuple(kept),
-            tuple(weights),
-            tuple(feet),
-            constant,
-            dt,
-            horizon,
-            lowest,
-            floor,
-            slope,
-            tuple(notices),
-        )
         if not kept:
             raise InputError(
                 f"{model!r} has nothing that white noise, a random walk or a Gauss-Markov process "
                 "stands for: add the white noise of the sensor"
             )
-        return target
+        parts = (tuple(kept), tuple(weights), tuple(feet))
+        return cls(*parts, constant, dt, horizon, lowest, floor, slope, tuple(notices))
 
     @property
     def foot(self) -> float:
@@ -186,8 +162,7 @@ def _weight(
 ) -> tuple[float, float]:
     """Share of a spectrum that counts, and its low-frequency density (its foot).
 
-    low: Largest density below the frequency above which peaks average out within the horizon.
-    passing: That frequency, which may lie beyond the band, Hz.
+    low: Largest density below ``passing`` (Hz), above which peaks average out within the horizon.
     """
     high, own = float(np.max(density)), float(density[0])
     if high <= low:
@@ -242,17 +217,20 @@ def _has_variance(term: Process, dt: float) -> bool:
     return True
 
 
+def _line(label: str, f: float, amplitude: float, is_slow: bool, unit: str) -> Notice:
+    values, size = {"frequency": f, "amplitude": amplitude}, readable(amplitude, unit)
+    severity: Severity = "warning" if is_slow else "note"
+    more = {"variant": "slow" if is_slow else "", "label": label, "size": size}
+    return notice("line-left-out", "", values, severity=severity, **more)
+
+
 def _peak(label: str, f: FloatArray, density: FloatArray, weight: float, fast: float) -> Notice:
     place = float(f[int(np.argmax(density))])
     high = f >= fast
     variance = 2.0 * _integral((density * f)[high], np.log(f[high]))
     also = f" and {brief(100.0 * weight)} % of the peak" if weight > tuning.FADED else ""
-    values = {
-        "density": float(density[0]),
-        "frequency": place,
-        "variance": variance,
-        "share": weight,
-    }
+    values = {"density": float(density[0]), "frequency": place}
+    values |= {"variance": variance, "share": weight}
     return notice("fast-peak-left-out", "", values, also=also, label=label, fast=fast)
 
 

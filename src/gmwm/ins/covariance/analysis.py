@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from scipy.linalg import block_diag, eigh
@@ -12,12 +12,7 @@ from scipy.linalg import block_diag, eigh
 from gmwm._core.typing import BoolArray, FloatArray, IntArray
 from gmwm.errors import InputError
 from gmwm.ins import tuning
-from gmwm.ins.covariance.joint_kernels import (
-    JointFilter,
-    KeptCovariances,
-    Track,
-    run_jointly,
-)
+from gmwm.ins.covariance.joint_kernels import JointFilter, KeptCovariances, Track, run_jointly
 from gmwm.ins.filter import (
     NAVIGATION,
     Filter,
@@ -174,30 +169,32 @@ class Course:
         size = self.outputs.epoch.size
         out_P, out_J = np.empty((size, *P.shape)), np.empty((size, *J.shape))
         kept = KeptCovariances(self.outputs.epoch, self.outputs.before, out_P, out_J)
-        estimate, true = (
-            np.where(places >= 0, places + first, -1)
-            for places, first in (
-                (ready.noise_states, NAVIGATION),
-                (real.noise_states, NAVIGATION + table.m),
-            )
-        )
+        firsts = ((ready.noise_states, NAVIGATION), (real.noise_states, NAVIGATION + table.m))
+        estimate, true = (np.where(own >= 0, own + first, -1) for own, first in firsts)
         noises = (estimate, true, ready.lever_arm, ready.second_order)
         run_jointly(self.track, events, JointFilter(table.table, joint.table, *noises), P, J, kept)
         index, nine = self.outputs.epoch, slice(0, NAVIGATION)
         velocity = scenario.trajectory.velocity[index]
         # The filter's error in a sensor is the true sum less the estimated one, and either way
         # round it has the same second moments.
-        believed_sum, joint_sum = table.sums, joint.sums
         found = Analysis(
             time=self.outputs.time(dt),
             before=self.outputs.before == 1,
             predicted=unmodified(out_P[:, nine, nine], velocity),
             actual=unmodified(out_J[:, nine, nine], velocity),
-            sensor_predicted=believed_sum @ out_P[:, NAVIGATION:, NAVIGATION:] @ believed_sum.T,
-            sensor_actual=joint_sum @ out_J[:, NAVIGATION:, NAVIGATION:] @ joint_sum.T,
+            sensor_predicted=table.sums @ out_P[:, NAVIGATION:, NAVIGATION:] @ table.sums.T,
+            sensor_actual=joint.sums @ out_J[:, NAVIGATION:, NAVIGATION:] @ joint.sums.T,
         )
-        ends = [outage.end for outage in scenario.outages]
-        return replace(found, notices=tuple(_too_large(found, ends)))
+        notices = []
+        for end in (outage.end for outage in scenario.outages):
+            *tilts, heading = map(float, found.sd[found.index(end), 6:])
+            tilt = max(tilts)
+            if tilt > tuning.LINEAR_TILT or heading > tuning.LINEAR_HEADING:
+                values = {"time": end, "tilt": tilt, "heading": heading}
+                tilt_deg, heading_deg = map(float, np.degrees([tilt, heading]))
+                words = {"tilt_deg": tilt_deg, "heading_deg": heading_deg}
+                notices.append(notice("outside-linearity", "", values, **words))
+        return replace(found, notices=tuple(notices))
 
 
 def covariance_analysis(
@@ -222,29 +219,14 @@ def covariance_analysis(
     return Course.of(scenario).analyse(truth, believed)
 
 
-def _too_large(found: Analysis, ends: Sequence[float]) -> Iterator[Notice]:
-    """Ends of outages at which the true attitude error is beyond where predictions were checked."""
-    for end in ends:
-        tilt_north, tilt_east, heading = found.sd[found.index(end), 6:]
-        tilt = float(max(tilt_north, tilt_east))
-        if tilt > tuning.LINEAR_TILT or heading > tuning.LINEAR_HEADING:
-            yield notice(
-                "outside-linearity",
-                "",
-                {"time": end, "tilt": tilt, "heading": float(heading)},
-                tilt_deg=float(np.degrees(tilt)),
-                heading_deg=float(np.degrees(heading)),
-            )
-
-
 def _joint(believed: SensorStates, truth: SensorStates) -> SensorStates:
     """Estimated states, which nothing but the filter moves, and then the true ones."""
-
-    def both(first: FloatArray, second: FloatArray) -> FloatArray:
-        return np.concatenate([first, second], axis=-1)
-
     own, real = believed.table, truth.table
-    still = np.zeros_like(own.noise)
+    mine = dict.fromkeys(("noise", "noise_off", "cross"), np.zeros_like(own.noise))
+    mine |= {"phi": own.phi, "phi_off": own.phi_off, "gain": -own.gain}
+    both: dict[str, Any] = {
+        name: np.concatenate([array, getattr(real, name)], axis=-1) for name, array in mine.items()
+    }
     return SensorStates(
         names=(*believed.names, *truth.names),
         mean=np.append(believed.mean, truth.mean),
@@ -254,11 +236,6 @@ def _joint(believed: SensorStates, truth: SensorStates) -> SensorStates:
             axis=np.append(own.axis, real.axis),
             output=np.append(-own.output, real.output),
             partner=np.append(own.partner, real.partner + believed.m),
-            phi=both(own.phi, real.phi),
-            phi_off=both(own.phi_off, real.phi_off),
-            gain=both(-own.gain, real.gain),
-            noise=both(still, real.noise),
-            noise_off=both(still, real.noise_off),
-            cross=both(still, real.cross),
+            **both,
         ),
     )

@@ -16,7 +16,7 @@ from gmwm._core.typing import FloatArray
 from gmwm.calibration import Calibration
 from gmwm.errors import InputError
 from gmwm.ins import tuning
-from gmwm.ins.covariance.analysis import Analysis, Course
+from gmwm.ins.covariance.analysis import Course
 from gmwm.ins.filter import Outage, gnss
 from gmwm.ins.imu import AXES, SensorModels
 from gmwm.ins.simulation import Scenario
@@ -60,11 +60,9 @@ class ReducedError:
 
     duration: Of the outage, s.
     full: True error of the filter with the full model.
-    read_off, read_off_predicted: True and predicted error with the reduced model as it is read off
-        an Allan plot.
-    reduced, reduced_predicted: The same with the reduced model that was found.
-    nees: Expected normalised error squared of the position, per degree of freedom, with the reduced
-        model.
+    read_off, reduced: With the reduced model read off an Allan plot, and with the one found; each
+        also as predicted.
+    nees: Expected normalised error squared of the position, per degree of freedom, of the latter.
     """
 
     duration: float
@@ -162,11 +160,10 @@ def reduce(
     truth = SensorModels.of(models)
     assumed = scenario is None and trajectory is None
     if scenario is None:
-        scenario = with_outages(outages, trajectory, dt)
+        scenario = loiter_with_outages(outages, dt, trajectory)
     if not scenario.outages:
         raise InputError("outages: give one length at least, s")
     course = Course.of(scenario)
-    ends = [outage.end for outage in scenario.outages]
     longest = max(outage.duration for outage in scenario.outages)
     start = read_off(truth, form, longest, scenario.trajectory.dt)
     names = [f"{kind} {name}" for kind in ("gyro", "accel") for name in FORMS[form]]
@@ -183,45 +180,28 @@ def reduce(
     def score(logs: FloatArray) -> float:
         analysis = course.analyse(truth, scaled(logs))
         by_epoch = analysis.score(_POSITION_AND_VELOCITY)
-        return float(np.sum([by_epoch[analysis.index(end)] for end in ends]))
+        return float(np.sum([by_epoch[analysis.index(each.end)] for each in scenario.outages]))
 
     _, logs = smallest_score(score, [np.zeros(len(names))])
     best = scaled(logs)
     full, read, reduced = (course.analyse(truth, each) for each in (truth, start, best))
+    deviations = (full.sd, read.sd, read.predicted_sd, reduced.sd, reduced.predicted_sd)
+    errors = []
+    for outage in scenario.outages:
+        at = full.index(outage.end)
+        horizontal = [float(np.hypot(*sd[at, :2])) for sd in deviations]
+        errors.append(ReducedError(outage.duration, *horizontal, nees=float(reduced.nees()[at])))
     return Reduction(
         form=form,
         models=best,
         inflation=dict(zip(names, map(float, np.exp(logs)), strict=True)),
-        errors=tuple(_error(each, full, read, reduced) for each in scenario.outages),
+        errors=tuple(errors),
         notices=(*reduced.notices, *([notice("judged-on-loiter")] if assumed else ())),
     )
 
 
-def _error(outage: Outage, full: Analysis, read: Analysis, reduced: Analysis) -> ReducedError:
-    """Errors at the end of an outage, by the three models of the filter."""
-    at = full.index(outage.end)
-
-    def horizontal(sd: FloatArray) -> float:
-        return float(np.hypot(*sd[at, :2]))
-
-    return ReducedError(
-        duration=outage.duration,
-        full=horizontal(full.sd),
-        read_off=horizontal(read.sd),
-        read_off_predicted=horizontal(read.predicted_sd),
-        reduced=horizontal(reduced.sd),
-        reduced_predicted=horizontal(reduced.predicted_sd),
-        nees=float(reduced.nees()[at]),
-    )
-
-
 def read_off(models: SensorModels, form: str, longest: float, dt: float) -> SensorModels:
-    """Reduced models as people read them off the Allan deviation of full ones; see `Reduction`.
-
-    form: {"N+K", "N+GM"}.
-    longest: Longest outage, s.
-    dt: Sampling interval, s.
-    """
+    """Reduced models read off the Allan deviation of full ones; see `Reduction`."""
     reduced: dict[str, Model] = {}
     bias_sd: dict[str, float] = {}
     tau = dt * 2.0 ** np.arange(np.ceil(np.log2(10.0 * longest / dt)) + 1)
@@ -248,24 +228,18 @@ def read_off(models: SensorModels, form: str, longest: float, dt: float) -> Sens
     return SensorModels(reduced, bias_sd)
 
 
-def loiter_with_outages(lengths: Sequence[float], dt: float = 0.01) -> Scenario:
-    """A loiter with outages; see `with_outages`."""
-    return with_outages(lengths, None, dt)
-
-
-def with_outages(
-    lengths: Sequence[float], trajectory: Trajectory | None = None, dt: float = 0.01
+def loiter_with_outages(
+    lengths: Sequence[float], dt: float = 0.01, trajectory: Trajectory | None = None
 ) -> Scenario:
-    """A motion with one GNSS position a second of 1 m (vertical 1.5 m), and outages.
+    """A loiter with one GNSS position a second of 1 m (vertical 1.5 m), and outages.
 
     lengths: Of the outages, s, with two minutes before each.
-    trajectory: By default a loiter of a fixed-wing aircraft.
     dt: Sampling interval of the IMU of the loiter, s.
+    trajectory: Another motion than a loiter of a fixed-wing aircraft.
     Raises InputError if a length is not positive, or not a multiple of ``dt``, or the trajectory is
         too short.
     """
-    outages = []
-    start = tuning.SETTLING
+    outages, start = list[Outage](), tuning.SETTLING
     for length in lengths:
         outages.append(Outage(start, checks.positive("outage length", length)))
         # Ends at a fix: those of one second.

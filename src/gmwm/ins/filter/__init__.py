@@ -1,11 +1,6 @@
 """The INS/GNSS filter: mechanization, error states, measurement updates."""
 
-from gmwm.ins.filter.aiding import (
-    Aiding as Aiding,
-    Fixes as Fixes,
-    Outage as Outage,
-    gnss as gnss,
-)
+from gmwm.ins.filter.aiding import Aiding as Aiding, Fixes as Fixes, Outage as Outage, gnss as gnss
 from gmwm.ins.filter.covariance_kernels import (
     NAVIGATION as NAVIGATION,
     excess as excess,
@@ -16,8 +11,10 @@ from gmwm.ins.filter.covariance_kernels import (
 )
 from gmwm.ins.filter.filter import (
     Filter as Filter,
+    FilterInnovations as FilterInnovations,
     InitialSd as InitialSd,
     Outputs as Outputs,
+    Solution as Solution,
     modified as modified,
     navigate as navigate,
     unmodified as unmodified,
@@ -26,11 +23,9 @@ from gmwm.ins.filter.measurements import IS_GNSS as IS_GNSS, KINDS as KINDS, obs
 from gmwm.ins.filter.records import (
     Events as Events,
     Kinematics as Kinematics,
-    Scratch as Scratch,
     SensorTable as SensorTable,
     Transition as Transition,
     new_scratch as new_scratch,
     new_transition as new_transition,
 )
-from gmwm.ins.filter.solution import FilterInnovations as FilterInnovations, Solution as Solution
 from gmwm.ins.filter.states import SensorStates as SensorStates

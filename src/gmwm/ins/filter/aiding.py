@@ -10,7 +10,7 @@ import numpy as np
 
 from gmwm._core import checks
 from gmwm._core.distributions import chi2
-from gmwm._core.typing import BoolArray, FloatArray, IntArray
+from gmwm._core.typing import BoolArray, FloatArray
 from gmwm.errors import InputError
 from gmwm.ins import tuning
 from gmwm.ins.filter.measurements import IS_INFERRED, KINDS, MEASUREMENTS, Measurement
@@ -19,6 +19,7 @@ from gmwm.ins.imu import Imu
 from gmwm.ins.trajectory import Trajectory
 
 _SAME_TIME = 1e-6  # s: sums of sampling intervals are not exact
+_STANDSTILL = 1e-3  # m/s, below which the vehicle of a simulated trajectory stands
 
 
 @dataclass(frozen=True)
@@ -43,7 +44,7 @@ class Outage:
 
     @property
     def end(self) -> float:
-        """S."""
+        """End, s."""
         return self.start + self.duration
 
 
@@ -186,7 +187,12 @@ class Aiding:
             drawn = replace(each, value=each.moved(each.sd * rng.standard_normal(each.sd.shape)))
             sd, tau = each.measurement.slow_noise(self)
             if np.any(sd):
-                drawn = replace(drawn, value=drawn.moved(_markov(each.time, tau, rng) * sd))
+                # Stationary Gauss-Markov series of unit variance, times their size.
+                noise, state = rng.standard_normal(each.sd.shape), np.zeros(3)
+                for i, keep in enumerate(np.exp(-np.diff(each.time, prepend=-np.inf) / tau)):
+                    state = keep * state + np.sqrt(1.0 - keep**2) * noise[i]
+                    noise[i] = state
+                drawn = replace(drawn, value=drawn.moved(noise * sd))
             fixes.append(drawn)
         return replace(self, fixes=tuple(fixes))
 
@@ -212,16 +218,11 @@ class Aiding:
         order = np.lexsort((kind, offset, epoch))
         value = np.concatenate([none, *(each.value for each in self.fixes)])[order]
         kind, sd = kind[order], np.concatenate([none, *(each.sd for each in self.fixes)])[order]
-        gates = self._gates(kind, sd)
-        return Events(epoch[order], kind, offset[order], value, sd, gates)
-
-    def _gates(self, kind: IntArray, sd: FloatArray) -> FloatArray:
-        """Largest normalised innovation squared of each fix that is used."""
-        result = np.full(kind.size, np.inf)
-        gated = np.full(kind.size, self.gate is not None) | IS_INFERRED[kind]
+        gates = np.full(kind.size, np.inf)
+        gated = (self.gate is not None) | IS_INFERRED[kind]
         freedom = np.maximum(np.count_nonzero(sd, axis=1), 1)
-        result[gated] = chi2.isf(self.gate or tuning.GATE, freedom[gated])
-        return result
+        gates[gated] = chi2.isf(self.gate or tuning.GATE, freedom[gated])
+        return Events(epoch[order], kind, offset[order], value, sd, gates)
 
 
 def gnss(
@@ -274,7 +275,7 @@ def standstills(trajectory: Trajectory, interval: float = 1.0, sd: float = 0.01)
     fixes = _along("standstill", trajectory, interval, sd)
     index = np.rint(fixes.time / trajectory.dt).astype(int)
     speed = np.linalg.norm(trajectory.velocity[index], axis=1)
-    return Aiding((fixes.part(speed < tuning.STANDSTILL),))
+    return Aiding((fixes.part(speed < _STANDSTILL),))
 
 
 def _along(
@@ -307,15 +308,3 @@ def _three(name: str, values: Any) -> FloatArray:
     if array.shape != (3,) or not np.all(np.isfinite(array)):
         raise InputError(f"{name} = {checks.shown(values)}: give three finite numbers")
     return array
-
-
-def _markov(time: FloatArray, tau: float, rng: np.random.Generator) -> FloatArray:
-    """Three stationary Gauss-Markov series of unit variance at some times, (E, 3)."""
-    noise = rng.standard_normal((time.size, 3))
-    series = np.empty_like(noise)
-    decay = np.exp(-np.diff(time, prepend=-np.inf) / tau)
-    state = np.zeros(3)
-    for i, keep in enumerate(decay):
-        state = keep * state + np.sqrt(1.0 - keep**2) * noise[i]
-        series[i] = state
-    return series

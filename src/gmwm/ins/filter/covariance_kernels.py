@@ -26,12 +26,7 @@ _FAST = {"contract", "reassoc", "nsz"}
 
 @compiled()
 def error_rates(v: FloatArray, lla: FloatArray, F: FloatArray) -> None:
-    """Fill F (9, 9) of the navigation errors' equation ``dx/dt = F x + ...``.
-
-    v: (3,), velocity to the north, east and down, m/s.
-    lla: (3,), latitude, longitude, rad, and height, m.
-    F: (9, 9), overwritten.
-    """
+    """Fill F (9, 9) of the navigation errors' equation ``dx/dt = F x + ...``."""
     vn, ve, vd = v[0], v[1], v[2]
     sine, cosine = math.sin(lla[0]), math.cos(lla[0])
     tangent = sine / cosine
@@ -244,10 +239,7 @@ def excess(P: FloatArray, h: FloatArray, attitude: float) -> float:
     themselves. After a long outage that is far more than the noise of a precise fix; after a few
     fixes, little is left of it.
 
-    P: (n, n).
-    h: (9,), as in `measurement_update`.
-    attitude: Variance of the attitude, its three axes together, before the measurements of the
-        epoch, rad^2.
+    attitude: Variance of the three axes together before the measurements of the epoch, rad^2.
     """
     total = 0.0
     for i in range(9):

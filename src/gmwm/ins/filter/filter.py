@@ -10,7 +10,7 @@ import numpy as np
 
 from gmwm._core import checks
 from gmwm._core.spool import release, windows
-from gmwm._core.typing import FloatArray, IntArray
+from gmwm._core.typing import BoolArray, FloatArray, IntArray
 from gmwm.calibration import Calibration
 from gmwm.errors import InputError
 from gmwm.ins import tuning
@@ -28,11 +28,129 @@ from gmwm.ins.filter.records import (
     Samples,
     Settings,
 )
-from gmwm.ins.filter.solution import FilterInnovations, Solution
 from gmwm.ins.filter.states import SensorStates
-from gmwm.ins.geometry import matrix_from_rpy, skew
+from gmwm.ins.geometry import matrix_from_rpy, ned_difference, rpy_from_matrix, skew
 from gmwm.ins.imu import Imu, SensorModels
-from gmwm.ins.trajectory import NavState, check_latitudes
+from gmwm.ins.trajectory import NavState, Trajectory, check_latitudes
+
+
+@dataclass(frozen=True, eq=False)
+class FilterInnovations:
+    """Measurements less what the filter expected, component by component.
+
+    Attributes
+    ----------
+    time : (E,) ndarray
+        s.
+    kind : (E,) ndarray of int
+        Codes of `gmwm.ins.filter.KINDS`.
+    value, sd : (E, 3) ndarray
+        Each component given those before it, with the standard deviation that the filter expected;
+        so ``value / sd`` is white with unit variance if the filter is right. NaN where a component
+        was not measured, or not reached.
+    used : (E,) ndarray of bool
+        False where the measurement was beyond its gate, and was not used.
+    """
+
+    time: FloatArray
+    kind: IntArray
+    value: FloatArray
+    sd: FloatArray
+    used: BoolArray
+
+    @property
+    def standard(self) -> FloatArray:
+        """``value / sd``, (E, 3)."""
+        return self.value / self.sd
+
+    @property
+    def nis(self) -> FloatArray:
+        """Normalised innovation squared of each measurement, (E,); NaN where it was not reached.
+
+        Its degrees of freedom are the components in use.
+        """
+        squares = self.standard**2
+        reached = np.any(np.isfinite(squares), axis=1)
+        return np.where(reached, np.nansum(squares, axis=1), np.nan)
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """Position, velocity and attitude with their covariance at K epochs.
+
+    Attributes
+    ----------
+    time : (K,) ndarray
+        s since the first epoch.
+    before : (K,) ndarray of bool
+        Whether the measurements of the epoch are not in yet.
+    lla : (K, 3) ndarray
+        Latitude, longitude, rad, and height, m.
+    velocity : (K, 3) ndarray
+        To the north, east and down, m/s.
+    matrix : (K, 3, 3) ndarray
+        Attitude C_bn.
+    covariance : (K, 9, 9) ndarray
+        Of the errors of position (north, east, down, m), velocity (m/s) and attitude (rotation
+        about north, east and down, rad).
+    sensor_errors : (K, 6) ndarray
+        Estimated errors of the sensors without their white noise, rad/s and m/s^2.
+    sensor_covariance : (K, 6, 6) ndarray
+    innovations : FilterInnovations
+    state_names : tuple of str
+        Of the sensor states.
+    states, state_covariance : (m,) ndarray, (m, m) ndarray
+        Sensor states at the last epoch.
+    diverged_at : float or None
+        Time at which the filter was stopped because it had diverged, s.
+    """
+
+    time: FloatArray
+    before: BoolArray
+    lla: FloatArray
+    velocity: FloatArray
+    matrix: FloatArray
+    covariance: FloatArray
+    sensor_errors: FloatArray
+    sensor_covariance: FloatArray
+    innovations: FilterInnovations
+    state_names: tuple[str, ...]
+    states: FloatArray
+    state_covariance: FloatArray
+    diverged_at: float | None = None
+
+    @property
+    def rpy(self) -> FloatArray:
+        """Roll, pitch and yaw, rad, (K, 3)."""
+        return rpy_from_matrix(self.matrix)
+
+    @property
+    def sd(self) -> FloatArray:
+        """Predicted standard deviations of the nine navigation errors, (K, 9)."""
+        return np.sqrt(np.diagonal(self.covariance, axis1=1, axis2=2))
+
+    def errors(self, truth: Trajectory) -> FloatArray:
+        """Estimate less truth, (K, 9), in the order of ``covariance``.
+
+        Raises InputError if it ends before the solution.
+
+        Parameters
+        ----------
+        truth : Trajectory
+            From the same first epoch on.
+        """
+        index = np.rint(self.time / truth.dt).astype(int)
+        if index.size and index[-1] > truth.n:
+            raise InputError(
+                f"the trajectory ends at {truth.duration:g} s, before the solution at "
+                f"{self.time[-1]:g} s: give all of it"
+            )
+        # The estimate is (I - phi x) times the truth.
+        product = self.matrix @ np.swapaxes(matrix_from_rpy(truth.rpy[index]), 1, 2)
+        twice = np.swapaxes(product, 1, 2) - product
+        attitude = 0.5 * np.stack([twice[:, 2, 1], twice[:, 0, 2], twice[:, 1, 0]], axis=1)
+        position = ned_difference(self.lla, truth.lla[index])
+        return np.hstack([position, self.velocity - truth.velocity[index], attitude])
 
 
 @dataclass(frozen=True)
@@ -101,10 +219,7 @@ class Filter:
         second_order: bool = True,
         drift_known: bool = False,
     ) -> Filter:
-        """A filter for an IMU of sampling interval ``dt`` with covariance steps of ``step`` (s).
-
-        For ``drift_known`` see `SensorStates.of`.
-        """
+        """A filter for an IMU of interval ``dt`` (s), covariance steps of ``step`` (s)."""
         stride = max(round(checks.positive("step", step) / dt), 1)
         states = SensorStates.of(sensors, dt, stride, drift_known)
         noise_states = np.full((len(MEASUREMENTS), 3), -1, dtype=np.int64)
@@ -127,12 +242,6 @@ class Filter:
         """Number of states, those of navigation included."""
         return NAVIGATION + self.states.m
 
-    @property
-    def settings(self) -> Settings:
-        """Record for the kernels."""
-        table, lever = self.states.table, self.lever_arm
-        return Settings(table, self.noise_states, lever, self.second_order, self.stride)
-
     def covariance(self, initial: NavState, sd: InitialSd) -> FloatArray:
         """Covariance at the first epoch, (9 + m, 9 + m), with the modified velocity error."""
         P = np.zeros((self.size, self.size))
@@ -143,14 +252,7 @@ class Filter:
     def run(
         self, imu: Imu, initial: NavState, initial_sd: InitialSd, events: Events, outputs: Outputs
     ) -> Solution:
-        """Filter a record.
-
-        imu: Of the filter's sampling interval.
-        initial: FilterState at the first epoch.
-        events: Measurements.
-        outputs: Epochs to be kept.
-        Raises InputError if it starts closer than 1 deg to a pole.
-        """
+        """Filter a record of the filter's sampling interval; ``outputs`` are kept."""
         check_latitudes(initial.lla[None, :], "initial")
         C, v, lla = matrix_from_rpy(initial.rpy), initial.velocity.copy(), initial.lla.copy()
         P, x = self.covariance(initial, initial_sd), self.states.mean.copy()
@@ -164,7 +266,8 @@ class Filter:
         samples = Samples(imu.rotation, imu.velocity, imu.dt)
         place, rejected = np.zeros(4, dtype=np.int64), np.zeros(len(KINDS), dtype=np.int64)
         where = RunPlace(place, rejected, np.zeros(7))
-        stopped, settings = PAUSED, self.settings
+        table, lever, stopped = self.states.table, self.lever_arm, PAUSED
+        settings = Settings(table, self.noise_states, lever, self.second_order, self.stride)
         for part in (*windows(imu.n), slice(imu.n, imu.n)):
             if stopped == PAUSED:
                 stopped = run(samples, settings, estimate, events, found, kept, where, part.stop)
@@ -236,17 +339,13 @@ class Outputs:
 
 def modified(covariance: FloatArray, velocity: FloatArray) -> FloatArray:
     """Covariance with the modified velocity error ``dv - v x phi``, from one with ``dv``."""
-    return _with_turned_velocity(covariance, velocity, -1.0)
+    return unmodified(covariance, -velocity)
 
 
 def unmodified(covariance: FloatArray, velocity: FloatArray) -> FloatArray:
     """Covariance with the velocity error ``dv = u + v x phi``, from one with ``u``."""
-    return _with_turned_velocity(covariance, velocity, 1.0)
-
-
-def _with_turned_velocity(covariance: FloatArray, velocity: FloatArray, sign: float) -> FloatArray:
     T = np.tile(np.eye(9), (*covariance.shape[:-2], 1, 1))
-    T[..., VELOCITY:ATTITUDE, ATTITUDE:] = sign * skew(velocity)
+    T[..., VELOCITY:ATTITUDE, ATTITUDE:] = skew(velocity)
     return T @ covariance @ np.swapaxes(T, -1, -2)
 
 

@@ -90,19 +90,16 @@ class Position(Measurement):
 
     @staticmethod
     def slow_noise(aiding: Aiding) -> tuple[FloatArray, float]:
-        """That of multipath and of the atmosphere."""
         return np.asarray(aiding.coloured_sd), aiding.coloured_tau
 
     @staticmethod
     def moved(value: FloatArray, by: FloatArray) -> FloatArray:
-        """Positions moved by metres."""
         return offset(value, by)
 
     @staticmethod
     def along(
         trajectory: Trajectory, index: IntArray, arm: FloatArray, imu: Imu | None
     ) -> FloatArray:
-        """Positions of the antenna."""
         return offset(trajectory.lla[index], matrix_from_rpy(trajectory.rpy[index]) @ arm)
 
 
@@ -139,7 +136,6 @@ class Velocity(Measurement):
     def along(
         trajectory: Trajectory, index: IntArray, arm: FloatArray, imu: Imu | None
     ) -> FloatArray:
-        """Velocities of the antenna; with a lever arm, the error-free IMU is needed."""
         velocity = trajectory.velocity[index]
         if not np.any(arm):
             return velocity
@@ -165,19 +161,16 @@ class Height(Measurement):
 
     @staticmethod
     def slow_noise(aiding: Aiding) -> tuple[FloatArray, float]:
-        """How far the height of a pressure is off."""
         return np.array([aiding.barometer_sd, 0.0, 0.0]), aiding.barometer_tau
 
     @staticmethod
     def moved(value: FloatArray, by: FloatArray) -> FloatArray:
-        """Heights moved by the first column of ``by``."""
         return value + np.where(np.arange(3) == 0, by, 0.0)
 
     @staticmethod
     def along(
         trajectory: Trajectory, index: IntArray, arm: FloatArray, imu: Imu | None
     ) -> FloatArray:
-        """Heights of the IMU."""
         return np.where(np.arange(3) == 0, trajectory.lla[index, 2:], 0.0)
 
 
@@ -199,7 +192,6 @@ class Standstill(Measurement):
     def along(
         trajectory: Trajectory, index: IntArray, arm: FloatArray, imu: Imu | None
     ) -> FloatArray:
-        """Zeros."""
         return np.zeros((index.size, 3))
 
 
@@ -239,11 +231,8 @@ def observe(
 ) -> float:
     """Fill the row h (9,) of one component of a measurement; returns estimate less measurement.
 
-    kind: Code of `KINDS`, in the order of `MEASUREMENTS`.
-    value: (3,), what was measured.
-    rate: (3,), angular rate, body axes, rad/s.
-    lever: (3,), from the IMU to the antenna, body axes, m.
-    Returns: m or m/s.
+    kind: Code of `KINDS`.
+    rate, lever: (3,), angular rate, rad/s, and antenna from the IMU, m, body axes.
     """
     for i in range(9):
         h[i] = 0.0

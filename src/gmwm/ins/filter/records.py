@@ -220,20 +220,11 @@ def new_scratch(n: int) -> Scratch:
 
 
 @compiled()
-def new_kinematics() -> Kinematics:
-    """Room for a solution."""
-    return Kinematics(np.zeros((3, 3)), np.zeros(3), np.zeros(3))
-
-
-@compiled()
 def new_workspace(n: int) -> Workspace:
     """Work space for n states, the nine of navigation included."""
-    change, scratch, middle, there = (
-        new_transition(),
-        new_scratch(n),
-        new_kinematics(),
-        new_kinematics(),
-    )
+    change, scratch = new_transition(), new_scratch(n)
+    middle = Kinematics(np.zeros((3, 3)), np.zeros(3), np.zeros(3))
+    there = Kinematics(np.zeros((3, 3)), np.zeros(3), np.zeros(3))
     three = (np.zeros(3), np.zeros(3), np.zeros(3))
     rows = (np.zeros(9), np.zeros(9), np.zeros(n), np.zeros(n))
     held = (np.zeros((n, n)), np.zeros(n), np.zeros(6), np.zeros(n - 9))

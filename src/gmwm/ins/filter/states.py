@@ -1,9 +1,7 @@
-"""Sensor states of a navigation filter: those of the coloured errors of six axes.
+"""Sensor states of a navigation filter: the coloured errors of six axes.
 
-Every term of a model is a block of one or two states. Over k samples a block is propagated exactly:
-its transition, its noise, the angle or velocity that it adds to the integrals of the sensor, and
-the covariance of that with the states. So a correlation time may be shorter than the step of the
-covariance, as that of an analogue filter in front of the sampler is.
+Every term of a model is a block of one or two states, propagated exactly over k samples, so that a
+correlation time may be shorter than the step of the covariance.
 """
 
 from __future__ import annotations
@@ -138,10 +136,7 @@ def _states(
 def _blocks(
     axis: str, model: Model, bias: float, dt: float, drift_known: bool
 ) -> tuple[list[StateSpace], float]:
-    """Terms of a sensor that have states, and the variance of its white noise in a sample.
-
-    bias: Variance of a constant.
-    """
+    """Terms with states, a constant of variance ``bias`` too, and variance of the white noise."""
     blocks, white = [], 0.0
     for term in model.terms:
         form = term.state_space(dt)

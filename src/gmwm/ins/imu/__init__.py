@@ -1,9 +1,9 @@
 """Inertial signals and the errors of sensors."""
 
 from gmwm.ins.imu.emulation import Imu as Imu, emulate as emulate
-from gmwm.ins.imu.recorded import Recorded as Recorded
 from gmwm.ins.imu.sensors import (
     AXES as AXES,
+    Recorded as Recorded,
     SensorErrors as SensorErrors,
     SensorModels as SensorModels,
 )

@@ -1,9 +1,7 @@
 """Preintegrated increments of an IMU and their exact covariance with any composite error model.
 
-Preintegration (Forster et al. 2017, *IEEE Trans. Robotics* 33(1), 1-21) sums the samples between
-two keyframes in the body axes of the first. Its usual covariance knows white noise and a random
-walk; here the states of any error model go along, so that slow terms correlate the increments of a
-pair of keyframes, and of the next pairs through the states, as they do in truth.
+The usual covariance (Forster et al. 2017, *IEEE Trans. Robotics* 33(1), 1-21) knows white noise and
+a random walk; here slow terms of any model correlate the increments of all pairs of keyframes.
 """
 
 from __future__ import annotations
@@ -109,7 +107,17 @@ def preintegrate(
     dt, (turns, mean, half, by_mean, by_half) = imu.dt, _steps(imu)
     rotation, velocity, position = np.eye(3), np.zeros(3), np.zeros(3)
     covariance = np.zeros((9 + m, 9 + m))
-    covariance[9:, 9:] = _start(start, stationary)
+    if isinstance(start, str):
+        if checks.choice("start", start, ("known", "stationary")) == "stationary":
+            covariance[9:, 9:] = stationary
+    else:
+        given = checks.real_numbers(start, "start")
+        if given.shape != stationary.shape:
+            raise InputError(
+                f"start has shape {given.shape}: the sensors have {m} states, give a "
+                "covariance of theirs"
+            )
+        covariance[9:, 9:] = given
     jacobian = np.eye(9 + m)[:, 9:]
     A, B, Q = np.eye(9 + m), np.zeros((9, 6)), np.zeros((9 + m, 9 + m))
     A[9:, 9:], A[6:9, 3:6], Q[9:, 9:] = transition, dt * np.eye(3), drive
@@ -136,10 +144,10 @@ def preintegrate(
 
 
 def _steps(imu: Imu) -> tuple[FloatArray, ...]:
-    """What the samples of an IMU do: each an array of n matrices, (n, 3, 3).
+    """Effects of the samples, (n, 3, 3) each.
 
-    With the rotation vector r of a sample and its velocity increment u: turn exp(r), mean turn G1,
-    half of its mean G2 for the position, and the derivatives of G1 u and G2 u to r.
+    For a rotation vector r and a velocity increment u: turn exp(r), mean turn G1, G2 for the
+    position, and the derivatives of G1 u and G2 u to r.
     """
     part = matrix_from_rotation_vector(_NODES[:, None, None] * imu.rotation)  # exp(s r)
     mean = np.einsum("s,snij->nij", _WEIGHTS, part)
@@ -151,16 +159,3 @@ def _steps(imu: Imu) -> tuple[FloatArray, ...]:
     by_mean = -np.einsum("s,snij->nij", _WEIGHTS, inner)
     by_half = -np.einsum("s,snij->nij", _WEIGHTS * (1.0 - _NODES), inner)
     return matrix_from_rotation_vector(imu.rotation), mean, half, by_mean, by_half
-
-
-def _start(start: Start | FloatArray, stationary: FloatArray) -> FloatArray:
-    if isinstance(start, str):
-        known = checks.choice("start", start, ("known", "stationary")) == "known"
-        return np.zeros_like(stationary) if known else stationary
-    given = checks.real_numbers(start, "start")
-    if given.shape != stationary.shape:
-        raise InputError(
-            f"start has shape {given.shape}: the sensors have {len(stationary)} states, give a "
-            "covariance of theirs"
-        )
-    return given

@@ -1,6 +1,7 @@
 """Own logs: an IMU's record and GNSS fixes, aligned, filtered, examined and compared."""
 
 from gmwm.ins.logs.alignment import Alignment as Alignment, align as align
+from gmwm.ins.logs.attitude import standstills as standstills, steady as steady
 from gmwm.ins.logs.comparison import (
     Comparison as Comparison,
     Outcome as Outcome,
@@ -20,4 +21,3 @@ from gmwm.ins.logs.measured import LogSpec as LogSpec, Measured as Measured
 from gmwm.ins.logs.navigated import Navigated as Navigated
 from gmwm.ins.logs.replay import Replay as Replay
 from gmwm.ins.logs.smoother import Smoothed as Smoothed, smooth as smooth
-from gmwm.ins.logs.steadiness import standstills as standstills, steady as steady

@@ -30,9 +30,11 @@ from gmwm.ins.logs.attitude import (
     attitude_in_motion,
     gyrocompass,
     heading_from_course,
+    positions_of,
+    steady,
     turned,
+    velocity_at_rest,
 )
-from gmwm.ins.logs.steadiness import positions_of, steady, velocity_at_rest
 from gmwm.ins.trajectory import NavState
 from gmwm.issues import Notice, notice
 
@@ -42,9 +44,8 @@ class Alignment:
     """An initial state.
 
     epoch: Epoch of the IMU at which the filter starts.
-    gyro_bias: (3,), subtracted from the gyros, rad/s; zero if the vehicle never stood still.
-    gyro_bias_sd: Its standard deviation, rad/s; ``None`` if the vehicle never stood still.
-    notices: How the state was found.
+    gyro_bias, gyro_bias_sd: (3,), subtracted from the gyros, and standard deviation, rad/s; zero
+        and ``None`` if the vehicle never stood still.
     stood: Time over which the gyro bias was averaged, s.
     """
 
@@ -127,15 +128,10 @@ def align(
 ) -> Alignment:
     """Find an initial state in the data.
 
-    aiding: With position fixes.
-    models: Models of the IMU, with the standard deviation of constant biases.
-    heading: Heading of the forward axis at the first fix, rad from north to the east. By default
-        the course of GNSS once the vehicle moves, or from the Earth's rotation if the gyros show
-        it.
-    heading_sd: Standard deviation of a given heading, rad.
-    attitude: Roll, pitch and yaw at the first fix, rad. By default the vehicle is levelled while it
-        is steady; if it never is, the attitude follows from how its velocity changes.
-    attitude_sd: Standard deviation of a given attitude, rad, each axis.
+    heading, heading_sd: Forward axis at the first fix, rad from north to the east. By default the
+        course of GNSS once the vehicle moves, or from the Earth's rotation if the gyros show it.
+    attitude, attitude_sd: Roll, pitch and yaw at the first fix, rad. By default the vehicle is
+        levelled while steady; if it never is, the attitude follows from changes of its velocity.
     Raises InputError if there is no fix, no steady stretch or acceleration to level by, or no way
         to know the heading.
     """
@@ -196,10 +192,19 @@ def _levelled(
     drift = gyro_sd if still else float(np.hypot(biased, RATE))
     since_levelled = (epoch - levelled) * imu.dt
     tilt_sd = float(np.hypot(_tilt_sd(models, length, imu.dt, still), drift * since_levelled))
-    heading = given or _best_heading(
-        heading_from_course(imu, aiding, bias, body, epoch, drift),
-        gyrocompass(rate, level, lat, biased) if still else None,
-    )
+    heading = given
+    if heading is None:
+        by_course = heading_from_course(imu, aiding, bias, body, epoch, drift)
+        by_gyros = gyrocompass(rate, level, lat, biased) if still else None
+        known = [each for each in (by_course, by_gyros) if each is not None]
+        if not known:
+            raise InputError(
+                "the heading cannot be known: GNSS shows no motion fast enough in the first "
+                f"{tuning.SEARCHED:g} s, and the gyros cannot find it from the Earth's rotation: "
+                "give the heading",
+                "heading-unknown",
+            )
+        heading = min(known, key=lambda each: each.sd)
     yaw, yaw_sd = heading.yaw, heading.sd
     upright = rpy_from_matrix(body) * [1.0, 1.0, 0.0]
     C = matrix_from_rpy(np.array([0.0, 0.0, yaw])) @ matrix_from_rpy(upright)
@@ -222,29 +227,14 @@ def _levelled(
     return replace(found, gyro_bias=bias - earth, gyro_bias_sd=bias_sd, stood=length)
 
 
-def _best_heading(*found: Heading | None) -> Heading:
-    known = [each for each in found if each is not None]
-    if not known:
-        raise InputError(
-            "the heading cannot be known: GNSS shows no motion fast enough in the first "
-            f"{tuning.SEARCHED:g} s, and the gyros cannot find it from the Earth's rotation: "
-            "give the heading",
-            "heading-unknown",
-        )
-    return min(known, key=lambda each: each.sd)
-
-
 def _bias(models: SensorModels, kind: str) -> float:
     return max(models.bias_sd[axis] for axis in AXES if axis.startswith(kind))
 
 
 def mean_sd(models: SensorModels, kind: str, length: float, dt: float) -> float:
     """Standard deviation of a later error less its mean over a time, s; the worst axis."""
-    variances = [
-        float(models.models[axis].haar_variance(np.array([length]), dt)[0])
-        for axis in AXES
-        if axis.startswith(kind)
-    ]
+    own, tau = [axis for axis in AXES if axis.startswith(kind)], np.array([length])
+    variances = [float(models.models[axis].haar_variance(tau, dt)[0]) for axis in own]
     # The Allan variance, twice the Haar one, is half the mean square of such a difference.
     return float(np.sqrt(4.0 * max(variances)))
 

@@ -1,4 +1,4 @@
-"""Heading and attitude at the start: from GNSS, the Earth's rotation, or changes of velocity."""
+"""Where a vehicle is steady or at rest, and its attitude there: from GNSS, IMU and gravity."""
 
 from __future__ import annotations
 
@@ -7,6 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from gmwm._core.compiled import compiled
+from gmwm._core.distributions import chi2
+from gmwm._core.spool import release
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.ins.filter import Aiding, Fixes
@@ -22,15 +24,114 @@ from gmwm.ins.geometry import (
 )
 from gmwm.ins.imu import Imu
 from gmwm.ins.logs import tuning
-from gmwm.ins.logs.steadiness import positions_of
+
+_WINDOWS = 1024  # looked at together: a few MB
+
+
+def positions_of(aiding: Aiding) -> Fixes:
+    """Position fixes; raises InputError if there are none."""
+    found = aiding.of("position")
+    if found is None:
+        raise InputError("there is no position fix: a filter starts at one")
+    return found
+
+
+def steady(imu: Imu) -> tuple[int, int] | None:
+    """First and last sample of the first steady stretch, at rest or in motion; ``None`` without."""
+    size = max(round(tuning.STEADY_WINDOW / imu.dt), 1)
+    count = min(imu.n, round(tuning.SEARCHED / imu.dt)) // size
+    increments = np.hstack([each[: count * size] for each in (imu.rotation, imu.velocity)])
+    windows = increments.reshape(count, size, 6) / imu.dt
+    means = windows.mean(axis=1)
+    least, most = (
+        round(length / tuning.STEADY_WINDOW) for length in (tuning.STEADY_LEAST, tuning.STEADY_MOST)
+    )
+    steps, noise_of_means = np.diff(windows, axis=1), np.zeros(6)
+    if steps.size:
+        # The noise of the quietest window is divided by what the smallest of so many variances is
+        # of the usual one. Mean squares of differences have two thirds of the degrees of freedom.
+        dof = 2.0 / 3.0 * (size - 1)
+        smallest = chi2.ppf(1.0 - 0.5 ** (1.0 / count), dof) / dof
+        noise = np.sqrt(np.min(np.mean(steps**2, axis=1), axis=0) / (2.0 * smallest))
+        noise_of_means = noise / np.sqrt(size)
+    limit = np.maximum(np.repeat(tuning.STEADY, 3), tuning.SIGMAS * noise_of_means)
+    begin = 0
+    while begin + least <= count:
+        end = begin + 1
+        while end < count and end - begin < most:
+            # The mean of those before is uncertain itself.
+            far = limit * np.sqrt(1.0 + 1.0 / (end - begin))
+            if np.any(np.abs(means[end] - np.mean(means[begin:end], axis=0)) > far):
+                break
+            end += 1
+        if end - begin >= least:
+            return begin * size, end * size
+        begin = end
+    return None
+
+
+def velocity_at_rest(aiding: Aiding, dt: float, first: int, last: int) -> float | None:
+    """Standard deviation of the velocity of a vehicle at rest in a stretch; ``None`` if it moves.
+
+    Fixes show it: velocities near zero, or positions at one place.
+    """
+    begin, end = (first - 0.5) * dt, (last + 0.5) * dt
+    velocity = aiding.of("velocity")
+    if velocity is not None:
+        inside = (velocity.time >= begin) & (velocity.time <= end)
+        if np.any(inside):
+            mean, sd = np.mean(velocity.value[inside], axis=0), np.mean(velocity.sd[inside], axis=0)
+            sd = sd / np.sqrt(np.count_nonzero(inside))
+            if np.any(np.abs(mean) >= tuning.SIGMAS * sd):
+                return None
+            return max(float(np.max(sd)), tuning.STILL_VELOCITY_SD)
+    position = positions_of(aiding)
+    part = position.part((position.time >= begin) & (position.time <= end))
+    if part.time.size < 2:
+        return None
+    sd = np.hypot(part.sd[0], part.sd[-1])
+    if np.any(np.abs(ned_difference(part.value[-1], part.value[0])) > tuning.SIGMAS * sd):
+        return None
+    speed_sd = float(np.max(sd)) / float(part.time[-1] - part.time[0])
+    return max(speed_sd, tuning.STILL_VELOCITY_SD)
+
+
+def standstills(imu: Imu, aiding: Aiding, sd: float) -> Fixes | None:
+    """Standstills where the IMU is as quiet as at the start, with a velocity of ``sd`` (m/s).
+
+    Motion as quiet as that counts as rest too; the filter rejects what contradicts it. ``None`` if
+    the vehicle is not at rest at the start.
+    """
+    stretch = steady(imu)
+    if stretch is None or velocity_at_rest(aiding, imu.dt, *stretch) is None:
+        return None
+    quieter, length = tuning.ZERO_VELOCITY
+    size = max(round(length / imu.dt), 2)
+    count = imu.n // size
+    mean, scatter = np.empty((count, 6)), np.empty((count, 6))
+    for begin in range(0, count, _WINDOWS):
+        part = slice(begin, min(begin + _WINDOWS, count))
+        rows = slice(part.start * size, part.stop * size)
+        samples = np.hstack([imu.rotation[rows], imu.velocity[rows]]) / imu.dt
+        seconds = samples.reshape(-1, size, 6)
+        mean[part], scatter[part] = seconds.mean(axis=1), seconds.std(axis=1)
+        release(imu.rotation)
+        release(imu.velocity)
+    first, last = (-(-stretch[0] // size), stretch[1] // size)
+    rest = slice(first, max(last, first + 1))
+    level, usual = mean[rest].mean(axis=0), np.sqrt(np.mean(scatter[rest] ** 2, axis=0))
+    slow = np.abs(mean[:, :3] - level[:3]) <= tuning.STEADY[0]
+    still = np.all(scatter <= quieter * usual, axis=1) & np.all(slow, axis=1)
+    time = np.asarray((np.flatnonzero(still) + 1) * size * imu.dt, dtype=float)
+    zeros = np.zeros((time.size, 3))
+    return Fixes("standstill", time, zeros, zeros + sd)
+
+
+# -- heading --------------------------------------------------------------------------------------
 
 
 class Heading(NamedTuple):
-    """A heading at the first epoch of the filter.
-
-    yaw, sd: rad.
-    source: How it was found, in words.
-    """
+    """A heading at the first epoch of the filter, rad, and how it was found in words."""
 
     yaw: float
     sd: float
@@ -68,10 +169,9 @@ def heading_from_course(
 ) -> Heading | None:
     """Heading at an epoch from the first course of GNSS, turned back by the gyros.
 
-    C: Attitude at the epoch without its heading.
-    drift: Standard deviation of the gyros' error, rad/s.
+    C: Attitude without its heading; ``drift`` is the standard deviation of the gyros, rad/s.
     """
-    found = _from_velocity(aiding, epoch * imu.dt) or _from_chord(aiding, epoch * imu.dt)
+    found = _course(aiding, epoch * imu.dt)
     if found is None:
         return None
     last = min(round(found.end / imu.dt), imu.n)
@@ -88,28 +188,23 @@ def heading_from_course(
     return Heading(found.angle - mean_turn, sd, source)
 
 
-def _from_velocity(aiding: Aiding, start: float) -> _Course | None:
-    velocity = aiding.of("velocity")
-    if velocity is None:
-        return None
-    speed = np.hypot(velocity.value[:, 0], velocity.value[:, 1])
-    sd = np.sqrt(np.mean(velocity.sd[:, :2] ** 2, axis=1))
-    fast = (speed > tuning.COURSE_RATIO * sd) & (velocity.time >= start)
-    fast &= velocity.time <= start + tuning.SEARCHED
-    if not np.any(fast):
-        return None
-    i = int(np.argmax(fast))
-    time = float(velocity.time[i])
-    angle = float(np.arctan2(velocity.value[i, 1], velocity.value[i, 0]))
-    return _Course(angle, float(sd[i] / speed[i]), time, time)
+def _course(aiding: Aiding, start: float) -> _Course | None:
+    """Course of the first fast velocity, or between positions near in time and far apart.
 
-
-def _from_chord(aiding: Aiding, start: float) -> _Course | None:
-    """Course between two fixes that are near in time and far apart.
-
-    Fixes between them and the next one lie on the line, or one of the two is an outlier; if no
+    Fixes between the two and the next one lie on the line, or one of the two is an outlier; if no
     other fixes are far apart, the first two are taken all the same.
     """
+    velocity = aiding.of("velocity")
+    if velocity is not None:
+        speed = np.hypot(velocity.value[:, 0], velocity.value[:, 1])
+        sd = np.sqrt(np.mean(velocity.sd[:, :2] ** 2, axis=1))
+        fast = (speed > tuning.COURSE_RATIO * sd) & (velocity.time >= start)
+        fast &= velocity.time <= start + tuning.SEARCHED
+        if np.any(fast):
+            i = int(np.argmax(fast))
+            at = float(velocity.time[i])
+            angle = float(np.arctan2(velocity.value[i, 1], velocity.value[i, 0]))
+            return _Course(angle, float(sd[i] / speed[i]), at, at)
     positions = positions_of(aiding)
     time, sd = positions.time, np.sqrt(np.mean(positions.sd[:, :2] ** 2, axis=1))
     first = None
@@ -161,7 +256,16 @@ def attitude_in_motion(
     constant_sd: Standard deviations of constant errors of gyros and accelerometers, rad/s, m/s^2.
     Raises InputError if no stretch of up to `gmwm.ins.logs.tuning.MOTION_MOST` s shows the heading.
     """
-    start, velocity = epoch * imu.dt, _velocities(aiding)
+    start, velocity = epoch * imu.dt, aiding.of("velocity")
+    if velocity is None:  # differences of positions at the times between them
+        position = positions_of(aiding)
+        step = np.diff(position.time)
+        near = np.flatnonzero(step <= tuning.CHORD)
+        way = np.array([ned_difference(position.value[i + 1], position.value[i]) for i in near])
+        way_sd = np.hypot(position.sd[1:], position.sd[:-1])[near]
+        between = 0.5 * (position.time[1:] + position.time[:-1])[near]
+        each = step[near, None]
+        velocity = Fixes("velocity", between, way.reshape(-1, 3) / each, way_sd / each)
     lever = np.asarray(aiding.lever_arm, dtype=float)
     best: tuple[FloatArray, FloatArray] | None = None
     for length in np.arange(tuning.MOTION_LEAST, tuning.MOTION_MOST + 1.0, tuning.MOTION_LEAST):
@@ -182,20 +286,6 @@ def attitude_in_motion(
             "attitude-unknown",
         )
     return best
-
-
-def _velocities(aiding: Aiding) -> Fixes:
-    """Velocity fixes, or differences of positions at the times between them."""
-    velocity, position = aiding.of("velocity"), positions_of(aiding)
-    if velocity is not None:
-        return velocity
-    step = np.diff(position.time)
-    near = np.flatnonzero(step <= tuning.CHORD)
-    way = np.array([ned_difference(position.value[i + 1], position.value[i]) for i in near])
-    sd = np.hypot(position.sd[1:], position.sd[:-1])[near]
-    between = 0.5 * (position.time[1:] + position.time[:-1])[near]
-    each = step[near, None]
-    return Fixes("velocity", between, way.reshape(-1, 3) / each, sd / each)
 
 
 def _velocity_in_body_axes(

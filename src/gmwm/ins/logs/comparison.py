@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
+from itertools import permutations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -48,10 +49,9 @@ class Outcome:
         error is uncorrelated with the difference.
     reference_variance : (3,) ndarray
         Mean variance of the smoothed positions, m^2.
-    rms : dict
-        Root mean square of the true errors by part, m: the uncertainty of the reference included.
-    predicted : dict
-        The same as the filter predicts.
+    rms, predicted : dict
+        Root mean square of the true errors by part, m, the uncertainty of the reference included;
+        and as the filter predicts it.
     nees : Ratio
         NEES per degree of freedom.
     score : (K,) ndarray
@@ -327,9 +327,8 @@ class Comparison:
         ]
         lines += plain_table(("", *PARTS, "NEES/dof", "NIS/dof"), rows).splitlines()
         lines += ["", f"Errors over those of {first}, paired"]
-        pairs = {name: self.pairs[name, first] for name in others}
         cells = []
-        for name, p in pairs.items():
+        for name, p in ((name, self.pairs[name, first]) for name in others):
             interval = f"({p.lower:.3f} .. {p.upper:.3f})"
             score = f"{p.score:+.2f}", f"{p.score_p_value:.2g}"
             cells.append((name, f"{p.ratio:.3f}", interval, *score))
@@ -386,8 +385,15 @@ def compare(
         if length > tuning.LONGEST_OUTAGE:
             longest = f"{tuning.LONGEST_OUTAGE:g}"
             raise InputError(f"outages of {length:g} s: give {longest} s or less")
-    passes = _passes(duration, length, measured.imu.dt)
-    every = tuple(sorted((each for part in passes for each in part), key=lambda each: each.start))
+    step = max(round(length / measured.imu.dt), 1) * measured.imu.dt
+    count, first = int((duration - tuning.OUTAGES_FROM) / step), tuning.OUTAGES_FROM
+    if count < tuning.FEWEST_OUTAGES:
+        raise InputError(
+            f"the log is {duration:.4g} s long, enough for {max(count, 0)} outages of "
+            f"{length:g} s: {tuning.FEWEST_OUTAGES} are needed; give a log of "
+            f"{first + tuning.FEWEST_OUTAGES * step:g} s or shorter outages"
+        )
+    every = tuple(Outage(first + i * step, step) for i in range(count))
     ends = np.array([each.end for each in every])
     smoothed = {name: smooth(replay, ends) for name, replay in replays.items()}
     for name, track in smoothed.items():
@@ -396,50 +402,25 @@ def compare(
     # One reference for all models, so that none is its own.
     lla = np.mean([track.lla for track in smoothed.values()], axis=0)
     outcomes = {
-        name: _outcome(name, replay, smoothed[name], lla, passes, every)
-        for name, replay in replays.items()
+        name: _outcome(name, replay, smoothed[name], lla, every) for name, replay in replays.items()
     }
     scale = np.mean([each.squares for each in outcomes.values()], axis=(0, 1))
-    pairs = {
-        (a, b): paired(outcomes[a], outcomes[b], scale)
-        for a in outcomes
-        for b in outcomes
-        if a != b
-    }
+    names = permutations(outcomes, 2)
+    pairs = {(a, b): paired(outcomes[a], outcomes[b], scale) for a, b in names}
     notices = [replace(each, source=name) for name, own in models.items() for each in own.notices]
     return Comparison(
         measured.title, every, outcomes, pairs, duration, (*notices, *measured.notices)
     )
 
 
-def _passes(duration: float, length: float, dt: float) -> tuple[tuple[Outage, ...], ...]:
-    """Outages of two runs, each in the gaps of the other."""
-    step = max(round(length / dt), 1) * dt
-    count = int((duration - tuning.OUTAGES_FROM) / step)
-    if count < tuning.FEWEST_OUTAGES:
-        raise InputError(
-            f"the log is {duration:.4g} s long, enough for {max(count, 0)} outages of "
-            f"{length:g} s: {tuning.FEWEST_OUTAGES} are needed; give a log of "
-            f"{tuning.OUTAGES_FROM + tuning.FEWEST_OUTAGES * step:g} s or shorter outages"
-        )
-    every = [Outage(tuning.OUTAGES_FROM + i * step, step) for i in range(count)]
-    return tuple(every[::2]), tuple(every[1::2])
-
-
 def _outcome(
-    name: str,
-    replay: Replay,
-    smoothed: Smoothed,
-    lla: FloatArray,
-    passes: tuple[tuple[Outage, ...], ...],
-    every: tuple[Outage, ...],
+    name: str, replay: Replay, smoothed: Smoothed, lla: FloatArray, every: tuple[Outage, ...]
 ) -> Outcome:
     found: dict[float, tuple[FloatArray, FloatArray]] = {}
-    for part in passes:
+    for part in (every[::2], every[1::2]):  # two runs, each with its outages in the other's gaps
         ends = tuple(each.end for each in part)
-        solution = replace(replay, aiding=replay.aiding.without(part)).solution(
-            replay.imu.n * replay.imu.dt, ends
-        )
+        cut = replace(replay, aiding=replay.aiding.without(part))
+        solution = cut.solution(cut.imu.n * cut.imu.dt, ends)
         if solution.diverged_at is not None:
             raise InputError(f"{name}: the filter diverges in an outage: compare without it")
         kept = np.flatnonzero(solution.before)
@@ -451,10 +432,8 @@ def _outcome(
     variance = covariance - smoothed.covariance
     predicted = np.einsum("kii->ki", covariance)
     # Rounding, and a filter that is no better with all fixes than without, must not make it zero.
-    floor = tuning.LEAST_SHARE * predicted
-    variance = variance + np.einsum(
-        "ki,ij->kij", np.maximum(floor - np.einsum("kii->ki", variance), 0.0), np.eye(3)
-    )
+    lacking = np.maximum(tuning.LEAST_SHARE * predicted - np.einsum("kii->ki", variance), 0.0)
+    variance = variance + np.einsum("ki,ij->kij", lacking, np.eye(3))
     squares = np.einsum("ki,ki->k", error, np.linalg.solve(variance, error[..., None])[..., 0])
     reference = np.mean(np.einsum("kii->ki", smoothed.covariance), axis=0)
     return Outcome(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -52,32 +52,24 @@ class Faults:
         """
         base = whole.within(tuning.LARGEST_OFFSET + tuning.OFFSET_MARGIN, tuning.DIAGNOSED)
         near = cls._near(base)
-        is_at_limit = any(
-            abs(each.values.get("time offset", 0.0)) >= tuning.LARGEST_OFFSET for each in near.found
-        )
-        if measured is None or not (base.is_lost or is_at_limit):
-            return near
-        far = far_offset(measured)
-        if far is None:
+        offsets = [abs(each.values.get("time offset", 0.0)) for each in near.found]
+        is_suspected = base.is_lost or max(offsets, default=0.0) >= tuning.LARGEST_OFFSET
+        far = far_offset(measured) if measured is not None and is_suspected else None
+        if measured is None or far is None:
             return near
         offset, replay, start = far
-        later = start - alignment_of(measured).epoch * measured.imu.dt
+        delay = start - alignment_of(measured).epoch * measured.imu.dt
         base = replay.within(tuning.LARGEST_OFFSET + tuning.OFFSET_MARGIN, tuning.DIAGNOSED)
 
         def effort(each: Faults) -> tuple[bool, int, float]:
-            """Smaller is better, even if the two leave other fixes out."""
-            fixes = max(each.replay.standard.shape[0], 1)
+            fixes = max(each.replay.standard.shape[0], 1)  # the two may leave others out
             return not each.explained, len(each.found), -each.replay.log_likelihood / fixes
 
-        return min(near, cls._near(base)._with_offset(offset, later), key=effort)
+        return min(near, cls._near(base)._with_offset(offset, delay), key=effort)
 
     @classmethod
     def _near(cls, base: Replay) -> Faults:
-        """Faults that leave the filter near enough to show in its innovations.
-
-        One after the other, the fault is taken that makes the fixes most probable, as long as its
-        gain is beyond chance.
-        """
+        """Faults one after the other, each the most probable, while they are beyond chance."""
         here, found = base, list[Fault]()
         alternatives: tuple[str, ...] = ()
         resolution: dict[str, float] = {}
@@ -87,7 +79,13 @@ class Faults:
             # Of stamps and antenna the errors of both together: one could be taken for the other.
             resolution = alone | first[-1].errors
             known = {each.code for each in found} - {"outliers", "axis-signs"}
-            refined = _most_probable([c for c in _candidates(here, first) if not c.codes & known])
+            worth = [
+                each
+                for each in _candidates(here, first)
+                if not each.codes & known and each.gain > cost(1)
+            ]
+            refined = [faults for each in worth if (faults := each.refined())]
+            refined.sort(key=lambda faults: -faults[0].excess)
             if not refined or refined[0][0].excess <= 0.0:
                 break
             best, *others = refined
@@ -106,37 +104,24 @@ class Faults:
         found, here = _with_outliers_anew(base, found, here)
         return cls(tuple(found), alternatives, not contradicted(here), here, resolution)
 
-    def _with_offset(self, offset: float, later: float) -> Faults:
-        """These faults of a log with earlier stamps, after that offset as the first fault.
-
-        later: Delay of the filter's start, s.
-        """
+    def _with_offset(self, offset: float, delay: float) -> Faults:
+        """The offset as the first fault, then these; ``delay`` of the filter's start in s."""
         near = [each for each in self.found if each.code == "time-offset"]
         # A rest counts even where it is no fault of its own.
         left = near or next(constant_errors(self.replay)).refined()
         by = offset + sum(each.values["time offset"] for each in left)
         error = left[0].errors if left else {"time offset": self.resolution["time offset"]}
-        stamps = Fault(
-            "time-offset",
-            "",
-            lambda log: log.later(lambda time: np.full_like(time, -by)),
-            self.replay,
-            np.inf,
-            cost(1),
-            {"time offset": by},
-            error,
-        )
-        others = [
-            replace(
-                each,
-                values=each.values
-                | {name: each.values[name] + later for name in {"time"} & each.values.keys()},
-            )
-            for each in self.found
-            if each not in near
-        ]
+
+        def change(replay: Replay) -> Replay:
+            return replay.later(lambda time: np.full_like(time, -by))
+
+        values = {"time offset": by}
+        found = [Fault("time-offset", "", change, self.replay, np.inf, cost(1), values, error)]
+        for each in (each for each in self.found if each not in near):
+            times = {"time": each.values["time"] + delay} if "time" in each.values else {}
+            found.append(replace(each, values=each.values | times))
         alternatives = () if near else self.alternatives
-        return replace(self, found=(stamps, *others), alternatives=alternatives)
+        return replace(self, found=tuple(found), alternatives=alternatives)
 
 
 def contradicted(replay: Replay, level: float = LEVEL) -> bool:
@@ -153,16 +138,9 @@ def _candidates(here: Replay, constants: Sequence[Candidate]) -> Iterator[Candid
     cleaned = outliers(here)
     if cleaned is not None:
         yield cleaned
-    is_suspected = contradicted(here, tuning.SUSPECTED)
-    if is_suspected and here.is_lost:
+    if contradicted(here, tuning.SUSPECTED) and here.is_lost:
         yield far_heading(here)
         yield from wrong_signs(here)
-
-
-def _most_probable(candidates: Sequence[Candidate]) -> list[tuple[Fault, ...]]:
-    """Faults by their excess, the largest first."""
-    refined = [each.refined() for each in candidates if each.gain > cost(1)]
-    return sorted((each for each in refined if each), key=lambda each: -each[0].excess)
 
 
 def _with_outliers_anew(
@@ -190,9 +168,8 @@ def _with_outliers_anew(
 def far_offset(measured: Measured) -> tuple[float, Replay, float] | None:
     """A time offset of seconds, as of GPS time for UTC.
 
-    Level, heading and velocity at the start are as wrong as the stamps, so that nothing near the
-    filter of the stamps as they are shows the way: the filter is aligned and run with offsets all
-    over, then nearer and nearer to the best.
+    The start is as wrong as the stamps, so that the innovations show no way: the filter is aligned
+    and run with offsets all over, then nearer and nearer to the best.
 
     Returns: Delay of the stamps, s; the log without it, aligned anew; and the start of its filter,
         s since the first epoch of the IMU. ``None`` if no offset makes the innovations small.
@@ -217,10 +194,7 @@ def far_offset(measured: Measured) -> tuple[float, Replay, float] | None:
 
 
 def _size(measured: Measured, offset: float) -> float:
-    """Mean square of the innovations, robust against a few outliers.
-
-    Infinite if the filter cannot start or diverges, or few fixes are left: they show too little.
-    """
+    """Mean square of the innovations, robust to outliers; infinite if the filter fails."""
     earlier = _earlier(measured, offset)
     try:
         replay = Replay.of(earlier, alignment_of(earlier))
@@ -228,9 +202,8 @@ def _size(measured: Measured, offset: float) -> float:
         return np.inf
     replay = replay.within(0.0, tuning.DIAGNOSED)
     fixes = sum(e.time.size for e in measured.aiding.fixes if e.kind != "standstill")
-    if replay.standard.shape[0] < tuning.FAR_LEFT * fixes:
-        return np.inf
-    if not np.isfinite(replay.log_likelihood):
+    is_short = replay.standard.shape[0] < tuning.FAR_LEFT * fixes
+    if is_short or not np.isfinite(replay.log_likelihood):
         return np.inf
     return float(np.expm1(np.nanmean(np.log1p(replay.standard**2))))
 
@@ -249,37 +222,43 @@ def _earlier(measured: Measured, offset: float) -> Measured:
 
 
 def fault_notice(fault: Fault, start: float) -> Notice:
-    """A fault as a notice: ``values`` holds the estimates, SI, and standard errors.
-
-    start: Time of the filter's start on the clock of the files, s.
-    """
+    """A fault as a notice; ``start`` is the filter's on the clock of the files, s."""
     values: dict[str, Any] = {**fault.values}
     values |= {f"{name} error": each for name, each in fault.errors.items()}
     if "time" in values:
         values["time"] += start
-    words, code = _WORDS[fault.code](fault), fault.code
-    variant = {"outliers": "fixes", "heading": "wrong"}.get(code, "")
-    return notice(code, fault.where, values, severity="bad", variant=variant, **words)
+    variant = {"outliers": "fixes", "heading": "wrong"}.get(fault.code, "")
+    return notice(fault.code, fault.where, values, severity="bad", variant=variant, **_words(fault))
 
 
-def _outlier_words(fault: Fault) -> dict[str, Any]:
-    count = int(fault.values["count"])
-    fixes = "1 fix is an outlier" if count == 1 else f"{count} fixes are outliers"
-    share = per_cent(fault.values["fraction"])
-    return {"fixes": fixes, "share": share, "hint": "leave them out"}
-
-
-def _offset_words(fault: Fault) -> dict[str, Any]:
-    offset, scale = fault.values["time offset"], ""
-    if round(abs(offset)) == tuning.LEAP_SECONDS:
-        scale = f", as GPS time is ahead of UTC by {tuning.LEAP_SECONDS:g} s"
-    return {
-        "size": abs(offset),
-        "late": "late" if offset > 0.0 else "early",
-        "error": fault.errors["time offset"],
-        "scale": scale,
-        "change": "subtract it from" if offset > 0.0 else "add it to",
-    }
+def _words(fault: Fault) -> dict[str, Any]:
+    """What the sentence of a fault is filled with."""
+    values, errors = fault.values, fault.errors
+    if fault.code == "outliers":
+        count = int(values["count"])
+        fixes = "1 fix is an outlier" if count == 1 else f"{count} fixes are outliers"
+        return {"fixes": fixes, "share": per_cent(values["fraction"]), "hint": "leave them out"}
+    if fault.code == "time-offset":
+        offset, scale = values["time offset"], ""
+        if round(abs(offset)) == tuning.LEAP_SECONDS:
+            scale = f", as GPS time is ahead of UTC by {tuning.LEAP_SECONDS:g} s"
+        late, change = ("late", "subtract it from") if offset > 0.0 else ("early", "add it to")
+        error = errors["time offset"]
+        return {"size": abs(offset), "late": late, "error": error, "scale": scale, "change": change}
+    if fault.code == "heading":
+        yaw = np.degrees(fault.replay.state.rpy[2]) % 360.0
+        hint = f"give the heading {yaw:.1f} deg, or turn the axes to forward, right, down"
+        by, error_deg = np.degrees(values["heading"]), np.degrees(errors["heading"])
+        return {"by": by, "error_deg": error_deg, "hint": hint}
+    if fault.code == "lever-arm":
+        return _arm_words(fault)
+    wrong, unseen = (
+        [f"{fault.where}_{axis}" for axis, sign in values.items() if sign == wanted]
+        for wanted in (-1.0, 0.0)
+    )
+    unknown = f" (this motion does not show the sign of {', '.join(unseen)})" if unseen else ""
+    reverse = ", ".join(wrong or unseen)
+    return {"wrong": ", ".join(wrong) or "an axis", "unseen": unknown, "reverse": reverse}
 
 
 def _arm_words(fault: Fault) -> dict[str, Any]:
@@ -303,36 +282,6 @@ def _arm_words(fault: Fault) -> dict[str, Any]:
         )
     return {"parts": parts, "hint": hint}
 
-
-def _heading_words(fault: Fault) -> dict[str, Any]:
-    yaw = np.degrees(fault.replay.state.rpy[2]) % 360.0
-    return {
-        "by": np.degrees(fault.values["heading"]),
-        "error_deg": np.degrees(fault.errors["heading"]),
-        "hint": f"give the heading {yaw:.1f} deg, or turn the axes to forward, right, down",
-    }
-
-
-def _sign_words(fault: Fault) -> dict[str, Any]:
-    reversed_axes, unseen = (
-        [f"{fault.where}_{axis}" for axis, sign in fault.values.items() if sign == wanted]
-        for wanted in (-1.0, 0.0)
-    )
-    unknown = f" (this motion does not show the sign of {', '.join(unseen)})" if unseen else ""
-    return {
-        "wrong": ", ".join(reversed_axes) or "an axis",
-        "unseen": unknown,
-        "reverse": ", ".join(reversed_axes or unseen),
-    }
-
-
-_WORDS: Mapping[str, Callable[[Fault], dict[str, Any]]] = {
-    "time-offset": _offset_words,
-    "lever-arm": _arm_words,
-    "heading": _heading_words,
-    "axis-signs": _sign_words,
-    "outliers": _outlier_words,
-}
 
 _MOTION = {
     "time offset": ("a time offset of the fixes", "s", 1.0),

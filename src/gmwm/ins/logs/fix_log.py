@@ -134,7 +134,15 @@ def read_fix_log(path: str | os.PathLike[str]) -> FixLog:
         header = "time_s,latitude_deg,longitude_deg,height_m"
         log = LogColumns.find(file, _quantities, (TIME, *_POSITION), header)
         source = log.table.source
-        _check_triples(log)
+        for prefix in ("velocity ", "sd ", "sd velocity "):
+            group = [prefix + axis for axis in _NED]
+            there = [n for n in group if {n, n.replace("down", "up")} & log.columns.keys()]
+            if there and len(there) < len(group):
+                lacking = next(name for name in group if name not in there)
+                raise InputError(
+                    f"{source} has a column for {there[0]} and none for {lacking}: add it, or "
+                    "leave out all three"
+                )
         values = log.load()
     time = _times(log, values[TIME])
     found = log.radians(values, _LIMITS) | {"height": log.metres("height", values["height"])}
@@ -163,11 +171,7 @@ def read_fix_log(path: str | os.PathLike[str]) -> FixLog:
 
 
 def read_heights(path: str | os.PathLike[str]) -> tuple[str, FloatArray, FloatArray]:
-    """Read heights of a barometer from columns time and height.
-
-    Returns: source; time, height (E,), s and m; NaN where there is none.
-    Raises InputError if the file cannot be used.
-    """
+    """Source, time (s) and height (m) of a barometer, NaN where there is none."""
     log = LogColumns.find(Path(path), _quantities, (TIME, "height"), "time_s,height_m")
     values = log.load()
     return log.table.source, _times(log, values[TIME]), log.metres("height", values["height"])
@@ -235,19 +239,6 @@ def _quantities(name: str) -> tuple[str, ...]:
     return (prefix + ("down" if is_sd and direction == "up" else direction),)
 
 
-def _check_triples(log: LogColumns) -> None:
-    """Reject a part of three components."""
-    for prefix in ("velocity ", "sd ", "sd velocity "):
-        group = [prefix + axis for axis in _NED]
-        there = [n for n in group if {n, n.replace("down", "up")} & log.columns.keys()]
-        if there and len(there) < len(group):
-            lacking = next(name for name in group if name not in there)
-            raise InputError(
-                f"{log.table.source} has a column for {there[0]} and none for {lacking}: add it, "
-                "or leave out all three"
-            )
-
-
 def _times(log: LogColumns, stamps: FloatArray) -> FloatArray:
     """Time stamps in s; rejects missing ones, and ones that do not rise."""
     bad = np.flatnonzero(np.isnan(stamps))
@@ -283,15 +274,7 @@ def _deviations(
 
 
 def _check_axes(source: str, time: FloatArray, position: FloatArray, velocity: FloatArray) -> None:
-    """Reject positions and velocities that agree only with another column, sign or unit.
-
-    A filter would blame the sensors. The ways between positions are compared with the integral of
-    the velocities.
-
-    time: (E,), s.
-    position, velocity: (E, 3), latitude, longitude (rad), height (m); north, east, down (m/s); NaN
-        where there is none.
-    """
+    """Reject velocities that agree with positions only with another column, sign or unit."""
     there = np.all(np.isfinite(position) & np.isfinite(velocity), axis=1)
     time, position, velocity = time[there], position[there], velocity[there]
     if time.size < 2:

@@ -1,8 +1,7 @@
 """Possible faults of a log: time offset, lever arm, heading, axis signs, outliers.
 
-Each is a filter that allows for it. Its parameters are those under which the fixes
-are most probable, and its gain is the likelihood ratio. Constant errors, which move the innovations
-in proportion, are estimated by least squares from the innovations and their derivatives (Friedland
+Each is a filter that allows for it, with the parameters under which the fixes are most probable.
+Constant errors are estimated by least squares from the innovations and their derivatives (Friedland
 1969, *IEEE Trans. Autom. Control* 14, 359-367).
 """
 
@@ -63,7 +62,6 @@ class Fault:
 class Candidate(NamedTuple):
     """Faults that are worth a closer look if their first gain is among the largest.
 
-    codes: Codes of the faults.
     gain: A first guess, after few runs of the filter.
     refined: Gives the faults; several that are found together have the same gain and cost.
     errors: Standard errors of constant errors, whether there are any or not.
@@ -168,8 +166,8 @@ def wrong_signs(base: Replay) -> Iterator[Candidate]:
         shown = np.where(np.all(alike == alike[0], axis=0), alike[0], 0.0)
         values = dict(zip(("x", "y", "z"), shown.tolist(), strict=True))
         change = partial(Replay.with_signs, kind=kind, signs=ways[best])
-        gain, price = difference(tried[best], base), cost(1, len(ways))
-        here = tried[best]
+        here, price = tried[best], cost(1, len(ways))
+        gain = difference(here, base)
         fault = Fault("axis-signs", kind, change, here, relative_gain(gain, here), price, values)
         yield Candidate(frozenset({"axis-signs"}), gain, partial(tuple, (fault,)), {})
 
@@ -201,11 +199,7 @@ _CLOCK = Constant(
     lambda r, x: r.along(lambda time: np.full_like(time, -x[0])),
 )
 _ARM = Constant(
-    "lever-arm",
-    ("forward", "right", "down"),
-    lambda r, x: r.with_arm_longer(x),
-    0.5,
-    tuning.LARGEST_ARM,
+    "lever-arm", ("forward", "right", "down"), Replay.with_arm_longer, 0.5, tuning.LARGEST_ARM
 )
 _HEADING = Constant(
     "heading", ("heading",), lambda r, x: r.turned_by(float(x[0])), 0.01, 0.5 * np.pi
@@ -234,17 +228,18 @@ def fitted(
     base: Replay, here: Replay, errors: tuple[Constant, ...], start: float = 0.0
 ) -> tuple[Fault, ...]:
     """Constant errors by Gauss-Newton, one fault each; ``start`` is in ``here`` already."""
-    origin, parts = here, _parts(errors)
+    ends = np.cumsum([len(each.names) for each in errors]).tolist()
+    parts = [slice(end - len(each.names), end) for each, end in zip(errors, ends, strict=True)]
     # Stamps that are farther off leave no fix near.
     most = np.concatenate(
         [np.full(len(each.names), each.usual if each.smooth else np.inf) for each in errors]
     )
     theta, covariance = np.zeros(parts[-1].stop), np.eye(parts[-1].stop)
 
-    def changed(x: FloatArray) -> Replay:
-        replay = origin
+    def changed(x: FloatArray, replay: Replay = here, is_smooth: bool = False) -> Replay:
         for each, part in zip(errors, parts, strict=True):
-            replay = each.change(replay, x[part])
+            change = each.smooth if is_smooth and each.smooth else each.change
+            replay = change(replay, x[part])
         return replay
 
     for _ in range(tuning.ROUNDS):
@@ -265,9 +260,13 @@ def fitted(
     unusual = 0.5 * float(_information(errors) @ theta**2)
     gain = difference(here, base) - unusual
     if errors[0].smooth is not None and np.isfinite(base.log_likelihood):
-        regular, without = _smooth_gain(base, errors, theta)
+        # With the same noise between fixes, which has a gain by chance.
+        smoothed = partial(changed, replay=base, is_smooth=True)
+        along = smoothed(theta)
+        regular = difference(along, base)
         if len(errors) == 1:  # beside the antenna, the less exact one would tell them apart
-            covariance = without
+            columns = _columns(along, smoothed, errors, theta)
+            covariance = gauss_newton(along, columns, errors, theta)[1]
         # The gain of the stamps is the exact one; it counts if it does not come of other noise.
         gain = gain if regular > price + unusual else min(gain, regular - unusual)
     gain, deviations = relative_gain(gain, here), np.sqrt(np.diag(covariance))
@@ -283,27 +282,6 @@ def fitted(
 
         found.append(Fault(each.code, "", change, here, gain, price, values, spread))
     return tuple(found)
-
-
-def _smooth_gain(
-    base: Replay, errors: tuple[Constant, ...], theta: FloatArray
-) -> tuple[float, FloatArray]:
-    """Gain and covariance with the same noise between fixes, which has a gain by chance."""
-
-    def changed(x: FloatArray) -> Replay:
-        replay = base
-        for each, part in zip(errors, _parts(errors), strict=True):
-            replay = (each.smooth or each.change)(replay, x[part])
-        return replay
-
-    here = changed(theta)
-    columns = _columns(here, changed, errors, theta)
-    return difference(here, base), gauss_newton(here, columns, errors, theta)[1]
-
-
-def _parts(errors: tuple[Constant, ...]) -> list[slice]:
-    ends = np.cumsum([len(each.names) for each in errors]).tolist()
-    return [slice(end - len(each.names), end) for each, end in zip(errors, ends, strict=True)]
 
 
 def _information(errors: tuple[Constant, ...]) -> FloatArray:

@@ -21,17 +21,12 @@ from gmwm.ins.trajectory import is_time
 from gmwm.issues import Notice, notice
 from gmwm.readers import CsvTable, Recording, bare, is_text, load_columns, read
 
-Columns = Mapping[str, str | int] | None
-
 _UNITS_OF_CLOCKS = (1.0, 1e-3, 1e-6, 1e-9)  # s
 
 
 @dataclass(frozen=True, eq=False)
 class ImuLog:
-    """An IMU record with the clock of its time stamps.
-
-    start: Time of the first epoch on that clock, s; 0 without time stamps.
-    """
+    """An IMU record; ``start`` is the time of its first epoch, s, 0 without time stamps."""
 
     imu: Imu
     start: float
@@ -81,14 +76,20 @@ def read_imu(
 
 def read_imu_log(
     path: str | os.PathLike[str],
-    channels: Columns = None,
+    channels: Mapping[str, str | int] | None = None,
     time: str | int | bool | None = None,
     start: float | None = None,
     **reading: Any,
 ) -> ImuLog:
     """Read an IMU record with its clock; see `read_imu`."""
-    columns, reversed_axes = _signs(channels)
-    recording = read(path, channels=columns, time=time, **reading).of_one_rate("navigation")
+    columns, reversed_axes = dict(channels or {}), set[str]()
+    for name, column in columns.items():
+        if isinstance(column, str) and column.startswith("-") and len(column) > 1:
+            reversed_axes.add(name)
+            plain = column[1:]
+            columns[name] = int(plain) if plain.isascii() and plain.isdigit() else plain
+    named = None if channels is None else columns
+    recording = read(path, channels=named, time=time, **reading).of_one_rate("navigation")
     missing = [axis for axis in AXES if axis not in recording.names]
     if missing:
         raise InputError(
@@ -108,7 +109,12 @@ def read_imu_log(
             f"{source}: the mean specific force is {force:.4g} m/s^2, far from gravity: check the "
             "unit of the accelerometers, and that gravity is not subtracted"
         )
-    notices += _stuck(rotation, velocity, dt, first)
+    for axis, name in enumerate(AXES):
+        at, count = longest_run((rotation if axis < 3 else velocity)[:, axis % 3])
+        if count > 1 and count * dt > tuning.LONGEST_HELD:
+            values = {"start": first + at * dt, "length": count * dt}
+            hint = "leave that part of the log out, or check what is in the column"
+            notices.append(notice("stuck", name, values, variant="log", hint=hint))
     if mean[2] > 0.0:
         notices.append(notice("axis-up", "accel_z"))
     for each in (rotation, velocity):
@@ -119,25 +125,7 @@ def read_imu_log(
     return ImuLog(imu, first - dt, source, (*recording.notices, *notices))
 
 
-def _signs(channels: Columns) -> tuple[Columns, frozenset[str]]:
-    """The columns without their minus signs, and the channels that had one."""
-    if channels is None:
-        return None, frozenset()
-    columns: dict[str, str | int] = {}
-    reversed_axes = set()
-    for name, column in channels.items():
-        if isinstance(column, str) and column.startswith("-") and len(column) > 1:
-            reversed_axes.add(name)
-            column = column[1:]
-            if column.isascii() and column.isdigit():
-                column = int(column)
-        columns[name] = column
-    return columns, frozenset(reversed_axes)
-
-
-def _joined(
-    recording: Recording, axes: tuple[str, ...], reversed_axes: frozenset[str]
-) -> FloatArray:
+def _joined(recording: Recording, axes: tuple[str, ...], reversed_axes: set[str]) -> FloatArray:
     """Samples of three axes, (n, 3); on disk if the recording is."""
     series = [recording[axis].values for axis in axes]
     sign = np.array([-1.0 if axis in reversed_axes else 1.0 for axis in axes])
@@ -152,10 +140,7 @@ def _joined(
 
 
 def _fill(source: str, dt: float, *triads: FloatArray) -> list[Notice]:
-    """Fill short gaps along straight lines, in place.
-
-    Raises InputError if a gap is too long, or at an end.
-    """
+    """Fill short gaps along straight lines, in place; rejects long ones and ones at an end."""
     most = max(round(tuning.LONGEST_FILLED / dt), 1)
     longest, filled = 0, set[int]()
     for name, samples in zip(AXES, (each[:, i] for each in triads for i in range(3)), strict=True):
@@ -180,21 +165,6 @@ def _fill(source: str, dt: float, *triads: FloatArray) -> list[Notice]:
     if not filled:
         return []
     return [notice("samples-filled", values={"count": len(filled), "longest": longest})]
-
-
-def _stuck(rotation: FloatArray, velocity: FloatArray, dt: float, start: float) -> list[Notice]:
-    """Channels that hold one value for long; ``start`` is the time of the first sample."""
-    notices = []
-    for axis, name in enumerate(AXES):
-        first, count = longest_run((rotation if axis < 3 else velocity)[:, axis % 3])
-        length = count * dt
-        if length <= tuning.LONGEST_HELD or count == 1:
-            continue
-        begin = start + first * dt
-        values = {"start": begin, "length": length}
-        hint = "leave that part of the log out, or check what is in the column"
-        notices.append(notice("stuck", name, values, variant="log", hint=hint))
-    return notices
 
 
 def longest_run(samples: FloatArray) -> tuple[int, int]:

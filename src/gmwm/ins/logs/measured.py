@@ -15,9 +15,9 @@ from gmwm.errors import InputError
 from gmwm.ins.filter import Aiding, Fixes
 from gmwm.ins.imu import AXES, Imu, SensorModels
 from gmwm.ins.logs import tuning
+from gmwm.ins.logs.attitude import standstills
 from gmwm.ins.logs.fix_log import read_fix_log, read_heights
 from gmwm.ins.logs.imu_log import ImuLog, read_imu_log
-from gmwm.ins.logs.steadiness import standstills
 from gmwm.ins.spec import (
     FileName,
     Meters,
@@ -249,10 +249,7 @@ def _within(aiding: Aiding, log: ImuLog, source: str) -> tuple[Aiding, list[Noti
 def _with_barometer(
     aiding: Aiding, spec: BarometerSpec, folder: Path, log: ImuLog
 ) -> tuple[Aiding, list[Notice]]:
-    """The fixes with heights, which are set to the first position fix.
-
-    Raises InputError if no height is near it.
-    """
+    """The fixes with heights, which are set to the first position fix."""
     source, time, height = read_heights(folder / spec.file)
     time = time - log.start
     inside = np.isfinite(height) & (time > -0.5 * log.imu.dt)

@@ -97,9 +97,17 @@ class Navigated:
         longest = int(np.argmax(np.diff(ends)))
         start, end = float(ends[longest]), float(ends[longest + 1])
         solution = replay.solution(interval, (end,))
-        return cls(measured, alignment, solution, _longest_outage(solution, start, end))
-
-    # -- numbers ----------------------------------------------------------------------------------
+        # The one epoch that is kept before its measurements is the nearest to the end; none, if the
+        # filter diverged earlier.
+        early = np.flatnonzero(solution.before)
+        sd = solution.sd[early[0], :3] if early.size else np.full(3, np.nan)
+        innovations, distance = solution.innovations, None
+        is_next = np.abs(innovations.time - end) < 1e-5
+        value = innovations.value[is_next & (innovations.kind == KINDS["position"])][:1, :2]
+        if value.size and np.all(np.isfinite(value)):
+            distance = float(np.hypot(*value[0]))
+        outage = LongestOutage(start, end, (float(sd[0]), float(sd[1]), float(sd[2])), distance)
+        return cls(measured, alignment, solution, outage)
 
     def test(self, kind: str | None = None) -> InnovationTest:
         """Size and whiteness of the innovations.
@@ -113,9 +121,7 @@ class Navigated:
 
     @cached_property
     def faults(self) -> Faults:
-        """Faults of the log; tens of runs of the filter where the innovations contradict it, five
-        where they do not.
-        """
+        """Faults of the log, by tens of runs of the filter, or five if nothing contradicts it."""
         return Faults.of(Replay.of(self.measured, self.alignment), self.measured)
 
     @property
@@ -211,24 +217,18 @@ class Navigated:
         hint = " and ".join(f"{kind}_sd" for kind in sizes if kind in assumed)
         hint = f"give {hint}" if hint else ""
         is_mild = all(1.0 / tuning.MILD < size < tuning.MILD for size in sizes.values())
+        code = "too-large" if largest >= 1.0 else "too-small"
+        words: dict[str, Any] = {"sizes": shown, "hint": hint}
         if sizes.keys() <= assumed and is_mild:
-            code = "too-large" if largest > 1.0 else "too-small"
-            return notice(
-                code, values=sizes, severity="note", variant="assumed", sizes=shown, hint=hint
-            )
+            return notice(code, values=sizes, severity="note", variant="assumed", **words)
+        # By the median, which a few far fixes do not move.
+        usual = np.nanmedian(self.solution.innovations.standard**2) / chi2.ppf(0.5, 1)
         if min(sizes.values()) < 1.0 < largest:
             code = "mixed-sizes"
-        elif largest < 1.0:
-            code = "too-small"
-        else:
-            # By the median, which a few far fixes do not move.
-            squares = self.solution.innovations.standard**2
-            usual = float(np.nanmedian(squares) / chi2.ppf(0.5, 1))
-            if usual < tuning.MOSTLY_FINE:
-                words: dict[str, Any] = {"variant": "innovations", "hint": "", "sizes": shown}
-                return notice("outliers", "", sizes, severity="bad", **words)
-            code = "too-large"
-        return notice(code, values=sizes, sizes=shown, hint=hint)
+        elif largest >= 1.0 and usual < tuning.MOSTLY_FINE:
+            words |= {"variant": "innovations", "hint": "", "severity": "bad"}
+            code = "outliers"
+        return notice(code, values=sizes, **words)
 
     def _fault_verdict(self, faults: tuple[Notice, ...]) -> Notice:
         first, found = faults[0], self.faults
@@ -242,8 +242,6 @@ class Navigated:
         )
         values = {**first.values, "explained": found.explained, "faults": len(faults)}
         return Notice(first.code, worst_first(faults)[0].severity, first.where, text, values)
-
-    # -- words and files --------------------------------------------------------------------------
 
     def __str__(self) -> str:
         imu = self.measured.imu
@@ -343,8 +341,6 @@ class Navigated:
             np.savetxt(stream, columns, digits, delimiter=",", header=_HEADER, comments="")
         return path
 
-    # -- figures ----------------------------------------------------------------------------------
-
     def report(self, path: str | os.PathLike[str]) -> Path:
         """Write the page; see `gmwm.report.write_navigated_report`."""
         page: Path = make("page", self, path)
@@ -386,8 +382,7 @@ class Navigated:
         `gmwm.ins.logs.tuning.OUTAGES_SHOWN`.
         """
         innovations = self.solution.innovations
-        time = innovations.time[innovations.kind == KINDS["position"]]
-        time = np.concatenate([[0.0], time])
+        time = np.append(0.0, innovations.time[innovations.kind == KINDS["position"]])
         steps = np.diff(time)
         if not steps.size:
             return []
@@ -437,19 +432,3 @@ class Navigated:
             )
             pictures.append((title, figure))
         return pictures
-
-
-def _longest_outage(solution: Solution, start: float, end: float) -> LongestOutage:
-    """Prediction for the end of a time without fixes, and the distance of the next fix from it."""
-    # The one epoch that is kept before its measurements is the nearest to the end; none, if the
-    # filter diverged earlier.
-    early = np.flatnonzero(solution.before)
-    sd = solution.sd[early[0], :3] if early.size else np.full(3, np.nan)
-    innovations = solution.innovations
-    first = np.flatnonzero(
-        (np.abs(innovations.time - end) < 1e-5) & (innovations.kind == KINDS["position"])
-    )
-    distance = None
-    if first.size and np.all(np.isfinite(innovations.value[first[0], :2])):
-        distance = float(np.hypot(*innovations.value[first[0], :2]))
-    return LongestOutage(start, end, (float(sd[0]), float(sd[1]), float(sd[2])), distance)

@@ -25,11 +25,8 @@ Shift = Callable[[FloatArray], FloatArray]
 
 @dataclass(frozen=True, eq=False)
 class Replay:
-    """The inputs of a filter of real data.
+    """The inputs of a filter of real data, from the first epoch of the filter on.
 
-    imu: From the first epoch of the filter on.
-    state: State at that epoch.
-    aiding: On the time of ``imu``.
     is_at_rest: Whether the vehicle stands still at that epoch.
     """
 
@@ -51,19 +48,10 @@ class Replay:
         is_at_rest = alignment.stood > 0.0
         return cls(imu, alignment.state, alignment.sd, models, aiding, is_at_rest)
 
-    # -- what the filter finds --------------------------------------------------------------------
-
     def solution(self, interval: float, before: tuple[float, ...] = ()) -> Solution:
         """The filter's solution every ``interval`` (s), and ``before`` the fixes of some times."""
-        return navigate(
-            self.imu,
-            self.state,
-            self.models,
-            self.aiding,
-            initial_sd=self.sd,
-            interval=interval,
-            before=before,
-        )
+        given = (self.imu, self.state, self.models, self.aiding)
+        return navigate(*given, initial_sd=self.sd, interval=interval, before=before)
 
     @cached_property
     def innovations(self) -> FilterInnovations:
@@ -107,19 +95,12 @@ class Replay:
     @property
     def kinds(self) -> tuple[str, ...]:
         """Kinds of fixes, but standstills."""
-        return tuple(
-            dict.fromkeys(
-                each.kind
-                for each in self.aiding.fixes
-                if each.time.size and each.kind != "standstill"
-            )
-        )
+        fixes = [each for each in self.aiding.fixes if each.time.size]
+        return tuple(dict.fromkeys(e.kind for e in fixes if e.kind != "standstill"))
 
     def test(self, kind: str | None = None) -> InnovationTest:
         """Size and whiteness of the innovations of a kind, or of all."""
         return innovation_sizes(self.innovations, kind)
-
-    # -- other assumptions ------------------------------------------------------------------------
 
     def later(self, shift: Shift) -> Replay:
         """Fixes with later stamps, and with them the one that made the initial state.
@@ -195,10 +176,8 @@ class Replay:
     def turned_by(self, by: float, sd: float | None = None) -> Replay:
         """An initial heading that is larger by an angle, rad, with standard deviation ``sd``."""
         rpy = self.state.rpy + np.array([0.0, 0.0, by])
-        heading = self.sd.heading if sd is None else sd
-        return replace(
-            self, state=replace(self.state, rpy=rpy), sd=replace(self.sd, heading=heading)
-        )
+        sd = self.sd.heading if sd is None else sd
+        return replace(self, state=replace(self.state, rpy=rpy), sd=replace(self.sd, heading=sd))
 
     def with_signs(self, kind: str, signs: tuple[float, ...]) -> Replay:
         """Axes of a kind of sensors times signs; levelled by the accelerometers anew."""
@@ -235,15 +214,9 @@ class Replay:
 
 def alignment_of(measured: Measured) -> Alignment:
     """The start of a filter of real data; `align` with all that is known."""
-    return align(
-        measured.imu,
-        measured.aiding,
-        measured.sensors,
-        measured.heading,
-        measured.heading_sd,
-        measured.attitude,
-        measured.attitude_sd,
-    )
+    heading = measured.heading, measured.heading_sd
+    attitude = measured.attitude, measured.attitude_sd
+    return align(measured.imu, measured.aiding, measured.sensors, *heading, *attitude)
 
 
 def innovation_sizes(innovations: FilterInnovations, kind: str | None = None) -> InnovationTest:

@@ -18,7 +18,6 @@ from gmwm.ins.filter import (
     Filter,
     Kinematics,
     Outputs,
-    SensorStates,
     Solution,
     Transition,
     measurement_update,
@@ -35,15 +34,8 @@ from gmwm.ins.logs.replay import Replay
 
 @dataclass(frozen=True, eq=False)
 class Smoothed:
-    """Positions and their covariance at K times.
+    """Positions (K, 3) and covariance (K, 3, 3), m^2, at K times, and the forward solution."""
 
-    time: (K,), s.
-    lla: (K, 3), latitude, longitude, rad, and height, m.
-    covariance: (K, 3, 3), north, east, down, m^2.
-    solution: Solution of the forward filter.
-    """
-
-    time: FloatArray
     lla: FloatArray
     covariance: FloatArray
     solution: Solution
@@ -60,11 +52,7 @@ class _Update:
 
 
 def smooth(replay: Replay, at: FloatArray) -> Smoothed:
-    """Smooth a log.
-
-    at: (K,), wanted times, s, rising; each is rounded to the nearest sample.
-    Returns: NaN if the forward filter diverged.
-    """
+    """Smooth a log at rising times, s; NaN if the forward filter diverged."""
     imu, step = replay.imu, tuning.SMOOTHER_STEP
     ready = Filter.of(replay.models, replay.aiding, imu.dt, step)
     outputs = Outputs.every(step, imu.dt, imu.n, also=at)
@@ -72,8 +60,7 @@ def smooth(replay: Replay, at: FloatArray) -> Smoothed:
     solution = ready.run(imu, replay.state, replay.sd, events, outputs)
     wanted = np.rint(at / imu.dt).astype(np.int64)
     if solution.diverged_at is not None:
-        nothing = np.full((at.size, 3), np.nan)
-        return Smoothed(at, nothing, np.full((at.size, 3, 3), np.nan), solution)
+        return Smoothed(np.full((at.size, 3), np.nan), np.full((at.size, 3, 3), np.nan), solution)
     P = ready.covariance(replay.state, replay.sd)
     forward = _Forward(replay, ready, events, solution, P)
     kept = forward.run(set(wanted.tolist()))
@@ -85,7 +72,8 @@ def smooth(replay: Replay, at: FloatArray) -> Smoothed:
         if epoch in place:
             i, C = place[epoch], kept[epoch]
             error = -C[:3] @ adjoint
-            lla[i] = offset(forward.position(epoch)[None], -error[None])[0]
+            here = solution.lla[forward.index[epoch]]
+            lla[i] = offset(here[None], -error[None])[0]
             covariance[i] = C[:3, :3] - C[:3] @ information @ C[:, :3]
         for update in reversed(updates):
             h, K = update.row, update.gain
@@ -96,7 +84,7 @@ def smooth(replay: Replay, at: FloatArray) -> Smoothed:
             advance = forward.transition(first, count)[0]
             adjoint = advance.T @ adjoint
             information = advance.T @ information @ advance
-    return Smoothed(at, lla, covariance, solution)
+    return Smoothed(lla, covariance, solution)
 
 
 class _Forward:
@@ -111,22 +99,19 @@ class _Forward:
         self._imu, self._ready, self._P = replay.imu, ready, P
         self._aiding = replay.aiding
         nodes = np.rint(solution.time / replay.imu.dt).astype(np.int64)
-        self._index = {int(epoch): i for i, epoch in enumerate(nodes)}
+        self.index = {int(epoch): i for i, epoch in enumerate(nodes)}
         self._nodes, self._solution = nodes, solution
         self.steps: list[tuple[int, int, list[_Update]]] = []
         self._events = events
 
-    def position(self, epoch: int) -> FloatArray:
-        """Latitude, longitude and height of the solution at an epoch."""
-        return np.asarray(self._solution.lla[self._index[epoch]])
-
     def run(self, wanted: set[int]) -> dict[int, FloatArray]:
         """Run forwards; the covariance after the measurements of the wanted epochs."""
         epochs = np.union1d(self._nodes, self._events.epoch)
+        table, scratch = self._ready.states.table, new_scratch(self._P.shape[0])
         kept, event, before = {}, 0, int(epochs[0])
         for epoch in epochs.tolist():
             for first, count in self.strides(before, epoch):
-                self._propagate(first, count)
+                propagate(self._P, self.transition(first, count)[1], table, count, scratch)
             updates = []
             while event < self._events.epoch.size and self._events.epoch[event] == epoch:
                 updates += self._updates(event, epoch)
@@ -150,21 +135,21 @@ class _Forward:
         """Transition of all states over some samples, and its parts: navigation, and by sensors."""
         v, lla, C, i = self._nominal(epoch + 0.5 * count)
         if i + 1 < self._nodes.size:
-            later = i + 1
-            share = (epoch + 0.5 * count - self._nodes[i]) / max(
-                int(self._nodes[later] - self._nodes[i]), 1
-            )
-            v = (1.0 - share) * v + share * self._solution.velocity[later]
-            C = (1.0 - share) * C + share * self._solution.matrix[later]
+            step = max(int(self._nodes[i + 1] - self._nodes[i]), 1)
+            share = (epoch + 0.5 * count - self._nodes[i]) / step
+            v = (1.0 - share) * v + share * self._solution.velocity[i + 1]
+            C = (1.0 - share) * C + share * self._solution.matrix[i + 1]
         change = new_transition()
         transition(Kinematics(np.ascontiguousarray(C), v, lla), count * self._imu.dt, change)
-        return _whole(self._ready.states, change.A, change.B, count), change
-
-    def _propagate(self, epoch: int, count: int) -> None:
-        """Propagate the covariance by some samples."""
-        _, change = self.transition(epoch, count)
-        table = self._ready.states.table
-        propagate(self._P, change, table, count, new_scratch(self._P.shape[0]))
+        table, m = self._ready.states.table, self._ready.states.m
+        whole, index = np.zeros((NAVIGATION + m, NAVIGATION + m)), np.arange(m)
+        whole[:NAVIGATION, :NAVIGATION] = change.A
+        whole[NAVIGATION + index, NAVIGATION + index] = table.phi[count]
+        own = index[table.partner != index]
+        whole[NAVIGATION + own, NAVIGATION + table.partner[own]] = table.phi_off[count][own]
+        own = np.flatnonzero(table.axis >= 0)
+        whole[:NAVIGATION, NAVIGATION + own] = change.B[:, table.axis[own]] * table.gain[count][own]
+        return whole, change
 
     def _updates(self, event: int, epoch: int) -> list[_Update]:
         """Update the covariance by the components of a fix, with the filter's innovations."""
@@ -193,21 +178,3 @@ class _Forward:
             _, variance = measurement_update(self._P, h, state, noise, 0.0, np.zeros(n), gain)
             found.append(_Update(row, gain, float(value), float(variance)))
         return found
-
-
-def _whole(states: SensorStates, A: FloatArray, B: FloatArray, count: int) -> FloatArray:
-    """Transition of all states over some samples, (9 + m, 9 + m)."""
-    table, n = states.table, NAVIGATION + states.m
-    whole = np.zeros((n, n))
-    whole[:NAVIGATION, :NAVIGATION] = A
-    index = np.arange(states.m)
-    whole[NAVIGATION + index, NAVIGATION + index] = table.phi[count]
-    paired = table.partner != index
-    whole[NAVIGATION + index[paired], NAVIGATION + table.partner[paired]] = table.phi_off[count][
-        paired
-    ]
-    of_sensor = np.flatnonzero(table.axis >= 0)
-    whole[:NAVIGATION, NAVIGATION + of_sensor] = (
-        B[:, table.axis[of_sensor]] * table.gain[count][of_sensor]
-    )
-    return whole

@@ -9,11 +9,11 @@ from gmwm.ins.simulation.consistency import (
 )
 from gmwm.ins.simulation.filter_errors import (
     GROUPS as GROUPS,
+    QUANTITIES as QUANTITIES,
     FilterErrors as FilterErrors,
     lag_one as lag_one,
 )
-from gmwm.ins.simulation.outage_errors import QUANTITIES as QUANTITIES
-from gmwm.ins.simulation.scenario import (
+from gmwm.ins.simulation.trials import (
     ErrorSource as ErrorSource,
     Experiment as Experiment,
     Scenario as Scenario,

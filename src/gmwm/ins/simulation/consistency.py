@@ -6,7 +6,6 @@ Navigation*, sec. 5.4.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -104,7 +103,7 @@ def at_epoch(runs: FilterErrors, index: int) -> Consistency:
         Of the epoch; see `FilterErrors.index`.
     """
     alive = np.isfinite(runs.error[:, index, 0])
-    return _consistency(runs, alive, np.array([index]), chi_square_ratio, coverage_at_epoch)
+    return _consistency(runs, alive, np.array([index]), single=True)
 
 
 def over_time(runs: FilterErrors, start: float = 0.0, end: float = np.inf) -> Consistency:
@@ -127,43 +126,38 @@ def over_time(runs: FilterErrors, start: float = 0.0, end: float = np.inf) -> Co
             f"{runs.time[0]:g} s to {runs.time[-1]:g} s"
         )
     alive = np.all(np.isfinite(runs.error[:, epochs, 0]), axis=1)
-
-    def mean_of_runs(squares: FloatArray, size: int) -> Ratio:
-        return mean_ratio(np.mean(squares, axis=1) / size)
-
-    return _consistency(runs, alive, epochs, mean_of_runs, coverage_over_time)
+    return _consistency(runs, alive, epochs, single=False)
 
 
 def _consistency(
-    runs: FilterErrors,
-    alive: BoolArray,
-    epochs: IntArray,
-    nees_of: Callable[[FloatArray, int], Ratio],
-    coverage_of: Callable[[FloatArray], tuple[Coverage, ...]],
+    runs: FilterErrors, alive: BoolArray, epochs: IntArray, *, single: bool
 ) -> Consistency:
-    """Consistency of some runs at some epochs.
+    """Consistency of some runs at one epoch, or over several."""
+    result = Consistency({}, {}, {}, {})
 
-    nees_of: Makes the NEES from squares (R, K) of a number of degrees of freedom.
-    coverage_of: Makes the coverage from standardised errors (R, K, d).
-    """
-    nees, coverage, rms, score = {}, {}, {}, {}
+    def judge(name: str, squares: FloatArray, standard: FloatArray, size: int) -> None:
+        if single:
+            result.nees[name] = chi_square_ratio(squares, size)
+        else:
+            result.nees[name] = mean_ratio(np.mean(squares, axis=1) / size)
+        result.coverage[name] = coverage_of(standard, single)
+        result.rms[name] = float(np.sqrt(np.mean(standard**2))) if standard.size else float("nan")
+
     for i, (name, part) in enumerate(GROUPS.items()):
         size = part.stop - part.start
         squares = runs.nees[alive][:, epochs, i]
-        nees[name] = nees_of(squares, size)
-        standard = runs.error[alive][:, epochs, part] / runs.sd[alive][:, epochs, part]
-        coverage[name], rms[name] = coverage_of(standard), _rms(standard)
+        error, sd = runs.error[alive][:, epochs, part], runs.sd[alive][:, epochs, part]
+        judge(name, squares, error / sd, size)
         densities = squares + runs.log_det[alive][:, epochs, i] + size * np.log(2.0 * np.pi)
-        score[name] = float(0.5 * np.mean(densities)) if squares.size else float("nan")
+        result.score[name] = float(0.5 * np.mean(densities)) if squares.size else float("nan")
     settled = epochs[np.all(np.isfinite(runs.sensor_nees[alive][:, epochs]), axis=0)]
     if np.any(alive) and settled.size:
         # Only sensors that have states.
         error, sd = runs.sensor_error[alive][:, settled], runs.sensor_sd[alive][:, settled]
         known = np.all(sd > 0.0, axis=(0, 1))
         standard = np.asarray(error[..., known] / sd[..., known])
-        nees["sensors"] = nees_of(runs.sensor_nees[alive][:, settled], int(np.sum(known)))
-        coverage["sensors"], rms["sensors"] = coverage_of(standard), _rms(standard)
-    return Consistency(nees, coverage, rms, score)
+        judge("sensors", runs.sensor_nees[alive][:, settled], standard, int(np.sum(known)))
+    return result
 
 
 @dataclass(frozen=True)
@@ -218,32 +212,22 @@ def mean_ratio(values: FloatArray) -> Ratio:
     return Ratio(mean, max(1.0 - width, 0.0), 1.0 + width, p_value)
 
 
-def coverage_at_epoch(standard: FloatArray) -> tuple[Coverage, ...]:
-    """Coverage of standardised errors (R, 1, d); components are correlated: one draw a run."""
-    fractions = _fractions(standard)
-    return tuple(
-        _binomial(level, float(np.mean(each)) if each.size else float("nan"), each.size)
-        for level, each in zip(LEVELS, fractions, strict=True)
-    )
+def coverage_of(standard: FloatArray, single: bool) -> tuple[Coverage, ...]:
+    """Coverage of standardised errors (R, K, d).
 
-
-def coverage_over_time(standard: FloatArray) -> tuple[Coverage, ...]:
-    """Coverage of standardised errors (R, K, d), with the scatter between runs as its error."""
+    single: Whether K is 1: each run is a draw, since components are correlated; else the error is
+        the scatter between runs.
+    """
     runs, result = len(standard), []
-    for level, each in zip(LEVELS, _fractions(standard), strict=True):
+    for level in LEVELS:
+        each = np.mean(np.abs(standard) < norm.ppf(0.5 + 0.5 * level), axis=(1, 2))
         mean, draws = float(np.mean(each)) if runs else float("nan"), float(runs)
-        error = float(np.var(each, ddof=1)) / runs if runs > 1 else 0.0
+        error = float(np.var(each, ddof=1)) / runs if runs > 1 and not single else 0.0
         if error > 0.0:
             few, many = t.ppf(_UPPER, [max(runs - 1, 1), standard.size - 1])
             draws = min(mean * (1.0 - mean) / error, float(standard.size)) * (many / few) ** 2
         result.append(_binomial(level, mean, draws))
     return tuple(result)
-
-
-def _fractions(standard: FloatArray) -> FloatArray:
-    """Fraction of standardised errors (R, K, d) of each run in each of `LEVELS`, (levels, R)."""
-    bounds = norm.ppf(0.5 + 0.5 * np.array(LEVELS))
-    return np.stack([np.mean(np.abs(standard) < bound, axis=(1, 2)) for bound in bounds])
 
 
 def _binomial(level: float, fraction: float, draws: float) -> Coverage:
@@ -254,7 +238,3 @@ def _binomial(level: float, fraction: float, draws: float) -> Coverage:
     lower = float(betaincinv(hits, draws - hits + 1.0, tail)) if hits > 0.0 else 0.0
     upper = float(betaincinv(hits + 1.0, draws - hits, 1.0 - tail)) if hits < draws else 1.0
     return Coverage(level, fraction, lower, upper)
-
-
-def _rms(standard: FloatArray) -> float:
-    return float(np.sqrt(np.mean(standard**2))) if standard.size else float("nan")

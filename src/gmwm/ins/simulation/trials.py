@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, TypedDict, Unpack
+from typing import Any, Protocol, TypedDict, Unpack
 
 import numpy as np
 
@@ -14,13 +14,134 @@ from gmwm._core import checks
 from gmwm._core.runs import Earlier, do_runs
 from gmwm._core.typing import FloatArray, Progress
 from gmwm.errors import InputError
-from gmwm.ins.filter import Filter, InitialSd, Outage, Outputs, Solution
+from gmwm.ins import tuning
+from gmwm.ins.filter import Aiding, Filter, InitialSd, Outage, Outputs, Solution
 from gmwm.ins.geometry import matrix_from_rotation_vector, matrix_from_rpy, offset, rpy_from_matrix
 from gmwm.ins.imu import Imu, SensorErrors, SensorModels, emulate
-from gmwm.ins.simulation.filter_errors import PER_RUN, FilterErrors, errors_of_run
-from gmwm.ins.simulation.scenario import ErrorSource, Scenario, Simulated
+from gmwm.ins.simulation.filter_errors import (
+    PER_RUN,
+    QUANTITIES,
+    FilterErrors,
+    errors_of_run,
+    sizes,
+)
 from gmwm.ins.trajectory import NavState, Trajectory
 from gmwm.issues import Notice, notice
+
+_SAME_TIME = 1e-6  # s
+_KEPT_EPOCHS = 300  # whose errors are kept, besides outages: a figure shows no more
+_OUTAGE_EPOCHS = 1.0  # s between epochs that are kept in an outage
+
+
+class ErrorSource(Protocol):
+    """Where sensor errors come from: models, or a real recording."""
+
+    @property
+    def available(self) -> int | None:
+        """Number of independent runs; ``None`` for any number."""
+
+    def draw(self, run: int, n: int, dt: float, rng: np.random.Generator) -> SensorErrors:
+        """Errors of one run."""
+
+
+@dataclass(frozen=True)
+class Simulated:
+    """Sensor errors drawn from models.
+
+    Attributes
+    ----------
+    models : SensorModels
+    """
+
+    models: SensorModels
+
+    @property
+    def available(self) -> int | None:
+        """Any number of runs."""
+        return None
+
+    def draw(self, run: int, n: int, dt: float, rng: np.random.Generator) -> SensorErrors:
+        """Errors of one run; see `SensorModels.simulate`."""
+        return self.models.simulate(n, dt, rng)
+
+
+@dataclass(frozen=True, eq=False)
+class Scenario:
+    """A trajectory with its aiding and outages.
+
+    Attributes
+    ----------
+    trajectory : Trajectory
+    aiding : Aiding
+        Error-free fixes of the whole trajectory; their noise is drawn run by run.
+    outages : tuple of Outage
+    initial_sd : InitialSd
+        The error of the initial state is drawn from it.
+    step : float
+        Of the covariance, s.
+    interval : float
+        At which errors are kept, s; zero for some 300 epochs.
+    second_order : bool
+        Whether filters allow for the square of the tilt error; see `gmwm.ins.filter.Filter`.
+    """
+
+    trajectory: Trajectory
+    aiding: Aiding
+    outages: tuple[Outage, ...] = ()
+    initial_sd: InitialSd = field(default_factory=InitialSd)
+    step: float = tuning.COVARIANCE_STEP
+    interval: float = 0.0
+    second_order: bool = True
+
+    def __post_init__(self) -> None:
+        dt = self.trajectory.dt
+        for outage in self.outages:
+            epoch = outage.end / dt
+            if abs(epoch - round(epoch)) * dt > _SAME_TIME:
+                raise InputError(
+                    f"the outage from {outage.start:g} s ends at {outage.end:.9g} s, between two "
+                    f"epochs of the trajectory: give multiples of its {dt:g} s"
+                )
+            if round(epoch) > self.trajectory.n:
+                raise InputError(
+                    f"the outage from {outage.start:g} s to {outage.end:g} s goes beyond the end "
+                    f"of the trajectory at {self.trajectory.duration:g} s: begin it earlier"
+                )
+
+    def outputs(self) -> Outputs:
+        """Epochs that are kept: evenly spaced, every second of an outage, and its end before the
+        first fix.
+        """
+        dt, n = self.trajectory.dt, self.trajectory.n
+        interval = self.interval or float(max(np.ceil(n * dt / _KEPT_EPOCHS), dt))
+        within = [np.arange(o.start, o.end, max(_OUTAGE_EPOCHS, dt)) for o in self.outages]
+        ends = [outage.end for outage in self.outages]
+        return Outputs.every(interval, dt, n, ends, also=np.concatenate([[], *within]))
+
+
+@dataclass(frozen=True, eq=False)
+class Experiment:
+    """Filters that navigate on the same errors.
+
+    Attributes
+    ----------
+    scenario : Scenario
+    source : ErrorSource
+    filters : dict
+        Name -> `SensorModels`.
+    truth : SensorModels or None
+        The models that errors are drawn from; ``None`` for real ones.
+    runs, seed : int
+    title : str
+    """
+
+    scenario: Scenario
+    source: ErrorSource
+    filters: dict[str, SensorModels]
+    truth: SensorModels | None
+    runs: int = 100
+    seed: int = 0
+    title: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,6 +169,17 @@ class MonteCarlo:
         if name not in self.filters:
             raise InputError(f"no filter {name!r}: there are {', '.join(self.filters)}")
         return self.filters[name]
+
+
+def pooled_sizes(study: MonteCarlo, name: str) -> dict[str, FloatArray]:
+    """Root mean square over the outages of a run, of each error of `QUANTITIES`, (R,)."""
+    if not study.outages:
+        raise InputError("the study has no outage: give one at least")
+    each = [sizes(study[name], outage.end) for outage in study.outages]
+    return {
+        quantity: np.sqrt(np.mean([part[quantity] ** 2 for part in each], axis=0))
+        for quantity in QUANTITIES
+    }
 
 
 class RunOptions(TypedDict, total=False):

@@ -25,17 +25,15 @@ from gmwm.ins.simulation.consistency import (
     innovation_test,
     over_time,
 )
-from gmwm.ins.simulation.filter_errors import FilterErrors
-from gmwm.ins.simulation.outage_errors import (
+from gmwm.ins.simulation.filter_errors import (
     QUANTITIES,
     ErrorDifference,
     ErrorSizes,
+    FilterErrors,
     difference,
-    pooled_sizes,
     spread,
 )
-from gmwm.ins.simulation.scenario import Experiment
-from gmwm.ins.simulation.trials import MonteCarlo, RunOptions, monte_carlo
+from gmwm.ins.simulation.trials import Experiment, MonteCarlo, RunOptions, monte_carlo, pooled_sizes
 from gmwm.issues import Notice, notice
 
 if TYPE_CHECKING:
@@ -62,13 +60,8 @@ class Validation:
     @classmethod
     def of(cls, experiment: Experiment, **options: Unpack[RunOptions]) -> Validation:
         """Do the runs of an experiment; see `gmwm.ins.monte_carlo`."""
-        filters, runs, seed = experiment.filters, experiment.runs, experiment.seed
-        return cls(
-            experiment,
-            monte_carlo(experiment.scenario, experiment.source, filters, runs, seed, **options),
-        )
-
-    # -- numbers ----------------------------------------------------------------------------------
+        e = experiment
+        return cls(e, monte_carlo(e.scenario, e.source, e.filters, e.runs, e.seed, **options))
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -126,8 +119,6 @@ class Validation:
         first, other = (pooled_sizes(self.study, each) for each in (self.names[0], name))
         return difference(other, first, quantity, self.experiment.seed)
 
-    # -- words ------------------------------------------------------------------------------------
-
     def __str__(self) -> str:
         truth, runs = self.study.truth, self.study[self.names[0]].runs
         head = (
@@ -140,48 +131,33 @@ class Validation:
                 f"Errors after {outage.duration:g} s without GNSS, at {outage.end:g} s, before the "
                 f"first fix\n{self._errors(i)}"
             )
-        blocks.append(
-            "NEES per degree of freedom: 1 if the filter is consistent, * out of band\n"
-            + plain_table(
-                ["filter", "", *(_SHORT.get(group, group) for group in _GROUPS)],
-                [
-                    [name, label, *(_starred(found, group) for group in _GROUPS)]
-                    for name in self.names
-                    for label, found in self._judgements(name)
-                ],
-            )
-        )
-        if self.study.outages:
-            for group in ("horizontal", "vertical"):
-                blocks.append(
-                    f"{group.capitalize()} errors within predicted intervals, %\n"
-                    + plain_table(
-                        ["filter", "", *(f"{100.0 * level:g} %" for level in LEVELS)],
-                        [
-                            [name, label, *map(_percent, found.coverage[group])]
-                            for name in self.names
-                            for label, found in self._judgements(name)
-                        ],
-                    )
-                )
+        judged = []
+        for name in self.names:
+            ends = zip(self.study.outages, self.at_ends(name), strict=True)
+            judged.append((name, "GNSS on", self.with_gnss(name)))
+            judged += [(name, f"at {outage.end:g} s", found) for outage, found in ends]
+        head = "NEES per degree of freedom: 1 if the filter is consistent, * out of band\n"
+        columns = ["filter", "", *(_SHORT.get(group, group) for group in _GROUPS)]
+        rows = [
+            [name, label, *(_starred(found, group) for group in _GROUPS)]
+            for name, label, found in judged
+        ]
+        blocks.append(head + plain_table(columns, rows))
+        columns = ["filter", "", *(f"{100.0 * level:g} %" for level in LEVELS)]
+        for group in ("horizontal", "vertical") if self.study.outages else ():
+            head = f"{group.capitalize()} errors within predicted intervals, %\n"
+            rows = [
+                [name, label, *map(_percent, each.coverage[group])] for name, label, each in judged
+            ]
+            blocks.append(head + plain_table(columns, rows))
+        head = "Innovations: NIS per degree of freedom, p-value of whiteness\n"
         rows = [[name, str(self.innovations(name)).strip()] for name in self.names]
-        blocks.append(
-            "Innovations: NIS per degree of freedom, p-value of whiteness\n"
-            + plain_table(["filter", ""], rows)
-        )
+        blocks.append(head + plain_table(["filter", ""], rows))
         if self.study.outages and len(self.names) > 1:
             blocks.append(
                 f"Horizontal error against {self.names[0]}, over all outages\n{self._differences()}"
             )
         return "\n\n".join(blocks)
-
-    def _judgements(self, name: str) -> list[tuple[str, Consistency]]:
-        """Consistency of a filter with GNSS and at the ends of the outages."""
-        ends = zip(self.study.outages, self.at_ends(name), strict=True)
-        return [
-            ("GNSS on", self.with_gnss(name)),
-            *((f"at {outage.end:g} s", each) for outage, each in ends),
-        ]
 
     def _errors(self, outage: int) -> str:
         """Table of the errors at the end of an outage."""
@@ -208,8 +184,6 @@ class Validation:
             means = f"{d.value:+.3g} ({d.lower:+.3g} .. {d.upper:+.3g}){mark}"
             rows.append([name, ratio, means])
         return plain_table(["filter", "ratio of RMS", "difference of means [m], = if none"], rows)
-
-    # -- figures ----------------------------------------------------------------------------------
 
     def report(self, path: str | os.PathLike[str]) -> Path:
         """Write the page."""

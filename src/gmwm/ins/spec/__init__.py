@@ -1,10 +1,10 @@
 """Studies of navigation as people write them, in YAML."""
 
-from gmwm.ins.spec.document import read_document as read_document
 from gmwm.ins.spec.experiment import ReadingSpec as ReadingSpec, experiment_from as experiment_from
 from gmwm.ins.spec.fields import (
     FileName as FileName,
     Meters as Meters,
+    Models as Models,
     PositiveMeters as PositiveMeters,
     PositiveRadians as PositiveRadians,
     PositiveSeconds as PositiveSeconds,
@@ -14,10 +14,8 @@ from gmwm.ins.spec.fields import (
     Spec as Spec,
     Three as Three,
     number as number,
-    written as written,
-)
-from gmwm.ins.spec.sensor_terms import (
-    Models as Models,
+    read_document as read_document,
     read_models as read_models,
     sensor_models as sensor_models,
+    written as written,
 )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
@@ -24,6 +24,9 @@ from gmwm.ins.spec.fields import (
     Declared,
     FileName,
     Meters,
+    Models,
+    OfFile,
+    OfTerms,
     PositiveHertz,
     PositiveMeters,
     PositiveSeconds,
@@ -31,9 +34,10 @@ from gmwm.ins.spec.fields import (
     Seconds,
     Spec,
     Three,
+    form_of,
+    read_models,
     written,
 )
-from gmwm.ins.spec.sensor_terms import Models, ModelsSpec, OfFile, OfTerms, form_of, read_models
 from gmwm.ins.trajectory import Trajectory, car_drive, fixed_wing_loiter, helicopter_mapping
 from gmwm.readers import read
 
@@ -162,14 +166,14 @@ def experiment_from(content: Mapping[str, Any], folder: Path = Path()) -> Experi
         That paths are relative to.
     """
     spec = ExperimentSpec.parse(content)
-    trajectory, outages = _trajectory(spec, folder), _outages(spec)
-    scenario = Scenario(trajectory, _aiding(spec.gnss, trajectory), outages, spec.initial_sd)
-    _check_fixes(scenario)
-    truth, source = _source(spec.truth, trajectory, folder)
-    known = _Known(truth, source, _about_outages(spec, scenario), folder)
+    trajectory = _trajectory(spec, folder)
+    scenario = _scenario(spec, trajectory)
+    source, about = _source(spec.truth, trajectory, folder), _about_outages(spec, scenario)
     filters = {
-        name: _models(f"filters, {name}", each, known) for name, each in spec.filters.items()
+        name: _models(f"filters, {name}", each, source, about, folder)
+        for name, each in spec.filters.items()
     }
+    truth = source.models if isinstance(source, Simulated) else None
     title = Path(spec.trajectory).name
     return Experiment(scenario, source, filters, truth, spec.runs, spec.seed, title)
 
@@ -198,8 +202,8 @@ def _trajectory(spec: ExperimentSpec, folder: Path) -> Trajectory:
     return trajectory.segment(0.0, duration)
 
 
-def _outages(spec: ExperimentSpec) -> tuple[Outage, ...]:
-    """Outages in order of time; rejected if two overlap."""
+def _scenario(spec: ExperimentSpec, trajectory: Trajectory) -> Scenario:
+    """Reject outages that overlap or take no fix away, and a study without fixes."""
     outages = sorted((Outage(*each) for each in spec.outages), key=lambda outage: outage.start)
     for first, second in pairwise(outages):
         if second.start < first.end - _SAME_TIME:
@@ -207,28 +211,25 @@ def _outages(spec: ExperimentSpec) -> tuple[Outage, ...]:
                 f"outages: that from {second.start:g} s begins before that from {first.start:g} s "
                 f"ends at {first.end:g} s: write them as one, or apart"
             )
-    return tuple(outages)
-
-
-def _aiding(spec: GnssSpec, trajectory: Trajectory) -> Aiding:
-    return gnss(trajectory, **spec.given, imu=emulate(trajectory) if any(spec.lever_arm) else None)
-
-
-def _check_fixes(scenario: Scenario) -> None:
-    """Reject a study without fixes, and an outage that takes none away."""
-    aiding = scenario.aiding
+    aiding = _aiding(spec.gnss, trajectory)
+    scenario = Scenario(trajectory, aiding, tuple(outages), spec.initial_sd)
     total = sum(each.time.size for each in aiding.fixes)
     if not total:
         raise InputError(
             "gnss: there is no fix: give position_sd or velocity_sd, and an interval below the "
             "duration"
         )
-    for outage in scenario.outages:
+    for outage in outages:
         if sum(each.time.size for each in aiding.without([outage]).fixes) == total:
             raise InputError(
                 f"outages: no fix falls into that from {outage.start:g} s to {outage.end:g} s: "
                 "make it longer than the interval of the fixes"
             )
+    return scenario
+
+
+def _aiding(spec: GnssSpec, trajectory: Trajectory) -> Aiding:
+    return gnss(trajectory, **spec.given, imu=emulate(trajectory) if any(spec.lever_arm) else None)
 
 
 def _about_outages(spec: ExperimentSpec, scenario: Scenario) -> Scenario:
@@ -243,13 +244,10 @@ def _about_outages(spec: ExperimentSpec, scenario: Scenario) -> Scenario:
     return Scenario(part, aiding, moved, scenario.initial_sd, interval=tuning.SETTLING)
 
 
-def _source(
-    given: str | RecordingsSpec | ModelsSpec, trajectory: Trajectory, folder: Path
-) -> tuple[SensorModels | None, ErrorSource]:
-    """Models that errors are drawn from, ``None`` for real ones, and where errors come from."""
+def _source(given: _Truth, trajectory: Trajectory, folder: Path) -> Recorded | Simulated:
+    """Models or recordings that errors come from."""
     if not isinstance(given, RecordingsSpec):
-        models = read_models("truth", given, folder)
-        return models, Simulated(models)
+        return Simulated(read_models("truth", given, folder))
     recordings = [read(folder / name, **given.options()) for name in given.recordings]
     source = Recorded.of(recordings, trajectory.duration)
     if abs(trajectory.dt / source.dt - 1.0) > _SAME_RATE:
@@ -257,35 +255,28 @@ def _source(
             f"truth: {source.source} has {1.0 / source.dt:g} Hz and the trajectory "
             f"{1.0 / trajectory.dt:g} Hz: give a trajectory of the recordings' rate"
         )
-    return None, source
+    return source
 
 
-@dataclass(frozen=True, eq=False)
-class _Known:
-    """What the models of filters may refer to; the scenario is that of reduced models."""
-
-    truth: SensorModels | None
-    source: ErrorSource
-    scenario: Scenario
-    folder: Path
-
-
-def _models(where: str, given: str | ReducedSpec | ModelsSpec, known: _Known) -> SensorModels:
-    """Models of a filter, written at ``where``."""
-    models, dt = known.truth, known.scenario.trajectory.dt
+def _models(
+    where: str, given: _Filter, source: ErrorSource, scenario: Scenario, folder: Path
+) -> SensorModels:
+    """Models of a filter, written at ``where``; the scenario is that of reduced models."""
+    models = source.models if isinstance(source, Simulated) else None
+    dt = scenario.trajectory.dt
     if given == "truth" and models is None:
         raise InputError(f"{where}: real errors have no true model: give a calibration")
     if isinstance(given, ReducedSpec):
         if given.of != "truth":
-            models = read_models(where, given.of, known.folder)
+            models = read_models(where, given.of, folder)
         if models is None:
             raise InputError(f"{where}: name what is reduced, as in of: calibration.json")
     elif given != "truth":
-        models = read_models(where, given, known.folder)
-        if isinstance(known.source, Recorded):
+        models = read_models(where, given, folder)
+        if isinstance(source, Recorded):
             # A random walk does not start at zero in the middle of a recording.
             walks = {
-                axis: known.source.bias_sd[axis]
+                axis: source.bias_sd[axis]
                 for axis, model in models.models.items()
                 if models.bias_sd[axis] == 0.0 and any(term.is_walk for term in model.terms)
             }
@@ -293,8 +284,8 @@ def _models(where: str, given: str | ReducedSpec | ModelsSpec, known: _Known) ->
     assert models is not None
     try:
         if isinstance(given, ReducedSpec):
-            scenario = known.scenario if known.scenario.outages else None
-            models = reduce(models, given.reduce, scenario=scenario, dt=dt).models
+            about = scenario if scenario.outages else None
+            models = reduce(models, given.reduce, scenario=about, dt=dt).models
         SensorStates.of(models, dt, 1)
     except InputError as error:
         raise InputError(f"{where}, {error}") from None

@@ -1,7 +1,6 @@
-"""What people write, checked field by field: values with units, and messages that name the place.
+"""What people write, checked field by field: values with units, models of sensors, YAML files.
 
-A value with a unit such as ``"140 deg/h"`` becomes a number in SI units by a validator of the
-field; pydantic says where it stood.
+A value such as ``"140 deg/h"`` becomes a number in SI units; pydantic says where a fault stood.
 """
 
 from __future__ import annotations
@@ -9,31 +8,51 @@ from __future__ import annotations
 import dataclasses
 import re
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Annotated, Any, ClassVar, Self, TypeVar
 
 from pydantic import (
     BaseModel,
     BeforeValidator,
     ConfigDict,
+    Discriminator,
     Field,
     GetCoreSchemaHandler,
     StringConstraints,
+    Tag,
+    TypeAdapter,
     ValidationError,
+    ValidationInfo,
     ValidatorFunctionWrapHandler,
     WrapValidator,
     create_model,
+    field_validator,
     model_validator,
 )
 from pydantic_core import CoreSchema, core_schema
 
 from gmwm._core import checks
-from gmwm._core.units import factor
+from gmwm._core.files import opened
+from gmwm._core.units import SI_UNIT, factor, si_parameter_unit
+from gmwm.calibration import load
 from gmwm.errors import InputError
-from gmwm.ins import tuning
+from gmwm.ins.imu import SensorModels
+from gmwm.process import (
+    BiasInstability,
+    GaussMarkov,
+    Model,
+    Process,
+    QuantizationNoise,
+    RandomWalk,
+    RateRamp,
+    WhiteNoise,
+)
 
 FILE, RECORDINGS, MODELS, REDUCED = TAGS = ("<file>", "<recordings>", "<models>", "<reduced>")
 """Forms that one key may have; pydantic puts them into the place of an error."""
 
+_LEAST, _LARGEST = 1e-60, 1e60  # SI: beyond, powers overflow or vanish
+_LARGEST_FILE = 1 << 20  # bytes of a document that a person writes
 _NUMBER = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*)")
 
 
@@ -114,10 +133,7 @@ def _sentence(error: ValidationError, where: str, needs: str) -> tuple[str, str]
 
 
 def value(given: Any, si_unit: str) -> float:
-    """A number in SI units, from a number or from text such as ``"140 deg/h"``.
-
-    Raises InputError if it is not a finite number, or its unit is of another dimension.
-    """
+    """A finite number in SI units, from a number or from text such as ``"140 deg/h"``."""
     if checks.is_number(given):
         found = float(given)
     else:
@@ -129,7 +145,7 @@ def value(given: Any, si_unit: str) -> float:
             )
         number, unit = match.groups()
         found = float(number) * (factor(unit, si_unit) if unit else 1.0)
-    if found != 0.0 and not tuning.LEAST_NUMBER < abs(found) < tuning.LARGEST_NUMBER:
+    if found != 0.0 and not _LEAST < abs(found) < _LARGEST:
         raise InputError(f"{checks.shown(given)} is beyond what sensors and drives have: check it")
     return found
 
@@ -171,3 +187,200 @@ PositiveRadians = Annotated[Radians, Field(gt=0.0)]
 PositiveSeconds = Annotated[Seconds, Field(gt=0.0)]
 PositiveSpeed = Annotated[float, number("m/s"), Field(gt=0.0)]
 FileName = Annotated[str, StringConstraints(pattern=r"^[^\x00]+$"), written("the name of a file")]
+
+
+def read_document(path: Path) -> dict[str, Any]:
+    """Content of a YAML file, a mapping; keys without a value are left out."""
+    try:
+        with opened(path) as stream:
+            text = stream.read(_LARGEST_FILE + 1)
+        if len(text) > _LARGEST_FILE:
+            raise InputError(f"{path}: has more than {_LARGEST_FILE:,} bytes: check the path")
+        content = _load(text.decode("utf-8-sig"))
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror}): check the path") from None
+    except InputError:
+        raise
+    except Exception as error:  # PyYAML raises KeyError, AttributeError, ... for odd tags
+        raise InputError(f"{path}: is not YAML ({_reason(error)}): correct it") from None
+    if content is None:
+        raise InputError(f"{path} is empty: write trajectory:, truth:, filters: into it")
+    if not isinstance(content, Mapping):
+        raise InputError(
+            f"{path}: {checks.shown(content)} is not a mapping: write KEY: VALUE lines"
+        )
+    return {name: each for name, each in content.items() if each is not None}
+
+
+def _load(text: str) -> Any:
+    import yaml
+
+    loader = yaml.SafeLoader(text)
+    try:
+        node = loader.get_single_node()
+        _check_keys(node, set())
+        return None if node is None else loader.construct_document(node)
+    finally:
+        loader.dispose()
+
+
+def _check_keys(node: Any, checked: set[int]) -> None:
+    """Reject a key given twice, which YAML would replace; an alias is a node checked before."""
+    if node is None or isinstance(node.value, str) or id(node) in checked:
+        return
+    checked.add(id(node))
+    seen: set[str] = set()
+    for item in node.value:
+        if not isinstance(item, tuple):
+            _check_keys(item, checked)
+            continue
+        key, value = item
+        name = str(key.value)
+        if key.tag != "tag:yaml.org,2002:merge" and name in seen:
+            raise ValueError(f"line {key.start_mark.line + 1}: {name!r} is there twice")
+        seen.add(name)
+        _check_keys(key, checked)
+        _check_keys(value, checked)
+
+
+def _reason(error: Exception) -> str:
+    """The error and its line, without the parser's own picture of it."""
+    import yaml
+
+    mark = getattr(error, "problem_mark", None)
+    problem = getattr(error, "problem", None)
+    if mark is None or problem is None:
+        text = checks.shown(" ".join(str(error).split())).strip("'\"")
+        fits = isinstance(error, ValueError | RecursionError | yaml.YAMLError)
+        return text if fits else f"a value does not fit its tag, {text}"
+    return f"line {mark.line + 1}, column {mark.column + 1}: {problem}"
+
+
+_KINDS: dict[str, type[Process]] = {
+    "N": WhiteNoise,
+    "K": RandomWalk,
+    "Q": QuantizationNoise,
+    "B": BiasInstability,
+    "R": RateRamp,
+}
+
+_PAIRS = TypeAdapter(Annotated[tuple[tuple[Any, Any], ...], written("[[sigma, tau], ...]")])
+
+
+class Terms(Spec):
+    """The error model of a sensor; ``bias`` is the standard deviation of a constant."""
+
+    QUANTITY: ClassVar[str]
+
+    N: WhiteNoise | None = None
+    K: RandomWalk | None = None
+    Q: QuantizationNoise | None = None
+    B: BiasInstability | None = None
+    R: RateRamp | None = None
+    GM: tuple[GaussMarkov, ...] = ()
+    bias: float = 0.0
+
+    @field_validator(*_KINDS, mode="before")
+    @classmethod
+    def _term(cls, given: Any, info: ValidationInfo) -> Process:
+        kind = _KINDS[info.field_name or ""]
+        unit = si_parameter_unit(kind.parameters[0].unit, cls.QUANTITY).replace(" s", "*s")
+        return kind(value(given, unit))
+
+    @field_validator("GM", mode="before")
+    @classmethod
+    def _markov(cls, given: Any) -> tuple[GaussMarkov, ...]:
+        unit, pairs = SI_UNIT[cls.QUANTITY], _PAIRS.validate_python(given)
+        return tuple(GaussMarkov(value(sigma, unit), value(tau, "s")) for sigma, tau in pairs)
+
+    @field_validator("bias", mode="before")
+    @classmethod
+    def _bias(cls, given: Any) -> float:
+        return value(given, SI_UNIT[cls.QUANTITY])
+
+    @model_validator(mode="after")
+    def _has_noise(self) -> Self:
+        if not self.terms:
+            raise ValueError("there is no noise: give N at least")
+        Model(self.terms)
+        return self
+
+    @property
+    def terms(self) -> tuple[Process, ...]:
+        """In the order of the keys above."""
+        single = (self.N, self.K, self.Q, self.B, self.R)
+        return (*(term for term in single if term is not None), *self.GM)
+
+
+class GyroTerms(Terms):
+    """The error model of a gyro."""
+
+    QUANTITY = "gyro"
+
+
+class AccelTerms(Terms):
+    """The error model of an accelerometer."""
+
+    QUANTITY = "accel"
+
+
+class ModelsSpec(Spec):
+    """Models by kind of sensor or by axis; an axis goes before its kind."""
+
+    gyro: GyroTerms | None = None
+    accel: AccelTerms | None = None
+    gyro_x: GyroTerms | None = None
+    gyro_y: GyroTerms | None = None
+    gyro_z: GyroTerms | None = None
+    accel_x: AccelTerms | None = None
+    accel_y: AccelTerms | None = None
+    accel_z: AccelTerms | None = None
+
+    @model_validator(mode="after")
+    def _complete(self) -> Self:
+        self.models()
+        return self
+
+    def models(self) -> SensorModels:
+        """Models of all six axes."""
+        given: dict[str, Terms] = self.given
+        return SensorModels.of(
+            {name: Model(each.terms) for name, each in given.items()},
+            {name: each.bias for name, each in given.items()},
+        )
+
+
+def form_of(given: Any) -> str | None:
+    """The form of what may be a file, models or a mapping that says where to take them from."""
+    if isinstance(given, str):
+        return FILE
+    if not isinstance(given, Mapping):
+        return None
+    return RECORDINGS if "recordings" in given else REDUCED if "reduce" in given else MODELS
+
+
+OfFile = Annotated[FileName, Tag(FILE)]
+OfTerms = Annotated[ModelsSpec, Tag(MODELS)]
+Models = Annotated[
+    OfFile | OfTerms, Discriminator(form_of), written("a calibration.json, or models")
+]
+"""Sensor models, or the name of a calibration.json that has them."""
+
+
+def sensor_models(given: Mapping[str, Any], where: str) -> SensorModels:
+    """Models of six sensors from a mapping as of `ModelsSpec`, written at ``where``."""
+    return ModelsSpec.parse(given, where).models()
+
+
+def read_models(where: str, given: str | ModelsSpec, folder: Path) -> SensorModels:
+    """Sensor models from what was written, or from a calibration.json relative to a folder."""
+    if isinstance(given, ModelsSpec):
+        return given.models()
+    try:
+        calibration = load(folder / given)
+    except InputError as error:
+        raise InputError(f"{where}: {error}") from None
+    try:
+        return SensorModels.of(calibration)
+    except InputError as error:
+        raise InputError(f"{where}, {given}: {error}") from None

@@ -1,8 +1,7 @@
-"""Manoeuvres, and the trajectories that a list of them gives.
+"""Trajectories from lists of manoeuvres or through waypoints.
 
-Speed is horizontal speed over ground. Heading is counted from north to the east. Every change
-begins and ends with a ramp of its rate that is smooth in its second derivative, so angular rates
-and specific forces are continuous.
+Speed is horizontal, over ground; heading is counted from north to the east. Rates of change rise
+and fall smoothly, so that angular rates and specific forces are continuous.
 """
 
 from __future__ import annotations
@@ -13,18 +12,22 @@ from dataclasses import dataclass
 from typing import Any, Protocol, TypedDict, Unpack
 
 import numpy as np
+from scipy.integrate import simpson
 
 from gmwm._core.checks import is_number, positive, sampling_interval, shown
 from gmwm._core.compiled import compiled
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
-from gmwm.ins.geometry import RATE, gravity_at, radii
+from gmwm.ins.geometry import RATE, gravity_at, ned_difference, radii
 from gmwm.ins.trajectory.trajectory import Trajectory, check_latitudes, finite_numbers
 
 Lla = Sequence[float] | FloatArray
 """Latitude, longitude, rad, and height, m."""
 
 _LONGEST = 10_000_000  # steps: 2 GB while the trajectory is built
+_SHORTEST = 1e-6  # m
+_HALF_TURN = math.radians(179.0)  # the corner of a U-turn lies at infinity
+_TURN_POINTS = 1001
 
 
 @dataclass(frozen=True)
@@ -198,13 +201,7 @@ def _check_number(name: str, value: float, unit: str) -> None:
 
 
 class Body(TypedDict, total=False):
-    """How the body is turned.
-
-    flat: False: turns are banked so that the specific force stays in the body's plane of symmetry.
-        True: roll is zero, as of a car.
-    level: False: the body points where it goes, up and down slopes. True: pitch is zero, as of a
-        helicopter that climbs vertically.
-    """
+    """How the body is turned; see `perform`."""
 
     flat: bool
     level: bool
@@ -349,10 +346,7 @@ def _walk(
     start: FloatArray,
     lla: FloatArray,
 ) -> None:
-    """Integrate the way over the ellipsoid by the fourth-order Runge-Kutta rule.
-
-    ``speed``, ``heading`` and ``climb`` are given at epochs and half-way.
-    """
+    """Integrate the way by the fourth-order Runge-Kutta rule; inputs at epochs and half-way."""
     lla[0] = start
     for i in range(lla.shape[0] - 1):
         a, b, c = 2 * i, 2 * i + 1, 2 * i + 2
@@ -375,3 +369,93 @@ def _angular_speed(lat: float, h: float, speed: float, heading: float) -> tuple[
     meridian, transverse = radii(lat)
     north, east = speed * math.cos(heading), speed * math.sin(heading)
     return north / (meridian + h), east / ((transverse + h) * math.cos(lat))
+
+
+def through(
+    waypoints: Sequence[Lla] | FloatArray,
+    *,
+    speed: float,
+    turn_rate: float,
+    dt: float = 0.01,
+    ramp: float = 2.0,
+    flat: bool = False,
+    level: bool = False,
+) -> Trajectory:
+    """The trajectory of a vehicle that follows straight legs and cuts the corners.
+
+    It starts at the first waypoint in the direction of the second and ends at the last one. Legs
+    have a constant heading. Heights change on the straight parts; corners are level.
+
+    Raises InputError if legs are too short for the turns at their ends or for the climb, or one
+    turns back.
+
+    Parameters
+    ----------
+    waypoints : (k, 3) array_like
+        Latitude, longitude, rad, and height, m.
+    speed : float
+        Horizontal speed over ground, m/s.
+    turn_rate : float
+        Highest rate of turn, rad/s.
+    dt, ramp, flat, level : optional
+        See `perform`.
+    """
+    points = finite_numbers(waypoints, "waypoints")
+    if points.ndim != 2 or points.shape[1] != 3 or len(points) < 2:
+        raise InputError(
+            f"waypoints has shape {points.shape}: give two or more, each of latitude, longitude "
+            "and height"
+        )
+    speed, ramp = positive("speed", speed), positive("ramp", ramp)
+    turn_rate = positive("turn_rate", turn_rate)
+    legs = ned_difference(points[1:], points[:-1])
+    lengths = np.hypot(legs[:, 0], legs[:, 1])
+    if np.any(lengths < _SHORTEST):
+        i = int(np.argmin(lengths))
+        raise InputError(f"waypoints {i} and {i + 1} lie over each other: leave one out")
+    headings = np.arctan2(legs[:, 1], legs[:, 0])
+    turns = (np.diff(headings) + np.pi) % (2.0 * np.pi) - np.pi
+    corners = [Pulse(float(turn), turn_rate, ramp) for turn in turns]
+    cuts = [0.0, *(_cut(corner, speed, i) for i, corner in enumerate(corners, start=1)), 0.0]
+    manoeuvres: list[Manoeuvre] = []
+    for i, length in enumerate(lengths):
+        time, rise = (float(length) - cuts[i] - cuts[i + 1]) / speed, -float(legs[i, 2])
+        if time < 0.0:
+            raise InputError(
+                f"waypoints {i} and {i + 1} are {length:.4g} m apart where turns take "
+                f"{cuts[i] + cuts[i + 1]:.4g} m: set them farther apart, turn faster or go slower"
+            )
+        if rise and time < 2.0 * ramp:
+            raise InputError(
+                f"waypoints {i} and {i + 1} leave {time:.4g} s to climb {rise:.4g} m: set them "
+                "farther apart, or at one height"
+            )
+        if rise:
+            manoeuvres.append(Climb(rise, abs(rise) / (time - ramp)))
+        elif time > 0.0:
+            manoeuvres.append(Straight(time))
+        if i < len(corners) and corners[i].change:
+            manoeuvres.append(Turn(corners[i].change, turn_rate))
+    body: Body = {"flat": flat, "level": level}
+    motion = {"heading": float(headings[0]), "speed": speed}
+    return perform(manoeuvres, start=points[0], dt=dt, ramp=ramp, **motion, **body)
+
+
+def _cut(corner: Pulse, speed: float, waypoint: int) -> float:
+    """How far before a waypoint a turn, which is symmetric, begins, and behind it ends, m."""
+    if abs(corner.change) > _HALF_TURN:
+        raise InputError(
+            f"waypoint {waypoint} asks to turn back: put two waypoints there, side by side"
+        )
+    if not corner.change:
+        return 0.0
+    base, _ = displacement(corner, -0.5 * corner.change, speed)
+    return base / (2.0 * math.cos(0.5 * corner.change))
+
+
+def displacement(turn: Pulse, heading: float, speed: float) -> tuple[float, float]:
+    """How far a turn from a heading (rad) at a speed (m/s) leads to the north and east, m."""
+    time = np.linspace(0.0, turn.duration, _TURN_POINTS)
+    along = heading + turn.value(time)
+    north, east = (float(simpson(each, x=time)) for each in (np.cos(along), np.sin(along)))
+    return speed * north, speed * east

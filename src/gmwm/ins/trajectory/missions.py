@@ -19,9 +19,9 @@ from gmwm.ins.trajectory.manoeuvres import (
     Stop,
     Straight,
     Turn,
+    displacement,
     perform,
 )
-from gmwm.ins.trajectory.routes import displacement
 from gmwm.ins.trajectory.trajectory import Trajectory
 
 _START = (math.radians(46.52), math.radians(6.57), 400.0)

@@ -8,22 +8,81 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from scipy.interpolate import CubicSpline, make_lsq_spline
 
 from gmwm._core.checks import is_number, positive, real_numbers, sampling_interval, shown
 from gmwm._core.spool import release, windows
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
-from gmwm.ins.trajectory.splines import (
-    smoothed,
-    track_velocity,
-    unwrapped_angles,
-    unwrapped_longitudes,
-)
+from gmwm.ins.geometry import radii_along
 from gmwm.ins.trajectory.trajectory_file import read_log
 
+_DEGREE = 3
+_LARGEST_TURN = 0.5 * np.pi  # rad from epoch to epoch; beyond, the way round would be a guess
 _ATTITUDE_CUTOFF = 5.0  # of that of the track
-HIGHEST_LATITUDE = math.radians(89.0)
-"""North-east-down axes turn too fast beyond it, rad."""
+_HIGHEST_LATITUDE = math.radians(89.0)  # beyond, north-east-down axes turn too fast
+
+
+def unwrapped_longitudes(lla: FloatArray) -> FloatArray:
+    """Positions of which the longitude does not jump at the date line, shape (n + 1, 3)."""
+    result = np.array(lla, dtype=float)
+    result[:, 1] = np.unwrap(result[:, 1])
+    return result
+
+
+def unwrapped_angles(rpy: FloatArray) -> FloatArray:
+    """Roll, pitch and yaw, (n + 1, 3), rad, that do not jump at +-180 deg.
+
+    Raises InputError if roll or yaw still turn by more than 90 deg between epochs.
+    """
+    result = np.unwrap(np.asarray(rpy, dtype=float), axis=0)
+    result[:, 1] = rpy[:, 1]
+    steps = np.abs(np.diff(result, axis=0))
+    if np.any(steps > _LARGEST_TURN):
+        row, column = (int(i) for i in np.argwhere(steps > _LARGEST_TURN)[0])
+        raise InputError(
+            f"{('roll', 'pitch', 'yaw')[column]} turns by "
+            f"{np.degrees(steps[row, column]):.0f} deg from epoch {row} to {row + 1}: give "
+            "attitudes that stay away from a pitch of +-90 deg, at a rate that follows the turns"
+        )
+    return result
+
+
+def coefficients(values: FloatArray, dt: float) -> FloatArray:
+    """Spline through values (n + 1, 3): coefficients (n, 3, 4) of 1, t, t^2, t^3 by interval."""
+    spline = CubicSpline(np.arange(len(values)) * dt, values, axis=0)
+    return np.ascontiguousarray(np.transpose(spline.c[::-1], (1, 2, 0)))
+
+
+def track_velocity(lla: FloatArray, dt: float) -> FloatArray:
+    """Velocity, (n + 1, 3), along a track without jumps of the longitude."""
+    # Relative to the first epoch fewer digits are lost in the differences.
+    spline = CubicSpline(np.arange(len(lla)) * dt, lla - lla[0], axis=0)
+    rate = spline(np.arange(len(lla)) * dt, 1)
+    lat, h = lla[:, 0], lla[:, 2]
+    meridian, transverse = radii_along(lat)
+    return np.stack(
+        [(meridian + h) * rate[:, 0], (transverse + h) * np.cos(lat) * rate[:, 1], -rate[:, 2]],
+        axis=-1,
+    )
+
+
+def smoothed(values: FloatArray, dt: float, cutoff: float) -> FloatArray:
+    """Least-squares cubic spline with evenly spaced knots: what moves faster is left out.
+
+    Knots are half a period of the cutoff (Hz) apart; with less than two samples from knot to knot,
+    nothing is left out. de Boor (1978), *A Practical Guide to Splines*, ch. XIV.
+    """
+    n = len(values) - 1
+    spans = max(round(2.0 * cutoff * n * dt), 1)
+    if n < 2 * spans + _DEGREE:
+        return values
+    x = np.linspace(0.0, spans, n + 1)
+    knots = np.concatenate([np.zeros(_DEGREE), np.arange(spans + 1.0), np.full(_DEGREE, spans)])
+    # The mean is taken out so that a height of 500 m costs no digits.
+    mean = np.mean(values, axis=0)
+    spline = make_lsq_spline(x, values - mean, knots, _DEGREE)
+    return mean + spline(x)
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,13 +192,13 @@ class Trajectory:
             differentiated only once, five times this. It has no effect from a quarter of the
             sampling rate on. ``None``: leave all as it is.
         """
-        log = read_log(Path(path))
-        lla, rpy = log.lla, unwrapped_angles(log.rpy)
+        dt, lla, rpy = read_log(Path(path))
+        rpy = unwrapped_angles(rpy)
         if smooth is not None:
             cutoff = positive("smooth", smooth, "give a cutoff in Hz, or None to leave all as is")
-            lla = smoothed(unwrapped_longitudes(lla), log.dt, cutoff)
-            rpy = smoothed(rpy, log.dt, _ATTITUDE_CUTOFF * cutoff)
-        return cls.from_arrays(log.dt, lla, rpy)
+            lla = smoothed(unwrapped_longitudes(lla), dt, cutoff)
+            rpy = smoothed(rpy, dt, _ATTITUDE_CUTOFF * cutoff)
+        return cls.from_arrays(dt, lla, rpy)
 
     @property
     def n(self) -> int:
@@ -185,7 +244,7 @@ class Trajectory:
 
 def check_latitudes(lla: FloatArray, name: str) -> None:
     """Raise InputError for positions near the poles, where north and east turn too fast."""
-    bad = np.flatnonzero(~(np.abs(lla[:, 0]) <= HIGHEST_LATITUDE))
+    bad = np.flatnonzero(~(np.abs(lla[:, 0]) <= _HIGHEST_LATITUDE))
     if bad.size:
         raise InputError(
             f"{name}: latitude {math.degrees(lla[bad[0], 0]):.6g} deg at index {bad[0]} is too "
@@ -194,10 +253,7 @@ def check_latitudes(lla: FloatArray, name: str) -> None:
 
 
 def finite_numbers(values: object, name: str) -> FloatArray:
-    """An array of finite numbers.
-
-    Raises InputError with the row of the first that is not finite.
-    """
+    """An array of finite numbers; InputError names the row of the first that is not."""
     array = np.ascontiguousarray(real_numbers(values, name))
     for part in windows(len(array)):
         if not np.all(np.isfinite(array[part])):

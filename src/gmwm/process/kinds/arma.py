@@ -14,11 +14,11 @@ from scipy.linalg import solve_discrete_lyapunov
 
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
-from gmwm.process import spectral, synthesis
+from gmwm.process import spectral
 from gmwm.process.base import Process, Shape
 from gmwm.process.parameter import Parameter, parameter
 from gmwm.process.spectral import squared_sine
-from gmwm.process.state_space import StateSpace
+from gmwm.process.state_space import StateSpace, from_state_space
 
 Coefficients = int | float | Sequence[float | None] | None
 
@@ -62,11 +62,7 @@ class ARIMA(Process):
     )
 
     def __init__(
-        self,
-        ar: Coefficients = 0,
-        d: int = 0,
-        ma: Coefficients = 0,
-        sigma2: float | None = None,
+        self, ar: Coefficients = 0, d: int = 0, ma: Coefficients = 0, sigma2: float | None = None
     ) -> None:
         ar_values, ma_values = _coefficients(ar, "ar"), _coefficients(ma, "ma")
         if d not in (0, 1, 2):
@@ -133,8 +129,6 @@ class ARIMA(Process):
 
     __hash__ = Process.__hash__
 
-    # -- moments ----------------------------------------------------------------------------------
-
     def psd(self, f: FloatArray, dt: float) -> FloatArray:
         delay = np.exp(-2j * np.pi * np.asarray(f) * dt)
         numerator = np.polynomial.polynomial.polyval(delay, [1.0, *self.ma])
@@ -156,7 +150,11 @@ class ARIMA(Process):
             )
         tau = np.asarray(tau, dtype=float)
         m = np.rint(tau / dt)
-        decay = _decay_lags(self.ar, self.ma)
+        radius = float(np.max(np.abs(np.roots([1.0, *(-c for c in self.ar)])), initial=0.0))
+        lags = np.log(_NEGLIGIBLE) / np.log(radius) if 0.0 < radius < 1.0 else 0.0
+        # A root of multiplicity p decays like k^(p-1) radius^k.
+        lags = int(min((1.0 + 0.5 * len(self.ar)) * lags, 2.0 * _MAX_LAGS))
+        decay = lags + sum(self.orders) + 2
         if decay > _MAX_LAGS or np.any(np.abs(m - tau / dt) > 1e-6 * m) or np.any(m < 1.0):
             return spectral.haar_variance(self.psd, tau, dt)
         covariance = _unit_autocovariance(self.ar, self.ma, decay)
@@ -194,9 +192,7 @@ class ARIMA(Process):
             for _ in range(self.d):
                 series = np.cumsum(series)
             return np.asarray(series)
-        return synthesis.from_state_space(self.state_space(dt), n, rng)
-
-    # -- for the estimator ------------------------------------------------------------------------
+        return from_state_space(self.state_space(dt), n, rng)
 
     def shape_to_free(self, shape: Shape) -> FloatArray:
         p = self.orders[0]
@@ -286,14 +282,6 @@ def _inside(coefficients: FloatArray) -> FloatArray:
         if _stable(moved.tolist()):
             break
     return moved
-
-
-def _decay_lags(ar: tuple[float, ...], ma: tuple[float, ...]) -> int:
-    """Lags after which the autocovariance is below rounding."""
-    radius = float(np.max(np.abs(np.roots([1.0, *(-c for c in ar)])), initial=0.0))
-    lags = np.log(_NEGLIGIBLE) / np.log(radius) if 0.0 < radius < 1.0 else 0.0
-    # A root of multiplicity p decays like k^(p-1) radius^k.
-    return int(min((1.0 + 0.5 * len(ar)) * lags, 2.0 * _MAX_LAGS)) + len(ar) + len(ma) + 2
 
 
 @lru_cache(maxsize=16)

@@ -23,11 +23,10 @@ import numpy as np
 
 from gmwm._core.compiled import compiled
 from gmwm._core.typing import FloatArray
-from gmwm.process import synthesis
 from gmwm.process.base import Process, Shape
 from gmwm.process.parameter import parameter
 from gmwm.process.spectral import squared_sine
-from gmwm.process.state_space import StateSpace
+from gmwm.process.state_space import StateSpace, first_order, from_state_space
 
 _SERIES_BELOW = 0.5
 _SINH_ARRAY = np.array([1.0 / factorial(2 * k + 1) for k in range(1, 9)])
@@ -95,7 +94,7 @@ class GaussMarkov(Process):
     def draw(self, n: int, dt: float, rng: np.random.Generator) -> FloatArray:
         series = rng.standard_normal(n)
         driving = self.sigma * np.sqrt(-np.expm1(-2.0 * dt / self.tau))
-        synthesis.first_order(series, float(np.exp(-dt / self.tau)), float(driving), self.sigma)
+        first_order(series, float(np.exp(-dt / self.tau)), float(driving), self.sigma)
         return series
 
     def shape_grid(self, dt: float, n: int) -> list[Shape]:
@@ -165,7 +164,7 @@ class Resonance(Process):
         return StateSpace.of(names, transition, 0.5 * (noise + noise.T), stationary)
 
     def draw(self, n: int, dt: float, rng: np.random.Generator) -> FloatArray:
-        return synthesis.from_state_space(self.state_space(dt), n, rng)
+        return from_state_space(self.state_space(dt), n, rng)
 
     def shape_grid(self, dt: float, n: int) -> list[Shape]:
         low, high = np.log10(4.0 / (n * dt)), np.log10(0.45 / dt)

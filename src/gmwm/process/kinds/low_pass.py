@@ -8,6 +8,7 @@ state-space form is that white noise, without a state.
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 from functools import lru_cache
 from typing import Any, ClassVar
 
@@ -19,6 +20,13 @@ from gmwm._core.frozen import frozen
 from gmwm._core.typing import FloatArray
 from gmwm.process.base import Process, Shape
 from gmwm.process.kinds.arma import haar_sum
+from gmwm.process.kinds.gauss_markov import (
+    GaussMarkov,
+    Resonance,
+    real_haar,
+    real_slope,
+    resonance_haar,
+)
 from gmwm.process.parameter import parameter
 from gmwm.process.spectral import (
     HALF_PANEL,
@@ -86,11 +94,7 @@ class LowPassNoise(_Filtered):
     label: ClassVar[str] = "low-pass noise"
     compiled_kind: ClassVar[int] = 3
     prefix: ClassVar[str] = "lowpass_"
-    _examples = (
-        (0.3, 0.1, 2.0, BUTTERWORTH),
-        (1.0, 0.31, 1.0, 0.6),
-        (2e-3, 0.02, 3.3, 1.0),
-    )
+    _examples = ((0.3, 0.1, 2.0, BUTTERWORTH), (1.0, 0.31, 1.0, 0.6), (2e-3, 0.02, 3.3, 1.0))
 
     def __init__(
         self,
@@ -261,3 +265,41 @@ def _window_curve(length: float, averaging: tuple[float, ...]) -> FloatArray:
     """Wavelet variance of white noise of unit variance behind a window."""
     covariance = _window_covariance(length)
     return np.array([haar_sum(covariance, m) for m in averaging])
+
+
+_GAUSS_MARKOV, _RESONANCE, _LOW_PASS = (
+    kind.compiled_kind for kind in (GaussMarkov, Resonance, LowPassNoise)
+)
+"""The kinds that the estimator's compiled loops know."""
+
+
+def compiled_levels(tau: FloatArray, dt: float, kinds: Collection[int]) -> tuple[Any, ...]:
+    """The averaging times (s) as `shaped_curve` of some kinds takes them."""
+    nothing = np.zeros(0), np.zeros((tau.size, 0))
+    m = np.ascontiguousarray(tau) / dt
+    panels = on_panels(tuple(m.tolist())) if _LOW_PASS in kinds else (nothing, nothing)
+    return (m, dt, *panels)
+
+
+@compiled()
+def shaped_curve(kind: int, shape: FloatArray, levels: Any) -> FloatArray:
+    """`Process.unit_haar_variance` of a compiled kind, (J,), for inner loops; empty where unknown.
+
+    kind: `Process.compiled_kind`.
+    shape: Values of the shape parameters.
+    levels: From `compiled_levels`.
+    """
+    m, dt, wide, narrow = levels
+    if kind == _GAUSS_MARKOV:
+        return real_haar(dt / shape[0], m)
+    if kind == _RESONANCE:
+        return resonance_haar(shape[0], shape[1], dt, m)
+    return low_pass_haar(shape[0], shape[1], shape[2], dt, wide, narrow)
+
+
+@compiled()
+def shaped_slope(kind: int, shape: FloatArray, levels: Any) -> FloatArray:
+    """Derivative of `shaped_curve` by its only shape coordinate; empty without a closed form."""
+    if kind == _GAUSS_MARKOV:
+        return real_slope(levels[1] / shape[0], levels[0])[:, 0].copy()
+    return np.zeros(0)

@@ -13,10 +13,9 @@ import numpy as np
 from scipy.special import digamma
 
 from gmwm._core.typing import FloatArray
-from gmwm.process import synthesis
 from gmwm.process.base import Process, Shape
 from gmwm.process.parameter import parameter
-from gmwm.process.spectral import squared_sine
+from gmwm.process.spectral import circulant, squared_sine
 from gmwm.process.state_space import StateSpace
 from gmwm.process.wavelets import wavelet as filters
 
@@ -235,7 +234,7 @@ class BiasInstability(Process):
         lag = np.arange(n + 1)
         covariance = -4.0 / np.pi / (4.0 * lag**2 - 1.0)
         eigenvalues = np.fft.rfft(np.concatenate([covariance, covariance[-2:0:-1]])).real
-        path = np.cumsum(synthesis.circulant(np.maximum(eigenvalues, 0.0), n, rng))
+        path = np.cumsum(circulant(np.maximum(eigenvalues, 0.0), n, rng))
         return self.B * (path - path[0])
 
 
@@ -268,8 +267,12 @@ class Sinusoid(Process):
         return ((float(self.frequency), float(self.amplitude)),)
 
     def haar_variance(self, tau: FloatArray, dt: float) -> FloatArray:
-        m = np.asarray(tau, dtype=float) / dt
-        return 0.5 * self.amplitude**2 * _line_gain(m, self.frequency * dt)
+        m, frequency = np.asarray(tau, dtype=float) / dt, self.frequency * dt
+        alias = abs(frequency - np.rint(frequency))
+        x = np.pi * m * alias
+        # sin(x)^2 / (m sin(pi f)), the ratio written through sinc so that f -> 0 stays exact.
+        ratio = x * np.sinc(x / np.pi) ** 2 / np.sinc(alias)
+        return np.asarray(0.5 * self.amplitude**2 * ratio**2)
 
     def autocovariance(self, lag: FloatArray, dt: float) -> FloatArray:
         phase = 2.0 * np.pi * self.frequency * dt * np.asarray(lag)
@@ -296,12 +299,3 @@ class Sinusoid(Process):
 def _odd_harmonic(k: FloatArray) -> FloatArray:
     """1 + 1/3 + ... + 1/(2k - 1), continued to real k."""
     return np.asarray(0.5 * (digamma(k + 0.5) - digamma(0.5)))
-
-
-def _line_gain(m: FloatArray, frequency: float) -> FloatArray:
-    """Squared Haar gain at one frequency (cycles per sample), also at multiples of 1 and near 0."""
-    alias = abs(frequency - np.rint(frequency))
-    x = np.pi * m * alias
-    # sin(x)^2 / (m sin(pi f)) with the ratio written through sinc so that f -> 0 stays exact.
-    ratio = x * np.sinc(x / np.pi) ** 2 / np.sinc(alias)
-    return np.asarray(ratio**2)

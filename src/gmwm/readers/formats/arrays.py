@@ -2,15 +2,19 @@
 
 A two-dimensional array has its samples along the rows. The fields of a structured array and the
 one-dimensional arrays of a file are columns with names; an ``(n, 3)`` array under a sensor's
-name (``gyro``) is its three axes. A single number named ``rate`` or ``dt`` gives the sampling
-rate.
+name (``gyro``) is its three axes. A single number named ``rate`` or ``dt`` gives the rate.
 """
 
 from __future__ import annotations
 
+import math
 import re
+import zipfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import lru_cache, partial
+from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -23,33 +27,74 @@ from gmwm.errors import InputError
 from gmwm.issues import Notice
 from gmwm.readers import tuning
 from gmwm.readers.names import AXES, CANONICAL, bare, meaning
+from gmwm.readers.registry import Wanted
 from gmwm.readers.table import LARGEST, Columns, Table, damage_named, label
 
 AnyArray = npt.NDArray[Any]
 
+_NPY_MAGIC = b"\x93NUMPY"
+_HEADERS = {(1, 0): np.lib.format.read_array_header_1_0}
 _RATES = ("rate", "fs", "sampling_rate", "sample_rate")
 _INTERVALS = ("dt", "sampling_interval")
-_KINDS = {
-    "O": "Python objects",
-    "c": "complex numbers",
-    "b": "booleans",
-    "S": "text",
-    "U": "text",
-    "M": "dates",
-    "m": "time spans",
-}
+_KINDS = {"O": "Python objects", "c": "complex numbers", "b": "booleans"}
+_KINDS |= {"S": "text", "U": "text", "M": "dates", "m": "time spans"}
+
+
+def open_numpy(path: Path, wanted: Wanted) -> tuple[ArrayTable, ...]:
+    """Open an NPY or NPZ file."""
+    is_archive = path.suffix.lower() == ".npz"
+    with damage_named(path.name), path.open("rb") as stream:
+        head = stream.read(len(_NPY_MAGIC))
+    if not head.startswith(b"PK" if is_archive else _NPY_MAGIC):
+        kind, writer = ("NPZ", "savez") if is_archive else ("NPY", "save")
+        raise InputError(f"{path.name} is not an {kind} file: write it with numpy.{writer}")
+    with damage_named(path.name):
+        if is_archive:
+            return (ArrayTable.of_entries(path.name, _entries(path)),)
+        # Mapped: a header that promises more than there is asks for no memory.
+        array: AnyArray = np.load(path, mmap_mode="r", allow_pickle=False)
+        return (ArrayTable.of_array(path.name, array_of(array)),)
+
+
+def _entries(path: Path) -> dict[str, Array]:
+    """Entries of an NPZ file, whose headers are read."""
+    found = {}
+
+    @lru_cache(maxsize=1)  # the columns of an entry are asked for one after another
+    def read(name: str) -> AnyArray:
+        with zipfile.ZipFile(path) as archive:
+            memory.require(archive.getinfo(name).file_size, path.name)
+            with archive.open(name) as stream:
+                array: AnyArray = np.lib.format.read_array(stream, allow_pickle=False)
+        return array
+
+    with zipfile.ZipFile(path) as archive:
+        for info in archive.infolist():
+            name = info.filename.removesuffix(".npy")
+            # What is not a plain array does no harm unless it is wanted.
+            found[name] = array_of(np.empty(0, dtype=object))
+            with archive.open(info) as stream:
+                if stream.read(len(_NPY_MAGIC)) != _NPY_MAGIC:
+                    continue
+            with archive.open(info) as stream:
+                version = np.lib.format.read_magic(stream)
+                header = _HEADERS.get(version, np.lib.format.read_array_header_2_0)(stream)
+            shape, _, dtype = header
+            if dtype.hasobject:
+                continue
+            if math.prod(shape) * dtype.itemsize > info.file_size:
+                raise ValueError("a header that promises more than there is")
+            like = np.broadcast_to(np.empty((), dtype), shape)
+            found[name] = Array(like, partial(read, info.filename))
+    return found
 
 
 @dataclass(frozen=True, eq=False)
 class Array:
-    """An array, or a part of one, that is not read yet.
+    """An array, or a part of one, that is not read yet."""
 
-    like: An array of its shape and type, without its content.
-    read: Gives the array itself.
-    """
-
-    like: AnyArray
-    read: Callable[[], AnyArray]
+    like: AnyArray  # an array of its shape and type, without its content
+    read: Callable[[], AnyArray]  # gives the array itself
 
     def __getitem__(self, part: Any) -> Array:
         return Array(self.like[part], lambda: self.read()[part])
@@ -80,10 +125,8 @@ class ArrayTable(Table):
         """Columns of the arrays of a file by their names.
 
         about: ``stamps`` and ``origin`` of the table.
-        Raises InputError if there are none, or a sampling rate among them is not positive.
         """
-        named: list[_Named] = []
-        matrices: list[_Named] = []
+        named, matrices = list[_Named](), list[_Named]()
         for name, array in entries.items():
             if array.like.dtype.names and array.like.ndim == 1:
                 named += _fields(array)
@@ -91,18 +134,14 @@ class ArrayTable(Table):
                 matrices.append((name, array))
             elif array.like.size != 1:
                 named += _axes_or_itself(name, array)
-        if len(matrices) == 1:  # columns without names come first
-            columns = _unnamed(source, matrices[0][1]) + named
-        else:
-            columns = named + matrices
-        return cls._of(source, columns, _stated_rate(source, entries), list(notices), about)
+        # Columns without names come first.
+        is_one = len(matrices) == 1
+        columns = _unnamed(source, matrices[0][1]) + named if is_one else named + matrices
+        return cls._of(source, columns, _stated_rate(source, entries), notices, about)
 
     @classmethod
     def of_array(cls, source: str, array: Array) -> ArrayTable:
-        """Columns of a single array.
-
-        Raises InputError if it has none.
-        """
+        """Columns of a single array."""
         like = array.like
         if like.dtype.names and like.ndim == 1:
             columns = _fields(array)
@@ -111,37 +150,31 @@ class ArrayTable(Table):
         elif like.ndim == 2:
             columns = _unnamed(source, array)
         else:
-            raise InputError(
-                f"{source} has shape {like.shape}: save samples along rows, one column for each "
-                "channel"
-            )
-        return cls._of(source, columns, None, [], {})
+            hint = "save samples along rows, one column for each channel"
+            raise InputError(f"{source} has shape {like.shape}: {hint}")
+        return cls._of(source, columns)
 
     @classmethod
     def _of(
         cls,
         source: str,
         columns: Sequence[_Named],
-        rate: float | None,
-        notices: list[Notice],
-        about: Mapping[str, Any],
+        rate: float | None = None,
+        notices: Sequence[Notice] = (),
+        about: Mapping[str, Any] = MappingProxyType({}),
     ) -> ArrayTable:
         if not columns:
-            raise InputError(
-                f"{source} holds no column of more than one sample: save arrays of samples in it"
-            )
+            text = f"{source} holds no column of more than one sample"
+            raise InputError(f"{text}: save arrays of samples in it")
         names, arrays = zip(*columns, strict=True)
-        return cls(source=source, names=names, arrays=arrays, rate=rate, notices=notices, **about)
+        told = list(notices)
+        return cls(source=source, names=names, arrays=arrays, rate=rate, notices=told, **about)
 
     def expected_rows(self) -> float:
-        """Rows of the longest column."""
         return float(max(array.like.shape[0] if array.like.ndim else 1 for array in self.arrays))
 
     def load(self, columns: Sequence[int]) -> Columns:
-        """Read some columns; see `Table`.
-
-        Raises InputError if lengths differ.
-        """
+        """Read some columns, which must have one length."""
         samples = sum(self.arrays[column].like.size for column in columns)
         memory.require(tuning.BYTES_PER_SAMPLE * samples, self.source)
         found = {column: self._column(column, slice(None)) for column in columns}
@@ -169,7 +202,6 @@ class ArrayTable(Table):
                 release(each)
 
     def where(self, row: int) -> str:
-        """The row."""
         return f"row {row} (counted from 0)"
 
     def _column(self, index: int, part: slice) -> FloatArray:
@@ -217,9 +249,8 @@ def _fields(array: Array) -> list[_Named]:
 def _unnamed(source: str, array: Array) -> list[_Named]:
     rows, width = array.like.shape
     if width > rows and width >= tuning.FEWEST_SAMPLES:
-        raise InputError(
-            f"{source} has shape {array.like.shape}: samples run along the rows here, save array.T"
-        )
+        text = f"{source} has shape {array.like.shape}"
+        raise InputError(f"{text}: samples run along the rows here, save array.T")
     return [("", array[:, i]) for i in range(width)]
 
 

@@ -24,22 +24,17 @@ from gmwm.readers.table import LARGEST, Columns, Table, usable
 
 @dataclass(frozen=True)
 class BinaryLayout:
-    """A record: time (float64), then six numbers, gyro and accelerometer x, y, z.
+    """A record: time (float64), then six numbers, gyro and accelerometer x, y, z."""
 
-    kind: numpy type of the six numbers.
-    gyro, accel: Scales of the numbers: rad and m/s of increments, rad/s and m/s^2 of rates.
-    order: {"=", "<", ">"}, native, little- or big-endian.
-    """
-
-    kind: str
+    kind: str  # numpy type of the six numbers
+    # gyro, accel: scales of the numbers: rad and m/s of increments, rad/s and m/s^2 of rates.
     gyro: float
     accel: float
     increments: bool = True
-    order: str = "="
+    order: str = "="  # {"=", "<", ">"}, native, little- or big-endian
 
     @property
     def record(self) -> np.dtype[np.void]:
-        """Numpy type of a record."""
         return np.dtype([("time", f"{self.order}f8"), ("values", f"{self.order}{self.kind}", (6,))])
 
 
@@ -53,34 +48,25 @@ LAYOUTS = {
     "NAVCHIP_FLT": BinaryLayout("f8", 2.0 * math.pi / (3600.0 * 360.0), 0.001),
     "KF-GINS": BinaryLayout("f8", 1.0, 1.0, order="<"),
 }
-"""Layouts with a name."""
-
 _KINDS = {"int16": "i2", "int32": "i4", "int64": "i8", "float32": "f4", "float64": "f8"}
 _ORDERS = {"native": "=", "little": "<", "big": ">"}
 _FORM = "TYPE,GYRO_SCALE,ACCEL_SCALE[,rates][,little|big]"
 
 
 def layout_of(text: str) -> BinaryLayout:
-    """A layout by its name, or as ``TYPE,GYRO_SCALE,ACCEL_SCALE[,rates][,little|big]``.
-
-    Raises InputError if it is neither.
-    """
+    """A layout by its name, or as ``TYPE,GYRO_SCALE,ACCEL_SCALE[,rates][,little|big]``."""
     if text.upper() in LAYOUTS:
         return LAYOUTS[text.upper()]
     parts = [part.strip() for part in text.split(",")]
     number = re.compile(r"[0-9.]+(?:[eE][+-]?[0-9]+)?")
     if len(parts) < 3 or parts[0] not in _KINDS or not all(map(number.fullmatch, parts[1:3])):
-        raise InputError(
-            f"layout {text!r} is unknown: give one of {', '.join(LAYOUTS)}, or {_FORM} with a type "
-            f"of {', '.join(_KINDS)}",
-            "layout",
-        )
+        known = f"{', '.join(LAYOUTS)}, or {_FORM} with a type of {', '.join(_KINDS)}"
+        raise InputError(f"layout {text!r} is unknown: give one of {known}", "layout")
     try:
         found = BinaryLayout(_KINDS[parts[0]], float(parts[1]), float(parts[2]))
     except ValueError:
-        raise InputError(
-            f"layout {text!r}: a scale is no number: write {_FORM}", "layout"
-        ) from None
+        problem = f"layout {text!r}: a scale is no number: write {_FORM}"
+        raise InputError(problem, "layout") from None
     for word in parts[3:]:
         if word in _ORDERS:
             found = replace(found, order=_ORDERS[word])
@@ -103,12 +89,8 @@ class BinaryTable(Table):
 
     @classmethod
     def open(cls, path: Path, layout: BinaryLayout) -> BinaryTable:
-        """Look at the size of a file and its first times.
-
-        Raises InputError if it is too short, or its times are not those of this layout.
-        """
-        record = layout.record.itemsize
-        size = path.stat().st_size
+        """Look at the size of a file and its first times."""
+        record, size = layout.record.itemsize, path.stat().st_size
         count, rest = divmod(size, record)
         if count < tuning.FEWEST_SAMPLES:
             raise InputError(
@@ -128,22 +110,15 @@ class BinaryTable(Table):
             even = np.all(np.isfinite(first)) and np.count_nonzero(steps > 0.0) > steps.size // 2
             median = float(np.median(steps)) if even else 0.0
         if not tuning.LEAST_STEP <= median < tuning.LARGEST_OF_BINARY:
-            raise InputError(
-                f"{path.name}: its first times, {first[0]:.6g} and {first[1]:.6g}, are no seconds "
-                "of a clock: give the layout of this file",
-                "layout",
-            )
+            times = f"{path.name}: its first times, {first[0]:.6g} and {first[1]:.6g}"
+            hint = "give the layout of this file"
+            raise InputError(f"{times}, are no seconds of a clock: {hint}", "layout")
         return table
 
     def expected_rows(self) -> float:
-        """Number of records."""
         return float(self.count)
 
     def segments(self, columns: Sequence[int], rows: int) -> Iterator[Columns]:
-        """Columns of ``rows`` records at a time.
-
-        Raises InputError if a number is infinite.
-        """
         interval = self._interval(rows) if self.layout.increments else 1.0
         scales = (1.0, *(self.layout.gyro / interval,) * 3, *(self.layout.accel / interval,) * 3)
         for start in range(0, self.count, rows):
@@ -153,10 +128,8 @@ class BinaryTable(Table):
                     found[column] = raw[column] * scales[column]
                 if not usable(found[column]):
                     row = int(np.flatnonzero(np.abs(found[column]) >= LARGEST)[0])
-                    raise InputError(
-                        f"{self.source}, {self.where(start + row)}: {found[column][row]} is not a "
-                        "usable number: check the layout"
-                    )
+                    text = f"{self.source}, {self.where(start + row)}: {found[column][row]}"
+                    raise InputError(f"{text} is not a usable number: check the layout")
             yield found
 
     def _raw(self, start: int, rows: int) -> list[FloatArray]:
@@ -178,5 +151,4 @@ class BinaryTable(Table):
         return float(np.mean(near))
 
     def where(self, row: int) -> str:
-        """The record."""
         return f"record {row} (counted from 0)"

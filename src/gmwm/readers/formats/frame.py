@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -16,39 +15,28 @@ from gmwm.readers.names import TIME, bare, meaning
 from gmwm.readers.registry import Wanted
 from gmwm.readers.table import Columns, Table, damage_named, label
 
-_INDEX = "__index_level_0__"
-"""Name that Arrow gives to an index of pandas without one."""
+_INDEX = "__index_level_0__"  # name that Arrow gives to an index of pandas without one
+_Parts = Callable[[Sequence[int], int], Iterator[Sequence[Any]]]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class FrameTable(Table):
-    """Columns of an Arrow table.
-
-    parts: Indices of columns and a number of rows -> their values, so many rows at a time.
-    """
+    """Columns of an Arrow table."""
 
     types: tuple[Any, ...]
     rows: int
-    parts: Callable[[Sequence[int], int], Iterator[Sequence[Any]]]
+    parts: _Parts  # indices of columns and a number of rows -> their values, so many rows at a time
 
     def expected_rows(self) -> float:
-        """Number of rows."""
         return float(self.rows)
 
     def segments(self, columns: Sequence[int], rows: int) -> Iterator[Columns]:
-        """Columns of ``rows`` or fewer rows at a time.
-
-        Raises InputError if a column holds no numbers, or one is infinite.
-        """
         for column in columns:
             kind = self.types[column]
             if not _is_number(kind):
-                raise InputError(
-                    f"{self.source}, column {label(self.names, column)} holds {kind}: give "
-                    "numbers, a column for each axis"
-                )
-        first: dict[int, int] = {}
-        row = 0
+                text = f"{self.source}, column {label(self.names, column)} holds {kind}"
+                raise InputError(f"{text}: give numbers, a column for each axis")
+        first, row = dict[int, int](), 0
         with damage_named(self.source):
             for part in self.parts(columns, rows):
                 found = {}
@@ -59,7 +47,6 @@ class FrameTable(Table):
                 yield found
 
     def where(self, row: int) -> str:
-        """The row."""
         return f"row {row} (counted from 0)"
 
     def _floats(self, column: int, values: Any, first: dict[int, int]) -> FloatArray:
@@ -92,10 +79,7 @@ def _is_time(kind: Any) -> bool:
 
 
 def open_frame(data: Any, wanted: Wanted) -> tuple[FrameTable, ...]:
-    """A DataFrame of pandas or polars, an Arrow table, or what gives itself as one.
-
-    Raises InputError if it cannot be turned into an Arrow table.
-    """
+    """A DataFrame of pandas or polars, an Arrow table, or what gives itself as one."""
     import pyarrow as pa
 
     source = f"the {type(data).__module__.partition('.')[0]} {type(data).__name__}"
@@ -117,39 +101,26 @@ def open_frame(data: Any, wanted: Wanted) -> tuple[FrameTable, ...]:
 
 
 def open_parquet(path: Path, wanted: Wanted) -> tuple[FrameTable, ...]:
-    """Open a Parquet file.
-
-    Raises InputError if it is damaged.
-    """
-    from pyarrow import parquet
-
-    with damage_named(path.name):
-        file = parquet.ParquetFile(path, memory_map=True)
-        parts = partial(_parquet_parts, path)
-        return (_table(path.name, _flat_schema(file), file.metadata.num_rows, parts),)
-
-
-def _flat_schema(file: Any) -> Any:
-    """With the fields of messages, ``angular_velocity.x``, as columns."""
-    return file.schema_arrow.empty_table().flatten().schema
-
-
-def _parquet_parts(path: Path, columns: Sequence[int], rows: int) -> Iterator[Sequence[Any]]:
+    """Open a Parquet file."""
     import pyarrow as pa
     from pyarrow import parquet
 
-    file = parquet.ParquetFile(path)  # not mapped: what was read would stay in memory
-    names = [_flat_schema(file).names[column] for column in columns]
-    for batch in file.iter_batches(batch_size=rows, columns=names):
-        part = pa.Table.from_batches([batch]).flatten()
-        yield [part.column(name) for name in names]
+    def parts(columns: Sequence[int], rows: int) -> Iterator[Sequence[Any]]:
+        names = [schema.names[column] for column in columns]
+        # Not mapped: what was read would stay in memory.
+        for batch in parquet.ParquetFile(path).iter_batches(batch_size=rows, columns=names):
+            part = pa.Table.from_batches([batch]).flatten()
+            yield [part.column(name) for name in names]
+
+    with damage_named(path.name):
+        file = parquet.ParquetFile(path, memory_map=True)
+        # With the fields of messages, ``angular_velocity.x``, as columns.
+        schema = file.schema_arrow.empty_table().flatten().schema
+        return (_table(path.name, schema, file.metadata.num_rows, parts),)
 
 
 def open_feather(path: Path, wanted: Wanted) -> tuple[FrameTable, ...]:
-    """Open a Feather file, which is one of Arrow's.
-
-    Raises InputError if it is damaged.
-    """
+    """Open a Feather file, which is one of Arrow's."""
     from pyarrow import feather
 
     with damage_named(path.name):
@@ -166,12 +137,7 @@ def _in_memory(source: str, table: Any) -> FrameTable:
     return _table(source, flat.schema, flat.num_rows, parts)
 
 
-def _table(
-    source: str,
-    schema: Any,
-    rows: int,
-    parts: Callable[[Sequence[int], int], Iterator[Sequence[Any]]],
-) -> FrameTable:
+def _table(source: str, schema: Any, rows: int, parts: _Parts) -> FrameTable:
     if not schema.names:
         raise InputError(f"{source} holds no columns: save samples in it")
     names, types = [], tuple(each.type for each in schema)

@@ -3,47 +3,124 @@
 Their arrays are columns as those of an NPZ file are. A structure or a group stands before the names
 of what it holds, ``imu.gyro`` or ``imu/gyro``, where these alone are not clear; the attribute
 ``units`` of a data set is its unit.
+
+The libraries are compiled code that trusts the sizes and addresses in a file. Damaged ones end the
+process, read on without end, or take all memory: a file is read in another process first.
 """
 
 from __future__ import annotations
 
+import json
 import math
+import os
 import re
+import signal
+import subprocess
+import sys
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
+from dataclasses import replace
 from functools import lru_cache, partial
 from pathlib import Path
+from pkgutil import resolve_name
 from typing import Any
 
 import numpy as np
 
+from gmwm._core import memory
 from gmwm.errors import InputError
-from gmwm.readers.formats import trial
 from gmwm.readers.formats.arrays import AnyArray, Array, ArrayTable, array_of, is_sensor
 from gmwm.readers.names import bare, meaning
 from gmwm.readers.registry import Wanted
 from gmwm.readers.table import damage_named, library
 
+_LARGEST = 64 << 20  # bytes of a file whose arrays are read too; of others only their headers
+_SECONDS, _PER_SECOND = 6, 4 << 20  # of the processor, and bytes of the file for each one more
+_MEMORY, _UNPACKED = 512 << 20, 40  # bytes, and of each byte of the file, which may be compressed
+_MARK = "gmwm: "  # before the answer: libraries print too
+_PROGRAM = "from gmwm.readers.formats.hdf5 import answer; answer()"
+
 _MAT_73 = b"MATLAB 7.3"
 _TOGETHER = 256 << 20  # bytes of arrays that are read together
-_UNITS = ("units", "unit", "Units", "Unit")
 _NO_NUMBERS = ("char", "cell", "object", "function", "opaque", "sparse", "logical")
 
 
-def open_hdf5(path: Path, wanted: Wanted) -> tuple[ArrayTable, ...]:
-    """Open an HDF5 file, or a MAT file of version 7.3, whose arrays are stored transposed.
+def tried(opener: Callable[[Path], ArrayTable], path: Path) -> ArrayTable:
+    """Open a file of arrays, if another process could.
 
-    Raises InputError if it is damaged or holds no columns, or h5py is not installed.
+    Raises InputError if that process ended, or as it did. An array that it could not read is
+    rejected when it is asked for.
     """
-    return (trial.tried(read_hdf5, path),)
+    question = [f"{opener.__module__}:{opener.__qualname__}", os.fspath(path.absolute())]
+    done = subprocess.run(
+        # -P: modules are not looked for in the folder of the data.
+        [sys.executable, "-P", "-c", _PROGRAM, *question, str(memory.budget())],
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        encoding="utf-8",
+        errors="replace",
+        check=False,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
+    )
+    last = done.stdout.rpartition(_MARK)[2] if _MARK in done.stdout else ""
+    found: dict[str, Any] = {}
+    with suppress(json.JSONDecodeError):
+        found = json.loads(last)
+    if "unread" not in found:
+        damage = "is damaged, so that its library fails or reads on for too long: save it again"
+        raise InputError(**found) if found else InputError(f"{path.name} {damage}")
+    table = opener(path)
+    arrays = tuple(
+        Array(array.like, partial(_rejected, found["unread"][name]))
+        if name in found["unread"]
+        else array
+        for name, array in zip(table.names, table.arrays, strict=True)
+    )
+    return replace(table, arrays=arrays)
+
+
+def _rejected(text: str) -> AnyArray:
+    raise InputError(text)
+
+
+def answer() -> None:
+    """Try a file in this process, and print what came of it."""
+    opener, name, budget = sys.argv[1:]
+    path = Path(name)
+    size = path.stat().st_size
+    with memory.limited(int(budget) / (1 << 30)):
+        with suppress(ImportError, ValueError, OSError):  # not every system has limits
+            import resource
+
+            used = resource.getrusage(resource.RUSAGE_SELF)
+            seconds = int(used.ru_utime + used.ru_stime) + _SECONDS + size // _PER_SECOND
+            resource.setrlimit(resource.RLIMIT_CPU, (seconds, resource.RLIM_INFINITY))
+            signal.signal(signal.SIGXCPU, signal.SIG_DFL)
+            most = min(memory.budget(), _MEMORY + _UNPACKED * size)
+            resource.setrlimit(resource.RLIMIT_DATA, (most, resource.RLIM_INFINITY))
+        found: dict[str, Any] = {"unread": {}}
+        try:
+            table: ArrayTable = resolve_name(opener)(path)
+            for i, column in enumerate(table.names if size <= _LARGEST else ()):
+                try:
+                    table.load([i])
+                except InputError as error:
+                    found["unread"][column] = str(error)
+        except InputError as error:
+            found = {"text": error.problem, "code": error.code, "hint": error.hint}
+            found["values"] = error.values
+        print(_MARK + json.dumps(found), flush=True)
+
+
+def open_hdf5(path: Path, wanted: Wanted) -> tuple[ArrayTable, ...]:
+    """Open an HDF5 file, or a MAT file of version 7.3, whose arrays are stored transposed."""
+    return (tried(read_hdf5, path),)
 
 
 def open_mat(path: Path, wanted: Wanted) -> tuple[ArrayTable, ...]:
-    """Open a MAT file of version 4 to 7.
-
-    Raises InputError if it is damaged or holds no columns.
-    """
-    return (trial.tried(read_mat, path),)
+    """Open a MAT file of version 4 to 7."""
+    return (tried(read_mat, path),)
 
 
 def read_hdf5(path: Path) -> ArrayTable:
@@ -65,14 +142,12 @@ def read_hdf5(path: Path) -> ArrayTable:
             if name.startswith("#") or not isinstance(item, h5py.Dataset):
                 return
             if item.external:
-                raise InputError(
-                    f"{path.name}: {name} is in another file, {item.external[0][0]!r}, which is "
-                    "not opened: save its samples in this one"
-                )
+                text = f"{path.name}: {name} is in another file, {item.external[0][0]!r}"
+                raise InputError(f"{text}, which is not opened: save its samples in this one")
             if item.dtype.kind in "iufV" and item.shape:
                 like = np.broadcast_to(np.empty((), item.dtype), item.shape)
-                full = name if is_mat else _with_unit(name, item.attrs)
-                found[full] = Array(like, partial(read, name))
+                unit = "" if is_mat or meaning(name).unit is not None else _unit(item.attrs)
+                found[f"{name} [{unit}]" if unit else name] = Array(like, partial(read, name))
             elif item.dtype.kind in "iuf" and item.shape == ():
                 found[name] = array_of(np.asarray(item[()]))
 
@@ -80,13 +155,10 @@ def read_hdf5(path: Path) -> ArrayTable:
     return _table(path.name, found, is_transposed=is_mat)
 
 
-def _with_unit(name: str, attributes: Mapping[str, Any]) -> str:
-    for key in _UNITS:
-        unit = attributes.get(key)
-        unit = unit.decode(errors="replace") if isinstance(unit, bytes) else unit
-        if isinstance(unit, str) and unit and meaning(name).unit is None:
-            return f"{name} [{unit}]"
-    return name
+def _unit(attributes: Mapping[str, Any]) -> str:
+    units = [attributes.get(key) for key in ("units", "unit", "Units", "Unit")]
+    texts = [each.decode(errors="replace") if isinstance(each, bytes) else each for each in units]
+    return next((text for text in texts if isinstance(text, str) and text), "")
 
 
 def read_mat(path: Path) -> ArrayTable:

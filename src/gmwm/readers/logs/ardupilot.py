@@ -1,37 +1,41 @@
 """Flight logs of ArduPilot (DataFlash, binary).
 
-`IMU` holds samples of the filtered sensors, `GYR` and `ACC` (raw logging) and the batches `ISBH`
-and `ISBD` those at the sensor's own rate (ArduPilot, libraries/AP_InertialSensor/LogStructure.h).
-The former are read in blocks: memory holds no more than the columns that are asked for.
+A message is two marks, the number of its kind and a body, whose length and fields a message FMT
+before it states (ArduPilot, libraries/AP_Logger/README.md). `IMU` holds samples of the filtered
+sensors, `GYR` and `ACC` (raw logging) and the batches `ISBH` and `ISBD` those at the sensor's own
+rate (libraries/AP_InertialSensor/LogStructure.h). All but batches are read in blocks.
 """
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections import Counter, defaultdict
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
+import numpy.typing as npt
 
 from gmwm._core import memory
+from gmwm._core.compiled import compiled
 from gmwm.errors import InputError
-from gmwm.readers.formats.arrays import AnyArray, ArrayTable, array_of
-from gmwm.readers.logs.topics import (
-    MessageTable,
-    Topic,
-    choose_first,
-    cut_off,
-    end_of_content,
-    left_out,
-)
+from gmwm.readers.formats.arrays import AnyArray
+from gmwm.readers.logs import topics
+from gmwm.readers.logs.topics import MessageTable, Topic, topic_table
 from gmwm.readers.names import AXES
 from gmwm.readers.registry import Wanted
 from gmwm.readers.table import Columns, Table, damage_named, damage_notice
 
-if TYPE_CHECKING:
-    from gmwm.readers.logs.dataflash import Extent, Messages
+_FMT, _BEGIN = 0x80, 3  # number of the kind that states the others, bytes before a body
+_FORM = np.dtype("u1, u1, S4, S16, S64")
+_FORM.names = ("type", "length", "name", "letters", "columns")
+_TYPES = {
+    "a": "(32,)<i2", "b": "i1", "B": "u1", "g": "<f2", "h": "<i2", "H": "<u2", "i": "<i4",
+    "I": "<u4", "f": "<f4", "n": "S4", "N": "S16", "Z": "S64", "c": "<i2", "C": "<u2", "e": "<i4",
+    "E": "<u4", "L": "<i4", "d": "<f8", "M": "u1", "q": "<i8", "Q": "<u8",
+}  # fmt: skip
+_FACTORS = dict.fromkeys("cCeE", 0.01) | {"L": 1e-7}
+_BLOCK = 1 << 22  # bytes read at a time
 
 _RANKS = {"IMU": 0, "IMU2": 0, "IMU3": 0, "GYR": 1, "ACC": 1}
 _HEADER, _DATA = "ISBH", "ISBD"
@@ -41,8 +45,135 @@ _TIME = "time [us]"
 _SAMPLES = 32  # of a message of a batch
 _MARKS = b"\xa3\x95"
 _DAMAGE = "is no binary log of ArduPilot, or is damaged or cut off: get a whole copy"
-_REMAINS = 528
-"""Bytes at the end that may be remains of a page of the memory: pymavlink passes over as many."""
+_REMAINS = 528  # bytes at the end that may be remains of a page: pymavlink passes over as many
+
+
+@compiled()
+def _walk(
+    data: npt.NDArray[np.uint8],
+    at: int,
+    end: int,
+    lengths: npt.NDArray[np.int64],
+    is_wanted: npt.NDArray[np.bool_],
+    kinds: npt.NDArray[np.int64],
+    places: npt.NDArray[np.int64],
+) -> tuple[int, int, int, int]:
+    """Kinds and places of wanted messages, up to an FMT or the end of what is there.
+
+    end: Of the message before.
+    Returns: count; at, where the walk goes on; between, bytes that are no messages; end of the last
+        message.
+    """
+    count = between = 0
+    while at + 3 <= data.size:
+        kind = data[at + 2]
+        if data[at] != 0xA3 or data[at + 1] != 0x95 or lengths[kind] < 3:
+            at += 1
+            continue
+        if at + lengths[kind] > data.size:
+            break
+        if is_wanted[kind]:
+            kinds[count], places[count] = kind, at
+            count += 1
+        between += at - end
+        at += lengths[kind]
+        end = at
+        if kind == 0x80:
+            break
+    return count, at, between, end
+
+
+class _Forms:
+    """What the messages FMT have stated so far."""
+
+    def __init__(self, wanted: Collection[str]):
+        self.wanted = wanted
+        self.names: dict[int, str] = {}
+        self.types: dict[int, np.dtype[np.void]] = {}
+        self.factors: dict[int, dict[str, float]] = {}
+        self.lengths = np.zeros(256, np.int64)
+        self.lengths[_FMT] = _BEGIN + _FORM.itemsize
+        self.is_wanted = np.zeros(256, np.bool_)
+        self.is_wanted[_FMT] = True
+
+    def add(self, body: npt.NDArray[np.uint8]) -> None:
+        """One more kind; ValueError if the fields of a wanted one do not have its length."""
+        form = np.frombuffer(body.tobytes(), _FORM)[0]
+        number, name = int(form["type"]), form["name"].decode("latin-1")
+        if number == _FMT:
+            return
+        self.lengths[number] = form["length"]
+        self.is_wanted[number] = name in self.wanted
+        if name not in self.wanted:
+            return
+        letters = form["letters"].decode("latin-1")
+        fields = form["columns"].decode("latin-1").split(",")
+        pairs = list(zip(fields, letters, strict=True))
+        self.types[number] = np.dtype([(field, _TYPES[letter]) for field, letter in pairs])
+        if self.types[number].itemsize + _BEGIN != form["length"]:
+            raise ValueError(f"the fields of {name} do not have its length")
+        self.names[number] = name
+        self.factors[number] = {f: _FACTORS[c] for f, c in pairs if c in _FACTORS}
+
+
+class Messages:
+    """Messages of one kind that follow each other: structured rows, and where each begins."""
+
+    def __init__(self, kind: str, rows: AnyArray, places: AnyArray, factors: dict[str, float]):
+        self.kind, self.rows, self.places, self._factors = kind, rows, places, factors
+
+    @property
+    def fields(self) -> tuple[str, ...]:
+        return self.rows.dtype.names or ()
+
+    def __getitem__(self, field: str) -> AnyArray:
+        values = self.rows[field]
+        return values * self._factors[field] if field in self._factors else values
+
+
+@dataclass
+class Extent:
+    """How much of a log is messages, as far as it was read."""
+
+    between: int = 0  # bytes between them that are none
+    end: int = 0  # of the last one
+
+
+def messages(
+    path: Path, wanted: Collection[str], extent: Extent | None = None
+) -> Iterator[Messages]:
+    """Messages of some kinds, block by block; ``extent`` is kept up to date.
+
+    Raises KeyError, ValueError if the statement of a wanted kind is damaged.
+    """
+    forms, before, rest, end = _Forms(wanted), 0, b"", 0
+    extent = extent or Extent()
+    with path.open("rb") as stream:
+        while fresh := stream.read(_BLOCK):
+            data = np.frombuffer(rest + fresh, np.uint8)
+            at, count = 0, 1
+            kinds, places = np.empty((2, data.size // _BEGIN + 1), np.int64)
+            while count:
+                count, at, between, end = _walk(
+                    data, at, end, forms.lengths, forms.is_wanted, kinds, places
+                )
+                extent.between += between
+                is_form = bool(count) and kinds[count - 1] == _FMT
+                own = slice(count - is_form)
+                for kind in np.unique(kinds[own]):
+                    mine = places[own][kinds[own] == kind]
+                    inside = _BEGIN + np.arange(forms.types[kind].itemsize)
+                    rows = data[mine[:, None] + inside].view(forms.types[kind])[:, 0]
+                    name = forms.names[kind]
+                    yield Messages(name, rows, before + mine, forms.factors[kind])
+                if is_form:
+                    forms.add(data[at - _FORM.itemsize : at])
+                else:
+                    count = 0
+            extent.end = before + end
+            before += at
+            end -= at
+            rest = data[at:].tobytes()
 
 
 @dataclass(frozen=True)
@@ -58,7 +189,6 @@ class _Series:
         return self.kind if self.instance is None else f"{self.kind}[{self.instance}]"
 
     def fields_of(self, sensor: str) -> list[str]:
-        """Those of its axes."""
         names = [f"{_SENSORS[sensor][0]}{axis.upper()}" for axis in AXES]
         return [name for name in names if name in self.fields]
 
@@ -83,9 +213,6 @@ class DataflashTable(MessageTable):
     series: _Series
 
     def parts(self, columns: Sequence[int]) -> Iterator[Columns]:
-        """Columns of one block of messages after another."""
-        from gmwm.readers.logs.dataflash import messages  # compiled
-
         fields = list(self.series.columns.values())
         with damage_named(self.source, _DAMAGE):
             for found in messages(self.path, (self.series.kind,)):
@@ -101,7 +228,6 @@ def open_ardupilot(path: Path, wanted: Wanted) -> tuple[Table, ...]:
 
     wanted: Topics as ``"IMU[1]"``, or ``"GYR[0]"`` and ``"ACC[0]"``; by default that of `IMU`, else
         those of `GYR` and `ACC`, else the batches, if there is one IMU.
-    Raises InputError if it is damaged, holds no IMU or half of one, or topics have to be chosen.
     """
     with damage_named(path.name, _DAMAGE):
         counts, sensors, batches, damage = _contents(path)
@@ -115,31 +241,27 @@ def open_ardupilot(path: Path, wanted: Wanted) -> tuple[Table, ...]:
         raise InputError(
             f"{path.name} has no messages IMU, GYR, ACC or ISBD: set LOG_BITMASK to log the IMU"
         )
-    chosen = choose_first(path.name, ranks, wanted)
+    chosen = topics.choose_first(path.name, ranks, wanted)
     by_name = {series.name: series for series in counts}
     tables: list[Table] = []
     for topic in chosen:
-        notices = () if tables else (*damaged, *left_out(ranks, chosen))
+        notices = () if tables else (*damaged, *topics.left_out(ranks, chosen))
         if topic.name in by_name:
             series = by_name[topic.name]
-            names = series.columns
-            tables.append(
-                DataflashTable(
-                    source=path.name,
-                    names=tuple(names),
-                    notices=list(notices),
-                    topic=topic,
-                    path=path,
-                    series=series,
-                    stamps=f"{names[_TIME]} of {series.name}",
-                    origin=f"messages {series.kind}",
-                )
+            table = DataflashTable(
+                source=path.name,
+                names=tuple(series.columns),
+                notices=list(notices),
+                topic=topic,
+                path=path,
+                series=series,
+                stamps=f"{series.columns[_TIME]} of {series.name}",
+                origin=f"messages {series.kind}",
             )
+            tables.append(table)
         else:
             _, columns = batches[topic.name]
-            entries = {name: array_of(values) for name, values in columns.items()}
-            about = {"stamps": f"stamps of {topic.name}", "origin": "messages ISBH and ISBD"}
-            tables.append(ArrayTable.of_entries(path.name, entries, notices, **about))
+            tables.append(topic_table(path.name, topic, columns, "messages ISBH and ISBD", notices))
     return tuple(tables)
 
 
@@ -150,12 +272,8 @@ def _contents(
     path: Path,
 ) -> tuple[dict[_Series, int], dict[_Series, frozenset[str]], _Batches, str]:
     """How many messages there are of each series, its sensors, the batches, and what is damaged."""
-    from gmwm.readers.logs.dataflash import Extent, messages  # compiled
-
-    counts: Counter[_Series] = Counter()
-    sensors: dict[_Series, frozenset[str]] = {}
-    headers: list[Messages] = []
-    data: list[Messages] = []
+    counts, sensors = Counter[_Series](), defaultdict[_Series, frozenset[str]](frozenset)
+    headers, data = list[Messages](), list[Messages]()
     held, extent, stamps = 0, Extent(), list[float]()
     for found in messages(path, (*_RANKS, _HEADER, _DATA), extent):
         if "TimeUS" in found.fields:
@@ -169,27 +287,22 @@ def _contents(
                 mine = slice(None) if number is None else found["I"] == number
                 series = _Series(found.kind, number, found.fields)
                 counts[series] += found.rows[mine].size
-                sensors[series] = sensors.get(series, frozenset()) | {
+                sensors[series] |= {
                     sensor
                     for sensor in _SENSORS
                     if any(np.any(found[field][mine]) for field in series.fields_of(sensor))
                 }
     order = sorted(counts, key=lambda each: (list(_RANKS).index(each.kind), each.instance or 0))
     seconds = (stamps[-1] - stamps[0]) * 1e-6 if stamps else 0.0
-    damage = _damage_of(path, extent, seconds)
-    return {each: counts[each] for each in order}, sensors, _batches(headers, data), damage
-
-
-def _damage_of(path: Path, extent: Extent, seconds: float) -> str:
-    """What is wrong with a log of which messages were found, if anything is."""
-    end = end_of_content(path)
+    end = topics.end_of_content(path)
     with path.open("rb") as stream:
         stream.seek(extent.end)
         rest = stream.read(max(min(end - extent.end, _REMAINS), 0))
-    between = extent.between + (len(rest) if len(rest) == _REMAINS else 0)
-    if between:
-        return f"is damaged in places, where {between:,} bytes or more are no messages"
-    return cut_off(seconds) if rest and rest[:2] == _MARKS[: len(rest)] else ""
+    is_cut = bool(rest) and rest[:2] == _MARKS[: len(rest)]
+    damage = topics.cut_off(seconds) if is_cut else ""
+    if between := extent.between + (len(rest) if len(rest) == _REMAINS else 0):
+        damage = f"is damaged in places, where {between:,} bytes or more are no messages"
+    return {each: counts[each] for each in order}, sensors, _batches(headers, data), damage
 
 
 def _batches(parts_of_header: Sequence[Messages], parts: Sequence[Messages]) -> _Batches:

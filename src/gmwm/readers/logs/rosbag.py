@@ -1,38 +1,152 @@
 """ROS bags by `rosbags`, without a ROS installation: ROS 1, ROS 2 in SQLite or MCAP.
 
-Read in blocks of messages, so that memory holds no more than the columns that are asked for.
+Read in blocks of messages, so that memory holds no more than the columns that are asked for. Behind
+the header (stamp and ``frame_id``) of `sensor_msgs/Imu` and `sensor_msgs/Temperature` stand nothing
+but 64-bit floating-point numbers, so that messages of one ``frame_id`` are rows of one array. ROS 1
+writes them little-endian and unaligned (wiki.ros.org/roscpp/Overview/Messages and Serialization),
+ROS 2 in either byte order, aligned to eight bytes counted from the end of the encapsulation header
+(OMG CDR, formal/2021-11-01, 9.3; DDSI-RTPS 2.5, 10.2).
 """
 
 from __future__ import annotations
 
 import weakref
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import cached_property
 from itertools import islice
 from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
+from gmwm._core.typing import FloatArray
 from gmwm._core.units import SI_UNIT
 from gmwm.errors import InputError
 from gmwm.issues import notice
-from gmwm.readers.logs.ros_messages import (
-    CDR,
-    COVARIANCE_OF,
-    IMU,
-    ROS1,
-    TEMPERATURE,
-    Message,
-    Serialization,
-    decode,
-)
 from gmwm.readers.logs.topics import MessageTable, Topic, choose
 from gmwm.readers.registry import Wanted
 from gmwm.readers.table import Columns, damage_named, library
+
+_Bytes = npt.NDArray[np.uint8]
+_Integers = npt.NDArray[np.int64]
+
+# First number of these parts of `sensor_msgs/Imu`; their covariances follow.
+ANGULAR_VELOCITY, LINEAR_ACCELERATION = 13, 25
+
+
+@dataclass(frozen=True)
+class Message:
+    """A type of message: a header, then numbers."""
+
+    count: int  # numbers behind the header
+    columns: Mapping[str, int]  # name of a column, with its unit -> index of its number
+
+
+IMU = Message(
+    37,
+    {f"gyro_{axis} [rad/s]": ANGULAR_VELOCITY + i for i, axis in enumerate("xyz")}
+    | {f"accel_{axis} [m/s^2]": LINEAR_ACCELERATION + i for i, axis in enumerate("xyz")},
+)
+
+TEMPERATURE = Message(2, {"temperature [degC]": 0})
+
+COVARIANCE_OF = {"gyro": ANGULAR_VELOCITY + 3, "accel": LINEAR_ACCELERATION + 3}
+"""First number of the covariance of each sensor: -1 where the message does not have it."""
+
+
+@dataclass(frozen=True)
+class Serialization:
+    """How the header is written."""
+
+    stamp: int  # offset of the stamp, bytes
+    is_cdr: bool  # whether an encapsulation header says the byte order and numbers are aligned
+
+    @property
+    def text(self) -> int:
+        """Offset of ``frame_id``."""
+        return self.stamp + 12
+
+    def offset(self, frame: int) -> int:
+        """Where the numbers begin behind a ``frame_id`` of so many bytes."""
+        end = self.text + frame
+        return 4 + -(-(end - 4) // 8) * 8 if self.is_cdr else end
+
+
+ROS1, CDR = Serialization(4, False), Serialization(4, True)
+"""The stamp follows a counter in ROS 1, the encapsulation header in ROS 2."""
+
+_LITTLE = 0x0100
+_ORDERS = {0x0000: ">", _LITTLE: "<"}
+"""Byte order of plain CDR, by the two bytes of its encapsulation header as a small number."""
+
+
+def decode(
+    raw: Sequence[bytes],
+    message: Message,
+    wanted: Sequence[int],
+    serialization: Serialization,
+    where: Callable[[int], str],
+) -> tuple[_Integers, list[FloatArray]]:
+    """Stamps of the headers, ns, and numbers of messages.
+
+    wanted: Indices of the numbers behind the header.
+    where: Index of a message -> its place.
+    Raises InputError at a message that is too short, or of another encoding.
+    """
+    n, lengths = len(raw), list(map(len, raw))
+    is_even = lengths.count(lengths[0]) == n  # as a topic is, almost always: no copies
+    sizes = np.full(n, lengths[0]) if is_even else np.array(lengths)
+    if sizes.min() < serialization.text:
+        raise _cut_off(where(int(np.argmax(sizes < serialization.text))))
+    joined = np.frombuffer(b"".join(raw), np.uint8)
+    starts = np.cumsum(sizes) - sizes
+    inside = np.arange(serialization.text)
+    head = joined.reshape(n, -1) if is_even else joined[starts[:, None] + inside]
+    codes = _field(head, 0, "<u2") if serialization.is_cdr else np.full(n, _LITTLE)
+    frames = _field(head, serialization.text - 4, "<u4")
+    stamps = np.empty(n, np.int64)
+    numbers = [np.empty(n) for _ in wanted]
+    left = np.ones(n, dtype=bool)
+    while left.any():  # once: a topic has one encoding and one frame_id, almost always
+        first = int(np.argmax(left))
+        size, code = int(sizes[first]), int(codes[first])
+        if code not in _ORDERS:
+            text = f"{where(first)}: encoding 0x{code.to_bytes(2, 'little').hex()} is not plain CDR"
+            hint = "record with a usual RMW, or convert the bag with ros2 bag convert"
+            raise InputError(f"{text}: {hint}")
+        order = _ORDERS[code]
+        alike = (sizes == size) & (codes == code) & (frames == frames[first])
+        if alike.all():
+            rows: slice | _Integers = slice(None)
+            block = joined.reshape(n, size)
+        else:
+            rows = np.flatnonzero(alike)
+            block = joined[starts[rows][:, None] + np.arange(size)]
+        offset = serialization.offset(int(_field(block, serialization.text - 4, f"{order}u4")[0]))
+        if offset + 8 * message.count > size:
+            raise _cut_off(where(first))
+        # Seconds after 2038 are unsigned in ROS 1, and in ROS 2 as drivers write them.
+        seconds = _field(block, serialization.stamp, f"{order}u4").astype(np.int64)
+        stamps[rows] = seconds * 10**9 + _field(block, serialization.stamp + 4, f"{order}u4")
+        for values, index in zip(numbers, wanted, strict=True):
+            values[rows] = _field(block, offset + 8 * index, f"{order}f8")
+        left &= ~alike
+    return stamps, numbers
+
+
+def _field(block: _Bytes, offset: int, dtype: str) -> npt.NDArray[Any]:
+    """A number of each row, wherever it stands in it."""
+    rows, size = block.shape
+    return np.ndarray((rows,), dtype, block, offset, (size,))
+
+
+def _cut_off(place: str) -> InputError:
+    return InputError(f"{place} is cut off: record the bag again, or cut it before that message")
+
 
 _BLOCK = 1024  # messages: 0.3 MB of sensor_msgs/Imu, which stay in the cache
 _SEEN = 64  # messages from which it is judged what a topic holds
@@ -59,7 +173,14 @@ class _Bag:
     @contextmanager
     def opened(self) -> Iterator[Any]:
         """The reader of `rosbags`; what it raises is one sentence."""
-        with damage_named(self.path.name, self._damage):
+
+        def damage(error: Exception) -> str:
+            text = str(error).replace(str(self.path), self.path.name).rstrip(".")
+            tool = "rosbag reindex or decompress" if self.is_ros1 else "ros2 bag reindex or convert"
+            kind = f"of an unknown kind{f' ({text})' if text else ''}"
+            return f"is damaged or {kind}: get a whole copy, or try {tool}"
+
+        with damage_named(self.path.name, damage):
             yield self._reader
 
     @cached_property
@@ -67,39 +188,29 @@ class _Bag:
         """Open until the bag is dropped: its index may take as long to read as its messages."""
         kind = "rosbag1" if self.is_ros1 else "rosbag2"
         for file in sorted(self.path.glob("*.db3")) if self.path.is_dir() else [self.path]:
-            _check_pages(file)
+            with file.open("rb") as stream:
+                head = stream.read(18)
+            # SQLite takes the rest of its last page for zeros (Database File Format, 1.3.2).
+            size = int.from_bytes(head[16:], "big")
+            size = 65536 if size == 1 else size or 1
+            if head.startswith(_SQLITE) and file.stat().st_size % size:
+                raise ValueError(f"{file.name} ends inside a page")
         reader = library(f"rosbags.{kind}", "ros", self.path.name).Reader(self.path)
         reader.open()
         weakref.finalize(self, reader.close)
         return reader
 
-    def _damage(self, error: Exception) -> str:
-        text = str(error).replace(str(self.path), self.path.name).rstrip(".")
-        tools = "rosbag reindex or decompress" if self.is_ros1 else "ros2 bag reindex or convert"
-        return (
-            f"is damaged or of an unknown kind{f' ({text})' if text else ''}: get a whole copy, "
-            f"or try {tools}"
-        )
-
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class BagTable(MessageTable):
-    """A topic of a bag: one message a row, its stamp and numbers in it.
-
-    is_log: Whether the stamps are the times at which the messages were recorded.
-    start: Stamp that is written as zero, ns.
-    """
+    """A topic of a bag: one message a row, its stamp and numbers in it."""
 
     bag: _Bag
     message: Message
-    is_log: bool
-    start: int
+    is_log: bool  # whether the stamps are the times at which the messages were recorded
+    start: int  # stamp that is written as zero, ns
 
     def parts(self, columns: Sequence[int]) -> Iterator[Columns]:
-        """Columns of one block of messages after another.
-
-        Raises InputError if every header has the same stamp.
-        """
         wanted = [column for column in columns if column > 0]
         numbers = [self.message.columns[self.names[column]] for column in wanted]
         row, first, changes = 0, 0, False
@@ -109,7 +220,10 @@ class BagTable(MessageTable):
             records = map(parts, _messages(reader, self.topic.name))
             while block := list(islice(records, _BLOCK)):
                 times, raw = zip(*block, strict=True) if self.is_log else ((), block)
-                where = partial(self._place, row)
+
+                def where(i: int, first: int = row) -> str:
+                    return f"{self.source}, {self.where(first + i)}"
+
                 stamps, found = decode(raw, self.message, numbers, self.bag.serialization, where)
                 if self.is_log:
                     stamps = np.array(times, np.int64)
@@ -119,14 +233,8 @@ class BagTable(MessageTable):
                 part = dict(zip(wanted, found, strict=True))
                 yield {0: (stamps - self.start).astype(float)} | part if 0 in columns else part
         if 0 in columns and row > 1 and not changes:
-            raise InputError(
-                f"{self.source}, topic {self.topic.name}: every header has the same stamp",
-                "no-stamps",
-                'use the time of recording, clock="log"',
-            )
-
-    def _place(self, first: int, row: int) -> str:
-        return f"{self.source}, {self.where(first + row)}"
+            text = f"{self.source}, topic {self.topic.name}: every header has the same stamp"
+            raise InputError(text, "no-stamps", 'use the time of recording, clock="log"')
 
 
 def open_bag(path: Path, wanted: Wanted) -> tuple[BagTable, ...]:
@@ -134,24 +242,19 @@ def open_bag(path: Path, wanted: Wanted) -> tuple[BagTable, ...]:
 
     path: A file, or the folder of a bag of ROS 2.
     Returns: one table for each topic, those of thermometers last.
-    Raises InputError if it is damaged, holds no IMU or half of one, or topics have to be chosen.
     """
     is_folder = path.is_dir()
     if is_folder and not (path / "metadata.yaml").is_file():
-        raise InputError(
-            f"{path.name} has no metadata.yaml: name the .db3 or .mcap file in it, or write one "
-            "with ros2 bag reindex"
-        )
+        hint = "name the .db3 or .mcap file in it, or write one with ros2 bag reindex"
+        raise InputError(f"{path.name} has no metadata.yaml: {hint}")
     bag = _Bag(path, not is_folder and _is_ros1(path))
     with bag.opened() as reader:
         counts, others = _counts(reader)
         of_imu, warmth = counts["sensor_msgs/msg/Imu"], counts["sensor_msgs/msg/Temperature"]
         if not of_imu:
             listed = ", ".join(others[:8]) + (", ..." if len(others) > 8 else "")
-            raise InputError(
-                f"{path.name} has no messages of sensor_msgs/Imu: "
-                + (f"it has {listed}; record the topic of the IMU" if others else "it is empty")
-            )
+            held = f"it has {listed}; record the topic of the IMU" if others else "it is empty"
+            raise InputError(f"{path.name} has no messages of sensor_msgs/Imu: {held}")
         heads = {topic: list(islice(_messages(reader, topic), _SEEN)) for topic in of_imu}
         found = [
             Topic(topic, count, _sensors(reader, topic, bag, heads[topic]))
@@ -190,18 +293,6 @@ def open_bag(path: Path, wanted: Wanted) -> tuple[BagTable, ...]:
         warm = Message(TEMPERATURE.count, {f"{prefix}temperature [degC]": 0})
         tables.append(table(Topic(name, count), warm, warm.columns))
     return tuple(tables)
-
-
-def _check_pages(path: Path) -> None:
-    """Refuse a file of SQLite that ends inside a page, whose rest SQLite takes for zeros.
-
-    Its size is in the header (SQLite, Database File Format, 1.3.2).
-    """
-    with path.open("rb") as stream:
-        head = stream.read(18)
-    size = int.from_bytes(head[16:], "big")
-    if head.startswith(_SQLITE) and path.stat().st_size % (65536 if size == 1 else size or 1):
-        raise ValueError(f"{path.name} ends inside a page")
 
 
 def _is_ros1(path: Path) -> bool:

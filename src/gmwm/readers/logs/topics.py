@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import mmap
 from abc import abstractmethod
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from gmwm._core.units import SI_UNIT
 from gmwm.errors import InputError
 from gmwm.issues import Notice, notice
+from gmwm.readers.formats.arrays import AnyArray, ArrayTable, array_of
 from gmwm.readers.registry import Wanted
 from gmwm.readers.table import Columns, Table
 
@@ -20,14 +21,11 @@ _MEASURED = {"gyro": "angular rates", "accel": "accelerations"}
 
 @dataclass(frozen=True)
 class Topic:
-    """A series of messages of one IMU, or of one sensor of it.
-
-    count: Number of messages.
-    sensors: "gyro", "accel" or both, if not zeros all the time.
-    """
+    """A series of messages of one IMU, or of one sensor of it."""
 
     name: str
-    count: int
+    count: int  # number of messages
+    # "gyro", "accel" or both, if not zeros all the time.
     sensors: frozenset[str] = frozenset(SI_UNIT)
 
     def __str__(self) -> str:
@@ -38,8 +36,6 @@ class Topic:
 def choose(source: str, topics: Sequence[Topic], wanted: Wanted) -> tuple[Topic, ...]:
     """The topics to read: those wanted, else the only one, else one of gyros with one of forces.
 
-    source: Name of the file, for messages.
-    topics: One at least.
     Raises InputError with the code "topic", if one is not there, or it cannot be decided; with
         "sensor-absent", if the log has one sensor and not the other, and no channel is named.
     """
@@ -50,12 +46,9 @@ def choose(source: str, topics: Sequence[Topic], wanted: Wanted) -> tuple[Topic,
     is_part = absent in [topic.sensors for topic in topics]
     if there and absent and not (is_part or wanted.by_channel):
         (sensor,), (other,) = there, absent
-        raise InputError(
-            f"{source} has no {_MEASURED[other]}, or only zeros, in {chosen[0].name}",
-            "sensor-absent",
-            f'record them too, or read the rest alone, channels="{sensor}"',
-            {"sensor": sensor},
-        )
+        text = f"{source} has no {_MEASURED[other]}, or only zeros, in {chosen[0].name}"
+        hint = f'record them too, or read the rest alone, channels="{sensor}"'
+        raise InputError(text, "sensor-absent", hint, {"sensor": sensor})
     return chosen
 
 
@@ -64,24 +57,17 @@ def _chosen(source: str, topics: Sequence[Topic], wanted: Sequence[str]) -> tupl
     if not wanted:
         if len(topics) == 1 or _are_parts(topics):
             return tuple(topics)
-        raise InputError(
-            f"{source} has {len(topics)} topics of an IMU: {listed}",
-            "topic",
-            f'choose one, topic="{topics[0].name}"',
-        )
+        text = f"{source} has {len(topics)} topics of an IMU: {listed}"
+        raise InputError(text, "topic", f'choose one, topic="{topics[0].name}"')
     by_name = {topic.name.strip("/"): topic for topic in topics}
     for name in wanted:
         if name.strip("/") not in by_name:
-            raise InputError(
-                f"{source} has no topic {name!r} of an IMU: it has {listed}", "topic-unknown"
-            )
+            text = f"{source} has no topic {name!r} of an IMU: it has {listed}"
+            raise InputError(text, "topic-unknown")
     chosen = tuple(by_name[name.strip("/")] for name in dict.fromkeys(wanted))
     if len(chosen) > 1 and not _are_parts(chosen):
-        raise InputError(
-            f"{source}: {' and '.join(map(str, chosen))} are no pair of gyros and "
-            "accelerometers: choose one, or two such",
-            "topic",
-        )
+        text = f"{source}: {' and '.join(map(str, chosen))} are no pair of gyros and accelerometers"
+        raise InputError(f"{text}: choose one, or two such", "topic")
     return chosen
 
 
@@ -95,13 +81,10 @@ def _are_parts(topics: Sequence[Topic]) -> bool:
 def choose_first(
     source: str, ranks: Sequence[Sequence[Topic]], wanted: Wanted
 ) -> tuple[Topic, ...]:
-    """As `choose`, of the first rank that has any topic unless others are wanted.
-
-    Raises InputError as `choose` does.
-    """
+    """As `choose`, of the first rank that has any topic unless others are wanted."""
     if wanted.topics:
         return choose(source, [topic for rank in ranks for topic in rank], wanted)
-    return choose(source, next(rank for rank in ranks if rank), wanted)
+    return choose(source, next(filter(None, ranks)), wanted)
 
 
 def left_out(ranks: Sequence[Sequence[Topic]], chosen: Sequence[Topic]) -> tuple[Notice, ...]:
@@ -116,18 +99,29 @@ def left_out(ranks: Sequence[Sequence[Topic]], chosen: Sequence[Topic]) -> tuple
 
 def end_of_content(path: Path) -> int:
     """Byte after the last one that may be something else than padding, zeros or 0xFF."""
-    end = path.stat().st_size
-    if not end:
+    if not (end := path.stat().st_size):
         return 0
     with path.open("rb") as stream, mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ) as data:
         last = data[end - 1 :]
         while end and last in (b"\0", b"\xff"):
             start = max(end - _BLOCK, 0)
-            kept = len(data[start:end].rstrip(last))
-            end = start + kept
-            if kept:
+            end = start + len(data[start:end].rstrip(last))
+            if end > start:
                 break
     return end
+
+
+def topic_table(
+    source: str,
+    topic: Topic,
+    columns: Mapping[str, AnyArray],
+    origin: str,
+    notices: Sequence[Notice] = (),
+) -> ArrayTable:
+    """A table of the samples of a topic that are in memory."""
+    entries = {name: array_of(values) for name, values in columns.items()}
+    about = {"stamps": f"stamps of {topic.name}", "origin": origin}
+    return ArrayTable.of_entries(source, entries, notices, **about)
 
 
 def cut_off(seconds: float) -> str:
@@ -146,14 +140,9 @@ class MessageTable(Table):
         """Columns of one block of messages after another."""
 
     def expected_rows(self) -> float:
-        """Number of messages."""
         return float(self.topic.count)
 
     def segments(self, columns: Sequence[int], rows: int) -> Iterator[Columns]:
-        """Columns of some messages at a time.
-
-        Raises InputError if the log is damaged, or a number is infinite.
-        """
         row = 0
         for part in self.parts(columns):
             for column, values in part.items():
@@ -161,11 +150,8 @@ class MessageTable(Table):
             row += next(iter(part.values())).size
             yield part
         if not 0 < row <= self.topic.count:
-            raise InputError(
-                f"{self.source}, topic {self.topic.name}: its messages are not as many as its "
-                "index says: get a whole copy, or reindex it"
-            )
+            text = f"{self.source}, topic {self.topic.name}: its messages are not as many"
+            raise InputError(f"{text} as its index says: get a whole copy, or reindex it")
 
     def where(self, row: int) -> str:
-        """The message."""
         return f"message {row} of {self.topic.name} (counted from 0)"

@@ -15,11 +15,13 @@ from typing import Any
 
 import numpy as np
 
+from gmwm._core.units import SI_UNIT
 from gmwm.errors import InputError
 from gmwm.issues import Notice, notice
 from gmwm.readers import tuning
-from gmwm.readers.formats.arrays import AnyArray, ArrayTable, array_of
-from gmwm.readers.logs.topics import Topic, choose_first, cut_off, end_of_content, left_out
+from gmwm.readers.formats.arrays import AnyArray, ArrayTable
+from gmwm.readers.logs import topics
+from gmwm.readers.logs.topics import Topic, topic_table
 from gmwm.readers.names import AXES
 from gmwm.readers.registry import Wanted
 from gmwm.readers.table import damage_named, damage_notice, library
@@ -28,23 +30,15 @@ _COMBINED = "sensor_combined"
 _FIELDS = {"gyro": "gyro_rad", "accel": "accelerometer_m_s2"}
 _FIFO = {"sensor_gyro_fifo": "gyro", "sensor_accel_fifo": "accel"}
 _SINGLE = {"sensor_gyro": "gyro", "sensor_accel": "accel"}
-_UNITS = {"gyro": "rad/s", "accel": "m/s^2"}
 _TIME = "time [us]"
-_NO_TIME = 2**31 - 1
-"""RELATIVE_TIMESTAMP_INVALID of SensorCombined.msg."""
-
-_HEAD = 3
-"""Bytes of a message before its content."""
-
+_NO_TIME = 2**31 - 1  # RELATIVE_TIMESTAMP_INVALID of SensorCombined.msg
+_HEAD = 3  # bytes of a message before its content
 _PADDING = (b"\0" * _HEAD, b"\xff" * _HEAD)
-
 _HINT = (
     "log sensor_combined, which the default SDLOG_PROFILE has, or the raw FIFO topics (bits 8 and "
     "9 of SDLOG_PROFILE)"
 )
-
 _DAMAGE = "is no ULog, or is damaged or cut off: get a whole copy"
-
 _Columns = dict[str, AnyArray]
 
 
@@ -52,8 +46,6 @@ def open_ulog(path: Path, wanted: Wanted) -> tuple[ArrayTable, ...]:
     """Open a ULog.
 
     wanted: Topics as ``"sensor_gyro_fifo[1]"``; by default `sensor_combined`, else the FIFO topics.
-    Raises InputError if it is damaged, holds no IMU at its own rate or half of one, or topics have
-        to be chosen.
     """
     with damage_named(path.name, _DAMAGE):  # formats that are damaged lack fields
         return _tables(path, wanted)
@@ -62,48 +54,36 @@ def open_ulog(path: Path, wanted: Wanted) -> tuple[ArrayTable, ...]:
 def _tables(path: Path, wanted: Wanted) -> tuple[ArrayTable, ...]:
     sets, notices = _data_sets(path, wanted.damaged)
     by_name = {_name(each): each for each in sets}
-    combined = [
-        Topic(_name(each), each.data["timestamp"].size, _not_zero(each.data))
-        for each in sets
-        if each.name == _COMBINED
-    ]
-    fifo, single = (
-        [
-            Topic(_name(each), each.data["timestamp"].size, frozenset((kinds[each.name],)))
-            for each in sets
-            if each.name in kinds
-        ]
-        for kinds in (_FIFO, _SINGLE)
-    )
-    ranks = [combined, fifo, single]
+    ranks: list[list[Topic]] = [[], [], []]
+    for each in sets:
+        rank = 0 if each.name == _COMBINED else 1 if each.name in _FIFO else 2
+        only = (_FIFO | _SINGLE).get(each.name)
+        sensors = frozenset((only,)) if only else _not_zero(each.data)
+        ranks[rank].append(Topic(_name(each), each.data["timestamp"].size, sensors))
     if not any(ranks):
         raise InputError(f"{path.name} has no samples of an IMU: {_HINT}")
-    chosen = choose_first(path.name, ranks, wanted)
-    notices += left_out(ranks[:2], chosen)
-    tables: list[ArrayTable] = []
-
-    def add(topic: str, columns: _Columns) -> None:
-        entries = {name: array_of(values) for name, values in columns.items()}
-        told = () if tables else notices
-        about = {"stamps": f"stamps of {topic}", "origin": f"the definition of {topic}"}
-        tables.append(ArrayTable.of_entries(path.name, entries, told, **about))
-
+    chosen = topics.choose_first(path.name, ranks, wanted)
+    notices += topics.left_out(ranks[:2], chosen)
+    found: list[tuple[Topic, _Columns]] = []
     for topic in chosen:
         kind, data = by_name[topic.name].name, by_name[topic.name].data
         if kind == _COMBINED:
-            for columns in _combined(data):
-                add(topic.name, columns)
+            found += [(topic, columns) for columns in _combined(data)]
         elif kind in _FIFO:
-            add(topic.name, _from_fifo(data, _FIFO[kind]))
+            found.append((topic, _from_fifo(data, _FIFO[kind])))
         else:
             _check_not_thinned(path.name, topic, data)
             axes = [data[axis] for axis in AXES]
-            add(topic.name, _columns(data["timestamp"], _SINGLE[kind], axes))
+            found.append((topic, _columns(data["timestamp"], _SINGLE[kind], axes)))
     for each in sets:
         if each.name in _SINGLE and each.multi_id == 0 and "temperature" in each.data:
-            name = f"{each.name}_temperature [degC]"
-            columns = {_TIME: each.data["timestamp"], name: each.data["temperature"]}
-            add("thermometers", columns)
+            stamps, name = each.data["timestamp"], f"{each.name}_temperature [degC]"
+            columns = {_TIME: stamps, name: each.data["temperature"]}
+            found.append((Topic("thermometers", stamps.size), columns))
+    tables: list[ArrayTable] = []
+    for topic, columns in found:
+        told, origin = () if tables else notices, f"the definition of {topic.name}"
+        tables.append(topic_table(path.name, topic, columns, origin, told))
     return tuple(tables)
 
 
@@ -113,7 +93,7 @@ class _Stream(io.BufferedReader):
     def __init__(self, path: Path):
         super().__init__(io.FileIO(path))
         self.is_cut = False
-        self._end = end_of_content(path)
+        self._end = topics.end_of_content(path)
 
     def read(self, size: int | None = -1) -> bytes:
         found = super().read(size)
@@ -126,23 +106,21 @@ class _Stream(io.BufferedReader):
 
 def _data_sets(path: Path, is_taken: bool) -> tuple[list[Any], tuple[Notice, ...]]:
     """Topics about an IMU, and what was noticed."""
-    wanted = [_COMBINED, *_FIFO, *_SINGLE]
     reader = library("pyulog", "px4", path.name).ULog
     # pyulog prints what is damaged.
     quiet = redirect_stdout(io.StringIO())
     with damage_named(path.name, _DAMAGE), quiet, _Stream(path) as stream:
-        log = reader(stream, wanted)
+        log = reader(stream, [_COMBINED, *_FIFO, *_SINGLE])
     sets = [each for each in log.data_list if each.data["timestamp"].size]
     notices = []
     if log.file_corruption or stream.is_cut:
         first = min((int(each.data["timestamp"][0]) for each in sets), default=log.last_timestamp)
-        what = cut_off((log.last_timestamp - first) * 1e-6)
+        what = topics.cut_off((log.last_timestamp - first) * 1e-6)
         what = "is damaged in places" if log.file_corruption else what
         notices.append(damage_notice(path.name, what, is_taken))
     lost = sum(dropout.duration for dropout in log.dropouts) / 1e3
     if lost > 0.0:
-        count = len(log.dropouts)
-        notices.append(notice("log-dropouts", "", {"duration": lost}, count=count))
+        notices.append(notice("log-dropouts", "", {"duration": lost}, count=len(log.dropouts)))
     return sets, tuple(notices)
 
 
@@ -162,11 +140,8 @@ def _not_zero(data: Mapping[str, AnyArray]) -> frozenset[str]:
 
 
 def _columns(stamps: AnyArray, sensor: str, axes: Sequence[AnyArray]) -> _Columns:
-    named = {
-        f"{sensor}_{axis} [{_UNITS[sensor]}]": values
-        for axis, values in zip(AXES, axes, strict=True)
-    }
-    return {_TIME: stamps, **named}
+    names = [f"{sensor}_{axis} [{SI_UNIT[sensor]}]" for axis in AXES]
+    return {_TIME: stamps, **dict(zip(names, axes, strict=True))}
 
 
 def _combined(data: Mapping[str, AnyArray]) -> list[_Columns]:

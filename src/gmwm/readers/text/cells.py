@@ -10,9 +10,7 @@ from datetime import UTC, date, datetime, time, timedelta
 
 from gmwm.readers.table import LARGEST
 
-BLANKS = " "
-"""The delimiter that stands for runs of spaces and tabs."""
-
+BLANKS = " "  # the delimiter that stands for runs of spaces and tabs
 _RUN_OF_BLANKS = re.compile(r"[ \t]+")
 
 # A name keeps the unit in brackets that follows it after a blank: "wx [rad s^-1]".
@@ -49,10 +47,7 @@ _MINUTE, _LEAP_MINUTE = 60.0, 61.0  # s
 
 
 def split_line(line: str, delimiter: str) -> list[str]:
-    """Fields of a line, without blanks around them and without quotes.
-
-    Raises ValueError if the quotes do not match.
-    """
+    """Fields of a line without blanks or quotes around them; ValueError if quotes do not match."""
     if delimiter == BLANKS:
         return [cell.strip('"') for cell in _RUN_OF_BLANKS.split(line.strip(" \t"))]
     if '"' not in line:
@@ -72,9 +67,8 @@ def split_header(line: str, delimiter: str) -> list[str]:
 
 
 def number(cell: str, decimal: str) -> float | None:
-    """The number in a field.
+    """The number in a field without blanks around it.
 
-    cell: Without blanks around it.
     decimal: {".", ","}, decimal mark.
     Returns: NaN where the field is empty or one of the usual words for a missing sample, infinity
         where the number is infinite or too large for use, ``None`` where the field is text.
@@ -88,12 +82,9 @@ def number(cell: str, decimal: str) -> float | None:
 
 
 def seconds_of(found: re.Match[str]) -> float:
-    """Seconds since 1970-01-01, without leap seconds.
+    """Seconds since 1970-01-01 of a match of `DATE` or `FIELD_OF_DATE`, without leap seconds.
 
-    Whole days and minutes are counted by the calendar; the last minute of a day of UTC may have
-    61 s.
-
-    found: Of `DATE` or `FIELD_OF_DATE`.
+    The last minute of a day of UTC may have 61 s.
     Raises ValueError if there is no such day, minute, second or zone.
     """
     day, hour, minute, second = (part for part in found.groups()[:8] if part is not None)
@@ -125,20 +116,12 @@ def _day(text: str) -> date:
     return date(*map(int, parts))
 
 
-def has_zone(found: re.Match[str]) -> bool:
-    """Whether the zone of a date is written."""
-    return found[9] is not None
-
-
 def date_columns(rows: Sequence[Sequence[str]]) -> dict[int, bool]:
-    """Columns whose every field is a date, or empty; whether they have a zone.
-
-    rows: Fields of the first lines.
-    """
+    """Columns whose every field in these rows is a date, or empty; whether they have a zone."""
     result = {}
     for column in range(min(map(len, rows), default=0)):
         cells = [row[column] for row in rows if row[column]]
         found = [FIELD_OF_DATE.fullmatch(cell) for cell in cells]
         if cells and all(found):
-            result[column] = any(each is not None and has_zone(each) for each in found)
+            result[column] = any(each is not None and each[9] is not None for each in found)
     return result

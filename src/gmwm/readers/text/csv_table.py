@@ -21,16 +21,9 @@ from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.readers.registry import Wanted
 from gmwm.readers.table import Columns, Table, damage_notice, label, usable
-from gmwm.readers.text.cells import (
-    BLANKS,
-    FIELD_OF_DATE,
-    has_zone,
-    number,
-    seconds_of,
-    split_line,
-)
-from gmwm.readers.text.dialects import with_dialect
-from gmwm.readers.text.layout import Layout, find_layout
+from gmwm.readers.text import cells
+from gmwm.readers.text.cells import BLANKS
+from gmwm.readers.text.layout import Layout, find_layout, with_dialect
 from gmwm.readers.text.lines import blocks, content_size, count_lines
 
 if TYPE_CHECKING:
@@ -45,21 +38,16 @@ _NULLS = ["", "NA", "na", "N/A", "n/a", "#N/A", "null", "NULL", "Null", "None", 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class CsvTable(Table):
-    """A text file whose layout is known.
-
-    is_taken: Whether the rest of a damaged file is used; None if that cannot be asked for.
-    """
+    """A text file whose layout is known."""
 
     path: Path
     layout: Layout
+    # Whether the rest of a damaged file is used; None if that cannot be asked for.
     is_taken: bool | None = None
 
     @classmethod
     def open(cls, path: Path, is_taken: bool | None = None) -> CsvTable:
-        """Look at the beginning of a file.
-
-        Raises InputError if it cannot be read or is not a table.
-        """
+        """Look at the beginning of a file."""
         damages = list[str]()
         _, head = next(blocks(path, size=_HEAD, say=damages.append), (1, b""))
         if damages and not head:
@@ -89,18 +77,13 @@ class CsvTable(Table):
         return content_size(self.path) / max(len(head) / lines, 1.0)
 
     def segments(self, columns: Sequence[int], rows: int) -> Iterator[Columns]:
-        """Columns of about ``rows`` rows at a time.
-
-        Raises InputError at the first line with a wrong number of fields or with text for a number;
-        if there is none, at the end, for the first number that is infinite.
-        """
+        """See `Table`; infinite numbers are reported at the end, after lines that are wrong."""
         import pyarrow
 
         layout, before = self.layout, b""
-        parts: list[list[FloatArray]] = []
-        infinite: list[str] = []
+        parts, infinite = list[list[FloatArray]](), list[str]()
         for line, block in blocks(self.path, layout.offset, layout.line, say=self._note_damage):
-            if _is_cut(block, before, layout):
+            if not block.endswith((b"\n", b"\r")) and _is_cut(block, before, layout):
                 self._note_damage(f"is cut off in line {line}")
                 break
             before = block
@@ -127,7 +110,6 @@ class CsvTable(Table):
         }
 
     def where(self, row: int) -> str:
-        """The line of a row of data."""
         for line, block in blocks(self.path, self.layout.offset, self.layout.line):
             for i, text in enumerate(block.splitlines(), start=line):
                 if text.strip(b" \t"):
@@ -146,51 +128,41 @@ class CsvTable(Table):
             text = raw.decode(errors="replace")
             if layout.width > 1 and not text.strip(" \t"):
                 continue
-            cells = self._cells(line, text)
+            fields = self._fields(line, text)
             for values, column in zip(found, columns, strict=True):
-                value = number(cells[column], layout.decimal)
+                value = cells.number(fields[column], layout.decimal)
                 problem = "is not a number"
                 if value is None and column in layout.dates:
-                    value, problem = _date(cells[column], layout.dates[column])
-                cell = cells[column] if len(cells[column]) <= 30 else cells[column][:27] + "..."
+                    value, problem = _date(fields[column], layout.dates[column])
+                cell = fields[column]
+                cell = cell if len(cell) <= 30 else f"{cell[:27]}..."
                 place = f"line {line}, column {label(self.names, column)}: {cell!r}"
                 if value is None:
-                    raise InputError(
-                        f"{self.source}, {place} {problem}: correct the line, or choose other "
-                        "columns with channels= and time="
-                    )
+                    hint = "correct the line, or choose other columns with channels= and time="
+                    raise InputError(f"{self.source}, {place} {problem}: {hint}")
                 if math.isinf(value):
                     infinite.append(place)
                 values.append(value)
         return [np.array(values) for values in found]
 
-    def _cells(self, line: int, text: str) -> list[str]:
+    def _fields(self, line: int, text: str) -> list[str]:
         """Fields of a line; a delimiter after the last one does no harm."""
         width = self.layout.width
         try:
-            cells = split_line(text, self.layout.delimiter)
+            fields = cells.split_line(text, self.layout.delimiter)
         except ValueError as error:
-            raise InputError(
-                f"{self.source}, line {line}: quotes that do not match: correct the line"
-            ) from error
-        if len(cells) == width + 1 and not cells[-1]:
-            cells.pop()
-        if len(cells) != width:
-            raise InputError(
-                f"{self.source}, line {line}: {len(cells)} fields where {width} were expected: "
-                "correct the line or remove it"
-            )
-        return cells
+            text = f"{self.source}, line {line}: quotes that do not match"
+            raise InputError(f"{text}: correct the line") from error
+        if len(fields) == width + 1 and not fields[-1]:
+            fields.pop()
+        if len(fields) != width:
+            text = f"{self.source}, line {line}: {len(fields)} fields where {width} were expected"
+            raise InputError(f"{text}: correct the line or remove it")
+        return fields
 
 
 def _is_cut(block: bytes, before: bytes, layout: Layout) -> bool:
-    """Whether a last line has no end, and lacks fields or digits of its last field.
-
-    block: A block of lines; a line without an end is one by itself.
-    before: The block before it.
-    """
-    if block.endswith((b"\n", b"\r")):
-        return False
+    """Whether a last line without an end lacks fields, or digits of its last field."""
     delimiter = None if layout.delimiter == BLANKS else layout.delimiter.encode()
     *first, last = block.split(delimiter)
     if len(first) + 1 < layout.width:
@@ -209,7 +181,12 @@ def _parse_with_arrow(
     if b'"' in block or b"(" in block:  # the latter for nan(1), which Arrow takes for NaN
         return None
     if layout.delimiter == BLANKS:
-        block = _single_blanks(block)
+        block = block.replace(b"\t", b" ")
+        while b"  " in block:
+            block = block.replace(b"  ", b" ")
+        for end in (b"\n", b"\r"):
+            block = block.replace(b" " + end, end).replace(end + b" ", end)
+        block = block.strip(b" ")
     names = [str(i) for i in range(layout.width + layout.trailing)]
     types = {
         names[i]: pyarrow.timestamp("ns", tz="UTC" if layout.dates[i] else None)
@@ -252,8 +229,7 @@ def _parse_with_arrow(
 
 def _floats(column: pyarrow.ChunkedArray) -> FloatArray:
     """A column of floats, NaN where it has none; Arrow's own way imports pandas."""
-    result = np.empty(len(column))
-    at = 0
+    result, at = np.empty(len(column)), 0
     for chunk in column.chunks:
         known, values = chunk.buffers()
         part = result[at : at + len(chunk)]
@@ -265,30 +241,17 @@ def _floats(column: pyarrow.ChunkedArray) -> FloatArray:
     return result
 
 
-def _single_blanks(block: bytes) -> bytes:
-    """Turn runs of blanks to single ones, none at the ends of lines."""
-    block = block.replace(b"\t", b" ")
-    while b"  " in block:
-        block = block.replace(b"  ", b" ")
-    for end in (b"\n", b"\r"):
-        block = block.replace(b" " + end, end).replace(end + b" ", end)
-    return block.strip(b" ")
-
-
 def _date(cell: str, zoned: bool) -> tuple[float | None, str]:
     """Seconds since 1970, or ``None`` and what is wrong with the field."""
-    found = FIELD_OF_DATE.fullmatch(cell)
-    if found is not None and has_zone(found) is not zoned:
+    found = cells.FIELD_OF_DATE.fullmatch(cell)
+    if found is not None and (found[9] is not None) is not zoned:
         return None, f"has {'no' if zoned else 'a'} zone, unlike the dates before it"
     try:
-        return (seconds_of(found), "") if found else (None, "is no date")
+        return (cells.seconds_of(found), "") if found else (None, "is no date")
     except ValueError:
         return None, "is no date that exists"
 
 
 def open_text(path: Path, wanted: Wanted) -> tuple[CsvTable, ...]:
-    """Open a delimited text.
-
-    Raises InputError if it cannot be read or is not a table.
-    """
+    """Open a delimited text."""
     return (CsvTable.open(path, wanted.damaged),)

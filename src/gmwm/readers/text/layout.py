@@ -1,4 +1,4 @@
-"""How a delimited text is laid out: delimiter, decimal mark, header, where the data begin."""
+"""How a delimited text is laid out: delimiter, decimal mark, header, the dialect of an exporter."""
 
 from __future__ import annotations
 
@@ -6,15 +6,17 @@ import math
 import re
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from statistics import mode
 
 from gmwm.errors import InputError
 from gmwm.issues import Notice, notice
 from gmwm.readers import tuning
-from gmwm.readers.names import meaning, of_dates
+from gmwm.readers.names import AXES, meaning, of_dates
 from gmwm.readers.registry import READABLE
 from gmwm.readers.text.cells import BLANKS, date_columns, number, split_header, split_line
+
+_UNITS = {"gyro": "rad/s", "accel": "m/s^2"}
 
 _COMMENT_MARKS = ("#", "%", "//")
 _BLACKBOX = re.compile(rb'"?Product"?\s*,\s*"?Blackbox')
@@ -25,30 +27,86 @@ _UTF16_MARKS = (b"\xff\xfe", b"\xfe\xff")
 _LINE = re.compile(rb"[^\r\n]*(?:\r\n|\n|\r|$)")
 
 
+def _axes(**prefixes: str) -> dict[str, str]:
+    """Name of a column -> its meaning, for the three axes of a prefix."""
+    return {
+        f"{prefix}{axis}": f"{sensor}_{axis} [{_UNITS[sensor]}]"
+        for sensor, prefix in prefixes.items()
+        for axis in AXES
+    }
+
+
+_RENAMED = (
+    {"timestamp": "time [ns]"} | _axes(gyro="omega_", accel="alpha_"),  # Kalibr
+    {"timestamp": "time [us]", "gyro_rad[0]": "gyro_rad[0]"},  # ulog2csv of PX4
+    {"time": "time [ns]", "field.header.stamp": "field.header.stamp [ns]"},  # rostopic
+)
+"""Names by which an exporter is known, and their meaning."""
+
+_GRAVITY_IN_STEPS = re.compile(rb'"?acc_1G"?\s*,\s*"?([0-9]+)')
+_BLACKBOX_AXIS = re.compile(r"(gyroADC|accSmooth)\[([012])\]")
+_SCALES = re.compile(rb"(?m)^([tga])scale,([0-9.eE+-]+)")
+_GYROFLOW = {"t": "time [s]"} | _axes(gyro="g") | {f"a{axis}": f"accel_{axis} [g]" for axis in AXES}
+
+
+def with_dialect(layout: Layout, source: str, head: bytes) -> Layout:
+    """A layout with the units that a known exporter implies in its column names.
+
+    Betaflight (blackbox_decode): time in microseconds, gyros in deg/s, accelerometers in steps, of
+    which the preamble has the number per g. Sensor Logger: axes without the sensor, which is in the
+    name of the file, and time in nanoseconds. Gyroflow (gcsv): scales in the preamble. Xsens DOT:
+    a clock of 1 MHz, where MTi has 10 kHz. Kalibr, ulog2csv of PX4 and rostopic: units of time.
+    """
+    names, preamble = layout.names, head[: layout.offset]
+    if names[:1] == ("loopIteration",):
+        steps = _GRAVITY_IN_STEPS.search(preamble)
+        meant, scales = {"time": "time [us]", "time (us)": "time [us]"}, {}
+        for i, name in enumerate(names):
+            if found := _BLACKBOX_AXIS.fullmatch(name):
+                sensor, unit = ("gyro", " [deg/s]") if found[1] == "gyroADC" else ("accel", " [g]")
+                unit = unit if steps or sensor == "gyro" else ""
+                meant[name] = f"{sensor}_{AXES[int(found[2])]}{unit}"
+            if steps and name.startswith("accSmooth"):
+                scales[i] = 1.0 / max(int(steps[1]), 1)
+        return replace(_renamed(layout, meant), scales=scales)
+    if preamble.startswith(b"GYROFLOW IMU LOG"):
+        sizes = {letter.decode(): float(size) for letter, size in _SCALES.findall(preamble)}
+        meant = {name: new for name, new in _GYROFLOW.items() if name[0] in sizes}
+        scales = {i: sizes[name[0]] for i, name in enumerate(names) if name in meant}
+        return replace(_renamed(layout, meant), scales=scales)
+    if b"DOT" in preamble:
+        return _renamed(layout, {"SampleTimeFine": "time [us]"})
+    for meant in _RENAMED:
+        if set(meant) <= set(names):
+            return _renamed(layout, meant)
+    sensor = next((each for each in _UNITS if each in source.lower()), "")
+    if sensor and {*AXES, "seconds_elapsed"} <= set(names):
+        meant = {axis: f"{sensor}_{axis} [{_UNITS[sensor]}]" for axis in AXES}
+        layout = _renamed(layout, {**meant, "time": "time [ns]"})
+        if source.lower().startswith("accelerometer."):
+            return replace(layout, notices=(*layout.notices, notice("gravity-absent", "accel")))
+    return layout
+
+
+def _renamed(layout: Layout, meant: dict[str, str]) -> Layout:
+    return replace(layout, names=tuple(meant.get(name, name) for name in layout.names))
+
+
 @dataclass(frozen=True)
 class Layout:
-    """How to read a delimited text.
+    """How to read a delimited text."""
 
-    delimiter: One character; a space stands for runs of spaces and tabs.
-    decimal: {".", ","}.
-    names: Names of the columns, ``""`` where there is none.
-    tentative: Whether the names, if any, come from a comment line.
-    trailing: Whether every line of data ends with a delimiter.
-    offset: Bytes before the first line of data.
-    line: Number of that line, counted from 1.
-    scales: Index of a column -> factor of its numbers.
-    dates: Index of a column of dates -> whether they have a zone.
-    """
-
-    delimiter: str
-    decimal: str
-    names: tuple[str, ...]
-    tentative: bool
-    trailing: bool
-    offset: int
-    line: int
+    delimiter: str  # one character; a space stands for runs of spaces and tabs
+    decimal: str  # {".", ","}
+    names: tuple[str, ...]  # names of the columns, ``""`` where there is none
+    tentative: bool  # whether the names, if any, come from a comment line
+    trailing: bool  # whether every line of data ends with a delimiter
+    offset: int  # bytes before the first line of data
+    line: int  # number of that line, counted from 1
     notices: tuple[Notice, ...] = ()
+    # Index of a column -> factor of its numbers.
     scales: Mapping[int, float] = field(default_factory=dict)
+    # Index of a column of dates -> whether they have a zone.
     dates: Mapping[int, bool] = field(default_factory=dict)
 
     @property
@@ -65,12 +123,7 @@ class _Line:
 
 
 def find_layout(source: str, head: bytes) -> Layout:
-    """Find out how a text is laid out from its first lines.
-
-    source: Name of the file, for messages.
-    head: The beginning of the file, whole lines.
-    Raises InputError if this is not a text, has no data, or its header does not fit the data.
-    """
+    """How a text is laid out, from the whole lines at its beginning."""
     if head.startswith(_UTF16_MARKS):
         raise InputError(f"{source} is UTF-16 text: save it as UTF-8 or ASCII")
     if b"\0" in head:
@@ -126,25 +179,19 @@ def find_layout(source: str, head: bytes) -> Layout:
 
 def _first_lines(source: str, head: bytes) -> tuple[list[_Line], list[_Line]]:
     """Leading comments, and the lines from the first one that is not a comment."""
-    comments: list[_Line] = []
-    lines: list[_Line] = []
-    start = len(_UTF8_MARK) if head.startswith(_UTF8_MARK) else 0
-    preamble = 0
+    comments, lines = list[_Line](), list[_Line]()
+    start, preamble = len(_UTF8_MARK) if head.startswith(_UTF8_MARK) else 0, 0
     if _BLACKBOX.match(head, start):
         header = _BLACKBOX_HEADER.search(head, start)
         if header is None:
-            raise InputError(
-                f"{source} has the preamble of a blackbox log but no line that begins with "
-                "loopIteration: decode the log again"
-            )
+            text = f"{source} has the preamble of a blackbox log but no line that begins with"
+            raise InputError(f"{text} loopIteration: decode the log again")
         preamble = header.start()
     for i, found in enumerate(_LINE.finditer(head, start), start=1):
         raw = found.group().strip(b" \r\n")
-        if not raw.strip():
+        if not raw.strip() or found.start() < preamble:
             continue
         text = raw.decode(errors="replace")
-        if found.start() < preamble:
-            continue
         if lines or not text.startswith(_COMMENT_MARKS):
             if not lines and "\ufffd" in text and b"\xef\xbf\xbd" not in raw:
                 raise InputError(
@@ -193,9 +240,8 @@ def _delimiter(texts: Sequence[str]) -> str | None:
     if not counts[best]:
         return None
     # A single column has no delimiter; a comma then is the least surprising one.
-    if best == BLANKS and all(len(text.split()) == 1 for text in texts):
-        return ","
-    return best
+    is_single = best == BLANKS and all(len(text.split()) == 1 for text in texts)
+    return "," if is_single else best
 
 
 def _decimal(texts: Sequence[str], delimiter: str) -> str:
@@ -224,9 +270,8 @@ def _fields(source: str, line: _Line, delimiter: str, header: bool = False) -> l
     try:
         return (split_header if header else split_line)(line.text, delimiter)
     except ValueError as error:
-        raise InputError(
-            f"{source}, line {line.number}: quotes that do not match: correct the line"
-        ) from error
+        text = f"{source}, line {line.number}: quotes that do not match"
+        raise InputError(f"{text}: correct the line") from error
 
 
 def _without_last_empty(names: list[str], width: int) -> list[str]:

@@ -12,9 +12,7 @@ from typing import BinaryIO, cast
 
 from gmwm.errors import InputError
 
-BLOCK = 1 << 20
-"""Bytes read at once: large enough for speed, small beside the columns of a long recording."""
-
+BLOCK = 1 << 20  # bytes read at once
 _LONGEST_LINE = 1 << 20
 _GZIP_MAGIC = b"\x1f\x8b"
 _SIZE_AT_END = 4  # bytes of a gzip file, RFC 1952
@@ -31,17 +29,14 @@ def blocks(
 ) -> Iterator[tuple[int, bytes]]:
     r"""Iterate over a file's lines, many at a time.
 
-    Blank lines at the end of the file are left out, so that they need no care further on. A last
-    line without an end is a block by itself. Of a compression that is cut off, the whole lines
-    before that are given.
+    Blank lines at the end of the file are left out. A last line without an end is a block by
+    itself. If a compression is cut off, the whole lines before that are given.
 
     offset: Bytes (after decompression) to leave out at the beginning.
     line: Number of the line that begins there.
-    size: Bytes to read at once.
     say: Is told that the compression is cut off, and may raise an error.
-    Yields: line, number of the first line of the block, counted from 1; block, whole lines; ends
+    Yields: number of the first line of the block, counted from 1; the block, whole lines whose ends
         may be ``\n``, ``\r\n`` or ``\r``.
-    Raises InputError if the file cannot be read or its compression is damaged.
     """
     with _open(path) as stream:
         _, damage = _read(stream, offset, path.name)
@@ -49,7 +44,9 @@ def blocks(
         while fresh and not damage:
             fresh, damage = _read(stream, size, path.name)
             text += fresh
-            end = _end_of_content(text[: _end_of_last_line(text)])
+            # Lines may end in a bare \r; the last byte may be half of \r\n.
+            last = text.rfind(b"\n") + 1 or text.rfind(b"\r", 0, len(text) - 1) + 1
+            end = _end_of_content(text[:last])
             if end:
                 yield line, text[:end]
                 line += count_lines(text[:end])
@@ -83,12 +80,6 @@ def count_lines(text: bytes) -> int:
     return lines + text.count(b"\r") - text.count(b"\r\n") if b"\r" in text else lines
 
 
-def _end_of_last_line(text: bytes) -> int:
-    end = text.rfind(b"\n") + 1
-    # Only where lines end in a bare \r; the last byte may be half of \r\n.
-    return end or text.rfind(b"\r", 0, len(text) - 1) + 1
-
-
 def _end_of_content(text: bytes) -> int:
     content = len(text.rstrip(_BLANK))
     if not content:
@@ -113,17 +104,14 @@ def _open(path: Path) -> BinaryIO:
         return cast(BinaryIO, gzip.open(path, "rb"))
     if magic and path.suffix.lower() == ".gz":
         stream.close()
-        raise InputError(
-            f"{path.name} is not a gzip file although its name ends in .gz: "
-            "compress it with gzip, or remove .gz from its name"
-        )
+        hint = "compress it with gzip, or remove .gz from its name"
+        raise InputError(f"{path.name} is not a gzip file although its name ends in .gz: {hint}")
     return stream
 
 
 def _read(stream: BinaryIO, size: int, name: str) -> tuple[bytes, str]:
     """Bytes, and what is wrong if the compression ends with them."""
-    parts = list[bytes]()
-    damage = ""
+    parts, damage = list[bytes](), ""
     try:
         # A piece at a time: what was unpacked before an error is there.
         while size > 0 and (part := cast(io.BufferedReader, stream).read1(size)):

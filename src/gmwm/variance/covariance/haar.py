@@ -25,10 +25,56 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from gmwm._core.compiled import compiled
 from gmwm._core.typing import FloatArray, IntArray
 from gmwm.process import PSD, Panels, evaluated, haar_gain, in_hertz, quadrature, resolved_share
-from gmwm.variance.covariance.haar_kernels import lag_sums
 from gmwm.variance.covariance.lags import LagGrid, block_of, block_spectrum
+
+
+@compiled(fastmath={"reassoc", "contract"})
+def lag_sums(
+    once: FloatArray, averaging: IntArray, zero: FloatArray, counts: FloatArray, weights: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Sums over the lags of covariances and their squares, for each pair of levels, (L, L).
+
+    The gain of a Haar filter over its phase is (1 - cos(2 pi m f)) / (2 m sin(pi f)), so that a
+    covariance is a second difference over the averaging time m of the coarser level.
+
+    once: (L, size), covariances by lag of a level with that of which it is the second difference,
+        one period.
+    averaging: (L,) of int, averaging times, rising, in lags.
+    zero: (L, L), what the bin at zero frequency adds, which no difference shows.
+    counts: (L, L, H), weights of the lags from zero on, of those that there are.
+    weights: (H,), of all of them.
+    Returns: mean (L, L), sum of covariances times counts; above the diagonal, as are the others;
+        square, whole (L, L), sums of their squares, times counts and times weights.
+    """
+    levels, size = once.shape
+    lags, longest = weights.size, averaging[-1]
+    shape = (levels, levels)
+    mean, square, whole = np.zeros(shape), np.zeros(shape), np.zeros(shape)
+    around = np.empty(lags + 2 * longest)
+    middle = around[longest : longest + lags]
+    for j in range(levels):
+        at = -longest % size
+        for h in range(around.size):
+            around[h] = once[j, at]
+            at = at + 1 if at + 1 < size else 0
+        for k in range(j, levels):
+            m = averaging[k]
+            # Slices: an index that might be negative is looked at before each use.
+            later = around[longest + m : longest + m + lags]
+            earlier = around[longest - m : longest - m + lags]
+            scale, own = 0.5 / m, counts[j, k]
+            plain, squared, total = 0.0, 0.0, 0.0
+            for h in range(lags):
+                value = scale * (middle[h] - 0.5 * (later[h] + earlier[h])) + zero[j, k]
+                plain += own[h] * value
+                squared += own[h] * value * value
+                total += weights[h] * value * value
+            mean[j, k], square[j, k], whole[j, k] = plain, squared, total
+    return mean, square, whole
+
 
 # Mean of sin^4(x) sin^4(2^s x) over x, less the square of the mean of sin^4(x), for s = 0 and 1.
 _MEAN_PRODUCT_EXCESS = {0: 35.0 / 128.0 - 9.0 / 64.0, 1: 7.0 / 64.0 - 9.0 / 64.0}

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog
 
-from gmwm.filter_numbers.spectra.least_sum import least_sum
+from gmwm.filter_numbers.spectra.dominance import least_sum
 
 
 @pytest.mark.parametrize("m", [2, 3, 4])

@@ -14,8 +14,7 @@ from gmwm.ins.filter.filter import Filter, InitialSd
 from gmwm.ins.imu.emulation import emulate
 from gmwm.ins.imu.sensors import SensorModels
 from gmwm.ins.simulation.filter_errors import GROUPS
-from gmwm.ins.simulation.scenario import Scenario, Simulated
-from gmwm.ins.simulation.trials import monte_carlo
+from gmwm.ins.simulation.trials import Scenario, Simulated, monte_carlo
 from gmwm.ins.trajectory.missions import car_drive, fixed_wing_loiter, helicopter_mapping
 
 DT = 0.05

@@ -10,14 +10,13 @@ from gmwm.ins.covariance import reduction
 from gmwm.ins.covariance.analysis import Course, covariance_analysis
 from gmwm.ins.covariance.reduction import (
     FORMS,
+    loiter_with_outages,
     read_off,
     reduce,
-    with_outages,
 )
 from gmwm.ins.filter.aiding import Outage, gnss
 from gmwm.ins.imu.sensors import AXES, SensorModels
-from gmwm.ins.simulation.scenario import Scenario, Simulated
-from gmwm.ins.simulation.trials import monte_carlo
+from gmwm.ins.simulation.trials import Scenario, Simulated, monte_carlo
 from gmwm.ins.trajectory.missions import car_drive, fixed_wing_loiter
 
 DT = 0.1
@@ -136,7 +135,7 @@ def test_the_motion_that_it_is_judged_on_is_reported_or_given(monkeypatch):
     assert str(assumed.notices[0]) in " ".join(str(assumed).split())
     drive = car_drive(duration=130.0, dt=DT)
     given = reduce(WALK, "N+K", (5.0,), trajectory=drive)
-    own = with_outages((5.0,), drive)
+    own = loiter_with_outages((5.0,), trajectory=drive)
     assert own.trajectory is drive
     assert given.notices == ()
     full = covariance_analysis(own, WALK, WALK)

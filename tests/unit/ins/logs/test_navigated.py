@@ -10,7 +10,6 @@ import pytest
 import yaml
 
 from gmwm import Calibration, Channel, WhiteNoise, fit
-from gmwm._core.notices import Notice
 from gmwm.errors import InputError
 from gmwm.ins import Measured, Navigated, Outage, car_drive, emulate, fixed_wing_loiter, gnss
 from gmwm.ins.filter import KINDS
@@ -18,6 +17,7 @@ from gmwm.ins.geometry import ned_difference
 from gmwm.ins.imu import AXES
 from gmwm.ins.logs.replay import innovation_sizes
 from gmwm.ins.spec import sensor_models
+from gmwm.issues import Notice
 
 RATE, START = 10.0, 1000.0
 SENSORS = {

@@ -14,8 +14,13 @@ from gmwm.ins.geometry import (
 )
 from gmwm.ins.imu import Imu
 from gmwm.ins.logs import standstills, steady, tuning
-from gmwm.ins.logs.attitude import attitude_in_motion, gyrocompass, heading_from_course, turned
-from gmwm.ins.logs.steadiness import velocity_at_rest
+from gmwm.ins.logs.attitude import (
+    attitude_in_motion,
+    gyrocompass,
+    heading_from_course,
+    turned,
+    velocity_at_rest,
+)
 
 DT = 0.1
 LLA = np.array([0.8, 0.2, 300.0])

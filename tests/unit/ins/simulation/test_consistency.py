@@ -14,7 +14,7 @@ from statsmodels.stats.proportion import proportion_confint
 
 from gmwm.ins import Consistency, FilterErrors, at_epoch, innovation_test, over_time
 from gmwm.ins.simulation import GROUPS, chi_square_ratio, mean_ratio
-from gmwm.ins.simulation.consistency import LEVELS, coverage_at_epoch
+from gmwm.ins.simulation.consistency import LEVELS, coverage_of
 from marks import slow
 
 SIZES = {name: part.stop - part.start for name, part in GROUPS.items()} | {"sensors": 6}
@@ -123,7 +123,7 @@ def test_interval_of_coverage_is_honest_whatever_the_correlation_of_components(s
     standard = np.sqrt(correlation) * common + np.sqrt(1.0 - correlation) * rng.standard_normal(
         (draws, runs, size)
     )
-    found = [coverage_at_epoch(each[:, None]) for each in standard]
+    found = [coverage_of(each[:, None], single=True) for each in standard]
     for i in range(len(LEVELS)):
         assert np.mean([each[i].within for each in found]) >= least(draws, 0.95)
 
@@ -209,7 +209,7 @@ def test_interval_of_coverage_is_that_of_clopper_and_pearson(runs, data):
     inside = data.draw(st.integers(0, runs))
     standard = np.where(np.arange(runs) < inside, 0.0, 99.0)[:, None]
     expected = proportion_confint(inside, runs, 0.05, "beta")
-    for coverage in coverage_at_epoch(standard[:, None]):
+    for coverage in coverage_of(standard[:, None], single=True):
         assert coverage.fraction == pytest.approx(inside / runs)
         np.testing.assert_allclose([coverage.lower, coverage.upper], expected, atol=1e-12)
 

@@ -3,7 +3,7 @@ import pytest
 from scipy.interpolate import CubicSpline
 
 from gmwm.ins.trajectory import unwrapped_angles
-from gmwm.ins.trajectory.splines import smoothed
+from gmwm.ins.trajectory.trajectory import smoothed
 
 
 def test_smoothing_keeps_cubics_and_slow_waves() -> None:

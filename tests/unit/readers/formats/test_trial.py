@@ -10,10 +10,9 @@ import scipy.io
 
 import gmwm
 from gmwm import InputError
-from gmwm.readers.formats import trial
+from gmwm.readers.formats import hdf5 as trial
 from gmwm.readers.formats.arrays import ArrayTable, array_of
-from gmwm.readers.formats.hdf5 import read_mat
-from gmwm.readers.formats.trial import tried
+from gmwm.readers.formats.hdf5 import read_mat, tried
 
 X = np.random.default_rng(1).normal(size=100)
 OF_MATLAB = Path(scipy.io.__file__).parent / "matlab" / "tests" / "data"
@@ -83,7 +82,7 @@ def test_a_process_that_ends_is_a_damaged_file(file):
 
 @pytest.mark.skipif(os.name != "posix", reason="needs limits")
 def test_a_process_that_reads_on_is_a_damaged_file(file, monkeypatch):
-    begin = "from gmwm.readers.formats import trial; trial._SECONDS = 1; trial.answer()"
+    begin = "from gmwm.readers.formats import hdf5 as trial; trial._SECONDS = 1; trial.answer()"
     monkeypatch.setattr(trial, "_PROGRAM", begin)
     with pytest.raises(InputError, match=r"a\.mat is damaged"):
         tried(goes_on, file)

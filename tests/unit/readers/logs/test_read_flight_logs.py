@@ -22,7 +22,7 @@ from flight_logs import (
     write_dataflash,
     write_ulog,
 )
-from gmwm.readers.logs import dataflash
+from gmwm.readers.logs import ardupilot
 from gmwm.readers.names import CANONICAL
 
 
@@ -258,7 +258,7 @@ def test_messages_are_those_that_pymavlink_finds(tmp_path, monkeypatch):
         (m.TimeUS, m.I, m.GyrX, m.AccZ) for m in iter(log.recv_msg, None) if m.fmt.name == "IMU"
     ]
     log.filehandle.close()
-    monkeypatch.setattr(dataflash, "_BLOCK", 1000)
-    parts = list(dataflash.messages(path, ("IMU", "GYR")))
+    monkeypatch.setattr(ardupilot, "_BLOCK", 1000)
+    parts = list(ardupilot.messages(path, ("IMU", "GYR")))
     ours = [tuple(row) for part in parts for row in part.rows[["TimeUS", "I", "GyrX", "AccZ"]]]
     assert len(parts) > 10 and len(ours) > 390 and ours == found

@@ -5,7 +5,7 @@ import pytest
 
 import gmwm
 from gmwm import GaussMarkov, WhiteNoise
-from gmwm.variance.covariance.empirical import data_covariance
+from gmwm.variance.series import covariance_of_data
 
 MODEL = WhiteNoise(1.0) + GaussMarkov(0.5, 20.0)
 
@@ -22,7 +22,7 @@ def test_it_is_the_sum_over_all_lags_of_squared_covariances(n):
     coefficients = levels(n)
     size = coefficients[0].size
     padded = [np.pad(w, (0, size - w.size)) for w in coefficients]
-    found = data_covariance(coefficients, max(c.size for c in coefficients))
+    found = covariance_of_data(coefficients, max(c.size for c in coefficients))
     for j, a in enumerate(padded):
         for k, b in enumerate(padded):
             m_j, m_k = coefficients[j].size, coefficients[k].size
@@ -52,7 +52,7 @@ def test_its_mean_is_the_covariance_of_the_estimates(window):
 @pytest.mark.parametrize("window", ["none", "octave"])
 @pytest.mark.parametrize("n", [40, 1000, 1023])
 def test_it_is_positive_semidefinite(window, n):
-    found = data_covariance(levels(n), n, window)
+    found = covariance_of_data(levels(n), n, window)
     np.testing.assert_allclose(found, found.T)
     assert np.linalg.eigvalsh(found)[0] > -1e-12 * np.trace(found)
 
