@@ -410,7 +410,7 @@ def test_figures_hold_data_model_and_components(parsed, calibration):
     for fit, figure in zip(calibration.fits.values(), parsed.figures(), strict=True):
         traces = {trace["name"]: trace for trace in figure["data"]}
         positive = [label for label, curve in fit.components.items() if np.any(curve > 0.0)]
-        filtered, marks = "filter: N and K", "N at 1 s, 0.664 B at the floor, K at 3 s"
+        filtered, marks = "filter: N and K", "N at 1 s, 0.664 B at the lowest point, K at 3 s"
         assert list(traces) == [*positive, "model", DATA, filtered, marks]
         scale = {"gyro": 180.0 / np.pi * 3600.0, "accel": 1.0 / 9.80665e-6, None: 1.0}
         factor = scale[fit.wv.quantity]
@@ -502,7 +502,7 @@ def test_models_that_tie_and_the_data_sheet_are_drawn(calibration, tmp_path):
 @pytest.mark.parametrize(
     ("text", "what"),
     [
-        ("gyro: {N: 1.2}", "no number with a unit"),
+        ("gyro: {N: 1.2}", "not a number with a unit"),
         ("gyro: {N: 1.2 ug}", "does not measure"),
         ("gyro: {N: -1 deg/sqrt(h)}", "not positive"),
         ("gyro: {Z: 1 deg}", "is not one of N, B, K"),

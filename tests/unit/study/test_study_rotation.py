@@ -181,6 +181,6 @@ def test_what_cannot_be_rotated_is_refused(tmp_path):
     with pytest.raises(InputError, match="two recordings or more"):
         rotate("car", [recording(1)], tmp_path)
     given = [recording(1), recording(2, axes=AXES[:5], n=100)]
-    with pytest.raises(InputError, match="no channel accel_z"):
+    with pytest.raises(InputError, match="channel accel_z is missing"):
         reproduce_rotation("fig9", tmp_path, runs=2, seed=0, jobs=1, recordings=given, resume=False)
     assert list(tmp_path.iterdir()) == []
