@@ -328,7 +328,7 @@ def test_the_error_budget_is_in_the_report(parsed, calibration):
         assert [cell.startswith("≈") for cell in row[1:5]] == [t > np.radians(10) for t in tilt]
         assert row[5] == "m"
         assert re.fullmatch(r"gyro_x .*, \d+ %", row[6])
-    head = next(row for row in parsed.cells if row[0] == "error after coasting for (1 sigma)")
+    head = next(row for row in parsed.cells if row[0] == "error after an outage of (1 sigma)")
     assert head[1:5] == ["1 s", "10 s", "60 s", "600 s"]
 
 
