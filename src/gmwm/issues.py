@@ -777,7 +777,8 @@ _POPULATION = (
 )  # fmt: skip
 
 _STUDY = (
-    Issue("no-line", "{text}", topic="navigation"),
+    Issue("no-line", "{axes}: the Allan plot has neither a floor nor a slope of +1/2; its lowest "
+          "point gives a Gauss-Markov process", topic="navigation"),
 )  # fmt: skip
 
 CATALOGUE: Mapping[str, Issue] = _catalogue(

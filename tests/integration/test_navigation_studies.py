@@ -16,6 +16,7 @@ from gmwm.ins import (
     SensorModels,
     Simulated,
     at_epoch,
+    covariance_analysis,
     difference,
     gnss,
     helicopter_mapping,
@@ -24,7 +25,6 @@ from gmwm.ins import (
     over_time,
     spread,
 )
-from gmwm.ins.covariance.analysis import covariance_analysis
 from gmwm.ins.simulation import GROUPS
 from gmwm.ins.simulation.filter_errors import sizes
 

@@ -40,10 +40,10 @@ def report(run, file, tmp_path, monkeypatch):
 
 def test_what_is_found_and_taken_off(report):
     text, _ = report()
-    assert "Trust gyro_y, accel_z ; not gyro_x : the bias stepped ." in text
+    assert "Usable axes gyro_y, accel_z ; not gyro_x : the bias stepped ." in text
     assert re.search(r"severe gyro_x A step of .*? --remove-departures", text)
     text, _ = report("--remove-departures")
-    assert "Healthy, with care : departures from noise taken off (gyro_x)" in text
+    assert "Healthy, with care : departures from noise subtracted (gyro_x)" in text
     assert re.search(r"Notes .*?gyro_x A step of .*? \(taken off", text)
     assert "not valid" not in text
     assert "calibrate static.csv" not in text  # the command has the path that was given
@@ -54,11 +54,11 @@ def test_a_data_sheet_and_an_exported_file(report, tmp_path):
     (tmp_path / "sheet.yaml").write_text("gyro: {N: 0.3 deg/sqrt(h), B: 7 deg/h}\n")
     text, page = report("--datasheet", "sheet.yaml", "--export", "kalibr", "--leave", "all")
     assert "data sheet : sheet.yaml" in text
-    ratios = re.findall(r"Data sheet: N 0\.3 deg/sqrt\(h\) \(measured (\S+) times that\)", text)
+    ratios = re.findall(r"Data sheet: N 0\.3 deg/sqrt\(h\) \(measured: (\S+) times\)", text)
     assert list(map(float, ratios)) == pytest.approx([2.0, 2.0], rel=0.1)  # 0.1 deg/s at 100 Hz
     assert page.count('"name":"data sheet"') == 2
     # Nothing is looked for, and what is copied is what was written.
-    assert "The recording was not examined." in text
+    assert "The recording was not checked for defects." in text
     written = (tmp_path / "out" / "imu.yaml").read_text()
     copied = re.findall("<pre[^>]*>(.*?)</pre>", page, flags=re.DOTALL)
     assert written in map(html.unescape, copied)

@@ -6,7 +6,7 @@ import hashlib
 import json
 import shlex
 import sys
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -125,17 +125,9 @@ def calibrate(
       gmwm calibrate a.csv b.csv --rate 100 --gyro-unit deg/s --accel-unit g
       gmwm calibrate static.bag --export kalibr -o out
     """
-    from gmwm._core.memory import held, limited
-
-    with limited(memory):
-        on_disk = held() * (1 << 30) / _ARRAYS
-    if any(file.is_file() and _LARGE < file.stat().st_size < on_disk for file in files):
-        from gmwm._core.jobs import extra_workers, worker_pool
-
-        # Started first, so that it has imported what it needs when there is work for it.
-        others = worker_pool(extra_workers(jobs, _CHANNELS), "gmwm.estimate:compile_search")
-        click.get_current_context().with_resource(others)
+    _start_workers(files, jobs, memory)
     from gmwm._core.files import folder_to_fill, replaceable
+    from gmwm._core.memory import limited
     from gmwm.calibration import SCREENING, Stopwatch, calibrate as run, stage
     from gmwm.report import read_datasheet
 
@@ -149,26 +141,18 @@ def calibrate(
     with folder_to_fill(output) as folder, Stopwatch().running() as watch:
         with stage("read"), limited(memory):
             recordings = [read_recording(file, **reading) for file in files]
-        names = dict.fromkeys(c.name for each in recordings for c in each.inertial)
-        model = models_of_channels(given, tuple(names))
-        if datasheet is not None:  # what is wrong with it is known before the work
-            quantities = {c.name: c.quantity or "" for each in recordings for c in each.inertial}
+        quantities = {c.name: c.quantity or "" for each in recordings for c in each.inertial}
+        model = models_of_channels(given, tuple(quantities))
+        if datasheet is not None:  # rejected before the work
             read_datasheet(datasheet, quantities)
         with nullcontext() if quiet else progress_bar("calibrating", "channels") as bar:
             if bar is not None:
-                bar(0, len(names), "being examined")
+                bar(0, len(quantities), "being examined")
             chosen = () if "all" in left else [name for name in SCREENING if name not in left]
-            result = run(
-                recordings,
-                model,
-                screening=chosen,
-                still=not everything,
-                remove_departures=remove_departures,
-                jobs=jobs,
-                progress=bar,
-            )
+            how: dict[str, Any] = {"still": not everything, "remove_departures": remove_departures}
+            result = run(recordings, model, screening=chosen, jobs=jobs, progress=bar, **how)
         # The files first: who pipes the table into head must not lose them.
-        origin = {"command": _command()} | _hashes(files)
+        origin = {"command": shlex.join(["gmwm", *sys.argv[1:]])} | _hashes(files)
         own = recordings[0] if len(recordings) == 1 else None
         written = write_files(result, folder, own, datasheet, origin, target)
     if as_json:
@@ -178,9 +162,27 @@ def calibrate(
         click.echo(written)
     if timings:
         _show_timings(watch, jobs)
-    if not any(fit.valid for fit in result.values()):
-        click.echo("gmwm: no channel has a valid model, for the reasons in the report", err=True)
+    exit_unless(any(fit.valid for fit in result.values()), "channel")
+
+
+def exit_unless(valid: bool, what: str) -> None:
+    """End with the status for no valid model."""
+    if not valid:
+        click.echo(f"gmwm: no {what} has a valid model, see the report", err=True)
         click.get_current_context().exit(NONE_VALID)
+
+
+def _start_workers(files: Sequence[Path], jobs: int, memory: float | None) -> None:
+    """Start another process for a large file, so that it has done its imports when needed."""
+    from gmwm._core.memory import held, limited
+
+    with limited(memory):
+        on_disk = held() * (1 << 30) / _ARRAYS
+    if any(file.is_file() and _LARGE < file.stat().st_size < on_disk for file in files):
+        from gmwm._core.jobs import extra_workers, worker_pool
+
+        others = worker_pool(extra_workers(jobs, _CHANNELS), "gmwm.estimate:compile_search")
+        click.get_current_context().with_resource(others)
 
 
 def _show_timings(watch: Stopwatch, jobs: int) -> None:
@@ -268,11 +270,6 @@ def _cells(row: Estimate) -> tuple[str, str, str, str]:
     return row.key, f"{usual.value:.4g}", interval, usual.unit
 
 
-def _command() -> str:
-    """The command line, as one would write it again."""
-    return shlex.join(["gmwm", *sys.argv[1:]])
-
-
 def _hashes(files: Iterable[Path]) -> dict[str, str]:
     """Of each file, and of those in a folder, as a bag is one."""
     found = {}
@@ -312,8 +309,8 @@ def write_files(
                 with stage("exports"):
                     export(shown, "kalibr", path=new / "imu.yaml")
                 names.append("imu.yaml")
-                horizon = f"{TARGETS['kalibr'].horizon:g} s without aiding"
-                lines = [f"imu.yaml has N and K for {horizon}; gmwm export --horizon S for others"]
+                horizon = f"{TARGETS['kalibr'].horizon:g} s"
+                lines = [f"imu.yaml: N and K for outages up to {horizon}; others: gmwm export"]
             except InputError as error:
                 lines = [f"no imu.yaml: {error}"]  # the other files are no worse for it
     kalibr = folder / "imu.yaml"

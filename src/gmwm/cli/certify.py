@@ -45,7 +45,7 @@ _SI = {
     "Random walk in use, with -N, rad/s^2/sqrt(Hz) and m/s^3/sqrt(Hz).",
     name="walk",
 )
-@option("--outages T,T,...", "Times without aiding in seconds.", default="10,60")
+@option("--outages T,T,...", "Lengths of outages in seconds.", default="10,60")
 @option("--keyframe S", "Interval of keyframes or scans in seconds.", default=1.0)
 @option(
     "--motion NAME",
@@ -81,7 +81,7 @@ def certify(
     """Predict how consistent a filter is with the numbers in use.
 
     FILE is a calibration.json, taken for the truth. True errors beside those that the filter
-    believes, for free inertial growth, an INS/GNSS filter in outages and relative poses between
+    predicts, for free inertial growth, an INS/GNSS filter in outages and relative poses between
     keyframes; then what N and K have to cover, cause by cause.
 
     \b

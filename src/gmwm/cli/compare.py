@@ -29,9 +29,7 @@ if TYPE_CHECKING:
 @click.command()
 @click.argument("files", metavar="FILE FILE...", nargs=-1, required=True, type=PATH)
 @output_file("Page to write, of two printed ones.", "HTML")
-@option(
-    "--horizon S", "Time without aiding that the filter numbers are for, in seconds.", default=60.0
-)
+@option("--horizon S", "Longest outage that the filter numbers cover, in seconds.", default=60.0)
 @option(
     "--datasheet YAML",
     "N, B and K by sensor or channel, each with its unit, to be drawn over the curves "
@@ -64,7 +62,7 @@ def compare(
     from gmwm.population import compare as run, labelled
     from gmwm.report import read_datasheet
 
-    if datasheet is not None:  # what is wrong with it is known before the work
+    if datasheet is not None:  # rejected before the work
         read_datasheet(datasheet)
     calibrations = [_calibration(file, reading, quiet) for file in files]
     if datasheet is not None:

@@ -15,7 +15,7 @@ from gmwm.errors import InputError
 @option("--to NAME", "The program; see --list.", name="target")
 @option(
     "--horizon T",
-    "Time without aiding that the numbers are for, in seconds; by default 1 (keyframes,"
+    "Longest outage that the numbers cover, in seconds; by default 1 (keyframes,"
     " scans) or 60, see --list.",
     type=float,
 )
@@ -34,7 +34,7 @@ def export(
 
     FILE is a calibration.json, or numbers that gmwm bound or gmwm reduce saved. Several files make
     one IMU, such as gyros and accelerometers of different rates. The numbers of a calibration are
-    the smallest that are never too optimistic for its error models; comments say what they are.
+    the smallest that are not overconfident for its error models; comments explain them.
 
     \b
     Examples:

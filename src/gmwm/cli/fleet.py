@@ -10,7 +10,7 @@ from typing import Any
 
 import click
 
-from gmwm.cli.calibrate import NONE_VALID
+from gmwm.cli.calibrate import exit_unless
 from gmwm.cli.console import progress_bar
 from gmwm.cli.hints import with_hint
 from gmwm.cli.options import (
@@ -34,9 +34,7 @@ from gmwm.cli.options import (
     "Dask scheduler that does the work, e.g. tcp://10.0.0.1:8786; its workers read the files.",
 )
 @option("--resume", "Go on with what the folder holds; what changed is done again.")
-@option(
-    "--horizon S", "Time without aiding in seconds that N and K of a filter are for.", default=60.0
-)
+@option("--horizon S", "Longest outage that filter N and K cover, in seconds.", default=60.0)
 @reading_options
 @part_options
 @estimating_options
@@ -110,6 +108,4 @@ def fleet(
         reason = with_hint(InputError(first.text, first.code))
         count = "1 file" if len(found.failed) == 1 else f"{len(found.failed)} files"
         click.echo(f"gmwm: {count} cannot be used; the first: {reason}", err=True)
-    if not found.valid:
-        click.echo("gmwm: no unit has a valid model, for the reasons in the report", err=True)
-        click.get_current_context().exit(NONE_VALID)
+    exit_unless(bool(found.valid), "unit")

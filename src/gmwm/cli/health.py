@@ -34,7 +34,7 @@ def health(
     quiet: bool,
     **reading: Any,
 ) -> None:
-    """Find what is wrong with a recording before it is calibrated.
+    """Find defects of a recording before it is calibrated.
 
     Motion, gaps, dead and stuck channels, saturation, spikes and shocks, rounding, periodic lines,
     resonances, drift, changes of the noise, dependence between channels; worst first, with what

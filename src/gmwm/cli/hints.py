@@ -29,7 +29,7 @@ HINTS = {
     "other-runs": "-o FOLDER",
     "output": "{first}choose another place with -o",
     "rate": "--rate 100",
-    "rate-contradicted": "leave out the rate to use that of the stamps, or add --time none",
+    "rate-contradicted": "leave out the rate to use the stamps, or add --time none",
     "runs-in-use": "-o FOLDER",
     "sensor-absent": "record them too, or calibrate the rest alone, --channels {sensor}",
     "time-unit": "--rate {rate:.6g}, or name the column {column}",

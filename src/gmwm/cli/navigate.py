@@ -143,7 +143,7 @@ def _named(option: str, texts: tuple[str, ...]) -> dict[str, str]:
 )
 @option(
     "--filter NAME=FILE",
-    "A filter and the calibration.json that it believes; 'truth' for the true models; "
+    "A filter and its calibration.json; 'truth' for the true models; "
     "repeat. The others are compared with the first.",
     name="filters",
     multiple=True,
@@ -278,7 +278,7 @@ def navigate(
     content: dict[str, Any] = {} if file is None else read_document(file)
     content |= given
     folder = Path() if file is None else file.parent
-    # Where options were given too, what is wrong may be theirs.
+    # With options, an error may be theirs.
     place = None if given else file
     reading = {
         name: each
@@ -313,7 +313,7 @@ def navigate(
 
 @contextmanager
 def _named_in_messages(file: Path | None) -> Iterator[None]:
-    """The file of a study before what is wrong with it."""
+    """Put the file of a study before its errors."""
     try:
         yield
     except InputError as error:

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 units_option = option(
     "--units",
-    "Units of what is printed; files and JSON are in SI.",
+    "Units of the table; files and JSON are in SI.",
     type=click.Choice(["field", "si"]),
     default="field",
 )
@@ -53,7 +53,7 @@ def _tau(text: str | None) -> float | str | None:
 @_number_options
 @option(
     "--horizon S",
-    "Time without aiding in seconds; of relative poses, the interval of keyframes.",
+    "Longest outage in seconds; for relative poses, the interval of keyframes.",
     default=60.0,
 )
 @option(
@@ -81,7 +81,7 @@ def bound(file: Path, horizon: float, level: float | None, **options: Any) -> No
 @_number_options
 @option(
     "--outages T,T,...",
-    "Times without aiding that the numbers are for, in seconds.",
+    "Lengths of outages in seconds.",
     default="10,30,60",
 )
 @option(
@@ -118,7 +118,7 @@ def reduce(file: Path, outages: str, keyframe: float | None, **options: Any) -> 
     "slow ones are, as after aiding.",
 )
 def budget(file: Path, times: str, unknown_start: bool) -> None:
-    """Predict the error growth of unaided navigation.
+    """Predict the error growth in outages.
 
     FILE is a calibration.json. For each term of each channel's model: attitude (deg), velocity
     (m/s) and position (m) errors, 1 sigma, after coasting level and without manoeuvres from exact

@@ -67,7 +67,7 @@ def together(*options: Callable[[Any], Any]) -> Callable[[Any], Any]:
 
 
 def output_file(text: str, metavar: str = "FILE") -> Callable[[Any], Any]:
-    """The option of a file to write, which is refused before any work if it cannot be."""
+    """The option of a file to write; a path that cannot be written is rejected before any work."""
 
     def checked(_: click.Context, __: click.Parameter, path: Path | None) -> Path | None:
         from gmwm._core.files import writable_file
@@ -78,7 +78,7 @@ def output_file(text: str, metavar: str = "FILE") -> Callable[[Any], Any]:
 
 
 def output_folder(default: str, text: str, names: Sequence[str] = ()) -> Callable[[Any], Any]:
-    """The option of a folder to fill with files of some names, which is refused likewise."""
+    """The option of a folder to fill with files of these names, checked likewise."""
 
     def checked(_: click.Context, __: click.Parameter, path: Path) -> Path:
         from gmwm._core.files import writable_folder
@@ -115,8 +115,8 @@ reading_options = together(
     ),
     option(
         "--damaged",
-        "Use what is left of a text or a flight log that is cut off or damaged in places;"
-        " it is refused otherwise.",
+        "Use the readable part of a text or a flight log that is cut off or damaged;"
+        " it is rejected otherwise.",
     ),
 )
 """What the file is, for `read_recording`."""
@@ -140,8 +140,8 @@ part_options = together(
         "Only these channels: gyro_x,accel_z, or gyro for all of them.",
         name="only",
     ),
-    option("--start S", "Leave out what is before this time, in seconds.", type=float),
-    option("--stop S", "Leave out what is after this time, in seconds.", type=float),
+    option("--start S", "Leave out samples before this time, in seconds.", type=float),
+    option("--stop S", "Leave out samples after this time, in seconds.", type=float),
 )
 """Topics, channels and a stretch, for `read_recording`."""
 
@@ -200,34 +200,22 @@ def read_recording(
     return recording.part(0.0 if start is None else start, stop)
 
 
-def arguments_of_read(
-    rate: float | None,
-    gyro_unit: str | None,
-    accel_unit: str | None,
-    channels: tuple[str, ...],
-    time_column: str | None,
-    form: str | None = None,
-    layout: str | None = None,
-    damaged: bool = False,
-    topics: tuple[str, ...] = (),
-    clock: str = CLOCKS[0],
-    only: str | None = None,
-) -> dict[str, Any]:
-    """What `gmwm.read` is given for the options.
+def arguments_of_read(**options: Any) -> dict[str, Any]:
+    """Arguments of `gmwm.read` for `reading_options` and, where there are some, `part_options`.
 
     Raises InputError if an option cannot be used.
     """
-    units = {k: v for k, v in (("gyro", gyro_unit), ("accel", accel_unit)) if v is not None}
+    units = {kind: options[f"{kind}_unit"] for kind in ("gyro", "accel")}
     return {
-        "rate": rate,
-        "units": units,
-        "channels": _chosen(roles(channels), only),
-        "time": time_reference(time_column),
-        "layout": layout,
-        "topic": topics,
-        "clock": clock,
-        "format": form,
-    } | ({"damaged": True} if damaged else {})
+        "rate": options["rate"],
+        "units": {kind: unit for kind, unit in units.items() if unit is not None},
+        "channels": _chosen(roles(options["channels"]), options.get("only")),
+        "time": time_reference(options["time_column"]),
+        "layout": options.get("layout"),
+        "topic": options.get("topics", ()),
+        "clock": options.get("clock", CLOCKS[0]),
+        "format": options.get("form"),
+    } | ({"damaged": True} if options.get("damaged") else {})
 
 
 def _chosen(
@@ -299,7 +287,7 @@ def written_models(texts: Sequence[str]) -> dict[str, Model]:
 def models_of_channels(
     given: Mapping[str, Model], channels: Sequence[str]
 ) -> dict[str, Model] | None:
-    """The model of each channel: its own, else that of its sensor, else that of all.
+    """The model of each channel: its own, its sensor's, or the one for all.
 
     given: See `written_models`.
     Returns: None if nothing is given.
@@ -321,7 +309,7 @@ def models_of_channels(
 
 
 def _model(text: str) -> Model:
-    """A model, all parameters of which are free.
+    """A model with free parameters.
 
     Raises InputError if it is none.
     """
@@ -333,7 +321,7 @@ def _model(text: str) -> Model:
         found = _TERM.fullmatch(part)
         if found is None or found[2] not in kinds:
             raise InputError(
-                f"--model {text}: {part.strip()!r} is no term: write {_terms()} with +, "
+                f"--model {text}: {part.strip()!r} is not a term: write {_terms()} with +, "
                 "e.g. --model 'N + K + 2 GM'"
             )
         terms += [kinds[found[2]]() for _ in range(int(found[1] or 1))]

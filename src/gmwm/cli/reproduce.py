@@ -87,7 +87,7 @@ def reproduce(
 ) -> None:
     """Repeat an experiment of the paper, or our own harder one.
 
-    The paper is that of Stebler and others (2012).
+    The paper is Stebler and others (2012).
 
     table2, table3 and table4 print errors (root mean square, relative, over the Cramer-Rao
     bound), coverage of the 95 % intervals and the paper's own errors; fig2, fig3 and fig4 draw
@@ -95,7 +95,7 @@ def reproduce(
     shows the bias of lines in the Allan plot; weights2, weights3 and weights4 compare weights and
     wavelets of the method of moments; selection counts how often the true model is chosen. fig5
     and fig6 show one gyro with lines and with the fitted model; fig7 and fig8 navigate a
-    helicopter, fig9 a car, with GNSS outages, by filters that believe different calibrations.
+    helicopter, fig9 a car, with GNSS outages, by filters with different calibrations.
     Times are in seconds, rates in 1/s. Raw estimates are kept in Parquet.
 
     \b
@@ -130,33 +130,28 @@ def reproduce(
         with folder_to_fill(output) as folder:
             _alone(experiment, folder, runs, seed, processes)
         return
-    from gmwm.study import FIGURES, STUDIES, run_study
+    with folder_to_fill(output) as folder:
+        work: dict[str, Any] = {"jobs": processes, "resume": resume, "cluster": cluster}
+        _simulated(experiment, folder, seed, runs=runs, methods=methods or None, **work)
+
+
+def _simulated(experiment: str, folder: Path, seed: int, *, runs: int | None, **work: Any) -> None:
+    """Tables and boxplots of simulated series."""
+    from gmwm.study import FIGURES, STUDIES, boxplots, run_study
 
     study = FIGURES.get(experiment) or STUDIES[experiment]
-    with folder_to_fill(output) as folder:
-        try:
-            with progress_bar(study.name, "runs") as bar:
-                table = run_study(
-                    study,
-                    folder,
-                    runs=runs or study.runs,
-                    seed=seed,
-                    methods=methods or None,
-                    jobs=processes,
-                    resume=resume,
-                    cluster=cluster,
-                    progress=bar,
-                )
-        except KeyboardInterrupt:
-            click.echo(f"finished runs are kept in {folder}: add --resume to go on", err=True)
-            raise
-        written = [_raw(experiment, table, folder)]
-        if experiment in FIGURES:
-            from gmwm.study import boxplots
-
-            written += boxplots(study, table, folder / experiment)
-        else:
-            written += _tables(study, table, seed, folder)
+    try:
+        with progress_bar(study.name, "runs") as bar:
+            count = runs or study.runs
+            table = run_study(study, folder, runs=count, seed=seed, progress=bar, **work)
+    except KeyboardInterrupt:
+        click.echo(f"finished runs are kept in {folder}: add --resume to go on", err=True)
+        raise
+    written = [_raw(experiment, table, folder)]
+    if experiment in FIGURES:
+        written += boxplots(study, table, folder / experiment)
+    else:
+        written += _tables(study, table, seed, folder)
     click.echo("\n".join(f"wrote {path}" for path in written))
 
 
@@ -217,7 +212,7 @@ def _navigated(
             text, paths = run(experiment, folder, recordings=recordings, progress=bar, **options)
     except KeyboardInterrupt:
         if rotate:
-            click.echo(f"what is done is kept in {folder}: add --resume to go on", err=True)
+            click.echo(f"finished work is kept in {folder}: add --resume to go on", err=True)
         raise
     click.echo(text)
     click.echo("\n" + "\n".join(f"wrote {path}" for path in paths))

@@ -6,7 +6,7 @@ Every function draws into given axes or new ones and returns them; none knows wh
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -52,7 +52,12 @@ def deviation(
     """
     ax = ax or _new_axes(4.6)
     bars = np.stack([np.maximum(value - lower, 0.0), np.maximum(upper - value, 0.0)])
-    style = {"color": DATA_COLOUR, "markersize": 4.5, "capsize": 2.5, "elinewidth": 1.0}
+    style: dict[str, Any] = {
+        "color": DATA_COLOUR,
+        "markersize": 4.5,
+        "capsize": 2.5,
+        "elinewidth": 1.0,
+    }
     ax.errorbar(tau, value, bars, fmt="o", label=f"data, {interval} interval", zorder=4, **style)
     _label(ax, f"Allan deviation [{unit}]", title)
     return ax

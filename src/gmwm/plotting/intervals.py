@@ -27,8 +27,10 @@ def intervals(
     from matplotlib.ticker import FormatStrFormatter, LogLocator, NullFormatter
 
     names = max((list(rows) for rows in panels.values()), key=len)
-    size, grid = (4.4 * len(panels), 1.2 + 0.38 * len(names)), {"squeeze": False, "sharey": True}
-    figure, axes = plt.subplots(1, len(panels), figsize=size, layout="constrained", **grid)
+    size = 4.4 * len(panels), 1.2 + 0.38 * len(names)
+    figure, axes = plt.subplots(
+        1, len(panels), figsize=size, layout="constrained", squeeze=False, sharey=True
+    )
     axes[0, 0].set_yticks(range(len(names)), names)
     axes[0, 0].set_ylim(len(names) - 0.5, -0.5)
     for ax, (title, rows) in zip(axes[0], panels.items(), strict=True):

@@ -200,8 +200,8 @@ def _map(ax: Axes) -> None:
 def _legend_above(figure: Figure, ax: Axes, title: str | None = None) -> None:
     """Of one panel, where it hides none."""
     handles, labels = ax.get_legend_handles_labels()
-    style = {"fontsize": "x-small", "title_fontsize": "x-small", "loc": "outside upper center"}
-    figure.legend(handles, labels, ncols=4, title=title, **style)
+    style: dict[str, Any] = {"fontsize": "x-small", "title_fontsize": "x-small", "ncols": 4}
+    figure.legend(handles, labels, title=title, loc="outside upper center", **style)
 
 
 def _plain(ax: Axes) -> None:

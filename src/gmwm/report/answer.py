@@ -1,4 +1,4 @@
-"""The first screen: what an engineer came for, axis by axis."""
+"""The first screen: health, filter numbers, length and the axes."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def answer(calibration: Calibration, numbers: Mapping[float, Certified]) -> dict
 
 
 def _causes(calibration: Calibration) -> dict[str, list[str]]:
-    """Why fits are not valid -> of which channels."""
+    """Reason why a fit is not valid -> its channels."""
     causes: dict[str, list[str]] = {}
     for name, fit in calibration.items():
         if not fit.valid:
@@ -59,10 +59,10 @@ def verdict(calibration: Calibration) -> dict[str, str]:
     removed = dict.fromkeys(n.where for n in found if n.values.get("removed"))
     causes = _causes(calibration)
     parts = [f"{', '.join(names)} not valid: {cause}" for cause, names in causes.items()]
-    parts += [f"{', '.join(calibration.skipped)} without a model"] if calibration.skipped else []
+    parts += [f"{', '.join(calibration.skipped)} have no model"] if calibration.skipped else []
     others = [_counted(found, severity, calibration) for severity in ("bad", "warning")]
     if removed:
-        others.append(f"departures from noise taken off ({', '.join(removed)})")
+        others.append(f"departures from noise subtracted ({', '.join(removed)})")
     text, rest = ("; ".join(filter(None, each)) for each in ([*parts, *others], others))
     if is_severe or causes or calibration.skipped:
         all_out = not any(fit.valid for fit in calibration.values())
@@ -73,12 +73,12 @@ def verdict(calibration: Calibration) -> dict[str, str]:
         return {"state": "care", "word": "Not examined", "text": text, "rest": text}
     if text:
         return {"state": "care", "word": "Healthy, with care", "text": text, "rest": text}
-    text = "nothing was found that spoils the estimates"
+    text = "no defect found"
     return {"state": "good", "word": "Healthy", "text": text, "rest": text}
 
 
 def _counted(notices: Sequence[Notice], severity: str, channels: Iterable[str]) -> str:
-    """How many of a severity, and where: in which channels, of which parameters or not."""
+    """Number of notices of a severity, and their channels."""
     texts = ", ".join(each.where for each in notices if each.severity == severity).split(", ")
     places = (next((c for c in channels if f"{text} ".startswith(f"{c} ")), text) for text in texts)
     where = ", ".join(filter(None, dict.fromkeys(places)))
@@ -97,9 +97,12 @@ def trust(name: str, fit: Fit, calibration: Calibration) -> tuple[bool, str]:
     fits = "fits the data"
     if at.worst is not None:
         share = per_cent(abs(at.worst[0]))
-        fits = f"fits within {share} up to {at.known_to:.3g} s"
+        fits = f"within {share} of the data up to {brief(at.known_to, 2)} s"
     tied = next((n for n in calibration.notices if n.code == AMBIGUITY and n.where == name), None)
-    return True, f"{fits}, {tied.values.get('models', 2):g} models fit alike" if tied else fits
+    return (
+        True,
+        f"{fits}, {tied.values.get('models', 2):g} models fit equally well" if tied else fits,
+    )
 
 
 def quantity_text(value: float, unit: str, fit: Fit) -> dict[str, str]:
@@ -167,11 +170,17 @@ def _numbers(found: Axis | Triad, upper: Collection[str], fit: Fit) -> dict[str,
 
 
 def _box(numbers: Certified, calibration: Calibration) -> dict[str, Any]:
-    """What a filter should believe for one time without aiding."""
+    """Filter numbers for one length of outages."""
     horizon, axes = numbers.horizon, numbers.axes
     covered = {
         name: [n.text for n in axis.notices if n.code in _COVERS] for name, axis in axes.items()
     }
+    nees = {t.quantity: list((t.shared_nees or {}).values()) for t in numbers.triads}
+    shared = [(name, _consistency(each, horizon)) for name, each in nees.items()]
+    single = [
+        (name, "; ".join([_consistency([axis.nees], horizon), *covered[name]]))
+        for name, axis in axes.items()
+    ]
     return {
         "horizon": f"{horizon:g}",
         "shown": horizon == SHOWN,
@@ -183,16 +192,7 @@ def _box(numbers: Certified, calibration: Calibration) -> dict[str, Any]:
         "texts": numbers.texts,
         "problem": numbers.problem,
         "notes": numbers.notes,
-        "about": [
-            *(
-                (triad.quantity, _consistency(list((triad.shared_nees or {}).values()), horizon))
-                for triad in numbers.triads
-            ),
-            *(
-                (name, "; ".join([_consistency([axis.nees], horizon), *covered[name]]))
-                for name, axis in axes.items()
-            ),
-        ],
+        "about": [*shared, *single],
     }
 
 
@@ -201,9 +201,9 @@ def _of_all_axes(triad: Triad, calibration: Calibration) -> dict[str, Any]:
     names = [axis.name for axis in triad.axes]
     valid = [name for name in names if calibration[name].valid]
     invalid = [name for name in names if name not in valid]
-    use = f"provisional for {', '.join(invalid)} (not valid)" if invalid else ""
+    use = f"do not use {', '.join(invalid)} yet" if invalid else ""
     if use and valid:
-        use = f"safe for {', '.join(valid)}, {use}"
+        use = f"use for {', '.join(valid)}; {use}"
     upper = [letter for letter in "NK" if triad.is_upper(letter)]
     return {
         "name": triad.quantity,
@@ -213,14 +213,14 @@ def _of_all_axes(triad: Triad, calibration: Calibration) -> dict[str, Any]:
 
 
 def filter_sentence(calibration: Calibration) -> str:
-    """What a filter should believe of the sensors; empty without gyros and accelerometers."""
+    """Filter numbers of both sensors; empty without gyros and accelerometers."""
     parts = []
     for triad in certified(calibration, (SHOWN,))[SHOWN].triads:
         found = _of_all_axes(triad, calibration)
         use = f" ({found['use']})" if found["use"] else ""
         parts.append(f"{found['name']} N {found['N']['si']}, K {found['K']['si']}{use}")
     text = "; ".join(parts)
-    return text and f"Filter, for up to {SHOWN:g} s without aiding: {text}."
+    return text and f"N and K for outages up to {SHOWN:g} s: {text}."
 
 
 def _consistency(found: Sequence[Mapping[float, float]], time: float) -> str:

@@ -1,4 +1,4 @@
-"""What the models mean for navigation: the error budget in words, tables and a figure."""
+"""The error budget in words, tables and a figure."""
 
 from __future__ import annotations
 
@@ -52,10 +52,10 @@ def navigation(calibration: Calibration) -> dict[str, Any] | None:
         "sentence": _sentence(known, unknown),
         "starts": [
             (
-                "The slow errors are known at the start, as after a filter with aiding",
+                "Slow errors known at the start, as after aiding",
                 _rows(known, invalid),
             ),
-            ("Nothing is known of the errors at the start", _rows(unknown, invalid)),
+            ("Slow errors unknown at the start", _rows(unknown, invalid)),
         ],
         "parts": _parts(known, invalid),
         "notes": known.notes,
@@ -111,7 +111,7 @@ def _parts(budget: ErrorBudget, invalid: Set[str]) -> list[dict[str, Any]]:
 
 
 def _sentence(known: ErrorBudget, unknown: ErrorBudget) -> str:
-    """The headline: what a minute without aiding costs."""
+    """The headline: errors after a minute without aiding."""
     if HORIZONTAL not in known.groups or _COASTING not in known.times:
         return ""
     at = known.times.index(_COASTING)
@@ -125,8 +125,7 @@ def _sentence(known: ErrorBudget, unknown: ErrorBudget) -> str:
         )
 
     return (
-        "A minute without aiding from exact attitude, velocity and position costs "
-        f"{lost(known)} (1 sigma) if the slow errors are known when it begins, and "
-        f"{lost(unknown)} if nothing is known of them. After fixes, which leave errors of "
-        "attitude and velocity, it costs more: gmwm certify."
+        "After a 60 s outage from exact attitude, velocity and position the errors are "
+        f"{lost(known)} (1 sigma) if the slow errors are known at its start, and {lost(unknown)} "
+        "if they are unknown. After fixes they are larger: use gmwm certify."
     )

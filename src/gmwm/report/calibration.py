@@ -1,4 +1,4 @@
-"""The page: what is shown, in which order, and in which words."""
+"""The page of a calibration: its content, in order."""
 
 from __future__ import annotations
 
@@ -70,10 +70,7 @@ def write_report(
     provenance : mapping of str to str, optional
         What else is known of where the numbers come from: commands, hashes of files.
 
-    Raises
-    ------
-    InputError
-        If the file cannot be written, or the data sheet not be read.
+    Raises InputError if the file cannot be written, or the data sheet not be read.
     """
     path = writable_file(path)
     text = page(calibration, recording, datasheet=datasheet, provenance=provenance)
@@ -121,7 +118,7 @@ def fragment(calibration: Calibration) -> str:
     """The answer for a notebook: health, a filter's numbers, length, and the axes as a table."""
     found = verdict(calibration)
     believed = filter_sentence(calibration)
-    heads = ("channel", "model", "total white noise", "B", "slow terms", "")
+    heads = ("channel", "model", "N", "B", "slow terms", "")
     head = f"<tr>{''.join(f'<th>{each}</th>' for each in heads)}</tr>"
     rows = []
     for name, fit in calibration.items():
@@ -148,7 +145,7 @@ def fragment(calibration: Calibration) -> str:
 def _side_by_side(
     calibration: Calibration, recording: Recording | None
 ) -> tuple[dict[float, Certified], dict[str, dict[str, Any]]]:
-    """What a filter should believe, and the figures of the samples: what takes longest."""
+    """Filter numbers and figures of the samples, which take longest."""
     believed = partial(certified, calibration)
     samples = {} if recording is None else recording
     drawn = {
@@ -166,10 +163,8 @@ def _side_by_side(
 def _of_samples(fit: Fit, channel: Channel | None, spans: Spans) -> dict[str, Any]:
     if channel is None:
         return {"density": None, "series": None}
-    return {
-        "density": density_figure(fit, channel, spans),
-        "series": series_figure(fit, channel, spans),
-    }
+    drawn = {"density": density_figure, "series": series_figure}
+    return {name: draw(fit, channel, spans) for name, draw in drawn.items()}
 
 
 def _channel(
@@ -180,12 +175,12 @@ def _channel(
     own = numbers.axes.get(name)
     believed = (own.N, own.K) if own is not None else None
     is_valid, why = trust(name, fit, calibration)
+    rivals = calibration.rivals.get(name, ())
+    # A small misfit is in the line below the title already.
+    shown = [n for n in fit.notices if (n.code, n.severity) != ("misfit", "note")]
     return {
         "name": name,
-        # A misfit that the intervals allow for is in the line below the title, and not twice.
-        "notices": worst_first(
-            [n for n in fit.notices if (n.code, n.severity) != ("misfit", "note")]
-        ),
+        "notices": worst_first(shown),
         "model": fit.model.title(),
         "valid": is_valid,
         "why": why,
@@ -194,12 +189,7 @@ def _channel(
         "ambiguity": ambiguity(calibration, name),
         "stated": _stated(name, fit, sheet),
         "rows": [_row(each, lengths.get(each.key), duration) for each in fit.estimates],
-        "figure": deviation_figure(
-            fit,
-            filter_numbers=believed,
-            rivals=calibration.rivals.get(name, ()),
-            sheet=sheet,
-        ),
+        "figure": deviation_figure(fit, filter_numbers=believed, rivals=rivals, sheet=sheet),
         "sliders": _sliders(fit, believed),
         "residuals": residual_figure(fit),
         "left_out": sum(stop - start for start, stop in calibration.left_out.get(name, ())),
@@ -214,8 +204,8 @@ def _noise(fit: Fit, number: float) -> str:
         return ""
     text = quantity_text(number, "u/sqrt(Hz)", fit)["field"]
     return (
-        f"The filter's N for {SHOWN:g} s, {text}, covers slower terms too; N of the table of "
-        "parameters is that of one term."
+        f"Filter N for {SHOWN:g} s is {text}: it covers slower terms too. N in the table below "
+        "belongs to one term."
     )
 
 
@@ -252,7 +242,7 @@ def _stated(name: str, fit: Fit, sheet: Datasheet | None) -> str:
     for key, value in values.items():
         text = f"{key} {quantity_text(value, units[key], fit)['field']}"
         if measured[key] > 0.0:
-            text += f" (measured {brief(measured[key] / value, 3)} times that)"
+            text += f" (measured: {brief(measured[key] / value, 3)} times)"
         parts.append(text)
     return f"Data sheet: {', '.join(parts)}."
 
@@ -262,7 +252,7 @@ def _fitness(fit: Fit) -> str:
     if fit.p_value == fit.p_value:
         text += f", p = {fit.p_value_allowed:.2g}"
     if fit.discrepancy > 0.0:
-        text += f" if the model may be off by {per_cent(fit.discrepancy)} of the variance"
+        text += f" with a model error of {per_cent(fit.discrepancy)} of the variance"
     return "; ".join(part for part in (text, fit.goodness.sentence) if part)
 
 
@@ -271,7 +261,7 @@ def _row(estimate: Estimate, length: float | None, duration: float) -> dict[str,
 
     def cell(value: float, low: float, high: float, unit: str) -> dict[str, str]:
         if estimate.kind == "bound":
-            return {"value": f"< {brief(high, 4)}", "interval": "upper bound, 95 %", "unit": unit}
+            return {"value": f"< {brief(high, 4)}", "interval": "95 % upper limit", "unit": unit}
         if estimate.kind == "estimated":
             interval = f"{brief(low, 4)} to {brief(high, 4)}"
             return {"value": brief(value, 4), "interval": interval, "unit": unit}

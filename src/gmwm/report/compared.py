@@ -52,10 +52,7 @@ def write_sensor_comparison_report(
     provenance : mapping of str to str, optional
         What else is known of where the numbers come from.
 
-    Raises
-    ------
-    InputError
-        If the file cannot be written, or the data sheet not be read.
+    Raises InputError if the file cannot be written, or the data sheet not be read.
     """
     path, sheet = writable_file(path), None
     if datasheet is not None:

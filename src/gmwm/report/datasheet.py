@@ -22,7 +22,7 @@ _TERMS: dict[str, tuple[str, type[Process]]] = {
     "K": ("u/s/sqrt(Hz)", RandomWalk),
 }
 _VALUE = re.compile(r"\s*([-+.\deE]+)\s+(\S.*?)\s*")
-_MEND = "write it like 'N: 0.15 deg/sqrt(h)', 'B: 7 deg/h'"
+_HINT = "write it like 'N: 0.15 deg/sqrt(h)', 'B: 7 deg/h'"
 
 
 @dataclass(frozen=True)
@@ -62,18 +62,15 @@ def read_datasheet(
     channels : dict of str to str, optional
         Channel name -> quantity. Without them a name may be of any axis, such as gyro_x.
 
-    Raises
-    ------
-    InputError
-        If it cannot be read or has anything else.
+    Raises InputError if it cannot be read or has anything else.
     """
     try:
         content = yaml.safe_load(Path(path).read_text(encoding="utf-8"))
     except Exception as error:  # PyYAML raises a dozen types for values of a wrong tag
         what = " ".join(str(error).split())[:200]
-        raise InputError(f"{path}: cannot be read as YAML ({what}): {_MEND}") from None
+        raise InputError(f"{path}: cannot be read as YAML ({what}): {_HINT}") from None
     if not isinstance(content, dict) or not content:
-        raise InputError(f"{path}: holds no sensors: begin with 'gyro:' or 'accel:', and {_MEND}")
+        raise InputError(f"{path}: holds no sensors: begin with 'gyro:' or 'accel:', and {_HINT}")
     if channels is None:
         kinds = {name: str(name).partition("_")[0] for name in content}
         channels = {name: kind for name, kind in kinds.items() if kind in SI_UNIT}
@@ -82,11 +79,11 @@ def read_datasheet(
     for name, values in content.items():
         if not isinstance(name, str) or name not in known:
             raise InputError(
-                f"{path}: {str(name)[:40]!r} is no sensor of the recording: there are "
+                f"{path}: {str(name)[:40]!r} is not a sensor of the recording; there are "
                 f"{', '.join(known)}"
             )
         if not isinstance(values, dict):
-            raise InputError(f"{path}: {name} has no numbers: {_MEND}")
+            raise InputError(f"{path}: {name} has no numbers: {_HINT}")
         entries[name] = {
             str(key): _value(f"{path}: {name}", key, value, known[name])
             for key, value in values.items()
@@ -96,7 +93,7 @@ def read_datasheet(
 
 def _value(where: str, key: Any, value: Any, quantity: str) -> float:
     if key not in _TERMS:
-        raise InputError(f"{where}: {str(key)[:40]!r} is not one of {', '.join(_TERMS)}: {_MEND}")
+        raise InputError(f"{where}: {str(key)[:40]!r} is not one of {', '.join(_TERMS)}: {_HINT}")
     found = _VALUE.fullmatch(value) if isinstance(value, str) else None
     try:
         if found is None:
@@ -104,7 +101,7 @@ def _value(where: str, key: Any, value: Any, quantity: str) -> float:
         number = float(found[1])
     except ValueError:
         raise InputError(
-            f"{where}: {key} = {str(value)[:40]!r} is no number with a unit: {_MEND}"
+            f"{where}: {key} = {str(value)[:40]!r} is not a number with a unit: {_HINT}"
         ) from None
     unit = si_parameter_unit(_TERMS[key][0], quantity)
     si = number * factor(found[2], unit)

@@ -66,16 +66,9 @@ def overview_figure(calibration: Calibration, quantity: str | None) -> Figure:
         seen += [total, value]
     low, high = deviation_range(np.concatenate(seen))
     ends = np.concatenate([fit.wv.tau for fit in fits.values()])
-    return _figure(
-        traces,
-        {
-            "height": 300,
-            "xaxis": _times(np.sort(ends)),
-            "yaxis": {**_axis(units[0][0]), "range": [np.log10(2.0 * low), np.log10(high)]},
-        },
-        units=units,
-        toggles=range(0, len(traces), 2),
-    )
+    deviations = _axis(units[0][0], 2.0 * low, high)
+    layout = {"height": 300, "xaxis": _times(np.sort(ends)), "yaxis": deviations}
+    return _figure(traces, layout, units=units, toggles=range(0, len(traces), 2))
 
 
 def deviation_figure(
@@ -85,7 +78,7 @@ def deviation_figure(
     rivals: Sequence[Model] = (),
     sheet: Datasheet | None = None,
 ) -> Figure:
-    """Allan deviation of the data with intervals, model, terms, and what a filter believes.
+    """Allan deviation of the data with intervals, model, terms, and the filter numbers.
 
     filter_numbers: (float, float), n and K of the curve that the sliders move, SI.
     rivals: That describe the data as well: drawn faintly.
@@ -93,21 +86,12 @@ def deviation_figure(
     wv, factor = fitted.wv, per_si("u", fitted)
     tau, components = dense_curves(fitted)
     total = root_sum(list(components.values()))
-    traces = [
-        {
-            **_line(
-                at,
-                factor * root_sum(list(parts.values())),
-                "other models that fit alike",
-                "#777777",
-                "solid",
-                1.0,
-            ),
-            "opacity": 0.85,
-            "legendgroup": "ties",
-        }
-        for at, parts in (dense_curves(fitted, rival) for rival in rivals)
-    ]
+    traces = []
+    for rival in rivals:
+        at, parts = dense_curves(fitted, rival)
+        curve, name = factor * root_sum(list(parts.values())), "models that fit equally well"
+        faint = _line(at, curve, name, "#777777", "solid", 1.0)
+        traces.append({**faint, "opacity": 0.85, "legendgroup": "ties"})
     toggles = [0] if traces else []
     for (label, curve), colour in zip(components.items(), _colours(len(components)), strict=True):
         if np.any(curve > 0.0):
@@ -121,17 +105,9 @@ def deviation_figure(
     traces.append(_line(tau, factor * total, "model", SUM_COLOUR, "solid", 2.2))
     value = factor * wv.allan_deviation
     toggles.append(len(traces))
-    traces.append(
-        {
-            **_points(wv.tau, value, f"data, {100.0 * wv.confidence:g} % interval", DATA_COLOUR, 6),
-            "error_y": _bars(
-                value,
-                factor * np.sqrt(2.0 * wv.lower),
-                factor * np.sqrt(2.0 * wv.upper),
-                DATA_COLOUR,
-            ),
-        }
-    )
+    low, high = factor * np.sqrt(2.0 * wv.lower), factor * np.sqrt(2.0 * wv.upper)
+    points = _points(wv.tau, value, f"data, {100.0 * wv.confidence:g} % interval", DATA_COLOUR, 6)
+    traces.append({**points, "error_y": _bars(value, low, high, DATA_COLOUR)})
     more: Figure = {}
     if filter_numbers is not None:
         more["whatif"] = {"curve": WHATIF, "factor": factor}
@@ -140,16 +116,11 @@ def deviation_figure(
         believed = factor * np.sqrt(N**2 / tau + K**2 * tau / 3.0)
         traces.append(_line(tau, believed, WHATIF, _FILTER, "dot", 2.4))
     traces.append(_marks(fitted, filter_numbers, factor))
-    low, high = deviation_range(np.concatenate([factor * total, value]))
-    marks = [y for y in traces[-1]["y"] if y > low / _BELOW]
+    bottom, top = deviation_range(np.concatenate([factor * total, value]))
+    marks = [0.7 * y for y in traces[-1]["y"] if y > bottom / _BELOW]
     units = _units("Allan deviation", "u", fitted)
-    layout = {
-        "xaxis": _times(wv.tau),
-        "yaxis": {
-            **_axis(units[0][0]),
-            "range": [np.log10(min([low, *(0.7 * y for y in marks)])), np.log10(high)],
-        },
-    }
+    deviations = _axis(units[0][0], min([bottom, *marks]), top)
+    layout = {"xaxis": _times(wv.tau), "yaxis": deviations}
     return _figure(traces, layout, units=units, toggles=toggles, **more)
 
 
@@ -163,7 +134,7 @@ def _marks(fitted: Fit, numbers: tuple[float, float] | None, factor: float) -> F
     return {
         "type": "scatter",
         "mode": "markers+text",
-        "name": "N at 1 s, 0.664 B at the floor, K at 3 s",
+        "name": "N at 1 s, 0.664 B at the lowest point, K at 3 s",
         "x": [each[1] for each in shown],
         "y": [float(f"{each[2]:.5g}") for each in shown],
         "text": [each[0] for each in shown],
@@ -189,47 +160,31 @@ def residual_figure(fitted: Fit) -> Figure:
     well = np.maximum(np.abs(low), np.abs(high))[at.dof[shown] > 30.0]
     reach = float(min(1.15 * np.max([5.0, *well, *np.abs(misfit)]), _SHARE))
     inside = np.abs(misfit) <= reach
-    points = {
-        **_points(
-            at.tau[shown],
-            np.clip(misfit, -0.96 * reach, 0.96 * reach),
-            "data over model",
-            COMPONENT_COLOURS[0],
-            7,
-        ),
-        "error_y": _bars(misfit, low, high, COMPONENT_COLOURS[0]),
-        "customdata": [
-            [float(f"{value:.4g}") for value in row]
-            for row in zip(misfit, at.residual[shown], at.dof[shown], strict=True)
-        ],
+    clipped, colour = np.clip(misfit, -0.96 * reach, 0.96 * reach), COMPONENT_COLOURS[0]
+    points = _points(at.tau[shown], clipped, "data over model", colour, 7)
+    rows = zip(misfit, at.residual[shown], at.dof[shown], strict=True)
+    points |= {
+        "mode": "markers+text",
+        "text": ["" if ok else f"{x:+.0f} %" for ok, x in zip(inside, misfit, strict=True)],
+        "textposition": "middle left",
+        "error_y": _bars(misfit, low, high, colour),
+        "customdata": [[float(f"{value:.4g}") for value in row] for row in rows],
         "hovertemplate": "%{x:.4g} s: deviation %{customdata[0]:+.2g} % off the model, "
         "%{customdata[1]:+.2f} standard errors, %{customdata[2]:.3g} degrees of freedom"
         "<extra></extra>",
     }
-    points["mode"] = "markers+text"
-    points["text"] = [
-        "" if ok else f"{value:+.0f} %" for ok, value in zip(inside, misfit, strict=True)
-    ]
-    points["textposition"] = "middle left"
     points["marker"]["symbol"] = [
         "circle" if ok else "triangle-up" if value > 0.0 else "triangle-down"
         for ok, value in zip(inside, misfit, strict=True)
     ]
-    layout = {
-        "height": 190,
-        "xaxis": _times(at.tau),
-        "yaxis": {
-            **_linear("data less model [%]"),
-            "range": [-reach, reach],
-            "zeroline": True,
-            "zerolinecolor": SUM_COLOUR,
-        },
-    }
+    zero = {"range": [-reach, reach], "zeroline": True, "zerolinecolor": SUM_COLOUR}
+    shares = {**_linear("data - model [%]"), **zero}
+    layout = {"height": 190, "xaxis": _times(at.tau), "yaxis": shares}
     return _figure([points], layout)
 
 
 def density_figure(fitted: Fit, channel: Channel, spans: Spans) -> Figure:
-    """Root of the spectral density of the samples, with that of the model and of its terms."""
+    """Square root of the spectral density: samples, model and its terms."""
     factor = per_si("u/sqrt(Hz)", fitted)
     frequency, root = density(channel, spans)
     traces = [_line(frequency, factor * root, "data", "#7f8c99", "solid", 1.2)]
@@ -252,14 +207,8 @@ def density_figure(fitted: Fit, channel: Channel, spans: Spans) -> Figure:
         traces.append(_line(grid, factor * total, "model", SUM_COLOUR, "solid", 2.0))
     units = _units("density", "u/sqrt(Hz)", fitted)
     known = root[root > 0.0]
-    layout = {
-        "height": 300,
-        "xaxis": _axis("frequency [Hz]"),
-        "yaxis": {
-            **_axis(units[0][0]),
-            "range": [np.log10(0.4 * factor * known.min()), np.log10(2.5 * factor * known.max())],
-        },
-    }
+    densities = _axis(units[0][0], 0.4 * factor * known.min(), 2.5 * factor * known.max())
+    layout = {"height": 300, "xaxis": _axis("frequency [Hz]"), "yaxis": densities}
     return _figure(traces, layout, units=units, toggles=toggles)
 
 
@@ -269,46 +218,31 @@ def series_figure(fitted: Fit, channel: Channel, spans: Spans) -> Figure:
     end = channel.n * channel.dt
     unit, scale = ("h", 3600.0) if end > 7200.0 else ("min", 60.0) if end > 600.0 else ("s", 1.0)
     time = found.time / scale
-    edge = {"type": "scatter", "mode": "lines", "x": _plain(time), "hoverinfo": "skip"}
+    edge: Figure = {"type": "scatter", "mode": "lines", "x": _plain(time), "hoverinfo": "skip"}
+    edge |= {"line": {"width": 0}}
+    low, high = _plain(factor * found.low), _plain(factor * found.high)
+    filled = {"fill": "tonexty", "fillcolor": "rgba(0,114,178,0.35)"}
+    mean = _line(time, factor * found.mean, "mean of the bin", SUM_COLOUR, "solid", 1.2)
     traces: list[Figure] = [
-        {**edge, "name": "smallest", "y": _plain(factor * found.low), "line": {"width": 0}},
-        {
-            **edge,
-            "name": "largest",
-            "y": _plain(factor * found.high),
-            "line": {"width": 0},
-            "fill": "tonexty",
-            "fillcolor": "rgba(0,114,178,0.35)",
-        },
-        {
-            **_line(time, factor * found.mean, "mean of the bin", SUM_COLOUR, "solid", 1.2),
-            "hovertemplate": f"%{{y:.4g}} at %{{x:.4g}} {unit}<extra></extra>",
-        },
+        {**edge, "name": "smallest", "y": low},
+        {**edge, "name": "largest", "y": high, **filled},
+        {**mean, "hovertemplate": f"%{{y:.4g}} at %{{x:.4g}} {unit}<extra></extra>"},
     ]
-    units = _units("signal less mean", "u", fitted)
+    units = _units("signal - mean", "u", fitted)
+    mark = {"type": "rect", "yref": "paper", "y0": _TICK, "y1": 1, "line": {"width": 0}}
+    mark |= {"fillcolor": "#d55e00"}
+    spans_out = [(first / scale, last / scale) for first, last in found.left_out[:500]]
     layout = {
         "height": 220,
         "xaxis": _linear(f"time [{unit}]"),
         "yaxis": _linear(units[0][0]),
-        "shapes": [
-            {
-                "type": "rect",
-                "yref": "paper",
-                "y0": _TICK,
-                "y1": 1,
-                "x0": first / scale,
-                "x1": last / scale,
-                "fillcolor": "#d55e00",
-                "line": {"width": 0},
-            }
-            for first, last in found.left_out[:500]
-        ],
+        "shapes": [{**mark, "x0": first, "x1": last} for first, last in spans_out],
     }
     return _figure(traces, layout, units=units)
 
 
 def growth_figure(known: ErrorBudget, unknown: ErrorBudget, of: str, quantity: str) -> Figure:
-    """Growth of an error with coasting time: its parts, their total, and that of unknown starts."""
+    """Growth of an error in an outage: parts, total, and total for unknown slow errors."""
     unit, times = FIELD_UNITS[quantity], np.array(known.grid)
     curves = known.curves(of, quantity)
     traces = [
@@ -325,7 +259,7 @@ def growth_figure(known: ErrorBudget, unknown: ErrorBudget, of: str, quantity: s
     title = f"{of} {quantity} [{unit}]"
     layout = {
         "height": 280,
-        "xaxis": _axis("coasting time [s]") | {"tickvals": known.times, "minor": {}},
+        "xaxis": _axis("outage [s]") | {"tickvals": known.times, "minor": {}},
         "yaxis": _axis(title[0].upper() + title[1:]) | {"dtick": 2},
     }
     return _figure(traces, layout, toggles=range(len(traces)))
@@ -413,15 +347,12 @@ def _times(tau: FloatArray) -> Figure:
     return {**_axis("averaging time [s]"), "range": ends.tolist()}
 
 
-def _axis(title: str) -> Figure:
-    return {
-        **_linear(title),
-        "type": "log",
-        "exponentformat": "power",
-        "dtick": 1,
-        "ticks": "outside",
-        "minor": {"ticks": "outside", "ticklen": 3},
-    }
+def _axis(title: str, low: float | None = None, high: float = 1.0) -> Figure:
+    """A logarithmic axis, between two values where they are given."""
+    minor = {"ticks": "outside", "ticklen": 3}
+    style = {"type": "log", "exponentformat": "power", "dtick": 1, "ticks": "outside"}
+    ends = {} if low is None else {"range": [float(np.log10(low)), float(np.log10(high))]}
+    return {**_linear(title), **style, "minor": minor, **ends}
 
 
 def _linear(title: str) -> Figure:

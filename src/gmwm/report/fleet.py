@@ -28,9 +28,9 @@ from gmwm.report.page import origin, write_page
 from gmwm.report.text import duration_text
 
 _TITLES = {
-    "filter_N": "N for a filter",
-    "filter_K": "K for a filter",
-    "floor_B": "B at the lowest point",
+    "filter_N": "filter N",
+    "filter_K": "filter K",
+    "floor_B": "bias instability B",
 }
 _MOSTLY = 0.5  # of the variance between units, which longer recordings would make less
 _MOST_NAMED = 12  # units in a line of text
@@ -44,10 +44,7 @@ _FARTHEST = 3.0  # a limit beyond so many times the largest value is not drawn
 def write_fleet_report(fleet: Fleet, path: str | os.PathLike[str]) -> Path:
     """Write the report of a fleet as one HTML file that needs no network.
 
-    Raises
-    ------
-    InputError
-        If the file cannot be written.
+    Raises InputError if the file cannot be written.
     """
     path = writable_file(path)
     return write_page(
@@ -104,7 +101,7 @@ def _verdict(fleet: Fleet) -> dict[str, str]:
         parts.append(f"{len(fleet.failed)} could not be calibrated")
     apart = {outlier.device for each in fleet.spreads for outlier in each.outliers}
     if apart:
-        parts.append(f"{len(apart)} {'stand' if len(apart) > 1 else 'stands'} apart")
+        parts.append(f"{len(apart)} {'outliers' if len(apart) > 1 else 'outlier'}")
     if not fleet.valid:
         return {"state": "bad", "word": "No valid model", "text": "; ".join(parts)}
     is_good = len(sound) == len(fleet) and not apart
@@ -118,9 +115,9 @@ def _largest(fleet: Fleet) -> str:
     if n >= needed_units():
         return ""
     return (
-        f"The largest of {n} values is, whatever the distribution, a limit for "
-        f"{100.0 * content_of_largest(n):.3g} % of all units with {100.0 * CONFIDENCE:g} % "
-        f"confidence, or for {100.0 * CONTENT:g} % with {100.0 * (1.0 - CONTENT**n):.3g} %."
+        f"A distribution-free limit needs {needed_units()} units. The largest of {n} values is "
+        f"such a limit for {100.0 * content_of_largest(n):.3g} % of all units with "
+        f"{100.0 * CONFIDENCE:g} % confidence."
     )
 
 
@@ -133,14 +130,9 @@ def _groups(fleet: Fleet) -> list[dict[str, Any]]:
         for parameter in DERIVED:
             own = [e for e in derived if (e.quantity, e.parameter) == (quantity, parameter)]
             if own:
-                numbers.append(
-                    {
-                        "title": _TITLES[parameter],
-                        "unit": own[0].field_unit[0],
-                        "picture": _picture(own),
-                        "rows": [_row(each) for each in own],
-                    }
-                )
+                head = {"title": _TITLES[parameter], "unit": own[0].field_unit[0]}
+                rows = [_row(each) for each in own]
+                numbers.append({**head, "picture": _picture(own), "rows": rows})
         is_free = any(row["free"] for number in numbers for row in number["rows"])
         title = quantity or "other channels"
         groups.append({"quantity": title, "numbers": numbers, "is_free": is_free})
@@ -157,14 +149,15 @@ def _row(spread: Spread) -> dict[str, Any]:
     free, both = spread.free_limit, spread.free_limits
     remarks = []
     if bounds:
-        remarks.append(f"{bounds} of them upper bounds")
+        remarks.append(f"{bounds} of them upper limits")
     if spread.without:
         remarks.append(f"{spread.without} units without")
     if not spread.is_normal:
         remarks.append(f"not normal, p = {spread.normality:.1g}")
+    text_of_sd = per_cent(spread.sd) if spread.is_logarithmic else text(spread.sd)
     share = spread.of_estimation
     if share > _MOSTLY:
-        remarks.append(f"{100.0 * min(share, 1.0):.0f} % of the variance is of estimation")
+        remarks.append(f"{100.0 * min(share, 1.0):.0f} % is estimation error: record longer")
     return {
         "channel": spread.channel,
         "parameter": f"{spread.parameter} of {spread.of}" if spread.of > 1 else spread.parameter,
@@ -172,7 +165,7 @@ def _row(spread: Spread) -> dict[str, Any]:
         "n": spread.n,
         "median": text(spread.median),
         "range": f"{text(spread.values.min())} to {text(spread.values.max())}",
-        "spread": _spread_text(spread, text),
+        "spread": "-" if not np.isfinite(spread.sd) else text_of_sd,
         "estimation": f"{100.0 * min(share, 1.0):.0f} %" if np.isfinite(share) else "",
         "limit": text(spread.normal_limit),
         "limits": " to ".join(map(text, spread.normal_limits)) if spread.n > 1 else "-",
@@ -181,12 +174,6 @@ def _row(spread: Spread) -> dict[str, Any]:
         "doubtful": not spread.is_normal,
         "remark": "; ".join(remarks),
     }
-
-
-def _spread_text(spread: Spread, text: Any) -> str:
-    if not np.isfinite(spread.sd):
-        return "-"
-    return per_cent(spread.sd) if spread.is_logarithmic else text(spread.sd)
 
 
 def _outliers(spreads: Sequence[Spread]) -> list[dict[str, str]]:

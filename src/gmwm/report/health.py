@@ -1,4 +1,4 @@
-"""What was found in the recording, in the order in which people want to read it."""
+"""Findings of the recording, worst first."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ def _of_recording(calibration: Calibration) -> list[Notice]:
 
 
 def findings_of_fits(calibration: Calibration) -> list[Notice]:
-    """Departures from noise, and what makes a fit not valid but is no finding of the recording."""
+    """Departures, and defects of fits that the recording's findings do not include."""
     known = {notice.code for notice in calibration.notices if notice.severity == "bad"}
     return [
         replace(notice, where=" ".join(part for part in (name, notice.where) if part))
@@ -82,7 +82,7 @@ def findings_of_fits(calibration: Calibration) -> list[Notice]:
 
 
 def ambiguity(calibration: Calibration, channel: str) -> list[str]:
-    """Which models describe a channel equally well, and what that means for a filter."""
+    """Models that fit a channel equally well, and their effect on filter numbers."""
     fit, rivals = calibration[channel], calibration.rivals.get(channel, ())
     return [
         f"{notice.text} ({notice.hint}){_effect(fit, rivals)}"
@@ -92,7 +92,7 @@ def ambiguity(calibration: Calibration, channel: str) -> list[str]:
 
 
 def _effect(fit: Fit, rivals: Sequence[Model]) -> str:
-    """By how much what a filter should believe differs between models that fit alike."""
+    """Change of the filter numbers between models that fit equally well."""
     if not rivals:
         return ""
     try:
@@ -103,7 +103,7 @@ def _effect(fit: Fit, rivals: Sequence[Model]) -> str:
     with np.errstate(divide="ignore", invalid="ignore"):
         change = float(np.nanmax(np.max(pairs, axis=0) / np.min(pairs, axis=0))) - 1.0
     size = f"at most {per_cent(change)}" if change > _LEAST_CHANGE else "less than 0.1 %"
-    text = f"N and K of a filter for {SHOWN:g} s change by {size} with another of them"
+    text = f"Filter N and K for {SHOWN:g} s change by {size} with another of these models"
     return f". {text}" if np.isfinite(change) else ""
 
 
@@ -124,7 +124,7 @@ def _rows(notices: list[Notice]) -> list[dict[str, Any]]:
 
 def _summary(notices: list[Notice]) -> str:
     if all(notice.severity not in ("bad", "warning") for notice in notices):
-        return "Nothing was found that spoils the estimates."
+        return "No defect found."
     parts = [part for severity in _COUNTED if (part := counted(notices, severity))]
     return f"{' and '.join([', '.join(parts[:-1]), parts[-1]] if parts[1:] else parts)}."
 

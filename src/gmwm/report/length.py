@@ -38,7 +38,7 @@ def _known(calibration: Calibration, horizon: float) -> Mapping[str, float]:
 
 
 def _least(calibration: Calibration, horizon: float, error: float) -> float:
-    """Length (s) at which the error of the worst curve is what is aimed at."""
+    """Length (s) at which the error of the worst curve is `_AIM`."""
     return max(calibration.duration * (error / _AIM) ** 2, 4.0 * horizon)
 
 
@@ -54,12 +54,12 @@ def length_sentence(calibration: Calibration, horizon: float) -> str:
     share, text = per_cent(known[worst]), duration_text(least)
     if least <= calibration.duration and covered:
         return (
-            f"long enough for {horizon:g} s without aiding: every curve is known there to {share} "
-            f"(1 sigma, {worst}), and {text} would do for {100.0 * _AIM:g} %"
+            f"long enough for {horizon:g} s outages: {worst} is known to +-{share} there; {text} "
+            f"would give +-{100.0 * _AIM:g} %"
         )
     return (
-        f"too short for {horizon:g} s without aiding: the curve is known there to {share} (1 "
-        f"sigma, {worst}); record {text} for {100.0 * _AIM:g} %"
+        f"too short for {horizon:g} s outages: record {text} for +-{100.0 * _AIM:g} % "
+        f"(now +-{share}, {worst})"
     )
 
 
@@ -75,13 +75,12 @@ def parameters_sentence(calibration: Calibration) -> str:
         return ""
     longest, what = max(finite)
     if longest <= calibration.duration:
-        return f"Every parameter of the models is known to {100.0 * _AIM:g} %"
+        return f"Every parameter has an error of at most {100.0 * _AIM:g} %"
     known = _known(calibration, SHOWN).values()
     is_more = bool(known) and longest > _least(calibration, SHOWN, max(known))
-    aside = ", which a filter does not need," if is_more else ""
+    aside = "; a filter needs less" if is_more else ""
     return (
-        f"Every parameter of the models to {100.0 * _AIM:g} %{aside} would take "
-        f"{duration_text(longest)} ({what})"
+        f"For {100.0 * _AIM:g} % in every parameter record {duration_text(longest)} ({what}){aside}"
     )
 
 
@@ -92,4 +91,4 @@ def part_sentence(calibration: Calibration, length: float, horizon: float) -> st
         return ""
     least = _least(calibration, horizon, max(known.values()))
     word = "long enough" if least <= length else "too short"
-    return f"That part is {word} for {horizon:g} s without aiding."
+    return f"That part is {word} for {horizon:g} s outages."

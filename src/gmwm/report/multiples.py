@@ -76,7 +76,7 @@ def multiple(
         parts.append(_ratios(equality, axis.fits, labels, x, shifts))
     else:
         middle = 0.5 * (_LEFT + _RIGHT), 0.5 * (_LOW + _BOTTOM) + 4.0
-        parts.append(_text(*middle, "nothing to compare with", "middle"))
+        parts.append(_text(*middle, "nothing to compare", "middle"))
     title = f"Allan deviation of {axis.name} in {unit} against averaging time in s"
     return (
         f'<svg viewBox="0 0 {_WIDTH:g} {_HEIGHT:g}" role="img" aria-label="{escape(title)}">'
@@ -151,7 +151,7 @@ def _ratios(
         parts.append(
             _text(_LEFT - 4.0, float(y(value)) + 3.5, f"{value:+g}" if value else "0", "end")
         )
-    parts.append(_text(_LEFT, _LOW - 4.0, "from their mean [%]", "start"))
+    parts.append(_text(_LEFT, _LOW - 4.0, "ratio to common - 1 [%]", "start"))
     for row, label in enumerate(shown):
         known = np.isfinite(away[row])
         at = x(np.log10(equality.tau[known]) + shifts[label])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +16,7 @@ from gmwm._core.text import readable
 from gmwm._core.units import SI_UNIT
 from gmwm.ins.logs import Comparison, Navigated
 from gmwm.ins.simulation import QUANTITIES, Consistency, Ratio, Validation
+from gmwm.process import Model
 from gmwm.report.page import write_page
 from gmwm.report.text import duration_text, model_text
 
@@ -32,10 +33,7 @@ _COVERED = ("horizontal", "vertical")
 def write_validation_report(validation: Validation, path: str | os.PathLike[str]) -> Path:
     """Write the report of a validation as one HTML file that needs no network.
 
-    Raises
-    ------
-    InputError
-        If the file cannot be written.
+    Raises InputError if the file cannot be written.
     """
     path = writable_file(path)
     study, experiment = validation.study, validation.experiment
@@ -56,17 +54,12 @@ def write_validation_report(validation: Validation, path: str | os.PathLike[str]
         groups=_GROUPS,
         gnss_on=[(name, _cells(validation.with_gnss(name))) for name in validation.names],
         innovations=[(name, validation.innovations(name)) for name in validation.names],
-        models=[
-            (
-                name,
-                [
-                    (axis, model_text(model, axis.partition("_")[0]))
-                    for axis, model in each.models.items()
-                ],
-            )
-            for name, each in experiment.filters.items()
-        ],
+        models=[(name, _models(each.models)) for name, each in experiment.filters.items()],
     )
+
+
+def _models(models: Mapping[str, Model]) -> list[tuple[str, str]]:
+    return [(axis, model_text(each, axis.partition("_")[0])) for axis, each in models.items()]
 
 
 def svg(figure: Figure) -> str:
@@ -137,13 +130,13 @@ def _compared(validation: Validation, name: str, first: str) -> str:
     interval = f"95 % interval {d.ratio_lower:.3g} to {d.ratio_upper:.3g}"
     if not d.significant:
         return (
-            f"Without GNSS, there is no difference to be seen between the horizontal errors with "
-            f"{name} and with {first}: {d.ratio:.3g} times the root mean square ({interval})."
+            f"Without GNSS, the horizontal error with {name} is the same as with {first}: "
+            f"{d.ratio:.3g} times ({interval})."
         )
     word = "larger" if d.value > 0.0 else "smaller"
     return (
         f"Without GNSS, the horizontal error with {name} is {word} than with {first}: "
-        f"{d.ratio:.3g} times the root mean square ({interval})."
+        f"{d.ratio:.3g} times in RMS ({interval})."
     )
 
 
@@ -151,12 +144,11 @@ def _judged(found: Sequence[Ratio]) -> str:
     """Whether a filter knows how good its position is, from its NEES at some times."""
     worst = max(found, key=lambda ratio: abs(np.log(ratio.value)))
     if any(ratio.p_value < _CONTRADICTED / len(found) for ratio in found):
-        better = "better" if worst.value > 1.0 else "worse"
-        verdict = f"believes its position to be {better} than it is"
+        verdict = f"is {'overconfident' if worst.value > 1.0 else 'conservative'} in position"
     elif not all(ratio.upper - ratio.lower < _WIDEST_BAND for ratio in found):
-        verdict = "cannot be judged by so few runs"
+        verdict = "has too few runs for a verdict"
     else:
-        verdict = "shows no contradiction between its position errors and what it predicts"
+        verdict = "is consistent in position"
     values = ", ".join(f"{ratio.value:.3g}" for ratio in found)
     return f"{verdict} (NEES per degree of freedom {values})"
 
@@ -165,10 +157,7 @@ def _judged(found: Sequence[Ratio]) -> str:
 def write_navigated_report(navigated: Navigated, path: str | os.PathLike[str]) -> Path:
     """Write the report of a solution as one HTML file that needs no network.
 
-    Raises
-    ------
-    InputError
-        If the file cannot be written.
+    Raises InputError if the file cannot be written.
     """
     path = writable_file(path)
     measured, alignment = navigated.measured, navigated.alignment
@@ -183,12 +172,8 @@ def write_navigated_report(navigated: Navigated, path: str | os.PathLike[str]) -
         innovations=svg(navigated.plot_innovations()),
         tests=[(kind, navigated.test(kind)) for kind in navigated.kinds],
         models=[
-            (
-                axis,
-                model_text(model, kind := axis.partition("_")[0]),
-                readable(sensors.bias_sd[axis], SI_UNIT[kind]),
-            )
-            for axis, model in sensors.models.items()
+            (axis, text, readable(sensors.bias_sd[axis], SI_UNIT[axis.partition("_")[0]]))
+            for axis, text in _models(sensors.models)
         ],
     )
 
@@ -197,10 +182,7 @@ def write_navigated_report(navigated: Navigated, path: str | os.PathLike[str]) -
 def write_comparison_report(comparison: Comparison, path: str | os.PathLike[str]) -> Path:
     """Write the report of a comparison of sensor models as one HTML file.
 
-    Raises
-    ------
-    InputError
-        If the file cannot be written.
+    Raises InputError if the file cannot be written.
     """
     path = writable_file(path)
     return write_page(

@@ -1,4 +1,4 @@
-"""The box "for your filter": certified numbers, their consistency, and the text to copy."""
+"""Filter numbers for several outages, and the texts to copy."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ _TITLES = {
 }
 """Of the files of programs, by their languages."""
 
-_NOT_VALID = "not valid: the fit is not, nor are numbers from it"
+_NOT_VALID = "the fit failed; do not use these numbers"
 
 
 @dataclass(frozen=True)
 class Certified:
-    """What a filter should believe for one time without aiding.
+    """Filter numbers for one length of outages.
 
     horizon: s.
     axes: The numbers of each channel for which there are some.
@@ -124,9 +124,8 @@ def _by_axis(axes: Mapping[str, Axis], invalid: Set[str], horizon: float) -> dic
         for name, each in axes.items()
     }
     about = (
-        "the numbers of each axis: N [u/sqrt(Hz)], K [u/s/sqrt(Hz)], sd of the bias state at the "
-        "start without that of\n# switching on [u]; u: rad/s, m/s^2; for "
-        f"{horizon:g} s without aiding"
+        f"filter numbers for outages up to {horizon:g} s: N [u/sqrt(Hz)], K [u/s/sqrt(Hz)], sd of "
+        "the bias state at\n# the start [u] (add your turn-on bias); u: rad/s, m/s^2"
     )
     marks = {name: f"  # {_NOT_VALID}" if name in invalid else "" for name in values}
     lines = [f"    {name!r}: {each!r},{marks[name]}" for name, each in values.items()]

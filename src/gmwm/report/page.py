@@ -71,7 +71,7 @@ def _environment() -> Environment:
 
 
 def origin(known: Mapping[str, str], what: str, sheet: Datasheet | None) -> dict[str, str]:
-    """What is known of where the numbers come from, versions and the date of ``what``."""
+    """Sources of the numbers, versions, and the date as ``what``."""
     known = dict(known) if sheet is None else {**known, "data sheet": sheet.name}
     return {printable(key): printable(value) for key, value in known.items()} | {
         "versions": f"gmwm {__version__}, numpy {np.__version__}, "

@@ -16,6 +16,7 @@ from functools import partial
 import numpy as np
 
 from gmwm._core.runs import do_runs
+from gmwm._core.tables import plain_table
 from gmwm._core.typing import FloatArray
 from gmwm.estimate import estimate
 from gmwm.process import RandomWalk, WhiteNoise
@@ -97,26 +98,23 @@ def _one_run(n: int, seed: int, run: int) -> dict[str, FloatArray]:
 
 def convergence_table(rows: list[Convergence]) -> str:
     """The table, 80 columns wide."""
-    lines = [
-        "Appendix A: least squares on the Allan variance of white noise + random walk",
+    parts = [
+        "Appendix A: least squares on the Allan variance of white noise + random walk\n"
         f"lines over 1-8 s and 16-128 s; means of {rows[0].runs} runs with standard errors",
     ]
     for k, name in enumerate(NAMES):
-        lines += [
-            "",
-            f"{name}, truth {_TRUE[k]:g}",
-            f"{'n':>11}{'Allan, expected':>18}{'Allan, mean':>24}{'GMWM, mean':>24}",
+        cells = [
+            [
+                f"{row.n:,}",
+                f"{row.expected[k]:.5g}",
+                f"{row.allan[k]:.5g} +- {row.allan_error[k]:.2g}",
+                f"{row.gmwm[k]:.5g} +- {row.gmwm_error[k]:.2g}",
+            ]
+            for row in rows
         ]
-        for row in rows:
-            allan = f"{row.allan[k]:.5g} +- {row.allan_error[k]:.2g}"
-            gmwm = f"{row.gmwm[k]:.5g} +- {row.gmwm_error[k]:.2g}"
-            lines.append(f"{row.n:>11,}{row.expected[k]:>18.5g}{allan:>24}{gmwm:>24}")
-    lines += [
-        "",
-        "Expected over true value, by the first k scales that white noise is read from",
-        f"{'k':>11}{NAMES[0]:>18}{NAMES[1]:>18}",
-    ]
-    for k in range(1, _SCALES.size):
-        white, walk = expectation(k) / _TRUE
-        lines.append(f"{k:>11}{white:>18.4g}{walk:>18.4g}")
-    return "\n".join(lines)
+        table = plain_table(("n", "Allan, expected", "Allan, mean", "GMWM, mean"), cells)
+        parts.append(f"{name}, truth {_TRUE[k]:g}\n{table}")
+    ratios = [(k, *(expectation(k) / _TRUE)) for k in range(1, _SCALES.size)]
+    table = plain_table(("k", *NAMES), [[f"{value:.4g}" for value in row] for row in ratios])
+    parts.append(f"Expected over true value; white noise from the first k scales\n{table}")
+    return "\n\n".join(parts)

@@ -10,6 +10,7 @@ from functools import partial
 import numpy as np
 
 from gmwm._core.runs import do_runs
+from gmwm._core.tables import plain_table
 from gmwm.process import (
     GaussMarkov,
     Model,
@@ -94,17 +95,13 @@ def _choose(
 
 def choice_table(choices: Sequence[Choice]) -> str:
     """The study as a table."""
-    runs = choices[0].runs
-    lines = [
-        f"Models chosen by gmwm.select, {runs} series each",
-        "",
-        f"{'n':>9} {'right':>6} {'fewer':>6} {'+1':>5} {'+2..':>5}  true model",
-    ]
+    runs, rows = choices[0].runs, []
     for choice in choices:
         fewer = sum(count for more, count in choice.surplus.items() if more < 0)
         many = sum(count for more, count in choice.surplus.items() if more > 1)
-        lines.append(
-            f"{choice.n:>9,} {choice.right / runs:>6.0%} {fewer / runs:>6.0%} "
-            f"{choice.surplus[1] / runs:>5.0%} {many / runs:>5.0%}  {choice.truth.title()}"
-        )
-    return "\n".join([*lines, "", "right: the very terms; fewer, +1, +2..: terms less or too many"])
+        counts = (choice.right, fewer, choice.surplus[1], many)
+        shares = [f"{count / runs:.0%}" for count in counts]
+        rows.append([f"{choice.n:,}", *shares, choice.truth.title()])
+    table = plain_table(("n", "right", "fewer", "+1", "+2..", "true model"), rows)
+    note = "right: the true terms; fewer, +1, +2..: terms too few or too many"
+    return f"Models chosen by gmwm.select, {runs} series each\n\n{table}\n\n{note}"

@@ -1,7 +1,7 @@
 """The paper's experiment: does the better sensor model navigate better (its Figures 5 to 9)?
 
 A static recording is calibrated three ways, by lines in the Allan plot (AV), by hand until the
-filter works (KF-tuned, the paper's Table V) and by GMWM; filters that believe each of them navigate
+filter works (KF-tuned, the paper's Table V) and by GMWM; filters with each of them navigate
 on the same errors along a helicopter's mapping flight and a car's drive. Errors are drawn from the
 paper's Table VI, or taken from real recordings: one is calibrated, the others are navigated with.
 """
@@ -92,7 +92,7 @@ class Calibrated:
     def curve_models(self, horizon: float) -> SensorModels:
         """Two numbers off each Allan curve: N at 1 s, and K from its height at a horizon (s).
 
-        K is that of the line of slope +1/2 through the deviation there.
+        K is read from the line of slope +1/2 through the deviation there.
         """
         models: dict[str, Model] = {}
         for axis, each in self.lines.items():
@@ -134,7 +134,7 @@ def static_recording(seed: int) -> Recording:
 def experiment(
     vehicle: str, calibrated: Calibrated, runs: int, seed: int, recordings: Sequence[Recording] = ()
 ) -> Experiment:
-    """Filters that believe different calibrations, on a helicopter or in a car.
+    """Filters with different calibrations, on a helicopter or in a car.
 
     vehicle: {"helicopter", "car"}.
     recordings: The one that was calibrated, and those whose errors are navigated with; by default
@@ -163,7 +163,7 @@ def scenario_of(vehicle: str) -> Scenario:
 
 
 def aligned(models: SensorModels, start: Mapping[str, float]) -> SensorModels:
-    """Models of filters that are switched on at any time, when the slow error is not zero.
+    """Models for filters that start at any time, when the slow error is not zero.
 
     start: Axis -> scatter of the means over a minute of the recording that was calibrated. What a
         model's stationary terms do not explain of it is the standard deviation of a constant, or of
@@ -225,7 +225,7 @@ def reproduce_figure(
     missing = [axis for axis in needed if axis not in first.names]
     if missing:
         raise InputError(
-            f"{first.source}: there is no channel {missing[0]}: {figure} needs {', '.join(needed)}"
+            f"{first.source}: channel {missing[0]} is missing: {figure} needs {', '.join(needed)}"
         )
     calibrated = Calibrated.of(first)
     if figure in _OF_ONE_GYRO:

@@ -14,11 +14,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gmwm._core.distributions import norm
+from gmwm._core.tables import plain_table
 from gmwm._core.text import bullets, wrapped
 from gmwm._core.typing import FloatArray
 from gmwm.ins import tuning
 from gmwm.ins.simulation import GROUPS, FilterErrors, Validation
 from gmwm.issues import Notice
+from gmwm.study.summary import markdown_table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -140,45 +142,46 @@ class Rotation:
     # -- words ------------------------------------------------------------------------------------
 
     def __str__(self) -> str:
-        turns = range(len(self.sources))
+        turns, both = range(len(self.sources)), ("horizontal", "vertical")
         by_turn = [f"{i + 1} calibrated" for i in turns]
-        return "\n\n".join(
-            "\n".join(block)
-            for block in (
-                self._head(),
-                self._table_of(
-                    f"All turns together, at the ends of outages, before the first fix: errors "
-                    f"over those of {FIRST}; NEES per degree of freedom",
-                    ["horizontal RMS", "vertical RMS", "NEES horizontal", "NEES vertical"],
-                    self._row,
-                ),
-                self._table_of(
-                    "Within the predicted intervals of 95 %, %; NEES of the position, which also "
-                    "judges how horizontal and vertical go together",
-                    ["horizontal", "vertical", "NEES position"],
-                    self._covered,
-                ),
-                self._table_of(
-                    f"Horizontal RMS over that of {FIRST}, turn by turn",
-                    by_turn,
-                    lambda name: [self.ratio(name, "horizontal", i) for i in turns],
-                ),
-                self._table_of(
-                    "NEES of the position, turn by turn",
-                    by_turn,
-                    lambda name: [self.nees(name, "position", i) for i in turns],
-                ),
-            )
-        )
 
-    def _table_of(
-        self, title: str, head: Sequence[str], row: Callable[[str], list[Interval]]
-    ) -> list[str]:
-        width = max(map(len, self.names))
-        lines = [*wrapped(title), " " * width + "".join(f"{each:>17}" for each in head)]
-        for name in self.names:
-            lines.append(f"{name:{width}}" + "".join(f"{each!s:>17}" for each in row(name)))
-        return lines
+        def ratios_and_nees(name: str) -> list[Interval]:
+            ratios = [self.ratio(name, each) for each in both]
+            return ratios + [self.nees(name, each) for each in both]
+
+        def covered(name: str) -> list[Interval]:
+            found = [self.coverage(name, each) for each in both]
+            shares = [Interval(100.0 * x.value, 100.0 * x.lower, 100.0 * x.upper) for x in found]
+            return [*shares, self.nees(name, "position")]
+
+        blocks = [self._head()]
+        for title, head, row in (
+            (
+                f"All turns, at the ends of outages before the first fix: errors over those of "
+                f"{FIRST}; NEES per degree of freedom",
+                [*(f"{each} RMS" for each in both), *(f"NEES {each}" for each in both)],
+                ratios_and_nees,
+            ),
+            (
+                "Share within predicted 95 % intervals, %; NEES of the position, which includes "
+                "the correlation of horizontal and vertical",
+                [*both, "NEES position"],
+                covered,
+            ),
+            (
+                f"Horizontal RMS over that of {FIRST}, turn by turn",
+                by_turn,
+                lambda name: [self.ratio(name, "horizontal", i) for i in turns],
+            ),
+            (
+                "NEES of the position, turn by turn",
+                by_turn,
+                lambda name: [self.nees(name, "position", i) for i in turns],
+            ),
+        ):
+            rows = [[name, *map(str, row(name))] for name in self.names]
+            blocks.append([*wrapped(title), plain_table(("filter", *head), rows)])
+        return "\n\n".join(map("\n".join, blocks))
 
     def _head(self) -> list[str]:
         turn = self.turns[0]
@@ -195,36 +198,17 @@ class Rotation:
         lines += bullets(self.notices)
         return lines
 
-    def _row(self, name: str) -> list[Interval]:
-        ratios = [self.ratio(name, each) for each in ("horizontal", "vertical")]
-        return ratios + [self.nees(name, each) for each in ("horizontal", "vertical")]
-
-    def _covered(self, name: str) -> list[Interval]:
-        found = [self.coverage(name, each) for each in ("horizontal", "vertical")]
-        shares = [Interval(100.0 * x.value, 100.0 * x.lower, 100.0 * x.upper) for x in found]
-        return [*shares, self.nees(name, "position")]
-
     def markdown(self) -> str:
         """All turns together, as a table for a page."""
-        head = [
-            "filter",
-            "horizontal error against GMWM",
-            "NEES horizontal",
-            "NEES vertical",
-            "NEES position",
-            "within 95 %: horizontal",
-            "vertical",
-        ]
-        rows = [head, ["---"] * len(head)]
+        groups = ("horizontal", "vertical", "position")
+        head = ["filter", "horizontal error against GMWM", *(f"NEES {each}" for each in groups)]
+        rows = []
         for name in self.names:
             ratio = "1" if name == FIRST else _of(self.ratio(name, "horizontal"))
-            judged = [_of(self.nees(name, each)) for each in ("horizontal", "vertical", "position")]
-            shares = [
-                f"{100.0 * self.coverage(name, each).value:.0f} %"
-                for each in ("horizontal", "vertical")
-            ]
-            rows.append([name, ratio, *judged, *shares])
-        return "\n".join("| " + " | ".join(row) + " |" for row in rows)
+            judged = [_of(self.nees(name, each)) for each in groups]
+            shares = [self.coverage(name, each).value for each in groups[:2]]
+            rows.append([name, ratio, *judged, *(f"{100.0 * each:.0f} %" for each in shares)])
+        return markdown_table([*head, "within 95 %: horizontal", "vertical"], rows)
 
     # -- figures ----------------------------------------------------------------------------------
 
@@ -232,29 +216,17 @@ class Rotation:
         """Ratio of horizontal errors and NEES of each filter: every turn, and all together."""
         from gmwm import plotting
 
-        turns = range(len(self.turns))
-        panels = {
-            "horizontal RMS against GMWM": {
-                name: [self.ratio(name, "horizontal", i) for i in (None, *turns)]
-                for name in self.names[1:]
-            },
-            "NEES of the position": {
-                name: [self.nees(name, "position", i) for i in (None, *turns)]
-                for name in self.names
-            },
-        }
-        return plotting.intervals(
-            {
-                title: {
-                    name: (
-                        [each.value for each in found[1:]],
-                        (found[0].value, found[0].lower, found[0].upper),
-                    )
-                    for name, found in rows.items()
-                }
-                for title, rows in panels.items()
-            }
-        )
+        def row(
+            measure: Callable[[str, str, int | None], Interval], name: str, what: str
+        ) -> tuple[list[float], tuple[float, float, float]]:
+            whole = measure(name, what, None)
+            single = [measure(name, what, i).value for i in range(len(self.turns))]
+            return single, (whole.value, whole.lower, whole.upper)
+
+        ratios = {name: row(self.ratio, name, "horizontal") for name in self.names[1:]}
+        judged = {name: row(self.nees, name, "position") for name in self.names}
+        panels = {"horizontal RMS against GMWM": ratios, "NEES of the position": judged}
+        return plotting.intervals(panels)
 
 
 @lru_cache(maxsize=16)

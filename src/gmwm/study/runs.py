@@ -14,7 +14,7 @@ import numpy.typing as npt
 import pyarrow as pa
 
 from gmwm._core.runs import do_runs
-from gmwm._core.typing import FloatArray, Progress
+from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.estimate import GMWM, estimate
 from gmwm.estimate.result import Fit
@@ -91,10 +91,8 @@ def run_study(
     runs: int,
     seed: int = 0,
     methods: Sequence[str] | None = None,
-    jobs: int = 1,
     resume: bool = False,
-    cluster: str | None = None,
-    progress: Progress | None = None,
+    **work: Any,
 ) -> pa.Table:
     """Make (or complete) the runs of a study.
 
@@ -102,9 +100,8 @@ def run_study(
     interrupted.
 
     methods: Some of ``study.methods``; all by default.
-    jobs: Processes on this machine.
     resume: Go on where an earlier call stopped.
-    cluster: Address of a Dask scheduler that does the work instead.
+    work: ``jobs``, ``cluster`` and ``progress`` of `gmwm._core.runs.do_runs`.
     Returns: one row a run and method: estimates, intervals, validity, seconds.
     Raises InputError if a method is unknown, or the folder holds runs and ``resume`` is not set, or
         it is and they are not of the same study.
@@ -124,9 +121,7 @@ def run_study(
         what,
         folder=folder / f"{study.name}-runs",
         earlier="resume" if resume else "refuse",
-        jobs=jobs,
-        cluster=cluster,
-        progress=progress,
+        **work,
     )
     columns = {"run": np.repeat(np.arange(runs), len(chosen))}
     columns |= {name: values.ravel() for name, values in found.items()}

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import pyarrow as pa
 
+from gmwm._core.tables import plain_table
 from gmwm._core.text import bullets
 from gmwm._core.typing import FloatArray
 from gmwm.estimate import cramer_rao
@@ -64,56 +65,39 @@ class Summary:
         return [m for m in self.study.methods if m in self.invalid]
 
     def __str__(self) -> str:
-        s = self.study
-        lines = [
-            s.title,
-            f"{self.runs:,} runs of {s.n:,} samples at {1.0 / s.dt:g} Hz, seed {self.seed}",
-            "",
-            f"{'quantity':<11}{'method':<9}{'RMSE':>10}{'relative':>10}{'/ bound':>9}"
-            f"{'bias':>9}{'covers':>9}{'paper':>10}",
-        ]
+        s, rows = self.study, []
         for quantity in s.quantities:
-            for method in self.methods:
-                lines.append(_line(quantity, method, self.scores[quantity.name, method]))
-            best = self.bounds[quantity.name]
+            name = quantity.name
+            rows += [_cells(name, method, self.scores[name, method]) for method in self.methods]
             for label, bounds in (("bound", self.bounds), ("moments", self.moment_bounds)):
-                bound = bounds[quantity.name]
-                absolute = bound * abs(s.true_value(quantity))
-                lines.append(
-                    f"{'':<11}{label:<9}{absolute:>10.3g}{bound:>10.3g}{bound / best:>9.2f}"
-                )
-            lines.append("")
-        lines += [f"{'':<11}{'method':<9}{'not valid':>10}{'median time':>14}"]
-        for method in self.methods:
-            time = f"{self.seconds[method]:.2g} s"
-            lines.append(f"{'':<11}{method:<9}{self.invalid[method]:>10,}{time:>14}")
-        lines += [
-            "",
-            "relative, bias: over the true value; bound: Cramer-Rao; moments: the same for",
-            "estimates by Haar wavelet variances only; covers: 95 % intervals",
+                bound, absolute = bounds[name], bounds[name] * abs(s.true_value(quantity))
+                ratio = f"{bound / self.bounds[name]:.2f}"
+                rows.append([name, label, f"{absolute:.3g}", f"{bound:.3g}", ratio, *[""] * 4])
+        columns = ("RMSE", "relative", "/ bound", "bias", "covers", "paper", "without")
+        times = [[m, f"{self.invalid[m]:,}", f"{self.seconds[m]:.2g} s"] for m in self.methods]
+        parts = [
+            f"{s.title}\n{self.runs:,} runs of {s.n:,} samples at {1.0 / s.dt:g} Hz, "
+            f"seed {self.seed}",
+            plain_table(("quantity", "method", *columns), rows),
+            plain_table(("method", "not valid", "median time"), times),
+            "relative, bias: over the true value; bound: Cramer-Rao; moments: the same for\n"
+            "estimates by Haar wavelet variances only; covers: 95 % intervals; without: runs\n"
+            "that have no estimate",
         ]
-        return "\n".join([*lines, *bullets(s.notes)])
+        return "\n".join(["\n\n".join(parts), *bullets(s.notes)])
 
     def markdown(self) -> str:
         """The table in the layout of the paper: RMSE (relative RMSE), methods side by side."""
-        head = ["", *self.methods, "Cramer-Rao bound"]
-        rows = [head, ["---"] * len(head)]
+        rows = []
         for quantity in self.study.quantities:
             name, truth = quantity.name, abs(self.study.true_value(quantity))
             scores = [self.scores[name, method] for method in self.methods]
-            bound = self.bounds[name]
-            rows.append(
-                [name, *(_cell(x.rmse, x.relative) for x in scores), _cell(bound * truth, bound)]
-            )
+            bound = _cell(truth, self.bounds[name])
+            rows.append([name, *(_cell(truth, x.relative) for x in scores), bound])
             if quantity.published:
-                rows.append(
-                    [
-                        f"{name}, paper",
-                        *(_cell(x.published * truth, x.published) for x in scores),
-                        "",
-                    ]
-                )
-        return "\n".join("| " + " | ".join(row) + " |" for row in rows)
+                paper = [_cell(truth, x.published) for x in scores]
+                rows.append([f"{name}, paper", *paper, ""])
+        return markdown_table(["", *self.methods, "Cramer-Rao bound"], rows)
 
 
 def summarise(study: Study, table: pa.Table, seed: int) -> Summary:
@@ -172,14 +156,19 @@ def _score(
     )
 
 
-def _line(quantity: Quantity, method: str, x: Score) -> str:
+def _cells(name: str, method: str, x: Score) -> list[str]:
     paper = "" if np.isnan(x.published) else f"{x.published:.3g}"
-    name = quantity.name
     bias = round(x.bias, 3) + 0.0  # no minus before a zero
-    numbers = f"{x.rmse:>10.3g}{x.relative:>10.3g}{x.ratio:>9.2f}{bias:>9.1%}{x.coverage:>9.1%}"
-    line = f"{name:<11}{method:<9}{numbers}{paper:>10}"
-    return line + (f"  ({x.missing} without)" if x.missing else "")
+    errors = [f"{x.rmse:.3g}", f"{x.relative:.3g}", f"{x.ratio:.2f}"]
+    shares = [f"{bias:.1%}", f"{x.coverage:.1%}"]
+    return [name, method, *errors, *shares, paper, str(x.missing or "")]
 
 
-def _cell(absolute: float, relative: float) -> str:
-    return "-" if np.isnan(relative) else f"{absolute:.3g} ({relative:.3g})"
+def _cell(truth: float, relative: float) -> str:
+    return "-" if np.isnan(relative) else f"{relative * truth:.3g} ({relative:.3g})"
+
+
+def markdown_table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """A table for a page in Markdown."""
+    lines = [head, ["---"] * len(head), *rows]
+    return "\n".join("| " + " | ".join(line) + " |" for line in lines)

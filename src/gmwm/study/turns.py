@@ -1,6 +1,6 @@
 """Calibrate every recording in turn and navigate with the others, by filters of equal standing.
 
-Every filter has a slow state on every axis; what it believes comes from the one recording that is
+Every filter has a slow state on every axis; its sensor model comes from the one recording that is
 calibrated.
 """
 
@@ -24,7 +24,7 @@ from gmwm.errors import InputError
 from gmwm.filter_numbers import SensorNumbers
 from gmwm.ins.imu import AXES, Recorded, SensorModels
 from gmwm.ins.simulation import Experiment, Validation
-from gmwm.issues import Notice
+from gmwm.issues import Notice, notice
 from gmwm.readers import Recording
 from gmwm.study.figures import saved
 from gmwm.study.navigation import TEN, Calibrated, aligned, scenario_of, times
@@ -119,7 +119,7 @@ def reproduce_rotation(
         missing = [axis for axis in AXES if axis not in recording.names]
         if missing:
             raise InputError(
-                f"{recording.source}: there is no channel {missing[0]}: {figure} needs "
+                f"{recording.source}: channel {missing[0]} is missing: {figure} needs "
                 f"{', '.join(AXES)}"
             )
     rotation = rotate(
@@ -143,7 +143,7 @@ def reproduce_rotation(
 def _filters(
     recording: Recording, start: dict[str, float], horizon: float, folder: Path
 ) -> tuple[dict[str, SensorModels], list[Notice]]:
-    """What filters believe after one recording is calibrated: nothing else is known to them."""
+    """Sensor models of the filters, from the one recording that is calibrated."""
     stem = _digest(recording)
 
     def kept(kind: type[_D], what: str, make: Callable[[], _D]) -> _D:
@@ -182,13 +182,8 @@ def _filters(
     axes = found.lineless()
     notices = []
     if axes:
-        text = (
-            f"{', '.join(axes)}: the plot has neither a floor nor a line of slope +1/2: lines have "
-            "a Gauss-Markov process as high as its lowest point"
-        )
-        notices.append(
-            Notice("no-line", "note", "", text, {"axes": ", ".join(axes)}, source=recording.source)
-        )
+        found_none = notice("no-line", "", {"axes": ", ".join(axes)})
+        notices.append(replace(found_none, source=recording.source))
     return filters, notices
 
 

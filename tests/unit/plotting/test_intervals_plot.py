@@ -4,7 +4,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
-from gmwm.plotting.intervals import intervals
+from gmwm.plotting import intervals
 
 
 def test_every_row_has_its_interval_and_its_single_values():

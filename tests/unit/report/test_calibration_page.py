@@ -212,7 +212,7 @@ def test_valid_and_not_valid(calibration):
         shown = Page(page(replace(calibration, fits=fits)))
         verdicts = {row[0]: row[-1] for row in shown.cells if row[0] in fits and len(row) == 7}
         assert set(verdicts) == set(fits)
-        start = "valid: fits" if valid else "not valid: the model misses the data"
+        start = "valid: within" if valid else "not valid: the model misses the data"
         assert all(text.startswith(start) for text in verdicts.values())
 
 
@@ -223,17 +223,17 @@ def test_numbers_that_are_not_valid_are_marked(calibration):
     assert first["trusted"] == [name for name, fit in calibration.items() if fit.valid]
     assert [names for names, _ in first["causes"]] == ["accel_x"]
     uses = {row["name"]: row["use"] for row in first["boxes"][0]["sensors"]}
-    assert uses == {"gyro": "", "accel": "provisional for accel_x (not valid)"}
+    assert uses == {"gyro": "", "accel": "do not use accel_x yet"}
     fits = {name: replace(fit, notices=()) for name, fit in calibration.items()}
     right = answer(right := replace(calibration, fits=fits), certified(right))
     assert [row["use"] for row in right["boxes"][0]["sensors"]] == ["", ""]
     assert right["causes"] == []
     two = {"accel_y": fits["accel_x"], **calibration.fits}
     mixed = answer(mixed := replace(calibration, fits=two), certified(mixed))["boxes"][0]
-    assert mixed["sensors"][1]["use"] == ("safe for accel_y, provisional for accel_x (not valid)")
+    assert mixed["sensors"][1]["use"] == ("use for accel_y; do not use accel_x yet")
     as_yaml, as_python = (found[60.0].texts[f"{each}, axis by axis"] for each in ("YAML", "Python"))
     for text in (as_yaml, as_python):
-        (line,) = [line for line in text.splitlines() if "# not valid" in line]
+        (line,) = [line for line in text.splitlines() if "# the fit failed" in line]
         assert "accel_x" in line
     spaces = {}
     exec(compile(as_python, "text", "exec"), spaces)
@@ -247,7 +247,7 @@ def test_how_well_a_curve_fits_is_said_of_the_levels_that_tell(calibration):
     assert at.known_to == known[-1] < fit.wv.tau[-1]
     share = 100.0 * np.max(np.abs(at.misfit[at.dof > 30.0]))
     assert trust("gyro_x", fit, calibration)[1] == (
-        f"fits within {share:.2g} % up to {known[-1]:.3g} s"
+        f"within {share:.2g} % of the data up to {known[-1]:.2g} s"
     )
 
 
@@ -262,10 +262,7 @@ def test_one_p_value_and_one_misfit(calibration):
     fit = replace(calibration["gyro_x"], discrepancy=0.01, notices=(misfit,))
     shown = Page(page(replace(calibration, fits={"gyro_x": fit})))
     assert shown.text.count("p = ") == 1
-    assert (
-        f"p = {fit.p_value_allowed:.2g} if the model may be off by 1 % of the variance"
-        in shown.text
-    )
+    assert f"p = {fit.p_value_allowed:.2g} with a model error of 1 % of the variance" in shown.text
     assert "to 7 %" not in shown.text
 
 
@@ -301,7 +298,7 @@ def test_interval_of_a_parameter(parsed, calibration):
 def test_upper_bounds_are_shown_as_such(parsed, calibration):
     bounds = calibration["accel_x"].upper_bounds
     assert bounds, "the fixture must have one"
-    shown = [row for row in parsed.cells if row[3:4] == ["upper bound, 95 %"]]
+    shown = [row for row in parsed.cells if row[3:4] == ["95 % upper limit"]]
     for key in bounds:
         row = next(row for row in shown if row[0] == key)
         assert row[2].startswith("< ")
@@ -331,7 +328,7 @@ def test_the_error_budget_is_in_the_report(parsed, calibration):
         assert [cell.startswith("≈") for cell in row[1:5]] == [t > np.radians(10) for t in tilt]
         assert row[5] == "m"
         assert re.fullmatch(r"gyro_x .*, \d+ %", row[6])
-    head = next(row for row in parsed.cells if row[0] == "error after coasting for (1 sigma)")
+    head = next(row for row in parsed.cells if row[0] == "error after an outage of (1 sigma)")
     assert head[1:5] == ["1 s", "10 s", "60 s", "600 s"]
 
 
@@ -357,13 +354,13 @@ def test_the_notes_of_the_error_budget(parsed, calibration):
 
 def test_what_is_not_valid_is_said_before_the_headline(parsed):
     warned = parsed.text.index("The model of accel_x is not valid: read the notices first.")
-    assert warned < parsed.text.index("A minute without aiding")
+    assert warned < parsed.text.index("After a 60 s outage")
 
 
 def test_the_headline_of_a_minute(parsed, calibration):
     budgets = [gmwm.error_budget(calibration, [60.0], calibrated=c) for c in (True, False)]
     metres = [budget.total()["position"][0] for budget in budgets]
-    sentence = re.search(r"A minute without aiding from exact .*? of them\.", parsed.text).group()
+    sentence = re.search(r"After a 60 s outage from exact .*? unknown\.", parsed.text).group()
     found = re.findall(r"([\d.,]+) m of horizontal position", sentence)
     assert [float(text.replace(",", "")) for text in found] == pytest.approx(metres, rel=6e-3)
 
@@ -389,7 +386,7 @@ def test_a_channel_without_an_axis_has_rows_of_its_own(calibration):
     shown = Page(page(replace(calibration, fits=fits)))
     names = [row[0] for row in shown.cells if row[:1] and row[0].startswith("gyro ")]
     assert names[:3] == ["gyro attitude", "gyro velocity", "gyro position"]
-    assert "A minute without" not in shown.text
+    assert "After a 60 s outage" not in shown.text
 
 
 def test_a_term_without_a_budget_is_told(calibration):
@@ -413,7 +410,7 @@ def test_figures_hold_data_model_and_components(parsed, calibration):
     for fit, figure in zip(calibration.fits.values(), parsed.figures(), strict=True):
         traces = {trace["name"]: trace for trace in figure["data"]}
         positive = [label for label, curve in fit.components.items() if np.any(curve > 0.0)]
-        filtered, marks = "filter: N and K", "N at 1 s, 0.664 B at the floor, K at 3 s"
+        filtered, marks = "filter: N and K", "N at 1 s, 0.664 B at the lowest point, K at 3 s"
         assert list(traces) == [*positive, "model", DATA, filtered, marks]
         scale = {"gyro": 180.0 / np.pi * 3600.0, "accel": 1.0 / 9.80665e-6, None: 1.0}
         factor = scale[fit.wv.quantity]
@@ -498,18 +495,18 @@ def test_models_that_tie_and_the_data_sheet_are_drawn(calibration, tmp_path):
     tau, stated = (np.array(traces["data sheet"][key]) for key in "xy")
     expected = np.sqrt(72.0**2 / tau[-1] + 1.0**2 * tau[-1] / 3.0)
     assert stated[-1] == pytest.approx(expected, rel=1e-3)
-    assert traces["other models that fit alike"]["opacity"] < 1.0
+    assert traces["models that fit equally well"]["opacity"] < 1.0
     assert "Data sheet: N 1.2 deg/sqrt(h) (measured" in shown.text
 
 
 @pytest.mark.parametrize(
     ("text", "what"),
     [
-        ("gyro: {N: 1.2}", "no number with a unit"),
+        ("gyro: {N: 1.2}", "not a number with a unit"),
         ("gyro: {N: 1.2 ug}", "does not measure"),
         ("gyro: {N: -1 deg/sqrt(h)}", "not positive"),
         ("gyro: {Z: 1 deg}", "is not one of N, B, K"),
-        ("magnetometer: {N: 1 deg}", "is no sensor"),
+        ("magnetometer: {N: 1 deg}", "is not a sensor"),
         ("gyro: 3", "has no numbers"),
         ("- 1", "holds no sensors"),
         ("{", "cannot be read as YAML"),
@@ -683,14 +680,16 @@ def test_health_is_in_the_first_lines_and_findings_worst_first(calibration):
     assert shown.text.startswith("Sensor error")
     (first,) = re.findall(r"Not healthy: .*? Length", shown.text)
     (why,) = (trust(n, fit, calibration)[1] for n, fit in calibration.items() if not fit.valid)
-    assert f"Trust gyro_x, voltage; not accel_x: {why}; no model of gyro_y. Filter for" in first
+    assert (
+        f"Usable axes gyro_x, voltage; not accel_x: {why}; no model of gyro_y. Filter for" in first
+    )
     # With those for which fits are not valid.
     severe = 1 + sum(n.severity == "bad" for fit in calibration.values() for n in fit.notices)
     assert f"Not healthy: {severe} severe issues (accel_x); 1 warning (gyro_x)." in first
     assert f"{severe} severe issues, 1 warning and" in shown.text
     order = [shown.text.index(words) for words in ("Broken", "Shaken", "Seen", "Fine")]
     assert order == sorted(order)
-    folded = shown.text.index("What was looked at and is fine")
+    folded = shown.text.index("Checks without a finding")
     assert order[2] < folded < order[3]
     assert ["warning", "gyro_x Shaken", "Done about shaken"] in shown.cells
 
@@ -707,12 +706,12 @@ def test_notices_of_several_recordings_say_which(calibration):
 def test_what_was_not_examined_says_so(calibration):
     notices = tuple(n for n in calibration.notices if n.code == "columns-not-used")
     shown = Page(page(replace(calibration, notices=notices)))
-    assert "was not examined" in shown.text
+    assert "was not checked for defects" in shown.text
     assert "column not used: 'temp'" in shown.text
     fits = {name: fit for name, fit in calibration.items() if fit.valid}
     harmless = replace(calibration, fits=fits, notices=(LENGTH, issue("good", "fine")))
     harmless = Page(page(harmless))
-    assert "Nothing was found that spoils the estimates." in harmless.text
+    assert "No defect found." in harmless.text
 
 
 def test_an_ambiguous_choice_is_reported_with_the_channel(calibration):

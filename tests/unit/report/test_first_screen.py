@@ -30,14 +30,14 @@ def gyro(calibration):
 
 
 @pytest.mark.parametrize("horizon", [1.0, 5.0, 60.0])
-def test_the_length_that_would_do_is_that_of_an_error_of_a_tenth(gyro, horizon):
+def test_the_advised_length_gives_an_error_of_a_tenth(gyro, horizon):
     known = known_at(gyro["gyro_x"], horizon)
     least = max(gyro.duration * (known / 0.1) ** 2, 4.0 * horizon)
     text = length_sentence(gyro, horizon)
     enough = least <= gyro.duration
     assert text.startswith("long enough" if enough else "too short")
-    assert f" for {horizon:g} s without aiding: " in text
-    named = re.search(r" and (.*) would do" if enough else r"record (.*) for 10 %", text)[1]
+    assert f" for {horizon:g} s outages: " in text
+    named = re.search(r"; (.*) would give" if enough else r"record (.*) for \+-10 %", text)[1]
     assert seconds(named) == pytest.approx(least, rel=0.02, abs=30.0)
 
 
@@ -48,21 +48,19 @@ def test_a_part_of_the_recording_is_judged_too(gyro):
         values = {"start": 100.0, "stop": 100.0 + length}
         part = Notice("longest-part", "note", "", "the longest part", values, "calibrate it")
         (advice,) = health(replace(gyro, notices=(part,)))["advice"]
-        assert advice == (
-            f"The longest part: calibrate it. That part is {word} for 60 s without aiding."
-        )
+        assert advice == (f"The longest part: calibrate it. That part is {word} for 60 s outages.")
 
 
-def test_parameters_are_said_to_need_more_than_a_filter(gyro, monkeypatch):
+def test_parameters_need_more_length_than_a_filter(gyro, monkeypatch):
     lengths = gyro["gyro_x"].needed_length(0.1)
     longest, key = max((seconds, key) for key, seconds in lengths.items())
     least = gyro.duration * (known_at(gyro["gyro_x"], 60.0) / 0.1) ** 2
     assert gyro.duration < longest < least
     text = parameters_sentence(gyro)
-    assert text.startswith("Every parameter of the models to 10 % would take ")
+    assert text.startswith("For 10 % in every parameter record ")
     assert text.endswith(f"({key} of gyro_x)")
     monkeypatch.setattr("gmwm.report.length.known_at", lambda *_: 0.01)
-    assert " to 10 %, which a filter does not need, would take " in parameters_sentence(gyro)
+    assert parameters_sentence(gyro).endswith("; a filter needs less")
 
 
 def test_what_a_tie_does_to_a_filter_is_said(gyro):
@@ -75,7 +73,8 @@ def test_what_a_tie_does_to_a_filter_is_said(gyro):
         change = 100.0 * (np.max(np.max(pairs, axis=0) / np.min(pairs, axis=0)) - 1.0)
         tied = replace(gyro, notices=(TIE,), rivals={"gyro_x": rivals})
         (text,) = ambiguity(tied, "gyro_x")
-        said = f"N and K of a filter for 60 s change by {end.format(change)} with another of them"
+        size = end.format(change)
+        said = f"Filter N and K for 60 s change by {size} with another of these models"
         assert text == f"2 models fit (the first is used). {said}"
 
 
@@ -88,7 +87,7 @@ def test_one_name_of_two_values_is_explained(calibration, tmp_path):
     assert 1.05 * fit.params["N"] < own.N
     text = replace(calibration, fits={"gyro_x": fit}).report(tmp_path / "r.html")
     shown = own.N * np.degrees(1.0) * 60.0
-    assert f"The filter's N for 60 s, {shown:.3g} deg/sqrt(h), covers slower terms too" in unescape(
+    assert f"Filter N for 60 s is {shown:.3g} deg/sqrt(h): it covers slower terms too" in unescape(
         text.read_text()
     )
 
@@ -99,9 +98,9 @@ def test_a_notebook_has_the_answers(calibration):
     assert lines[1] == filter_sentence(calibration)
     numbers = gmwm.bound(calibration["gyro_x"], horizon=60.0)
     assert lines[1].startswith(
-        f"Filter, for up to 60 s without aiding: gyro N {numbers.N:.3g} rad/s/sqrt(Hz), K "
+        f"N and K for outages up to 60 s: gyro N {numbers.N:.3g} rad/s/sqrt(Hz), K "
     )
-    assert "provisional for accel_x (not valid)" in lines[1]
+    assert "do not use accel_x yet" in lines[1]
     assert lines[2].startswith(f"Length: {length_sentence(calibration, 60.0)}. ")
     alone = replace(calibration, fits={"voltage": calibration["voltage"]})
-    assert "Filter, " not in alone._repr_html_()
+    assert "N and K for" not in alone._repr_html_()

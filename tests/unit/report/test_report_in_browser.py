@@ -211,7 +211,7 @@ def test_the_horizon_swaps_the_numbers(tab, calibration):
         assert times == {str(seconds)}
         own = gmwm.bound(calibration["gyro_x"], horizon=seconds)
         assert f"gyro N {number(own.N)} rad/s/sqrt(Hz), K {number(own.K)} " in text
-        assert f" for {seconds} s without aiding: " in text
+        assert f" for {seconds} s outages: " in text
 
 
 def test_csv_holds_every_curve(tab, shown):
@@ -223,7 +223,7 @@ def test_csv_holds_every_curve(tab, shown):
         "# x: averaging time [s]; y: Allan deviation [deg/h]", "curve,x,y,lower,upper",
     ]  # fmt: skip
     names = {line.split('"')[1] for line in lines[2:]}
-    assert {"model", "white noise", "random walk", "data sheet", "other models that fit alike",
+    assert {"model", "white noise", "random walk", "data sheet", "models that fit equally well",
             "data, 95 % interval", "filter: N and K"} <= names  # fmt: skip
     data = [line.split(",")[2:] for line in lines if line.startswith('"data')]
     low = [float(row[2]) for row in data if row[2]]

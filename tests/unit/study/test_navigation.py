@@ -3,13 +3,10 @@ from functools import cache
 import numpy as np
 import pytest
 
-from gmwm import GaussMarkov, RandomWalk, WhiteNoise
-from gmwm.calibration.calibration import Calibration
+from gmwm import Calibration, GaussMarkov, RandomWalk, Recording, WhiteNoise, fit, wavelet_variance
 from gmwm.errors import InputError
-from gmwm.estimate.entrance import fit
-from gmwm.ins.imu.sensors import AXES, SensorModels
+from gmwm.ins.imu import AXES, SensorModels
 from gmwm.process import BiasInstability, Model
-from gmwm.readers.recording import Recording
 from gmwm.study import navigation
 from gmwm.study.navigation import Calibrated, aligned, experiment, reproduce_figure
 from gmwm.study.sensor_tables import TABLE_5, TABLE_6

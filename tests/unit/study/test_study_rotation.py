@@ -6,15 +6,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from gmwm import GaussMarkov, RandomWalk, WhiteNoise
-from gmwm.calibration.calibration import Calibration
+from gmwm import Calibration, GaussMarkov, RandomWalk, Recording, WhiteNoise, fit, wavelet_variance
 from gmwm.errors import InputError
-from gmwm.estimate.entrance import fit
 from gmwm.ins import car_drive, gnss
 from gmwm.ins.filter.aiding import Outage
-from gmwm.ins.imu.sensors import AXES
-from gmwm.ins.simulation.trials import Scenario
-from gmwm.readers.recording import Recording
+from gmwm.ins.imu import AXES
+from gmwm.ins.simulation import Scenario
 from gmwm.study import turns
 from gmwm.study.rotation import Rotation, crossed_weights
 from gmwm.study.turns import reproduce_rotation, rotate
@@ -185,6 +182,6 @@ def test_what_cannot_be_rotated_is_refused(tmp_path):
     with pytest.raises(InputError, match="two recordings or more"):
         rotate("car", [recording(1)], tmp_path)
     given = [recording(1), recording(2, axes=AXES[:5], n=100)]
-    with pytest.raises(InputError, match="no channel accel_z"):
+    with pytest.raises(InputError, match="channel accel_z is missing"):
         reproduce_rotation("fig9", tmp_path, runs=2, seed=0, jobs=1, recordings=given, resume=False)
     assert list(tmp_path.iterdir()) == []
