@@ -13,14 +13,7 @@ from click.testing import CliRunner
 
 from gmwm import Calibration, Channel, WhiteNoise, fit, wavelet_variance
 from gmwm.cli.main import cli
-<<<<<<< HEAD
-from gmwm.estimate.entrance import fit
-from gmwm.ins.imu.sensors import AXES
-from gmwm.readers.recording import Channel
-from gmwm.variance import wavelet_variance
-=======
 from gmwm.ins.imu import AXES
->>>>>>> pages
 
 MODELS = {"gyro": {"N": "140 deg/h/sqrt(Hz)"}, "accel": {"N": "140 ug/sqrt(Hz)"}}
 STUDY = {

@@ -113,7 +113,7 @@ def test_outsiders_import_faces_only():
 
 
 LINES = {
-    "": 920, "_core": 2440, "process": 3260, "readers": 5550, "plotting": 840, "variance": 4850,
+    "": 920, "_core": 2440, "process": 3260, "readers": 5570, "plotting": 840, "variance": 4850,
     "diagnosis": 4070, "estimate": 7600, "selection": 1110, "calibration": 2240,
     "filter_numbers": 3700, "ins": 11300, "population": 2470, "export": 2000, "report": 2750,
     "study": 1960, "cli": 2400,

@@ -157,6 +157,18 @@ class Deviations:
         )
 
 
+def _noise_slopes(values: FloatArray, averaging: FloatArray) -> list[int]:
+    """Powers of the frequency in the spectrum, -4 to 2, at each averaging time, in samples."""
+    slopes: list[int] = []
+    for m in averaging.astype(int):
+        count = values.size // m
+        if count >= tuning.LEAST_FOR_SLOPE or not slopes:
+            slopes.append(_noise_slope(values[: count * m].reshape(count, m).mean(axis=1)))
+        else:
+            slopes.append(slopes[-1])
+    return slopes
+
+
 def deviations(
     data: Channel | FloatArray,
     dt: float | None = None,
@@ -217,13 +229,7 @@ def deviations(
     confidence = checks.share("confidence", confidence, 0.95)
     chosen = _chosen_kinds(kinds)
     averaging = _averaging(tau, channel)
-    slopes: list[int] = []  # powers of the frequency in the spectrum, -4 to 2
-    for m in averaging.astype(int):
-        count = values.size // m
-        if count >= tuning.LEAST_FOR_SLOPE or not slopes:
-            slopes.append(_noise_slope(values[: count * m].reshape(count, m).mean(axis=1)))
-        else:
-            slopes.append(slopes[-1])
+    slopes = _noise_slopes(values, averaging)
     found: dict[str, list[FloatArray]] = {}
     for name, kind in chosen.items():
         longest = kind.longest(values.size)

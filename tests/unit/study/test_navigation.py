@@ -10,7 +10,6 @@ from gmwm.process import BiasInstability, Model
 from gmwm.study import navigation
 from gmwm.study.navigation import Calibrated, aligned, experiment, reproduce_figure
 from gmwm.study.sensor_tables import TABLE_5, TABLE_6
-from gmwm.variance import wavelet_variance
 
 RATE, N = 20.0, 60_000
 UNITS = {"gyro": "rad/s", "accel": "m/s^2"}

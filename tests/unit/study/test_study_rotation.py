@@ -15,7 +15,6 @@ from gmwm.ins.simulation import Scenario
 from gmwm.study import turns
 from gmwm.study.rotation import Rotation, crossed_weights
 from gmwm.study.turns import reproduce_rotation, rotate
-from gmwm.variance import wavelet_variance
 
 FACTORS = {"GMWM": 1.0, "lines": 2.0}
 STRETCHES = (6, 8, 7)
