@@ -188,7 +188,7 @@ def _grid(clock: Clock) -> _Grid:
         wrong = short[:1] + 1 if short.size else np.array([int(np.argmax(steps)) + 1])
         usual = np.median(steps)
         what = f"is {steps[wrong[0] - 1]:.6g} after the one before, {usual:.6g} is usual"
-    if uneven is not None:
+    if uneven is not None and np.count_nonzero(steps < 0.0) <= 1:
         back = "the clock goes back: from here on stamps are early, or the rows are not in order"
         raise clock.error(uneven, back, f"use the part before or after, or, {_WAY_OUT}")
     stamp = f"time stamp {clock.stamps[wrong[0]]:.15g} {what}{_others(wrong.size)}"

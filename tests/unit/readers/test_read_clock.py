@@ -274,7 +274,7 @@ def test_line_counts_blank_lines_and_comments(timed):
     lines = path.read_text().splitlines()
     lines[20:20] = ["", "  "]
     path.write_text("\n".join(["# bench", *lines]))
-    assert "the clock goes back" in problem(path)
+    assert "goes back" in problem(path)
 
 
 @pytest.mark.parametrize("step", [1e-310, 1e-200, 1e130])

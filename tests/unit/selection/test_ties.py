@@ -170,7 +170,7 @@ def test_calibrate_tells_what_ties():
             break
     (told,) = found
     assert (told.where, told.severity) == ("gyro_x", "note")
-    assert "models describe the data equally well: " in told.text
+    assert "models fit equally well: " in told.text
     assert "rad/s" not in told.text  # in the units of the field
 
 
