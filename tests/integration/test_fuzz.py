@@ -8,7 +8,7 @@ import pytest
 
 import fuzz
 
-SOME = {"npy": 150, "odd": 2, "document": 8, "study": 12, "field": 12, "fleet": 4, "gzip": 40}
+SOME = {"npy": 150, "odd": 2, "document": 10, "study": 12, "field": 12, "fleet": 4, "gzip": 40}
 
 
 @pytest.mark.parametrize("name", sorted(fuzz.KINDS))

@@ -117,7 +117,7 @@ def test_options_go_before_the_file(run, no_pages):
                            "loiter")  # fmt: skip
     assert code == 0
     assert printed.startswith("loiter: 20 s at 20 Hz, 1 run, seed 7\n")
-    assert "only   at 12 s" in printed
+    assert "Errors after 4 s without GNSS, at 12 s" in printed
     assert "big" not in printed
 
 
@@ -243,7 +243,7 @@ BAD = {
     "initial_sd: number": ({"initial_sd": 5}, "initial_sd: 5: write KEY: VALUE"),
     "initial_sd: key": ({"initial_sd": {"roll": 1}}, "'roll' is unknown"),
     "initial_sd: unit": ({"initial_sd": {"tilt": "1 m"}}, "same as rad"),
-    "initial_sd: zero": ({"initial_sd": {"tilt": 0}}, "initial_sd, tilt: 0: input should be"),
+    "initial_sd: zero": ({"initial_sd": {"tilt": 0}}, "initial_sd: initial tilt = 0.0: give a positive"),
     "runs: part": ({"runs": 1.5}, "runs: 1.5: input should be a valid integer"),
     "seed: negative": ({"seed": -1}, "seed: -1: input should be greater"),
 }  # fmt: skip

@@ -44,7 +44,7 @@ def test_what_is_found_and_taken_off(report):
     assert re.search(r"severe gyro_x A step of .*? --remove-departures", text)
     text, _ = report("--remove-departures")
     assert "Healthy, with care : departures from noise subtracted (gyro_x)" in text
-    assert re.search(r"Notes .*?gyro_x A step of .*? \(taken off", text)
+    assert re.search(r"Notes .*?gyro_x A step of .*?subtracted", text)
     assert "not valid" not in text
     assert "calibrate static.csv" not in text  # the command has the path that was given
     assert "--remove-departures -o out" in text

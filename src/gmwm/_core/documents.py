@@ -9,6 +9,7 @@ import re
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
+from dataclasses import fields
 from functools import cache
 from pathlib import Path
 from types import MappingProxyType
@@ -145,6 +146,8 @@ class Document:
     SCHEMA_VERSION: ClassVar[int] = 1
     KEYS: ClassVar[Mapping[str, str]] = {}
     """Field -> key of the document, where it is another."""
+    LATER: ClassVar[frozenset[str]] = frozenset()
+    """Fields that documents written before they existed lack."""
 
     _kinds: ClassVar[dict[str, type[Document]]] = {}
 
@@ -156,8 +159,8 @@ class Document:
     def content(self) -> dict[str, Any]:
         """The fields in JSON types, with what is `derived` from them."""
         kind: Any = type(self)
-        fields = _adapter(kind).dump_python(self, mode="json")
-        return {self.KEYS.get(name, name): each for name, each in fields.items()} | self.derived()
+        found = _adapter(kind).dump_python(self, mode="json")
+        return {self.KEYS.get(name, name): each for name, each in found.items()} | self.derived()
 
     def derived(self) -> dict[str, Any]:
         """Keys of the document that are no fields, for readers of the file."""
@@ -174,9 +177,13 @@ class Document:
         """
         from pydantic import ValidationError
 
-        fields = {field: key for field, key in cls.KEYS.items() if key in content}
-        own = {key: each for key, each in content.items() if key not in fields.values()}
-        own |= {field: content[key] for field, key in fields.items()}
+        own = dict(content)
+        for each in fields(cls):  # type: ignore[arg-type]  # subclasses are dataclasses
+            key = cls.KEYS.get(each.name, each.name)
+            if key in content:
+                own[each.name] = content[key]
+            elif each.init and each.name not in cls.LATER:
+                raise InputError(f"there is no {key}")
         kind: Any = cls
         try:
             # Strict: lists become tuples, and mappings dataclasses, only if they come from JSON.

@@ -61,6 +61,7 @@ class Calibration(Mapping[str, Fit], Document):
 
     SCHEMA: ClassVar[str] = "gmwm.calibration"
     KEYS: ClassVar[Mapping[str, str]] = {"rate": "rate_hz", "fits": "channels"}
+    LATER: ClassVar[frozenset[str]] = frozenset({"rivals", "left_out"})
     SCHEMA_VERSION: ClassVar[int] = 2
 
     fits: Mapping[Text, Fit]

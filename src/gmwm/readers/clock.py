@@ -175,8 +175,9 @@ def _grid(clock: Clock) -> _Grid:
         short = np.flatnonzero(~(steps >= tuning.SHORTEST_STEP * median(steps)))
         if is_even and (change is not None or not short.size):
             jumps = find_jumps(clock.stamps)
-            jitter = float(np.std(np.delete(steps, jumps.rows - 1))) / jumps.interval
-            return _Grid(jumps, jitter, change)
+            if jumps.interval > 0.0:
+                jitter = float(np.std(np.delete(steps, jumps.rows - 1))) / jumps.interval
+                return _Grid(jumps, jitter, change)
         uneven = place_uneven(clock.stamps)
         if isinstance(uneven, Uneven):
             return _Grid(uneven.jumps, uneven.jitter, change, uneven)

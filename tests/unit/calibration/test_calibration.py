@@ -471,7 +471,6 @@ FIT = ("channels", "gyro_x")
         ],
         ((*FIT, "wavelet_variance", "variance"), GONE),
         ((*FIT, "wavelet_variance", "dt"), GONE),
-        ((*FIT, "wavelet_variance", "surplus"), 1.0),
         ((*FIT, "wavelet_variance", "tau"), ["a", "b"]),
         ((*FIT, "covariance"), [[1.0]]),
         ((*FIT, "model"), []),

@@ -463,7 +463,7 @@ def test_the_box_says_what_white_noise_and_random_walk_stand_for(calibration):
     texts = [n.text for n in gmwm.bound(fit).notices if n.code.startswith("more-than-")]
     (box,) = answer(one, certified(one))["boxes"]
     assert dict(box["about"])["gyro_x"].endswith(f"; {'; '.join(texts)}")
-    assert [text.split(" has to cover ")[0][-1] for text in texts] == ["t", "K"]
+    assert [re.search(r"\b([NK]) (?:is|covers) ", text)[1] for text in texts] == ["N", "K"]
     assert "; ".join(texts) in unescape(page(one))
 
 
