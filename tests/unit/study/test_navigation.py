@@ -137,7 +137,7 @@ def test_recordings_that_cannot_be_used_are_refused_before_they_are_calibrated(t
     model = WhiteNoise(1e-3) + RandomWalk(3e-4)
     for figure, given, message in (
         ("fig7", [recording(model, n=100)], "two recordings or more"),
-        ("fig5", [recording(model, axes=AXES[1:], n=100)], "no channel gyro_x"),
+        ("fig5", [recording(model, axes=AXES[1:], n=100)], "channel gyro_x is missing"),
         ("fig9", [recording(model, axes=AXES[:5], n=100)] * 2, "no channel accel_z"),
     ):
         with pytest.raises(InputError, match=message):
