@@ -350,7 +350,8 @@ def departure_notice(
     severity: Severity = "note"
     also = ""
     if not removed:
-        severity = "bad" if found.share > tuning.HARMFUL_SHARE else "warning"
+        is_sure = found.evidence >= tuning.SPOILING
+        severity = "bad" if is_sure and found.share > tuning.HARMFUL_SHARE else "warning"
         part = f"up to {100.0 * found.share:.0f} %" if found.share < 1.0 else "all"
         also = f"; it accounts for {part} of the model's wavelet variance: slow noise is too large"
         hint = None

@@ -138,7 +138,7 @@ def test_recordings_that_cannot_be_used_are_refused_before_they_are_calibrated(t
     for figure, given, message in (
         ("fig7", [recording(model, n=100)], "two recordings or more"),
         ("fig5", [recording(model, axes=AXES[1:], n=100)], "channel gyro_x is missing"),
-        ("fig9", [recording(model, axes=AXES[:5], n=100)] * 2, "no channel accel_z"),
+        ("fig9", [recording(model, axes=AXES[:5], n=100)] * 2, "channel accel_z is missing"),
     ):
         with pytest.raises(InputError, match=message):
             reproduce_figure(figure, tmp_path, runs=2, seed=0, jobs=1, recordings=given)
