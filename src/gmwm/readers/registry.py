@@ -37,7 +37,7 @@ class Format:
     """A kind of file.
 
     opener: Function of a path and `Wanted` that gives tables, as "module:name" in this room; it
-        asks for the libraries of an extra that it needs by `gmwm.readers.table.library`.
+        asks for the libraries of an extra that it needs by `library` of `gmwm.readers.table`.
     """
 
     name: str
