@@ -193,8 +193,8 @@ def unresolved_notice(name: str, fitted: Fit, largest: Model) -> Notice:
 
 def left_open(calibration: Calibration) -> dict[str, tuple[float, str]]:
     """By channel whose model has no walk, the largest K that the record leaves open; its unit."""
-    told = (notice for notice in calibration.notices if notice.code == UNRESOLVED)
-    return {each.where: _shown(each.values["K"], calibration[each.where]) for each in told}
+    open_walks = (notice for notice in calibration.notices if notice.code == UNRESOLVED)
+    return {each.where: _shown(each.values["K"], calibration[each.where]) for each in open_walks}
 
 
 def _shown(walk: float, fitted: Fit) -> tuple[float, str]:

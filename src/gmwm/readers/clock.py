@@ -105,8 +105,8 @@ def timing_of(clock: Clock, expected: float | None = None) -> Timing:
     slowest, fastest = tuning.RATES_OF_SENSORS if is_told else tuning.RATES_OF_SECONDS
     if not slowest <= rate <= fastest:
         hint = "the time column states no unit: name it, such as 'time [s]' or 'time [ms]'"
-        told = None if is_told else hint
-        notices.append(notice("rate-unlikely", "", {"rate": rate}, hint=told))
+        shown_hint = None if is_told else hint
+        notices.append(notice("rate-unlikely", "", {"rate": rate}, hint=shown_hint))
     if kept is not None:
         jumps = replace(jumps, rows=kept[jumps.rows], repeated=copies)
     return Timing(rate, jumps, (*notices, *last), found.jitter)

@@ -252,7 +252,7 @@ def _bandwidth_notices(model: Model, wv: WaveletVariance) -> list[Notice]:
             bandwidth = float(np.interp(-0.5 * density[0], -density[part], f[part]))
         low = term.psd(np.array([tuning.FOOT * bandwidth]), wv.dt)[0]
         if not low > 0.0:
-            continue  # a term of zero amplitude is no filter of the sensor's
+            continue  # a term of zero amplitude is not the sensor's filter
         unit, factor = customary_unit("u/sqrt(Hz)", wv.quantity, wv.unit)
         level = float(np.sqrt(low))
         values = {"bandwidth": bandwidth, "density": level}

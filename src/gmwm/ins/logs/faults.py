@@ -107,7 +107,7 @@ class Faults:
     def _with_offset(self, offset: float, delay: float) -> Faults:
         """The offset as the first fault, then these; ``delay`` of the filter's start in s."""
         near = [each for each in self.found if each.code == "time-offset"]
-        # A rest counts even where it is no fault of its own.
+        # A standstill counts even where it is not a fault itself.
         left = near or next(constant_errors(self.replay)).refined()
         by = offset + sum(each.values["time offset"] for each in left)
         error = left[0].errors if left else {"time offset": self.resolution["time offset"]}

@@ -167,8 +167,8 @@ class ArrayTable(Table):
             text = f"{source} holds no column of more than one sample"
             raise InputError(f"{text}: save arrays of samples in it")
         names, arrays = zip(*columns, strict=True)
-        told = list(notices)
-        return cls(source=source, names=names, arrays=arrays, rate=rate, notices=told, **about)
+        own = list(notices)
+        return cls(source=source, names=names, arrays=arrays, rate=rate, notices=own, **about)
 
     def expected_rows(self) -> float:
         return float(max(array.like.shape[0] if array.like.ndim else 1 for array in self.arrays))
