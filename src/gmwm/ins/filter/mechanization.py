@@ -117,10 +117,7 @@ def _run(
         step(at, now, now if i == 0 else before, samples.dt)
         if (i + 1) % _CLEAN_EVERY == 0:
             orthonormalise(at.C)
-        for j in range(3):
-            lla[i + 1, j] = at.lla[j]
-            velocity[i + 1, j] = at.v[j]
-        rpy[i + 1, 0], rpy[i + 1, 1], rpy[i + 1, 2] = angles(at.C)
+        lla[i + 1], velocity[i + 1], rpy[i + 1] = at.lla, at.v, angles(at.C)
 
 
 def integrate(imu: Imu, initial: NavState) -> Trajectory:
