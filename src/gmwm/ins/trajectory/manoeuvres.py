@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol, TypedDict, Unpack
+from typing import Protocol, TypedDict, Unpack
 
 import numpy as np
 from scipy.integrate import simpson
@@ -18,7 +18,7 @@ from gmwm._core.checks import is_number, positive, sampling_interval, shown
 from gmwm._core.compiled import compiled
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
-from gmwm.ins.geometry import RATE, gravity_at, ned_difference, radii
+from gmwm.ins.geometry import RATE, gravity_along, ned_difference, radii
 from gmwm.ins.trajectory.trajectory import Trajectory, check_latitudes, finite_numbers
 
 Lla = Sequence[float] | FloatArray
@@ -329,10 +329,10 @@ def _attitude(
         # The Earth's axis, and the specific force, in a level frame with the body's heading.
         ahead, across = np.cos(lla[:, 0]) * np.cos(heading), -np.cos(lla[:, 0]) * np.sin(heading)
         below = -np.sin(lla[:, 0])
-        gravity: Any = gravity_at.py_func
         forward = course.acceleration[::2] - 2.0 * RATE * across * climb
         right = speed * course.turn_rate[::2] + 2.0 * RATE * (below * speed + ahead * climb)
-        down = -course.climb_rate[::2] - 2.0 * RATE * across * speed - gravity(-below, lla[:, 2])
+        down = -course.climb_rate[::2] - 2.0 * RATE * across * speed
+        down -= gravity_along(lla[:, 0], lla[:, 2])
         roll = np.arctan2(right, -(forward * np.sin(pitch) + down * np.cos(pitch)))
     return np.stack([roll, pitch, heading], axis=-1)
 
