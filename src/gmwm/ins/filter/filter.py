@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, TypedDict, Unpack
 
 import numpy as np
@@ -167,10 +168,10 @@ class InitialSd:
         rad.
     """
 
-    position: float = field(default=1.0, metadata={"unit": "m"})
-    velocity: float = field(default=0.1, metadata={"unit": "m/s"})
-    tilt: float = field(default=np.radians(0.1), metadata={"unit": "rad"})
-    heading: float = field(default=np.radians(0.5), metadata={"unit": "rad"})
+    position: float = 1.0
+    velocity: float = 0.1
+    tilt: float = math.radians(0.1)
+    heading: float = math.radians(0.5)
 
     def __post_init__(self) -> None:
         for name in ("position", "velocity", "tilt", "heading"):

@@ -15,7 +15,6 @@ from gmwm.ins.geometry import (
     ECCENTRICITY_SQUARED,
     RATE,
     gravity_along,
-    matrix_from_rpy,
     radii_along,
 )
 from gmwm.ins.trajectory import (

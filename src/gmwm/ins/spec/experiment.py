@@ -21,7 +21,6 @@ from gmwm.ins.simulation import ErrorSource, Experiment, Scenario, Simulated
 from gmwm.ins.spec.fields import (
     RECORDINGS,
     REDUCED,
-    Declared,
     FileName,
     Meters,
     Models,
@@ -29,6 +28,7 @@ from gmwm.ins.spec.fields import (
     OfTerms,
     PositiveHertz,
     PositiveMeters,
+    PositiveRadians,
     PositiveSeconds,
     PositiveSpeed,
     Seconds,
@@ -100,6 +100,15 @@ class GnssSpec(Spec):
     coloured_tau: PositiveSeconds | None = None
 
 
+class InitialSpec(Spec):
+    """What is left out is as usual in `InitialSd`."""
+
+    position: PositiveMeters | None = None
+    velocity: PositiveSpeed | None = None
+    tilt: PositiveRadians | None = None
+    heading: PositiveRadians | None = None
+
+
 def _named(given: Any) -> dict[str, Any]:
     """Filters by names that tables and figures can show."""
     if not isinstance(given, Mapping):
@@ -148,7 +157,7 @@ class ExperimentSpec(Spec):
     filters: Annotated[dict[str, _Filter], BeforeValidator(_named)]
     outages: Annotated[tuple[_Span, ...], written("[[start, length], ...] in seconds")] = ()
     gnss: GnssSpec = GnssSpec()
-    initial_sd: Annotated[InitialSd, Declared()] = InitialSd()
+    initial_sd: InitialSpec = InitialSpec()
     runs: Annotated[StrictInt, Field(ge=1)] = 100
     seed: Annotated[StrictInt, Field(ge=0)] = 0
 
@@ -212,7 +221,7 @@ def _scenario(spec: ExperimentSpec, trajectory: Trajectory) -> Scenario:
                 f"ends at {first.end:g} s: write them as one, or apart"
             )
     aiding = _aiding(spec.gnss, trajectory)
-    scenario = Scenario(trajectory, aiding, tuple(outages), spec.initial_sd)
+    scenario = Scenario(trajectory, aiding, tuple(outages), InitialSd(**spec.initial_sd.given))
     total = sum(each.time.size for each in aiding.fixes)
     if not total:
         raise InputError(
