@@ -82,10 +82,15 @@ class FilterErrors:
 
     def index(self, time: float, *, before: bool = True) -> int:
         """Place of an epoch; InputError if it was not kept."""
-        found = np.flatnonzero((np.abs(self.time - time) < _SAME_TIME) & (self.before == before))
-        if found.size == 0:
-            raise InputError(f"no errors were kept at {time:g} s: give the end of an outage")
-        return int(found[0])
+        return place_of(time, self.time, self.before == before)
+
+
+def place_of(time: float, kept: FloatArray, of_kind: BoolArray) -> int:
+    """Place of a time among those that were kept and are of a kind."""
+    found = np.flatnonzero((np.abs(kept - time) < _SAME_TIME) & of_kind)
+    if found.size == 0:
+        raise InputError(f"no errors were kept at {time:g} s: give the end of an outage")
+    return int(found[0])
 
 
 PER_RUN = tuple(name for name in FilterErrors.__annotations__ if name not in ("time", "before"))
