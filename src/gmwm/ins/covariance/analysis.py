@@ -11,7 +11,6 @@ import numpy as np
 from scipy.linalg import block_diag, eigh
 
 from gmwm._core.typing import BoolArray, FloatArray, IntArray
-from gmwm.errors import InputError
 from gmwm.ins import tuning
 from gmwm.ins.covariance.joint_kernels import JointFilter, KeptCovariances, Track, run_jointly
 from gmwm.ins.filter import (

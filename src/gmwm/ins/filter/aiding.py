@@ -13,13 +13,7 @@ from gmwm._core.distributions import chi2
 from gmwm._core.typing import BoolArray, FloatArray
 from gmwm.errors import InputError
 from gmwm.ins import tuning
-from gmwm.ins.filter.measurements import (
-    IS_INFERRED,
-    KINDS,
-    MEASUREMENTS,
-    Instrument,
-    Measurement,
-)
+from gmwm.ins.filter.measurements import IS_INFERRED, KINDS, MEASUREMENTS, Instrument, Measurement
 from gmwm.ins.filter.records import Events
 from gmwm.ins.imu import Imu
 from gmwm.ins.trajectory import Trajectory

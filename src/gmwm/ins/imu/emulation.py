@@ -11,12 +11,7 @@ from gmwm._core.checks import sampling_interval
 from gmwm._core.spool import windows
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
-from gmwm.ins.geometry import (
-    ECCENTRICITY_SQUARED,
-    RATE,
-    gravity_along,
-    radii_along,
-)
+from gmwm.ins.geometry import ECCENTRICITY_SQUARED, RATE, gravity_along, radii_along
 from gmwm.ins.trajectory import (
     Trajectory,
     check_latitudes,

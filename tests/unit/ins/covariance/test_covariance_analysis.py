@@ -335,7 +335,7 @@ def test_an_epoch_that_was_not_kept():
     assert found.time[found.index(160.0)] == pytest.approx(160.0)
     assert found.before[found.index(160.0)]
     assert not found.before[found.index(160.0, before=False)]
-    with pytest.raises(InputError, match=r"nothing was kept at 161\.3 s"):
+    with pytest.raises(InputError, match=r"no errors were kept at 161\.3 s"):
         found.index(161.3)
 
 

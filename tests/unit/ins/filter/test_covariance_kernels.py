@@ -54,9 +54,7 @@ LEFT_OUT[5, 0], LEFT_OUT[5, 2] = 8.2e-9, 4e-8
 def nav_state(case):
     lat, lon, height, velocity, rpy = case
     return NavState(
-        np.array([np.radians(lat), np.radians(lon), height]),
-        np.array(velocity),
-        np.radians(rpy),
+        np.array([np.radians(lat), np.radians(lon), height]), np.array(velocity), np.radians(rpy)
     )
 
 

@@ -16,12 +16,7 @@ from gmwm.ins import (
 from gmwm.ins.filter import Kinematics
 from gmwm.ins.filter.mechanization import step
 from gmwm.ins.filter.records import Increments
-from gmwm.ins.geometry import (
-    RATE,
-    matrix_from_rotation_vector,
-    matrix_from_rpy,
-    ned_difference,
-)
+from gmwm.ins.geometry import RATE, matrix_from_rotation_vector, matrix_from_rpy, ned_difference
 from marks import slow
 
 NORTH = (math.radians(46.5), 0.1, 400.0)
