@@ -49,12 +49,6 @@ def radii_at(sin_lat: float) -> tuple[float, float]:
 
 
 @compiled()
-def radii(lat: float) -> tuple[float, float]:
-    """Radii of curvature of the meridian and of the prime vertical, m, at a latitude in rad."""
-    return radii_at(np.sin(lat))
-
-
-@compiled()
 def gravity_at(sin_lat: float, h: float) -> float:
     """Normal gravity, from the latitude's sine.
 

@@ -271,26 +271,24 @@ def _models(
     where: str, given: _Filter, source: ErrorSource, scenario: Scenario, folder: Path
 ) -> SensorModels:
     """Models of a filter, written at ``where``; the scenario is that of reduced models."""
-    models = source.models if isinstance(source, Simulated) else None
-    dt = scenario.trajectory.dt
-    if given == "truth" and models is None:
+    reduced, dt = isinstance(given, ReducedSpec), scenario.trajectory.dt
+    origin = given.of if isinstance(given, ReducedSpec) else given
+    if origin != "truth":
+        models = read_models(where, origin, folder)
+    elif isinstance(source, Simulated):
+        models = source.models
+    elif reduced:
+        raise InputError(f"{where}: name what is reduced, as in of: calibration.json")
+    else:
         raise InputError(f"{where}: real errors have no true model: give a calibration")
-    if isinstance(given, ReducedSpec):
-        if given.of != "truth":
-            models = read_models(where, given.of, folder)
-        if models is None:
-            raise InputError(f"{where}: name what is reduced, as in of: calibration.json")
-    elif given != "truth":
-        models = read_models(where, given, folder)
-        if isinstance(source, Recorded):
-            # A random walk does not start at zero in the middle of a recording.
-            walks = {
-                axis: source.bias_sd[axis]
-                for axis, model in models.models.items()
-                if models.bias_sd[axis] == 0.0 and any(term.is_walk for term in model.terms)
-            }
-            models = replace(models, bias_sd={**models.bias_sd, **walks})
-    assert models is not None
+    if isinstance(source, Recorded) and not reduced:
+        # A random walk does not start at zero in the middle of a recording.
+        walks = {
+            axis: source.bias_sd[axis]
+            for axis, model in models.models.items()
+            if models.bias_sd[axis] == 0.0 and any(term.is_walk for term in model.terms)
+        }
+        models = replace(models, bias_sd={**models.bias_sd, **walks})
     try:
         if isinstance(given, ReducedSpec):
             about = scenario if scenario.outages else None

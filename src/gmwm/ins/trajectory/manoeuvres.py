@@ -19,7 +19,7 @@ from gmwm._core.checks import is_number, positive, sampling_interval, shown
 from gmwm._core.compiled import compiled
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
-from gmwm.ins.geometry import RATE, gravity_along, ned_difference, radii
+from gmwm.ins.geometry import RATE, gravity_along, ned_difference, radii_at
 from gmwm.ins.trajectory.trajectory import Trajectory, check_latitudes, finite_numbers
 
 Lla = Sequence[float] | FloatArray
@@ -360,7 +360,7 @@ def _walk(
 @compiled()
 def _angular_speed(lat: float, h: float, speed: float, heading: float) -> tuple[float, float]:
     """Rates of latitude and longitude, rad/s."""
-    meridian, transverse = radii(lat)
+    meridian, transverse = radii_at(math.sin(lat))
     north, east = speed * math.cos(heading), speed * math.sin(heading)
     return north / (meridian + h), east / ((transverse + h) * math.cos(lat))
 
