@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import chi2, kstest
 
-from gmwm import GaussMarkov, QuantizationNoise, RandomWalk, WhiteNoise
+from gmwm import GaussMarkov, RandomWalk, WhiteNoise
 from gmwm.errors import InputError
 from gmwm.ins import (
     Aiding,
@@ -257,20 +257,6 @@ def test_sensor_errors_are_those_of_the_sample_after_an_epoch():
     assert np.all(np.isnan(runs.sensor_error[0, -1]))
     assert np.isnan(runs.sensor_nees[0, -1])
     assert np.all(np.isfinite(runs.sensor_nees[0, :-1]))
-
-
-def test_fast_processes_are_judged_at_their_own_sample():
-    """Errors that hardly outlive a sample: those of the sample before would be quite others."""
-    fast = SensorModels.of(
-        {
-            "gyro": WhiteNoise(1e-5) + GaussMarkov(1e-3, 0.02),
-            "accel": WhiteNoise(1e-4) + QuantizationNoise(1e-4),
-        }
-    )
-    runs = study(60, filters={"fast": fast}, source=Simulated(fast))["fast"]
-    squares = runs.sensor_nees[:, 1:-1]
-    dof = 6 * squares.size
-    assert np.mean(squares) / 6.0 == pytest.approx(1.0, abs=5.0 * np.sqrt(2.0 / dof))
 
 
 def test_a_random_walk_that_starts_at_zero_counts_from_its_first_step():
