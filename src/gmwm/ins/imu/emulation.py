@@ -10,13 +10,13 @@ import numpy as np
 from gmwm._core.checks import sampling_interval
 from gmwm._core.spool import windows
 from gmwm._core.typing import FloatArray
-from gmwm.errors import InputError
 from gmwm.ins.geometry import ECCENTRICITY_SQUARED, RATE, gravity_along, radii_along
 from gmwm.ins.trajectory import (
     Trajectory,
     check_latitudes,
     coefficients,
     finite_numbers,
+    finite_rows,
     unwrapped_angles,
     unwrapped_longitudes,
 )
@@ -46,14 +46,11 @@ class Imu:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "dt", sampling_interval(self.dt))
-        for name in ("rotation", "velocity"):
-            values = finite_numbers(getattr(self, name), name)
-            if values.ndim != 2 or values.shape[1] != 3 or len(values) != len(self.rotation):
-                raise InputError(
-                    f"{name} has shape {values.shape}: give rotation and velocity one row of 3 "
-                    "numbers for each interval"
-                )
-            object.__setattr__(self, name, values)
+        hint = "rotation and velocity one row of 3 numbers for each interval"
+        rotation = finite_rows(self.rotation, "rotation", hint)
+        object.__setattr__(self, "rotation", rotation)
+        velocity = finite_rows(self.velocity, "velocity", hint, n=len(rotation))
+        object.__setattr__(self, "velocity", velocity)
 
     @property
     def n(self) -> int:
@@ -77,14 +74,9 @@ class Imu:
         accel_errors : (n, 3) ndarray
             m/s^2.
         """
-        gyro = finite_numbers(gyro_errors, "gyro_errors")
-        accel = finite_numbers(accel_errors, "accel_errors")
-        for name, values in (("gyro_errors", gyro), ("accel_errors", accel)):
-            if values.shape != self.rotation.shape:
-                raise InputError(
-                    f"{name} has shape {values.shape}: give one row of 3 numbers for each of the "
-                    f"{self.n:,} intervals"
-                )
+        hint = f"one row of 3 numbers for each of the {self.n:,} intervals"
+        gyro = finite_rows(gyro_errors, "gyro_errors", hint, n=self.n)
+        accel = finite_rows(accel_errors, "accel_errors", hint, n=self.n)
         return Imu(self.dt, self.rotation + self.dt * gyro, self.velocity + self.dt * accel)
 
 

@@ -20,7 +20,7 @@ from gmwm._core.compiled import compiled
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.ins.geometry import RATE, gravity_along, ned_difference, radii_at
-from gmwm.ins.trajectory.trajectory import Trajectory, check_latitudes, finite_numbers
+from gmwm.ins.trajectory.trajectory import Trajectory, check_latitudes, finite_numbers, finite_rows
 
 Lla = Sequence[float] | FloatArray
 """Latitude, longitude, rad, and height, m."""
@@ -394,12 +394,8 @@ def through(
     dt, ramp, flat, level : optional
         See `perform`.
     """
-    points = finite_numbers(waypoints, "waypoints")
-    if points.ndim != 2 or points.shape[1] != 3 or len(points) < 2:
-        raise InputError(
-            f"waypoints has shape {points.shape}: give two or more, each of latitude, longitude "
-            "and height"
-        )
+    hint = "two or more, each of latitude, longitude and height"
+    points = finite_rows(waypoints, "waypoints", hint, 2)
     speed, ramp = positive("speed", speed), positive("ramp", ramp)
     turn_rate = positive("turn_rate", turn_rate)
     legs = ned_difference(points[1:], points[:-1])
