@@ -101,19 +101,22 @@ def update_jointly(
     variance: Of the measurement's white noise.
     gain: (n + q,), the filter's.
     """
-    n, a, k = h.size, np.zeros(J.shape[0]), np.zeros(J.shape[0])
+    n, size = h.size, J.shape[0]
+    a, k = np.zeros(size), np.zeros(size)
     for i in range(n):
         if h[i] != 0.0:
-            a += h[i] * J[i]
+            for j in range(size):
+                a[j] += h[i] * J[i, j]
     # Feedback: the integrals are corrected, and the estimates take what their errors lose.
     k[:n], k[n : gain.size] = gain[:n], -gain[n:]
     if estimate >= 0:
-        a += J[estimate] - J[truth]
+        for j in range(size):
+            a[j] += J[estimate, j] - J[truth, j]
     s = variance + np.sum(h * a[:n])
     if estimate >= 0:
         s += a[estimate] - a[truth]
-    for i in range(a.size):
-        for j in range(i, a.size):
+    for i in range(size):
+        for j in range(i, size):
             J[i, j] += s * k[i] * k[j] - k[i] * a[j] - a[i] * k[j]
             J[j, i] = J[i, j]
 

@@ -124,7 +124,7 @@ def propagate(P: FloatArray, change: Transition, table: SensorTable, samples: in
     cross, integral = table.cross[samples], table.integral[samples]
     n = P.shape[0]
     m = n - 9
-    S, T, U, W = np.zeros((6, n)), np.empty((9, n)), np.empty((9, 6)), np.empty((m, m))
+    S, T, U, row = np.zeros((6, n)), np.empty((9, n)), np.empty((9, 6)), np.empty(m)
     for i in range(m):
         a = axis[i]
         if a >= 0:
@@ -147,19 +147,28 @@ def propagate(P: FloatArray, change: Transition, table: SensorTable, samples: in
         if a >= 0:
             for i in range(9):
                 U[i, a] += T[i, 9 + k] * gain[k]
-    # Sensor states among themselves: rows, then columns of the upper half.
+    # Sensor states among themselves: rows, then columns, of the upper half; partners are
+    # neighbours, so that what a pair needs below the diagonal is done with it.
     for i in range(m):
-        for j in range(m):
-            W[i, j] = phi[i] * P[9 + i, 9 + j]
-        if partner[i] != i:
+        p = partner[i]
+        if p == i:
+            for j in range(i, m):
+                P[9 + i, 9 + j] *= phi[i]
+        elif i < p:
+            for j in range(i, m):
+                a, b = P[9 + i, 9 + j], P[9 + p, 9 + j]
+                P[9 + i, 9 + j] = phi[i] * a + phi_off[i] * b
+                P[9 + p, 9 + j] = phi[p] * b + phi_off[p] * a
+    for i in range(m):
+        if paired:
             for j in range(m):
-                W[i, j] += phi_off[i] * P[9 + partner[i], 9 + j]
-    for i in range(m):
+                row[j] = P[9 + i, 9 + j]
         for j in range(i, m):
-            P[9 + i, 9 + j] = W[i, j] * phi[j]
+            P[9 + i, 9 + j] *= phi[j]
         if paired:
             for j in range(i, m):
-                P[9 + i, 9 + j] += W[i, partner[j]] * phi_off[j]
+                if partner[j] != j:
+                    P[9 + i, 9 + j] += row[partner[j]] * phi_off[j]
         P[9 + i, 9 + i] += noise[i]
         if partner[i] > i:
             P[9 + i, 9 + partner[i]] += noise_off[i]
@@ -172,7 +181,8 @@ def propagate(P: FloatArray, change: Transition, table: SensorTable, samples: in
             P[i, 9 + j] = T[i, 9 + j] * phi[j]
         if paired:
             for j in range(m):
-                P[i, 9 + j] += T[i, 9 + partner[j]] * phi_off[j]
+                if partner[j] != j:
+                    P[i, 9 + j] += T[i, 9 + partner[j]] * phi_off[j]
         for j in range(m):
             if axis[j] >= 0:
                 P[i, 9 + j] += B[i, axis[j]] * cross[j]

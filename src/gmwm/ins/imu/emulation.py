@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from gmwm._core.checks import sampling_interval
-from gmwm._core.spool import windows
 from gmwm._core.typing import FloatArray
 from gmwm.ins.geometry import ECCENTRICITY_SQUARED, RATE, gravity_along, radii_along
 from gmwm.ins.trajectory import (
@@ -24,6 +23,7 @@ from gmwm.ins.trajectory import (
 # Gauss-Legendre rule of three points on [0, 1]: exact for polynomials of degree 5.
 _NODES = (0.5 - math.sqrt(0.15), 0.5, 0.5 + math.sqrt(0.15))
 _WEIGHTS = (5.0 / 18.0, 8.0 / 18.0, 5.0 / 18.0)
+_ROWS = 4096  # at a time: all that is computed of them stays in the processor's cache
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,9 +102,10 @@ def emulate(trajectory: Trajectory) -> Imu:
     dt, n = trajectory.dt, trajectory.n
     track, attitude = coefficients(lla - lla[0], dt), coefficients(rpy, dt)
     rotation, velocity = np.zeros((n, 3)), np.zeros((n, 3))
-    for part in windows(n):
+    for first in range(0, n, _ROWS):
+        part = slice(first, first + _ROWS)
         for node, weight in zip(_NODES, _WEIGHTS, strict=True):
-            rate, force = _sensed(track[part], lla[0], attitude[part], node * dt)
+            rate, force = _sensed(track[..., part], lla[0], attitude[..., part], node * dt)
             rotation[part] += weight * dt * rate
             velocity[part] += weight * dt * force
     return Imu(dt, rotation, velocity)
@@ -150,8 +151,8 @@ def _sensed(
 
 
 def _cubic(c: FloatArray, t: float) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Values, first and second derivatives, (3, n), of cubics (n, 3, 4)."""
-    a, b, c2, c3 = c.T
+    """Values, first and second derivatives, (3, n), of cubics (4, 3, n)."""
+    a, b, c2, c3 = c
     return (
         a + t * (b + t * (c2 + t * c3)),
         b + t * (2.0 * c2 + t * 3.0 * c3),

@@ -49,9 +49,9 @@ def unwrapped_angles(rpy: FloatArray) -> FloatArray:
 
 
 def coefficients(values: FloatArray, dt: float) -> FloatArray:
-    """Spline through values (n + 1, 3): coefficients (n, 3, 4) of 1, t, t^2, t^3 by interval."""
+    """Spline through values (n + 1, 3): coefficients (4, 3, n) of 1, t, t^2, t^3 by interval."""
     spline = CubicSpline(np.arange(len(values)) * dt, values, axis=0)
-    return np.ascontiguousarray(np.transpose(spline.c[::-1], (1, 2, 0)))
+    return np.ascontiguousarray(np.transpose(spline.c[::-1], (0, 2, 1)))
 
 
 def track_velocity(lla: FloatArray, dt: float) -> FloatArray:
