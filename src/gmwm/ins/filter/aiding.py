@@ -157,8 +157,8 @@ class Aiding:
     def __add__(self, other: Aiding) -> Aiding:
         """Both together; the antenna and the noise of the first, or the other's barometer."""
         own = self if self.barometer_sd else other
-        noise = {"barometer_sd": own.barometer_sd, "barometer_tau": own.barometer_tau}
-        return replace(self, fixes=(*self.fixes, *other.fixes), **noise)
+        sd, tau, fixes = own.barometer_sd, own.barometer_tau, (*self.fixes, *other.fixes)
+        return replace(self, fixes=fixes, barometer_sd=sd, barometer_tau=tau)
 
     def of(self, kind: str) -> Fixes | None:
         """The first fixes of a kind, ``None`` if there are none."""

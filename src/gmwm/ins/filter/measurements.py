@@ -30,7 +30,7 @@ class Instrument(NamedTuple):
     """
 
     trajectory: Trajectory
-    index: IntArray
+    epochs: IntArray
     arm: FloatArray
     imu: Imu | None
 
@@ -67,7 +67,7 @@ class Measurement:
     @staticmethod
     def along(where: Instrument) -> FloatArray:
         """Error-free values, (E, 3)."""
-        return np.zeros((where.index.size, 3))
+        return np.zeros((where.epochs.size, 3))
 
 
 @compiled()
@@ -106,7 +106,7 @@ class Position(Measurement):
 
     @staticmethod
     def along(where: Instrument) -> FloatArray:
-        truth, index = where.trajectory, where.index
+        truth, index = where.trajectory, where.epochs
         return offset(truth.lla[index], matrix_from_rpy(truth.rpy[index]) @ where.arm)
 
 
@@ -165,7 +165,7 @@ class Height(Measurement):
 
     @staticmethod
     def along(where: Instrument) -> FloatArray:
-        return np.where(np.arange(3) == 0, where.trajectory.lla[where.index, 2:], 0.0)
+        return np.where(np.arange(3) == 0, where.trajectory.lla[where.epochs, 2:], 0.0)
 
 
 class Standstill(Measurement):

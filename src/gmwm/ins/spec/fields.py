@@ -189,7 +189,7 @@ def read_document(path: Path) -> dict[str, Any]:
     return {name: each for name, each in content.items() if each is not None}
 
 
-class _UniqueKeys(yaml.SafeLoader):
+class _UniqueKeys(yaml.SafeLoader):  # type: ignore[misc]
     """Rejects a key given twice, which YAML would replace."""
 
     def compose_mapping_node(self, anchor: Any) -> Any:
