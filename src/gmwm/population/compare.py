@@ -74,7 +74,7 @@ def compare(
     """
     horizon = checks.positive("horizon", horizon, "give the longest outage in seconds")
     single = isinstance(sources, str | os.PathLike | Calibration | Recording) or is_frame(sources)
-    if single or not isinstance(sources, Mapping | Iterable):
+    if single or not isinstance(sources, Iterable):
         raise InputError(
             f"{checks.shown(sources)} is not a list of recordings: give two calibrations or more"
         )
@@ -186,11 +186,12 @@ def _different(given: Mapping[str, Calibration]) -> tuple[dict[str, Calibration]
     kept: dict[str, Calibration] = {}
     notices = []
     for label, each in given.items():
-        same = next((other for other, known in kept.items() if is_same(each, known)), None)
-        if same is None:
+        same = [other for other, known in kept.items() if is_same(each, known)]
+        if same:
+            copy = notice("same-recording", values={"other": same[0]})
+            notices.append(replace(copy, source=label))
+        else:
             kept[label] = each
-            continue
-        notices.append(replace(notice("same-recording", values={"other": same}), source=label))
     if len(kept) < 2:
         why = "; ".join(f"{n.source} is {n.text}" for n in notices) or f"there is {len(kept)}"
         raise InputError(f"a comparison needs two recordings or more ({why}): give another one")
@@ -234,16 +235,13 @@ def _unlike(fits: Mapping[str, Fit]) -> dict[str, Notice]:
         fits.values(), key=lambda fit: (sum(is_like(fit, f) for f in fits.values()), -fit.wv.dt)
     )
     most = [label for label, fit in fits.items() if is_like(fit, usual)]
-    others = most[0] if len(most) == 1 else "the others"
     found = {}
-    for label, fit in fits.items():
-        if label in most:
-            continue
+    for label, fit in ((label, fit) for label, fit in fits.items() if label not in most):
         code = "rates-differ" if fit.wv.unit == usual.wv.unit else "units-differ"
         values = {"rate": 1.0 / fit.wv.dt, "usual": 1.0 / usual.wv.dt}
-        found[label] = notice(
-            code, values=values, others=others, own=fit.wv.unit, common=usual.wv.unit
-        )
+        words = {"own": fit.wv.unit, "common": usual.wv.unit}
+        words["others"] = most[0] if len(most) == 1 else "the others"
+        found[label] = notice(code, values=values, **words)
     return found
 
 

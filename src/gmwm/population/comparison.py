@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
@@ -15,7 +16,7 @@ from gmwm._core.frozen import freeze
 from gmwm._core.pages import make
 from gmwm._core.tables import frame
 from gmwm._core.text import Printed, brief, bullets, per_cent, wrapped
-from gmwm._core.units import field_units, si_parameter_unit
+from gmwm._core.units import customary_unit
 from gmwm.calibration import Calibration
 from gmwm.errors import MissingNameError
 from gmwm.estimate import Estimate, Fit, JointFit
@@ -194,9 +195,8 @@ class AxisComparison:
 
     def number_text(self, letter: str, value: float) -> tuple[str, str]:
         """An N or a K in the data-sheet unit, and that unit."""
-        known = field_units(_UNITS[letter], self.quantity)
-        unit = known[0].unit if known else si_parameter_unit(_UNITS[letter], self.quantity)
-        text = f"{value * (known[0].per_si if known else 1.0):.3g}"
+        unit, scale = customary_unit(_UNITS[letter], self.quantity, "u")
+        text = f"{value * scale:.3g}"
         return (f"{float(text):,.0f}" if "e+" in text else text), unit
 
     def to_dict(self) -> dict[str, Any]:
@@ -284,9 +284,8 @@ class SensorComparison(Mapping[str, AxisComparison], Printed):
         counts = Counter(axis.state for axis in self.values())
         parts = []
         for state, word in STATES.items():
-            verb = word.split()[0]
             if counts[state] == 1 and state != "untested":
-                word = word.replace(verb, f"{verb}s", 1)
+                word = re.sub(r"^\w+", r"\g<0>s", word)
             if counts[state]:
                 parts.append(f"{counts[state]} {word}")
         return f"{len(self.labels)} recordings, {len(self)} axes: {', '.join(parts)}"
@@ -314,7 +313,7 @@ class SensorComparison(Mapping[str, AxisComparison], Printed):
         return "\n".join(lines)
 
     def _numbers(self, axis: AxisComparison) -> str:
-        found = []
+        found, own = [], len(axis.numbers.each)
         for letter in _UNITS:
             value, ratio = axis.numbers.value(letter), axis.numbers.inflation(letter)
             if np.isfinite(value):
@@ -322,11 +321,8 @@ class SensorComparison(Mapping[str, AxisComparison], Printed):
                 times = f" ({ratio:.2f} x joint)" if np.isfinite(ratio) else ""
                 shown = " ".join(axis.number_text(letter, value))
                 found.append(f"{letter} {sign}{shown}{times}")
-        own = len(axis.numbers.each)
-        if not found:
-            return "none: no recording can be used"
         few = f" (of {own} only)" if own < len(self.labels) else ""
-        return ", ".join(found) + few
+        return ", ".join(found) + few if found else "none: no recording can be used"
 
     @property
     def promise(self) -> str:
@@ -355,28 +351,19 @@ class SensorComparison(Mapping[str, AxisComparison], Printed):
 
     def to_frame(self) -> pandas.DataFrame:
         """A table with one row a channel, in SI units; needs pandas."""
-        nan = float("nan")
         rows = []
         for name, axis in self.items():
-            worst = axis.main[0] if axis.main else None
-            rows.append(
-                {
-                    "channel": name,
-                    "state": axis.state,
-                    "p_value": axis.p_value,
-                    "part": worst.part if worst else "",
-                    "extent": worst.extent if worst else nan,
-                    "sigma": worst.sigma if worst else nan,
-                    "recordings": len(axis.fits),
-                    "model": axis.joint.model.title() if axis.joint else "",
-                    "N": axis.numbers.value("N"),
-                    "N_inflation": axis.numbers.inflation("N"),
-                    "K": axis.numbers.value("K"),
-                    "K_inflation": axis.numbers.inflation("K"),
-                    "curve_inflation": axis.curve_inflation,
-                }
-            )
-        return frame(rows, tuple(rows[0]) if rows else ("channel",))
+            row: dict[str, Any] = {"channel": name, "state": axis.state, "p_value": axis.p_value}
+            row |= {"part": "", "extent": np.nan, "sigma": np.nan}
+            for worst in axis.main[:1]:
+                row |= {key: getattr(worst, key) for key in ("part", "extent", "sigma")}
+            row["recordings"] = len(axis.fits)
+            row["model"] = axis.joint.model.title() if axis.joint else ""
+            for letter in _UNITS:
+                row[letter] = axis.numbers.value(letter)
+                row[f"{letter}_inflation"] = axis.numbers.inflation(letter)
+            rows.append(row | {"curve_inflation": axis.curve_inflation})
+        return frame(rows, tuple(rows[0]))
 
     def report(
         self,
