@@ -30,19 +30,16 @@ from gmwm.report.answer import (
 from gmwm.report.budget import navigation
 from gmwm.report.datasheet import Datasheet, read_datasheet
 from gmwm.report.figure import (
+    Spans,
     density_figure,
     deviation_figure,
     overview_figure,
-    per_si,
     residual_figure,
     series_figure,
 )
-from gmwm.report.health import ambiguity, health
-from gmwm.report.length import length_sentence, parameters_sentence
+from gmwm.report.health import ambiguity, health, length_sentence, parameters_sentence
 from gmwm.report.numbers import SHOWN, Certified, certified
-from gmwm.report.page import origin, rendered, resource
-from gmwm.report.samples import Spans
-from gmwm.report.text import duration_text, needed
+from gmwm.report.page import duration_text, origin, rendered, resource, units_of
 
 _AIM = 0.1  # relative standard error
 
@@ -161,10 +158,10 @@ def _side_by_side(
 
 
 def _of_samples(fit: Fit, channel: Channel | None, spans: Spans) -> dict[str, Any]:
-    if channel is None:
-        return {"density": None, "series": None}
-    drawn = {"density": density_figure, "series": series_figure}
-    return {name: draw(fit, channel, spans) for name, draw in drawn.items()}
+    draw = {"density": density_figure, "series": series_figure}
+    return {
+        name: None if channel is None else make(fit, channel, spans) for name, make in draw.items()
+    }
 
 
 def _channel(
@@ -215,15 +212,9 @@ def _sliders(fit: Fit, numbers: tuple[float, float] | None) -> list[dict[str, st
         return []
     shown = []
     for letter, value, unit in zip("NK", numbers, ("u/sqrt(Hz)", "u/s/sqrt(Hz)"), strict=True):
-        text = quantity_text(1.0, unit, fit)
-        shown.append(
-            {
-                "letter": letter,
-                "value": f"{value:.6e}",
-                **{key: each.split(" ", 1)[1] for key, each in text.items()},
-                "per_si": f"{per_si(unit, fit):.9e}",
-            }
-        )
+        field, scale, si = units_of(unit, fit.wv)
+        own = {"letter": letter, "value": f"{value:.6e}", "per_si": f"{scale:.9e}"}
+        shown.append(own | {"field": field, "si": si})
     return shown
 
 
@@ -256,16 +247,28 @@ def _fitness(fit: Fit) -> str:
     return "; ".join(part for part in (text, fit.goodness.sentence) if part)
 
 
+def _needed(seconds: float | None, duration: float) -> str:
+    """Length of record that a parameter needs, in words; empty if it was not estimated."""
+    if seconds is None:
+        return ""
+    if seconds <= duration:
+        return "long enough"
+    if seconds == float("inf"):
+        return "not identified"
+    text = duration_text(seconds)
+    return text if text == "centuries" else f"needs {text}"
+
+
 def _row(estimate: Estimate, length: float | None, duration: float) -> dict[str, Any]:
     """A parameter for the table: SI, then each of the field's units."""
 
     def cell(value: float, low: float, high: float, unit: str) -> dict[str, str]:
+        text, interval = brief(value, 4), str(estimate.kind)
         if estimate.kind == "bound":
-            return {"value": f"< {brief(high, 4)}", "interval": "95 % upper limit", "unit": unit}
-        if estimate.kind == "estimated":
+            text, interval = f"< {brief(high, 4)}", "95 % upper limit"
+        elif estimate.kind == "estimated":
             interval = f"{brief(low, 4)} to {brief(high, 4)}"
-            return {"value": brief(value, 4), "interval": interval, "unit": unit}
-        return {"value": brief(value, 4), "interval": estimate.kind, "unit": unit}
+        return {"value": text, "interval": interval, "unit": unit}
 
     si = (estimate.value, estimate.lower, estimate.upper, estimate.unit)
     cells = [*(cell(f.value, f.lower, f.upper, f.unit) for f in estimate.field), cell(*si)]
@@ -277,5 +280,5 @@ def _row(estimate: Estimate, length: float | None, duration: float) -> dict[str,
         "meaning": estimate.meaning,
         "cells": cells,
         "error": error,
-        "needed": needed(length, duration),
+        "needed": _needed(length, duration),
     }

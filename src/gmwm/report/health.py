@@ -1,8 +1,8 @@
-"""Findings of the recording, worst first."""
+"""Findings of the recording, worst first, and whether it is long enough for a filter."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -16,12 +16,12 @@ from gmwm.estimate import Fit
 from gmwm.filter_numbers import bound
 from gmwm.issues import Notice, worst_first
 from gmwm.process import Model
-from gmwm.report.length import part_sentence
 from gmwm.report.numbers import SHOWN
+from gmwm.report.page import duration_text
 
+_AIM = 0.1  # relative standard error of a deviation or a parameter that is well enough known
 _COUNTED = {"bad": "severe issue", "warning": "warning", "note": "note"}
 _LEAST_CHANGE = 1e-3
-_LABELS = {"bad": "severe"}
 _COUNTED_ELSEWHERE = ("missing-samples", "events-left-out")
 """Of an examined recording, notices of gaps and events have the same numbers."""
 
@@ -34,7 +34,7 @@ def health(calibration: Calibration) -> dict[str, Any]:
         "examined": examined,
         "advice": [
             f"{_begun(n.text)}: {n.hint}. "
-            + part_sentence(calibration, n.values["stop"] - n.values["start"], SHOWN)
+            + _part_sentence(calibration, n.values["stop"] - n.values["start"], SHOWN)
             for n in calibration.notices
             if n.code == LONGEST_PART
         ],
@@ -112,7 +112,7 @@ def _rows(notices: list[Notice]) -> list[dict[str, Any]]:
     return [
         {
             "severity": notice.severity,
-            "label": _LABELS.get(notice.severity, notice.severity),
+            "label": "severe" if notice.severity == "bad" else notice.severity,
             "where": ", ".join(part for part in (notice.where, notice.source) if part),
             "text": _begun(notice.text),
             "hint": _begun(notice.hint),
@@ -132,3 +132,84 @@ def _summary(notices: list[Notice]) -> str:
 def _begun(text: str) -> str:
     """With a capital at the beginning; units and names keep theirs."""
     return text[:1].upper() + text[1:]
+
+
+# -- length ----------------------------------------------------------------------------------------
+
+
+def known_at(fit: Fit, tau: float, rivals: Sequence[Model] = ()) -> float:
+    """Relative standard error of the model's Allan deviation at an averaging time.
+
+    rivals: Models that describe the data as well: as far as the farthest of them.
+    """
+    if not fit.keys or fit.wv.dt > tau:
+        return float("nan")
+    with np.errstate(all="ignore"):
+        value, lower, upper = fit.deviation_interval(np.array([tau]), 0.6827, rivals)
+        farthest = max(upper[0] / value[0], value[0] / lower[0]) - 1.0
+    return float(farthest) if value[0] > 0.0 else float("nan")
+
+
+def _known(calibration: Calibration, horizon: float) -> Mapping[str, float]:
+    known = {
+        name: known_at(fit, horizon, calibration.rivals.get(name, ()))
+        for name, fit in calibration.items()
+    }
+    return {name: each for name, each in known.items() if np.isfinite(each)}
+
+
+def _least(calibration: Calibration, horizon: float, error: float) -> float:
+    """Length (s) at which the error of the worst curve is `_AIM`."""
+    return max(calibration.duration * (error / _AIM) ** 2, 4.0 * horizon)
+
+
+def length_sentence(calibration: Calibration, horizon: float) -> str:
+    """Whether the recording is long enough for a horizon, and how long would do."""
+    known = _known(calibration, horizon)
+    if not known:
+        return ""
+    worst = max(known, key=lambda name: known[name])
+    least = _least(calibration, horizon, known[worst])
+    # A curve that ends before the horizon is known there by the model alone.
+    covered = min(float(fit.wv.tau[-1]) for fit in calibration.values()) >= horizon
+    share, text = per_cent(known[worst]), duration_text(least)
+    if least <= calibration.duration and covered:
+        return (
+            f"long enough for {horizon:g} s outages: {worst} is known to +-{share} there; {text} "
+            f"would give +-{100.0 * _AIM:g} %"
+        )
+    return (
+        f"too short for {horizon:g} s outages: record {text} for +-{100.0 * _AIM:g} % "
+        f"(now +-{share}, {worst})"
+    )
+
+
+def parameters_sentence(calibration: Calibration) -> str:
+    """The length at which every parameter is well known; a filter's numbers need less."""
+    lengths = [
+        (seconds, f"{key} of {name}")
+        for name, fit in calibration.items()
+        for key, seconds in fit.needed_length(_AIM).items()
+    ]
+    finite = [each for each in lengths if np.isfinite(each[0])]
+    if not finite:
+        return ""
+    longest, what = max(finite)
+    if longest <= calibration.duration:
+        return f"Every parameter has an error of at most {100.0 * _AIM:g} %"
+    known = _known(calibration, SHOWN).values()
+    is_more = bool(known) and longest > _least(calibration, SHOWN, max(known))
+    aside = "; a filter needs less" if is_more else ""
+    return (
+        f"For {100.0 * _AIM:g} % in every parameter record {duration_text(longest)} ({what}){aside}"
+    )
+
+
+def _part_sentence(calibration: Calibration, length: float, horizon: float) -> str:
+    """Whether a part (s) of the recording is long enough too."""
+    known = _known(calibration, horizon)
+    if not known:
+        return ""
+    least = _least(calibration, horizon, max(known.values()))
+    word = "long enough" if least <= length else "too short"
+    return f"That part is {word} for {horizon:g} s outages."

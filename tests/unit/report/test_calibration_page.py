@@ -20,7 +20,7 @@ from gmwm.plotting import COMPONENT_COLOURS
 from gmwm.report import figure as figures, write_report
 from gmwm.report.answer import answer, trust
 from gmwm.report.budget import navigation
-from gmwm.report.calibration import page
+from gmwm.report.calibration import _needed as needed, page
 from gmwm.report.datasheet import read_datasheet
 from gmwm.report.figure import (
     density_figure,
@@ -30,8 +30,7 @@ from gmwm.report.figure import (
 )
 from gmwm.report.health import health
 from gmwm.report.numbers import certified
-from gmwm.report.page import resource
-from gmwm.report.text import duration_text, needed
+from gmwm.report.page import duration_text, resource
 
 VOID = {"meta", "wbr", "link", "br", "img", "input", "hr"}
 NAVIGATION = "plot-navigation"
