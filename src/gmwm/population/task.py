@@ -9,6 +9,7 @@ import os
 import re
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from inspect import signature
 from itertools import count
@@ -24,7 +25,7 @@ from gmwm.calibration import SCREENING, calibrate, floor, noise_density, random_
 from gmwm.errors import InputError, printable
 from gmwm.estimate import Fit
 from gmwm.issues import Notice
-from gmwm.population.unit import DERIVED, Number, Unit
+from gmwm.population.unit import Number, Unit
 from gmwm.process import Model, as_model
 from gmwm.readers import read
 
@@ -173,19 +174,14 @@ def digest_of(path: str) -> str:
 def _numbers(fit: Fit, horizon: float) -> dict[str, Number]:
     """The numbers of `DERIVED` that a fit gives."""
     found: dict[str, Number] = {}
-    try:
+    with suppress(InputError):  # no white noise and random walk bound this model
         bound = filter_numbers.bound(fit, horizon=horizon)
         for letter, value, level in (("N", bound.N, noise_density), ("K", bound.K, random_walk)):
-            found[f"filter_{letter}"] = (
-                Number(value, bound.stderr.get(letter), True)
-                if value > 0.0
-                else Number(level(fit).value, None, False)
-            )
-    except InputError:
-        pass  # no white noise and random walk bound this model
+            known = value > 0.0
+            value = value if known else level(fit).value
+            found[f"filter_{letter}"] = Number(value, bound.stderr.get(letter), known)
     low = floor(fit)
-    found["floor_B"] = Number(low.bias_instability, None, not low.falls)
-    return {name: found[name] for name in DERIVED if name in found}
+    return found | {"floor_B": Number(low.bias_instability, None, not low.falls)}
 
 
 # -- recordings ------------------------------------------------------------------------------------

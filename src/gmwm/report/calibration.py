@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from functools import partial
-from html import escape
 from operator import call
 from pathlib import Path
 from typing import Any
@@ -115,28 +114,26 @@ def fragment(calibration: Calibration) -> str:
     """The answer for a notebook: health, a filter's numbers, length, and the axes as a table."""
     found = verdict(calibration)
     believed = filter_sentence(calibration)
-    heads = ("channel", "model", "N", "B", "slow terms", "")
-    head = f"<tr>{''.join(f'<th>{each}</th>' for each in heads)}</tr>"
     rows = []
     for name, fit in calibration.items():
         is_valid, why = trust(name, fit, calibration)
-        cells = [
-            name,
-            fit.model.title(),
-            quantity_text(white_density(fit), "u/sqrt(Hz)", fit)["field"],
-            bias_instability(fit)["field"],
-            "; ".join(term["field"] for term in slow_terms(fit)) or "none found",
-            f"{'valid' if is_valid else 'not valid'}: {why}",
-        ]
-        rows.append("<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in cells) + "</tr>")
+        rows.append(
+            [
+                name,
+                fit.model.title(),
+                quantity_text(white_density(fit), "u/sqrt(Hz)", fit)["field"],
+                bias_instability(fit)["field"],
+                "; ".join(term["field"] for term in slow_terms(fit)) or "none found",
+                f"{'valid' if is_valid else 'not valid'}: {why}",
+            ]
+        )
     title = (
         f"{calibration.source or 'a recording'}: {duration_text(calibration.duration)} at "
         f"{calibration.rate:g} Hz. {found['word']}: {found['text']}."
     )
     lengths = [length_sentence(calibration, SHOWN), parameters_sentence(calibration)]
     lines = [title, believed, "Length: " + ". ".join(filter(None, lengths)) + "."]
-    shown = "".join(f"<p>{escape(line)}</p>" for line in lines if line)
-    return f"{shown}<table>{head}{''.join(rows)}</table>"
+    return rendered("fragment.html", lines=list(filter(None, lines)), rows=rows)
 
 
 def _side_by_side(

@@ -64,9 +64,7 @@ def write_sensor_comparison_report(
         path,
         "compared.html",
         comparison=comparison,
-        state="good"
-        if all(axis.state in ("agree", "close") for axis in comparison.values())
-        else "care",
+        state="care" if {"differ", "untested"} & {a.state for a in comparison.values()} else "good",
         axes=[_axis(axis, comparison, sheet) for axis in comparison.values()],
         notices=[n for n in worst_first(list(comparison.notices)) if n.code not in _REPEATED],
         aside=_ASIDE,
@@ -91,22 +89,15 @@ def _axis(
         if axis.name in comparison.calibrations[label]
     ]
     return {
-        "name": axis.name,
+        "of": axis,
         "state": _MARKS[axis.state],
         "word": STATES[axis.state],
-        "sentence": axis.sentence,
         "figure": multiple(axis, labels, others, sheet) if axis.fits or others else None,
-        "model": axis.joint.model.title() if axis.joint else "none",
-        "joint_valid": axis.joint is not None and axis.joint.valid,
-        "joint_codes": _codes(axis.joint),
+        "codes": _codes(axis.joint),
         "equality": _p(axis.joint.equality_p, "= ") if axis.joint else "",
-        "rows": [
-            _row(each, axis, labels) for each in axis.parameters if each.joint.kind != "fixed"
-        ],
+        "rows": [_row(p, axis, labels) for p in axis.parameters if p.joint.kind != "fixed"],
         "numbers": [_numbers(axis, letter, sheet) for letter in _LETTERS],
         "nees": _nees(axis),
-        "inflation": f"{axis.curve_inflation:.2f}" if np.isfinite(axis.curve_inflation) else "",
-        "own": len(axis.numbers.each),
     }
 
 

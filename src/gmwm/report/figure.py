@@ -7,7 +7,7 @@ hide; and ``whatif``: N and K of the curve that sliders move, with the sampling 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from itertools import pairwise
 from typing import Any
 
@@ -130,23 +130,21 @@ def _marks(fitted: Fit, numbers: tuple[float, float] | None, factor: float) -> F
     places = [("0.664 B", low.tau, low.deviation)]
     if numbers is not None:
         places += [("N at 1 s", 1.0, numbers[0]), ("K at 3 s", 3.0, numbers[1])]
-    shown = [(label, tau, y * factor) for label, tau, y in places if y > 0.0]
-    return {
-        "type": "scatter",
-        "mode": "markers+text",
-        "name": "N at 1 s, 0.664 B at the lowest point, K at 3 s",
-        "x": [each[1] for each in shown],
-        "y": [float(f"{each[2]:.5g}") for each in shown],
-        "text": [each[0] for each in shown],
-        "textposition": [
-            "top left" if label[0] == "K" or tau > 0.1 * fitted.wv.tau[-1] else "top right"
-            for label, tau, _ in shown
-        ],
-        "textfont": {"size": 14, "color": SUM_COLOUR},
+    shown = [each for each in places if each[2] > 0.0]
+    late = 0.1 * fitted.wv.tau[-1]
+    left = [label[0] == "K" or tau > late for label, tau, _ in shown]
+    return _scatter(
+        np.array([tau for _, tau, _ in shown]),
+        factor * np.array([y for *_, y in shown]),
+        "N at 1 s, 0.664 B at the lowest point, K at 3 s",
+        mode="markers+text",
+        text=[label for label, *_ in shown],
+        textposition=["top left" if is_left else "top right" for is_left in left],
+        textfont={"size": 14, "color": SUM_COLOUR},
         # Open, so that a point of the data beneath is seen.
-        "marker": {"symbol": "diamond-open", "size": 12, "color": _FILTER, "line": {"width": 2}},
-        "hovertemplate": "%{text}: %{y:.4g} at %{x:.4g} s<extra></extra>",
-    }
+        marker={"symbol": "diamond-open", "size": 12, "color": _FILTER, "line": {"width": 2}},
+        hovertemplate="%{text}: %{y:.4g} at %{x:.4g} s<extra></extra>",
+    )
 
 
 def residual_figure(fitted: Fit) -> Figure:
@@ -177,8 +175,8 @@ def residual_figure(fitted: Fit) -> Figure:
         "circle" if ok else "triangle-up" if value > 0.0 else "triangle-down"
         for ok, value in zip(inside, misfit, strict=True)
     ]
-    zero = {"range": [-reach, reach], "zeroline": True, "zerolinecolor": SUM_COLOUR}
-    shares = {**_linear("data - model [%]"), **zero}
+    shares = _linear("data - model [%]") | {"range": [-reach, reach], "zeroline": True}
+    shares |= {"zerolinecolor": SUM_COLOUR}
     layout = {"height": 190, "xaxis": _times(at.tau), "yaxis": shares}
     return _figure([points], layout)
 
@@ -221,8 +219,8 @@ def series_figure(fitted: Fit, channel: Channel, spans: Spans) -> Figure:
         {**line, "hovertemplate": f"%{{y:.4g}} at %{{x:.4g}} {unit}<extra></extra>"},
     ]
     units = _units("signal - mean", "u", fitted)
-    mark = {"type": "rect", "yref": "paper", "y0": _TICK, "y1": 1, "line": {"width": 0}}
-    mark |= {"fillcolor": "#d55e00"}
+    mark = {"type": "rect", "yref": "paper", "y0": _TICK, "y1": 1, "fillcolor": "#d55e00"}
+    mark |= {"line": {"width": 0}}
     out = [{"x0": first / scale, "x1": last / scale} for first, last in _gone(channel, spans)[:500]]
     layout = {
         "height": 220,
@@ -258,21 +256,15 @@ def growth_figure(known: ErrorBudget, unknown: ErrorBudget, of: str, quantity: s
 
 
 def _figure(
-    traces: Sequence[Figure],
-    layout: Mapping[str, Any],
+    traces: list[Figure],
+    layout: Figure,
     *,
     units: Sequence[tuple[str, float]] = (),
     toggles: Iterable[int] = (),
     **more: Any,
 ) -> Figure:
-    return {
-        "data": list(traces),
-        "layout": {**_LAYOUT, **layout},
-        "config": _CONFIG,
-        "units": list(units),
-        "toggles": list(toggles),
-        **more,
-    }
+    more |= {"units": list(units), "toggles": list(toggles), "config": _CONFIG}
+    return {"data": traces, "layout": _LAYOUT | layout, **more}
 
 
 def _units(title: str, unit: str, fitted: Fit) -> list[tuple[str, float]]:
@@ -283,39 +275,25 @@ def _units(title: str, unit: str, fitted: Fit) -> list[tuple[str, float]]:
 
 
 def _points(x: FloatArray, y: FloatArray, label: str, colour: str, size: int) -> Figure:
-    return {
-        "type": "scatter",
-        "mode": "markers",
-        "name": label,
-        "x": _plain(x),
-        "y": _plain(y),
-        "marker": {"color": colour, "size": size},
-        "hovertemplate": "%{y:.4g} at %{x:.4g} s",
-    }
-
-
-def _bars(value: FloatArray, low: FloatArray, high: FloatArray, colour: str) -> Figure:
-    return {
-        "type": "data",
-        "symmetric": False,
-        "array": _plain(np.maximum(high - value, 0.0)),
-        "arrayminus": _plain(np.maximum(value - low, 0.0)),
-        "color": colour,
-        "thickness": 1.2,
-        "width": 3,
-    }
+    marker = {"color": colour, "size": size}
+    hover = "%{y:.4g} at %{x:.4g} s"
+    return _scatter(x, y, label, mode="markers", marker=marker, hovertemplate=hover)
 
 
 def _line(x: FloatArray, y: FloatArray, label: str, colour: str, dash: str, width: float) -> Figure:
-    return {
-        "type": "scatter",
-        "mode": "lines",
-        "name": label,
-        "x": _plain(x),
-        "y": _plain(y),
-        "line": {"color": colour, "dash": dash, "width": width},
-        "hovertemplate": "%{y:.4g} at %{x:.4g}",
-    }
+    line = {"color": colour, "dash": dash, "width": width}
+    hover = "%{y:.4g} at %{x:.4g}"
+    return _scatter(x, y, label, mode="lines", line=line, hovertemplate=hover)
+
+
+def _scatter(x: FloatArray, y: FloatArray, label: str, **style: Any) -> Figure:
+    return {"type": "scatter", "name": label, "x": _plain(x), "y": _plain(y), **style}
+
+
+def _bars(value: FloatArray, low: FloatArray, high: FloatArray, colour: str) -> Figure:
+    above, below = (_plain(np.maximum(each, 0.0)) for each in (high - value, value - low))
+    style = {"type": "data", "symmetric": False, "color": colour, "thickness": 1.2, "width": 3}
+    return {**style, "array": above, "arrayminus": below}
 
 
 def _plain(values: FloatArray) -> list[float | None]:
@@ -338,13 +316,8 @@ def _axis(title: str, low: float | None = None, high: float = 1.0) -> Figure:
 
 
 def _linear(title: str) -> Figure:
-    return {
-        "title": {"text": title, "standoff": 6},
-        "gridcolor": _GRID,
-        "linecolor": "#888888",
-        "mirror": True,
-        "zeroline": False,
-    }
+    frame = {"gridcolor": _GRID, "linecolor": "#888888", "mirror": True, "zeroline": False}
+    return {"title": {"text": title, "standoff": 6}, **frame}
 
 
 def _colours(count: int) -> list[str]:

@@ -27,11 +27,7 @@ from gmwm.population import (
 from gmwm.report.page import duration_text, origin, write_page
 from gmwm.report.pictures import strip
 
-_TITLES = {
-    "filter_N": "filter N",
-    "filter_K": "filter K",
-    "floor_B": "bias instability B",
-}
+_TITLES = {"filter_N": "filter N", "filter_K": "filter K", "floor_B": "bias instability B"}
 _MOSTLY = 0.5  # of the variance between units, which longer recordings would make less
 
 
@@ -76,26 +72,25 @@ def fleet_fragment(fleet: Fleet) -> str:
 def _about(fleet: Fleet) -> str:
     done = fleet.done.values()
     lengths = sorted(each.duration for each in done)
+    ends = dict.fromkeys(map(duration_text, (lengths[0], lengths[-1])))
     rates = sorted({f"{each.rate:g}" for each in done}, key=float)
-    length = duration_text(lengths[0])
-    if duration_text(lengths[-1]) != length:
-        length += f" to {duration_text(lengths[-1])}"
-    return f"{length} of each at {' and '.join(rates)} Hz"
+    return f"{' to '.join(ends)} of each at {' and '.join(rates)} Hz"
 
 
 def _verdict(fleet: Fleet) -> dict[str, str]:
-    sound = [path for path, each in fleet.done.items() if each.valid]
-    parts = [f"{len(sound)} of {len(fleet)} units have a valid model of every axis"]
+    valid = sum(each.valid for each in fleet.done.values())
+    apart = len({outlier.device for each in fleet.spreads for outlier in each.outliers})
+    text = f"{valid} of {len(fleet)} units have a valid model of every axis"
     if fleet.failed:
-        parts.append(f"{len(fleet.failed)} could not be calibrated")
-    apart = {outlier.device for each in fleet.spreads for outlier in each.outliers}
+        text += f"; {len(fleet.failed)} could not be calibrated"
     if apart:
-        parts.append(f"{len(apart)} {'outliers' if len(apart) > 1 else 'outlier'}")
+        text += f"; {apart} outlier{'s' if apart > 1 else ''}"
+    state, word = "good", "Uniform"
     if not fleet.valid:
-        return {"state": "bad", "word": "No valid model", "text": "; ".join(parts)}
-    is_good = len(sound) == len(fleet) and not apart
-    word = "Uniform" if is_good else "With exceptions"
-    return {"state": "good" if is_good else "care", "word": word, "text": "; ".join(parts)}
+        state, word = "bad", "No valid model"
+    elif valid < len(fleet) or apart:
+        state, word = "care", "With exceptions"
+    return {"state": state, "word": word, "text": text}
 
 
 def _largest(fleet: Fleet) -> str:
@@ -180,12 +175,8 @@ def _troubled(fleet: Fleet) -> list[tuple[str, str, str]]:
 
 def _options(fleet: Fleet) -> dict[str, str]:
     """Those that say something, without those that the page has elsewhere."""
-    shown = fleet.options.items()
-    return {
-        key: _in_words(each)
-        for key, each in shown
-        if key not in ("horizon", "version") and (each or each is False)
-    }
+    shown = {k: each for k, each in fleet.options.items() if k not in ("horizon", "version")}
+    return {key: _in_words(each) for key, each in shown.items() if each or each is False}
 
 
 def _in_words(value: object) -> str:

@@ -171,32 +171,27 @@ class Rotation:
             return [*shares, self.nees(name, "position")]
 
         blocks = [self._head()]
-        for title, head, row in (
-            (
-                f"All turns, at the ends of outages before the first fix: errors over those of "
-                f"{FIRST}; NEES per degree of freedom",
-                [*(f"{each} RMS" for each in both), *(f"NEES {each}" for each in both)],
-                ratios_and_nees,
-            ),
-            (
-                "Share within predicted 95 % intervals, %; NEES of the position, which includes "
-                "the correlation of horizontal and vertical",
-                [*both, "NEES position"],
-                covered,
-            ),
-            (
-                f"Horizontal RMS over that of {FIRST}, turn by turn",
-                by_turn,
-                lambda name: [self.ratio(name, "horizontal", i) for i in turns],
-            ),
-            (
-                "NEES of the position, turn by turn",
-                by_turn,
-                lambda name: [self.nees(name, "position", i) for i in turns],
-            ),
-        ):
+
+        def add(title: str, heads: list[str], row: Callable[[str], list[Interval]]) -> None:
             rows = [[name, *(each.text("-") for each in row(name))] for name in self.names]
-            blocks.append([*wrapped(title), plain_table(("filter", *head), rows)])
+            blocks.append([*wrapped(title), plain_table(("filter", *heads), rows)])
+
+        add(
+            "All turns, at the ends of outages before the first fix: errors over those of "
+            f"{FIRST}; NEES per degree of freedom",
+            [*(f"{each} RMS" for each in both), *(f"NEES {each}" for each in both)],
+            ratios_and_nees,
+        )
+        add(
+            "Share within predicted 95 % intervals, %; NEES of the position, which includes the "
+            "correlation of horizontal and vertical",
+            [*both, "NEES position"],
+            covered,
+        )
+        title = f"Horizontal RMS over that of {FIRST}, turn by turn"
+        add(title, by_turn, lambda name: [self.ratio(name, "horizontal", i) for i in turns])
+        title = "NEES of the position, turn by turn"
+        add(title, by_turn, lambda name: [self.nees(name, "position", i) for i in turns])
         return "\n\n".join(map("\n".join, blocks))
 
     def _head(self) -> list[str]:

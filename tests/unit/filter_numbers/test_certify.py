@@ -255,7 +255,7 @@ def test_terms_of_imperfections():
     ("options", "message"),
     [
         ({"outages": ()}, "outages: give one length at least"),
-        ({"outages": (0.0,)}, "outage = 0.0"),
+        ({"outages": (0.0,)}, "outages = 0.0"),
         ({"keyframe": 0.01}, "two sampling intervals"),
         ({"motion": "boat"}, "motion 'boat' is not known: write handheld, drone, car, fixed-wing"),
         ({"imperfections": Imperfections(scale_error=0.01)}, "do nothing at rest"),

@@ -186,22 +186,25 @@ def test_every_channel_is_there(parsed, calibration):
     assert drawn == plots
 
 
-def test_head_line(parsed):
-    assert "bench.csv: stochastic error models" in parsed.text
-    assert "80 s static at 100 Hz, 8,000 samples a channel" in parsed.text
-    assert f"gmwm {gmwm.__version__}, numpy" in parsed.text
-
-
-def test_notes_and_skipped_channels(parsed):
-    assert "Column not used: 'temp'" in parsed.text
-    assert ["gyro_y", "skipped: constant at 0 rad/s", "skipped"] in parsed.cells
-
-
-def test_notices_are_sentences(parsed, calibration):
+def test_the_page_says_what_was_found(parsed, calibration):
+    fit = calibration["gyro_x"]
     notices = [notice for fit in calibration.fits.values() for notice in fit.notices]
-    assert notices, "the fixture must have some"
-    for notice in notices:
-        assert notice.sentence in parsed.text
+    notes = gmwm.error_budget(calibration).notes
+    assert notices and notes, "the fixture must have some"
+    for words in (
+        "bench.csv: stochastic error models",
+        "80 s static at 100 Hz, 8,000 samples a channel",
+        f"gmwm {gmwm.__version__}, numpy",
+        "Column not used: 'temp'",
+        f"objective {fit.objective:.4g} on {fit.dof} degrees of freedom",
+        *(notice.sentence for notice in notices),
+        *(f"{note[0].upper()}{note[1:]}." for note in notes),
+    ):
+        assert words in parsed.text
+    assert ["gyro_y", "skipped: constant at 0 rad/s", "skipped"] in parsed.cells
+    # What is not valid is said before the headline.
+    warned = parsed.text.index("The model of accel_x is not valid: read the notices first.")
+    assert warned < parsed.text.index("After a 60 s outage")
 
 
 def test_valid_and_not_valid(calibration):
@@ -306,11 +309,6 @@ def test_upper_bounds_are_shown_as_such(parsed, calibration):
         )
 
 
-def test_fitness_is_told(parsed, calibration):
-    fit = calibration["gyro_x"]
-    assert f"objective {fit.objective:.4g} on {fit.dof} degrees of freedom" in parsed.text
-
-
 # -- what it means for navigation -----------------------------------------------------------------
 
 
@@ -342,18 +340,6 @@ def test_every_term_of_the_error_budget_is_listed(parsed, calibration):
         for r in budget.rows
         if any(r.values)
     ]
-
-
-def test_the_notes_of_the_error_budget(parsed, calibration):
-    notes = gmwm.error_budget(calibration).notes
-    assert notes, "the fixture must have some"
-    for note in notes:
-        assert f"{note[0].upper()}{note[1:]}." in parsed.text
-
-
-def test_what_is_not_valid_is_said_before_the_headline(parsed):
-    warned = parsed.text.index("The model of accel_x is not valid: read the notices first.")
-    assert warned < parsed.text.index("After a 60 s outage")
 
 
 def test_the_headline_of_a_minute(parsed, calibration):
@@ -490,6 +476,7 @@ def test_models_that_tie_and_the_data_sheet_are_drawn(calibration, tmp_path):
     sheet.write_text("gyro: {N: 1.2 deg/sqrt(h), K: 60 deg/h/sqrt(h)}\n")
     rivals = {"gyro_x": (WhiteNoise(4e-4) + gmwm.GaussMarkov(1e-3, 30.0),)}
     shown = Page(page(replace(calibration, rivals=rivals), datasheet=sheet))
+    assert set(read_datasheet(sheet).entries) == {"gyro"}  # before there are channels, too
     traces = {trace["name"]: trace for trace in shown.figures()[0]["data"]}
     tau, stated = (np.array(traces["data sheet"][key]) for key in "xy")
     expected = np.sqrt(72.0**2 / tau[-1] + 1.0**2 * tau[-1] / 3.0)
@@ -518,12 +505,6 @@ def test_data_sheets_that_cannot_be_used(calibration, tmp_path, text, what):
         read_datasheet(path, {name: fit.wv.quantity or "" for name, fit in calibration.items()})
     with pytest.raises(InputError, match=what):
         read_datasheet(path)
-
-
-def test_a_data_sheet_is_read_before_there_are_channels(tmp_path):
-    path = tmp_path / "sheet.yaml"
-    path.write_text("gyro_z: {N: 1 deg/sqrt(h)}\naccel: {B: 1 g}\n")
-    assert set(read_datasheet(path).entries) == {"gyro_z", "accel"}
 
 
 def test_series_and_spectrum_leave_out_what_was_masked(calibration, recording):
@@ -590,24 +571,18 @@ def test_residuals_are_in_per_cent_of_the_deviation(parsed, calibration):
         assert low == -high
 
 
-def test_a_residual_beyond_the_axis_is_a_triangle_at_its_edge(calibration):
+@pytest.mark.parametrize("last", [400.0, 0.09])
+def test_residuals_are_within_the_axis_or_triangles_at_its_edge(calibration, last):
     fit = calibration["gyro_x"]
-    wv = replace(fit.wv, variance=fit.wv.variance * np.r_[np.ones(fit.wv.tau.size - 1), 400.0])
-    (points,) = residual_figure(replace(fit, wv=wv))["data"]
-    assert points["marker"]["symbol"][-1] == "triangle-up"
-    assert points["marker"]["symbol"][0] == "circle"
-    assert points["text"][0] == ""
-    assert points["text"][-1] == f"{points['customdata'][-1][0]:+.0f} %"
-
-
-def test_the_axis_of_residuals_reaches_what_is_missed(calibration):
-    fit = calibration["gyro_x"]
-    wv = replace(fit.wv, variance=fit.wv.variance * np.r_[np.ones(fit.wv.tau.size - 1), 0.09])
+    wv = replace(fit.wv, variance=fit.wv.variance * np.r_[np.ones(fit.wv.tau.size - 1), last])
     figure = residual_figure(replace(fit, wv=wv))
-    misfit = figure["data"][0]["customdata"][-1][0]
-    assert misfit < -60.0
-    assert figure["layout"]["yaxis"]["range"][0] < misfit
-    assert set(figure["data"][0]["marker"]["symbol"]) == {"circle"}
+    (points,) = figure["data"]
+    misfit, (low, high) = points["customdata"][-1][0], figure["layout"]["yaxis"]["range"]
+    beyond = not low < misfit < high
+    assert beyond == (last > 1.0) and (beyond or misfit < -60.0)
+    assert points["marker"]["symbol"][-1] == ("triangle-up" if beyond else "circle")
+    assert points["text"][-1] == (f"{misfit:+.0f} %" if beyond else "")
+    assert (points["marker"]["symbol"][0], points["text"][0]) == ("circle", "")
 
 
 def test_lines_are_seen_on_white_and_on_dark_screens():
