@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
+from itertools import cycle
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -146,11 +147,10 @@ class ErrorBudget:
             raise InputError(
                 f"the error budget has no total {of!r}: it has {', '.join(self.groups)}"
             )
+        flat = of == HORIZONTAL
+        channels = [c for c in self.channels if (axis(c) in ("x", "y") if flat else c == of)]
         return [
-            row
-            for row in self.rows
-            if (row.channel == of or (of == HORIZONTAL and axis(row.channel) in ("x", "y")))
-            and quantity in (None, row.quantity)
+            row for row in self.rows if row.channel in channels and quantity in (None, row.quantity)
         ]
 
     def __str__(self) -> str:
@@ -159,16 +159,14 @@ class ErrorBudget:
             f"exact attitude, velocity and position; {STARTS[self.calibrated]}.",
         ]
         for quantity in QUANTITIES:
-            channels = [c for c in self.channels if quantity in self.quantities(c)]
-            if not channels:
-                continue
-            table: list[tuple[str, str, FloatArray]] = []
-            for channel in channels:
+            table: list[tuple[str, str, Sequence[float] | FloatArray]] = []
+            for channel in self.channels:
                 rows = self._rows(channel, quantity)
-                parts = [(row.component, np.array(row.values)) for row in rows]
+                table += [("" if i else channel, r.component, r.values) for i, r in enumerate(rows)]
                 if len(rows) > 1:
-                    parts.append(("total", self.total(channel)[quantity]))
-                table += [("" if i else channel, *part) for i, part in enumerate(parts)]
+                    table.append(("", "total", self.total(channel)[quantity]))
+            if not table:
+                continue
             if HORIZONTAL in self.groups and quantity in self.quantities():
                 label = "tilt" if quantity == "attitude" else "horizontal, radial"
                 table.append((label, "", self.total()[quantity]))
@@ -209,8 +207,7 @@ class ErrorBudget:
         curves = self.curves(of, quantity)
         if ax is None:
             _, ax = plt.subplots(figsize=(7.0, 4.6), layout="constrained")
-        for i, (label, curve) in enumerate(curves.items()):
-            colour = COMPONENT_COLOURS[i % len(COMPONENT_COLOURS)]
+        for colour, (label, curve) in zip(cycle(COMPONENT_COLOURS), curves.items(), strict=False):
             ax.plot(self.grid, curve, color=colour, linewidth=1.3, linestyle="--", label=label)
         total = per_si(quantity) * root_sum([row.curve for row in self._rows(of, quantity)])
         ax.plot(self.grid, total, color=SUM_COLOUR, linewidth=2.6, label="total")
@@ -234,11 +231,8 @@ class ErrorBudget:
         for row in self._rows(of, quantity):
             label = row.channel if of == HORIZONTAL else row.component
             parts.setdefault(label, []).append(row.curve)
-        return {
-            label: per_si(quantity) * root_sum(part)
-            for label, part in parts.items()
-            if np.any(part)
-        }
+        scale = per_si(quantity)
+        return {label: scale * root_sum(part) for label, part in parts.items() if np.any(part)}
 
     def to_dict(self) -> dict[str, Any]:
         """Everything in JSON types and SI units, with the totals."""

@@ -67,16 +67,8 @@ def reduce(
     keyframe : float, optional
         Interval of keyframes or scans between which poses are related, s, for which they shall be
         good in place of outages.
-    bias_sd : float or mapping, optional
-        Standard deviation of a constant bias, such as the turn-on bias, in u; by axis or kind
-        ("gyro", "accel") if a mapping.
-    shared : bool, optional
-        Whether axes of a kind have the same numbers.
-    tau : float or "shared", optional
-        Correlation time of the Gauss-Markov process, s; "shared": the one for all axes that costs
-        least over them. By default each has its own.
-    dt : float, optional
-        Sampling interval of models that are not fitted, s; 0.01 s by default.
+    bias_sd, shared, tau, dt : optional
+        As in `gmwm.bound`.
     progress : callable, optional
         Called as ``progress(done, total, channel)``.
 

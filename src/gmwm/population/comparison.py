@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 from collections import Counter
@@ -11,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
+from pydantic_core import to_json
 
 from gmwm._core.frozen import freeze
 from gmwm._core.pages import make
@@ -20,7 +22,6 @@ from gmwm._core.units import customary_unit
 from gmwm.calibration import Calibration
 from gmwm.errors import MissingNameError
 from gmwm.estimate import Estimate, Fit, JointFit
-from gmwm.estimate.result import plain
 from gmwm.filter_numbers import FilterNumbers
 from gmwm.issues import Notice, worst_first
 from gmwm.population import tuning
@@ -46,15 +47,6 @@ _NAMES = {"short": "short times", "R": "drift"}
 def _percent(share: float) -> str:
     """A relative difference; a factor from one on."""
     return per_cent(share) if share < 0.995 else f"a factor of {brief(1.0 + share)}"
-
-
-def _without_nan(value: Any) -> Any:
-    """JSON types without NaN and infinity, which JSON lacks: ``None`` in their place."""
-    if isinstance(value, Mapping):
-        return {key: _without_nan(each) for key, each in value.items()}
-    if isinstance(value, list | tuple):
-        return [_without_nan(each) for each in value]
-    return plain(value) if isinstance(value, float) else value
 
 
 @dataclass(frozen=True)
@@ -216,14 +208,9 @@ class AxisComparison:
             "joint": None if self.joint is None else self.joint.to_dict(),
             "equality_p": self.joint.equality_p if self.joint else None,
             "parameters": [
-                {
-                    "key": each.key,
-                    "joint": each.joint.to_dict(),
-                    "spread": each.spread,
-                    "p_value": each.p_value,
-                    "each": [None if e is None else e.to_dict() for e in each.each],
-                }
-                for each in self.parameters
+                {"key": p.key, "joint": p.joint.to_dict(), "spread": p.spread, "p_value": p.p_value}
+                | {"each": [None if e is None else e.to_dict() for e in p.each]}
+                for p in self.parameters
             ],
             "numbers": {
                 "each": {label: each.row() for label, each in self.numbers.each.items()},
@@ -235,7 +222,7 @@ class AxisComparison:
             },
             "curve_inflation": self.curve_inflation,
         }
-        return dict(_without_nan(content))
+        return dict(json.loads(to_json(content, inf_nan_mode="null")))
 
 
 @dataclass(frozen=True, eq=False, repr=False)

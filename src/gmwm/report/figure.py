@@ -8,7 +8,6 @@ hide; and ``whatif``: N and K of the curve that sliders move, with the sampling 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -343,13 +342,12 @@ def _bins(channel: Channel, spans: Spans) -> FloatArray:
     values = _used(channel, spans)
     values -= np.nanmean(values)
     edges = np.unique(np.linspace(0, values.size, min(_BINS, values.size) + 1).astype(int))
-    bins = []
-    for start, stop in pairwise(edges.tolist()):
-        part = values[start:stop]
-        part = part[~np.isnan(part)]
-        found = (part.mean(), part.min(), part.max()) if part.size else (np.nan,) * 3
-        bins.append((0.5 * (start + stop) * channel.dt, *found))
-    return np.array(bins).T
+    first, known = edges[:-1], ~np.isnan(values)
+    with np.errstate(invalid="ignore"):
+        counts = np.add.reduceat(known, first, dtype=float)
+        mean = np.add.reduceat(np.where(known, values, 0.0), first) / counts
+        low, high = np.fmin.reduceat(values, first), np.fmax.reduceat(values, first)
+    return np.array([0.5 * (first + edges[1:]) * channel.dt, mean, low, high])
 
 
 def _gone(channel: Channel, spans: Spans) -> list[tuple[float, float]]:
