@@ -236,7 +236,7 @@ def _unlike(fits: Mapping[str, Fit]) -> dict[str, Notice]:
     for label, fit in ((label, fit) for label, fit in fits.items() if label not in most):
         code = "rates-differ" if fit.wv.unit == usual.wv.unit else "units-differ"
         values = {"rate": 1.0 / fit.wv.dt, "usual": 1.0 / usual.wv.dt}
-        words = {"own": fit.wv.unit, "common": usual.wv.unit}
+        words: dict[str, Any] = {"own": fit.wv.unit, "common": usual.wv.unit}
         words["others"] = most[0] if len(most) == 1 else "the others"
         found[label] = notice(code, values=values, **words)
     return found

@@ -195,9 +195,11 @@ def recordings(paths: Paths, folder: Path | None) -> list[Item]:
     folder: Folder of the outputs, which are no recordings.
     Raises InputError if there are none, or a pattern matches nothing.
     """
-    several = isinstance(paths, Iterable) and not isinstance(paths, str | os.PathLike)
+    given: Iterable[Any] = [paths]
+    if isinstance(paths, Iterable) and not isinstance(paths, str | os.PathLike):
+        given = paths
     found: dict[str, str] = {}
-    for each in paths if several else [paths]:
+    for each in given:
         text = os.fspath(each) if isinstance(each, str | os.PathLike) else None
         if not isinstance(text, str) or "\0" in text:
             raise InputError(f"{checks.shown(each)} is no path: give paths of recordings as text")

@@ -14,7 +14,7 @@ from gmwm._core.jobs import shared
 from gmwm._core.pages import page_of
 from gmwm._core.text import brief, per_cent
 from gmwm.calibration import Calibration, floor, sentence, white_density
-from gmwm.estimate import Estimate, Fit
+from gmwm.estimate import Fit
 from gmwm.issues import worst_first
 from gmwm.readers import Channel, Recording
 from gmwm.report.answer import (
@@ -182,7 +182,7 @@ def _channel(
         "noise": "" if own is None else _noise(fit, own.N),
         "ambiguity": ambiguity(calibration, name),
         "stated": _stated(name, fit, sheet),
-        "rows": [_row(each, lengths.get(each.key), duration) for each in fit.estimates],
+        "rows": [(e, _needed(lengths.get(e.key), duration)) for e in fit.estimates],
         "figure": deviation_figure(fit, filter_numbers=believed, rivals=rivals, sheet=sheet),
         "sliders": _sliders(fit, believed),
         "residuals": residual_figure(fit),
@@ -254,28 +254,3 @@ def _needed(seconds: float | None, duration: float) -> str:
         return "not identified"
     text = duration_text(seconds)
     return text if text == "centuries" else f"needs {text}"
-
-
-def _row(estimate: Estimate, length: float | None, duration: float) -> dict[str, Any]:
-    """A parameter for the table: SI, then each of the field's units."""
-
-    def cell(value: float, low: float, high: float, unit: str) -> dict[str, str]:
-        text, interval = brief(value, 4), str(estimate.kind)
-        if estimate.kind == "bound":
-            text, interval = f"< {brief(high, 4)}", "95 % upper limit"
-        elif estimate.kind == "estimated":
-            interval = f"{brief(low, 4)} to {brief(high, 4)}"
-        return {"value": text, "interval": interval, "unit": unit}
-
-    si = (estimate.value, estimate.lower, estimate.upper, estimate.unit)
-    cells = [*(cell(f.value, f.lower, f.upper, f.unit) for f in estimate.field), cell(*si)]
-    error = ""
-    if estimate.kind == "estimated" and estimate.value and estimate.stderr is not None:
-        error = per_cent(estimate.stderr / abs(estimate.value))
-    return {
-        "key": estimate.key,
-        "meaning": estimate.meaning,
-        "cells": cells,
-        "error": error,
-        "needed": _needed(length, duration),
-    }

@@ -17,7 +17,7 @@ from gmwm.filter_numbers import bound
 from gmwm.issues import Notice, worst_first
 from gmwm.process import Model
 from gmwm.report.numbers import SHOWN
-from gmwm.report.page import duration_text
+from gmwm.report.page import begun, duration_text
 
 _AIM = 0.1  # relative standard error of a deviation or a parameter that is well enough known
 _COUNTED = {"bad": "severe issue", "warning": "warning", "note": "note"}
@@ -33,7 +33,7 @@ def health(calibration: Calibration) -> dict[str, Any]:
     return {
         "examined": examined,
         "advice": [
-            f"{_begun(n.text)}: {n.hint}. "
+            f"{begun(n.text)}: {n.hint}. "
             + _part_sentence(calibration, n.values["stop"] - n.values["start"], SHOWN)
             for n in calibration.notices
             if n.code == LONGEST_PART
@@ -41,8 +41,9 @@ def health(calibration: Calibration) -> dict[str, Any]:
         "unexamined": () if examined else list(map(str, notices)),
         "summary": _summary(found),
         "severe": any(notice.severity == "bad" for notice in found),
-        "rows": _rows(found),
-        "good": _rows([notice for notice in notices if notice.severity == "good"]),
+        # Of equal ones, those of the whole recording before those of a channel.
+        "rows": worst_first(sorted(found, key=lambda notice: bool(notice.where))),
+        "good": [notice for notice in notices if notice.severity == "good"],
     }
 
 
@@ -107,31 +108,11 @@ def _effect(fit: Fit, rivals: Sequence[Model]) -> str:
     return f". {text}" if np.isfinite(change) else ""
 
 
-def _rows(notices: list[Notice]) -> list[dict[str, Any]]:
-    """Worst first; of equal ones, those of the whole recording before those of a channel."""
-    return [
-        {
-            "severity": notice.severity,
-            "label": "severe" if notice.severity == "bad" else notice.severity,
-            "where": ", ".join(part for part in (notice.where, notice.source) if part),
-            "text": _begun(notice.text),
-            "hint": _begun(notice.hint),
-            "done": notice.hint,
-        }
-        for notice in worst_first(sorted(notices, key=lambda notice: bool(notice.where)))
-    ]
-
-
 def _summary(notices: list[Notice]) -> str:
     if all(notice.severity not in ("bad", "warning") for notice in notices):
         return "No defect found."
     parts = [part for severity in _COUNTED if (part := counted(notices, severity))]
     return f"{' and '.join([', '.join(parts[:-1]), parts[-1]] if parts[1:] else parts)}."
-
-
-def _begun(text: str) -> str:
-    """With a capital at the beginning; units and names keep theirs."""
-    return text[:1].upper() + text[1:]
 
 
 # -- length ----------------------------------------------------------------------------------------

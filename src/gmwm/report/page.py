@@ -17,7 +17,7 @@ import numpy as np
 
 from gmwm._core import __version__
 from gmwm._core.files import written
-from gmwm._core.text import brief
+from gmwm._core.text import brief, per_cent
 from gmwm._core.units import field_units, si_parameter_unit
 from gmwm.errors import printable
 from gmwm.variance import WaveletVariance
@@ -51,6 +51,11 @@ def duration_text(seconds: float) -> str:
     return " ".join(f"{count} {unit}" for count, unit in parts if count)
 
 
+def begun(text: str) -> str:
+    """With a capital at the beginning; units and names keep theirs."""
+    return text[:1].upper() + text[1:]
+
+
 def units_of(unit: str, wv: WaveletVariance) -> tuple[str, float, str]:
     """The field's unit for a parameter of a channel, its number per SI unit, and the SI unit."""
     known = field_units(unit, wv.quantity)
@@ -78,8 +83,8 @@ def rendered(template: str, scripts: Sequence[str] = (), **values: Any) -> str:
     scripts: The only ones that a browser will run, by a Content-Security-Policy; nothing is loaded
         from any network.
     **values: Of the template, where ``tojson`` writes figures and ``scripts`` are those above; it
-        has the ``style`` of reports, the ``version`` of this package and the filters ``brief`` and
-        ``duration`` too.
+        has the ``style`` of reports, the ``version`` of this package and filters for numbers
+        and durations too.
     """
     hashes = (b64encode(sha256(script.encode()).digest()).decode() for script in scripts)
     allowed = " ".join(f"'sha256-{each}'" for each in hashes) or "'none'"
@@ -100,7 +105,12 @@ def _environment() -> Environment:
     )
     environment.policies["json.dumps_kwargs"] = {"allow_nan": False, "separators": (",", ":")}
     environment.globals |= {"style": resource("report.css"), "version": __version__}
-    environment.filters |= {"brief": brief, "duration": duration_text}
+    environment.filters |= {
+        "begun": begun,
+        "brief": brief,
+        "duration": duration_text,
+        "per_cent": per_cent,
+    }
     return environment
 
 

@@ -81,15 +81,17 @@ def multiple(
     if axis.joint is not None:
         tau, parts = dense_curves(axis.joint)
         curves.append(("joint", tau, np.log10(factor * root_sum(list(parts.values())))))
-    stated = sheet and sheet.deviation(axis.name, first.quantity, first.tau, first.dt)
+    stated = None
+    if sheet is not None:
+        stated = sheet.deviation(axis.name, first.quantity, first.tau, first.dt)
     if stated is not None:
         curves.append(("sheet", first.tau, np.log10(factor * stated)))
     shifts = _DODGE * np.linspace(-0.5, 0.5, max(len(axis.fits), 2))
     recordings = []
     for (label, fit), shift in zip(axis.fits.items(), shifts, strict=False):
         at, shown = x(np.log10(fit.wv.tau) + shift), y(decades(fit.wv.variance))
-        ends = (np.minimum(y(decades(each)), _MIDDLE) for each in (fit.wv.lower, fit.wv.upper))
-        recordings.append((labels.index(label), _line(at, shown), *_points(at, shown, *ends)))
+        bars = (np.minimum(y(decades(each)), _MIDDLE) for each in (fit.wv.lower, fit.wv.upper))
+        recordings.append((labels.index(label), _line(at, shown), *_points(at, shown, *bars)))
     ticks, ratios = _ratios(axis, x, shifts)
     return {
         "title": f"Allan deviation of {axis.name} in {unit} against averaging time in s",

@@ -81,7 +81,8 @@ def compare(fitted: Fit, truth: Model) -> list[Comparison]:
         key = item.key
         unit, scale = customary_unit(item.parameter.unit, fitted.wv.quantity, fitted.wv.unit)
         values = (item.value or 0.0, fitted.params[key], *intervals.get(key, (0.0, np.inf)))
-        rows.append(Comparison(fitted.wv.name, key, *(scale * each for each in values), unit))
+        true, estimate, low, high = (scale * each for each in values)
+        rows.append(Comparison(fitted.wv.name, key, true, estimate, low, high, unit))
     return rows
 
 

@@ -145,7 +145,7 @@ class Rotation:
         weights = crossed_weights(self.stretches, turn, tuning.BOOTSTRAP_DRAWS, seed)
         rows = slice(None) if turn is None else turn
         with np.errstate(invalid="ignore", divide="ignore"):
-            value = float(root(np.nansum(above[rows]) / np.nansum(below[rows])))
+            value = float(root(np.asarray(np.nansum(above[rows]) / np.nansum(below[rows]))))
             sums = (np.einsum("dcts,cts->d", weights, np.nan_to_num(e)) for e in (above, below))
             drawn = root(np.divide(*sums))
         drawn = drawn[np.isfinite(drawn)]

@@ -619,10 +619,10 @@ def test_a_step_that_spoils_a_fit_is_the_first_finding(calibration):
     crosstalk = issue("warning", "correlated noise", "")
     spoilt = in_options(replace(calibration, fits=fits, notices=(LENGTH, crosstalk)))
     first, second = health(spoilt)["rows"]
-    assert (first["severity"], first["where"]) == ("bad", "accel_x")
-    assert first["text"] == "A step of +2.7 mg at 293 s"
-    assert first["hint"].endswith("--stop 283.6 or --start 303.2, or --remove-departures")
-    assert second["severity"] == "warning"
+    assert (first.severity, first.where) == ("bad", "accel_x")
+    assert first.text == "a step of +2.7 mg at 293 s"
+    assert first.hint.endswith("--stop 283.6 or --start 303.2, or --remove-departures")
+    assert second.severity == "warning"
 
 
 def test_every_reason_why_a_channel_is_not_valid_is_a_finding(calibration):
@@ -631,8 +631,8 @@ def test_every_reason_why_a_channel_is_not_valid_is_a_finding(calibration):
     fits = {**calibration.fits, "gyro_x": replace(calibration["gyro_x"], notices=(missed, moved))}
     for notices in ((LENGTH, moved), ()):
         spoilt = replace(calibration, fits=fits, notices=notices)
-        rows = [(row["where"], row["text"]) for row in health(spoilt)["rows"]]
-        assert ("gyro_x", "The model misses the data by 40 %") in rows
+        rows = [(row.where, row.text) for row in health(spoilt)["rows"]]
+        assert ("gyro_x", "the model misses the data by 40 %") in rows
         # What is a finding of the recording is not said twice.
         assert sum("moved" in text for _, text in rows) == 1
         shown = page(spoilt)
