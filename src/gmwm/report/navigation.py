@@ -15,7 +15,7 @@ from gmwm._core.pages import page_of
 from gmwm._core.text import readable
 from gmwm._core.units import SI_UNIT, customary_unit
 from gmwm.ins.logs import Comparison, Navigated
-from gmwm.ins.simulation import QUANTITIES, Consistency, Ratio, Validation
+from gmwm.ins.simulation import QUANTITIES, Ratio, Validation
 from gmwm.process import Model
 from gmwm.report.page import write_page
 
@@ -51,7 +51,7 @@ def write_validation_report(validation: Validation, path: str | os.PathLike[str]
         growth=svg(validation.plot_growth()) if outages else "",
         outages=outages,
         groups=_GROUPS,
-        gnss_on=[(name, _cells(validation.with_gnss(name))) for name in validation.names],
+        gnss_on=[(name, validation.with_gnss(name)) for name in validation.names],
         innovations=[(name, validation.innovations(name)) for name in validation.names],
         models=[(name, _models(each.models)) for name, each in experiment.filters.items()],
     )
@@ -96,23 +96,11 @@ def _outage(validation: Validation, index: int) -> dict[str, Any]:
         "title": f"Outage of {outage.duration:g} s at {outage.start:g} s",
         "errors": svg(validation.plot_errors(index)),
         "rows": rows,
-        "nees": [(name, _cells(each)) for name, each in found.items()],
+        "nees": list(found.items()),
         "coverage": [
             (part, name, each.coverage[part]) for part in _COVERED for name, each in found.items()
         ],
     }
-
-
-def _cells(consistency: Consistency) -> list[tuple[str, bool]]:
-    """NEES of each group as text, and whether it lies in its band."""
-    cells = []
-    for group in _GROUPS:
-        ratio = consistency.nees.get(group)
-        if ratio is None or np.isnan(ratio.value):
-            cells.append(("-", True))
-        else:
-            cells.append((f"{ratio.value:.3g}", ratio.within or bool(np.isnan(ratio.lower))))
-    return cells
 
 
 def _sentences(validation: Validation) -> list[str]:
