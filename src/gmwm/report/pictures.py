@@ -17,9 +17,6 @@ from gmwm.filter_numbers import root_sum
 from gmwm.population import AxisComparison, Spread
 from gmwm.report.datasheet import Datasheet
 
-COLOURS = 8
-"""Of the page; further recordings begin anew, with a dashed line."""
-
 _LEFT, _RIGHT = 46.0, 374.0
 _TOP, _MIDDLE = 15.0, 196.0  # of the deviations
 _LOW, _BOTTOM = 212.0, 284.0  # of the ratios
