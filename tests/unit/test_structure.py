@@ -115,7 +115,7 @@ def test_outsiders_import_faces_only():
 LINES = {
     "": 920, "_core": 2180, "process": 3200, "readers": 5570, "plotting": 700, "variance": 4670,
     "diagnosis": 3460, "estimate": 7400, "selection": 1110, "calibration": 2100,
-    "filter_numbers": 3470, "ins": 10390, "population": 2250, "export": 1870, "report": 2310,
+    "filter_numbers": 3460, "ins": 10390, "population": 2250, "export": 1870, "report": 2250,
     "study": 1700, "cli": 2370,
 }  # fmt: skip
 """Most lines of Python of each room; they may only fall until they are those of the design."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -131,29 +131,29 @@ def known_at(fit: Fit, tau: float, rivals: Sequence[Model] = ()) -> float:
     return float(farthest) if value[0] > 0.0 else float("nan")
 
 
-def _known(calibration: Calibration, horizon: float) -> Mapping[str, float]:
-    known = {
+def _worst(calibration: Calibration, horizon: float) -> tuple[str, float, float] | None:
+    """Channel whose curve is known worst at a horizon, its error, and the length (s) for `_AIM`."""
+    errors = {
         name: known_at(fit, horizon, calibration.rivals.get(name, ()))
         for name, fit in calibration.items()
     }
-    return {name: each for name, each in known.items() if np.isfinite(each)}
-
-
-def _least(calibration: Calibration, horizon: float, error: float) -> float:
-    """Length (s) at which the error of the worst curve is `_AIM`."""
-    return max(calibration.duration * (error / _AIM) ** 2, 4.0 * horizon)
+    known = {name: each for name, each in errors.items() if np.isfinite(each)}
+    if not known:
+        return None
+    worst = max(known, key=known.__getitem__)
+    least = max(calibration.duration * (known[worst] / _AIM) ** 2, 4.0 * horizon)
+    return worst, known[worst], least
 
 
 def length_sentence(calibration: Calibration, horizon: float) -> str:
     """Whether the recording is long enough for a horizon, and how long would do."""
-    known = _known(calibration, horizon)
-    if not known:
+    found = _worst(calibration, horizon)
+    if found is None:
         return ""
-    worst = max(known, key=lambda name: known[name])
-    least = _least(calibration, horizon, known[worst])
+    worst, error, least = found
     # A curve that ends before the horizon is known there by the model alone.
     covered = min(float(fit.wv.tau[-1]) for fit in calibration.values()) >= horizon
-    share, text = per_cent(known[worst]), duration_text(least)
+    share, text = per_cent(error), duration_text(least)
     if least <= calibration.duration and covered:
         return (
             f"long enough for {horizon:g} s outages: {worst} is known to +-{share} there; {text} "
@@ -178,9 +178,8 @@ def parameters_sentence(calibration: Calibration) -> str:
     longest, what = max(finite)
     if longest <= calibration.duration:
         return f"Every parameter has an error of at most {100.0 * _AIM:g} %"
-    known = _known(calibration, SHOWN).values()
-    is_more = bool(known) and longest > _least(calibration, SHOWN, max(known))
-    aside = "; a filter needs less" if is_more else ""
+    found = _worst(calibration, SHOWN)
+    aside = "; a filter needs less" if found is not None and longest > found[2] else ""
     return (
         f"For {100.0 * _AIM:g} % in every parameter record {duration_text(longest)} ({what}){aside}"
     )
@@ -188,9 +187,6 @@ def parameters_sentence(calibration: Calibration) -> str:
 
 def _part_sentence(calibration: Calibration, length: float, horizon: float) -> str:
     """Whether a part (s) of the recording is long enough too."""
-    known = _known(calibration, horizon)
-    if not known:
-        return ""
-    least = _least(calibration, horizon, max(known.values()))
-    word = "long enough" if least <= length else "too short"
-    return f"That part is {word} for {horizon:g} s outages."
+    found = _worst(calibration, horizon)
+    word = "long enough" if found is not None and found[2] <= length else "too short"
+    return f"That part is {word} for {horizon:g} s outages." if found is not None else ""
