@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import combinations
 from typing import Any
 
@@ -18,13 +18,12 @@ from gmwm.calibration import tuning
 from gmwm.calibration.calibration import Calibration
 from gmwm.calibration.channel import (
     ChannelModel,
+    ChannelTask,
     GivenModels,
     advise_cut,
-    channel_model,
     model_of,
     with_validity,
 )
-from gmwm.calibration.removal import variance_without
 from gmwm.calibration.screening import (
     SCREENING,
     Screened,
@@ -32,13 +31,13 @@ from gmwm.calibration.screening import (
     stretches_at_rest,
     with_outcomes,
 )
-from gmwm.calibration.stages import Stopwatch, current, stage
+from gmwm.calibration.stages import current, stage
 from gmwm.calibration.summary import unresolved_notice
 from gmwm.diagnosis import first_in_common, thinned
 from gmwm.errors import InputError
 from gmwm.estimate import compile_steps
 from gmwm.issues import Notice, notice
-from gmwm.process import Model, Process
+from gmwm.process import Model
 from gmwm.readers import Channel, Recording, is_frame, read, require_recording
 from gmwm.selection import Selection, wider_ranges
 from gmwm.variance import MIN_SAMPLES
@@ -151,7 +150,9 @@ def _calibrated(
     robust = frozenset[str]().union(*(each.robust for each in treated))
     removals = tuning.REMOVALS if remove_departures else 0
     channels = [
-        _Channel(name, parts, name in robust, models[name], sources[name], offered[name], removals)
+        ChannelTask(
+            name, parts, sources[name], models[name], offered[name], name in robust, removals
+        )
         for name, parts in alive.items()
     ]
     workers.during_startup(compile_steps)
@@ -227,37 +228,8 @@ def _ambiguity(name: str, selection: Selection) -> Notice:
     return notice(AMBIGUITY, name, values, titles="; ".join(models), also=also)
 
 
-@dataclass(frozen=True, eq=False)
-class _Channel:
-    """A channel whose model is to be found, and how."""
-
-    name: str
-    parts: Sequence[Channel]
-    robust: bool
-    given: Process | Model | None
-    sources: Sequence[str]
-    offered: Sequence[Process]
-    removals: int
-
-    def model_found(self) -> tuple[ChannelModel | Notice, Stopwatch]:
-        """The model, with the time that it took."""
-        with Stopwatch().running() as watch:
-            found = channel_model(
-                self.name,
-                lambda removed: [
-                    variance_without(part, gone, robust=self.robust)
-                    for part, gone in zip(self.parts, removed, strict=True)
-                ],
-                self.given,
-                self.sources,
-                extra=self.offered,
-                removals=self.removals,
-            )
-        return found, watch
-
-
 def _models_found(
-    channels: Sequence[_Channel], progress: Progress | None
+    channels: Sequence[ChannelTask], progress: Progress | None
 ) -> dict[str, ChannelModel | Notice]:
     """The model of each channel, or why it has none; shared with the processes beside."""
     found: dict[str, ChannelModel | Notice] = {}
@@ -266,13 +238,13 @@ def _models_found(
         if progress is not None:
             progress(len(found), len(channels), name)
 
-    def begun() -> Iterator[_Channel]:
+    def begun() -> Iterator[ChannelTask]:
         # Each term offered doubles the candidates: those that take longest are not begun last.
-        for channel in sorted(channels, key=lambda each: -len(each.offered)):
+        for channel in sorted(channels, key=lambda each: -len(each.extra)):
             report(channel.name)
             yield channel
 
-    for channel, (one, watch) in workers.shared(_Channel.model_found, begun()):
+    for channel, (one, watch) in workers.shared(ChannelTask.timed_model, begun()):
         found[channel.name] = one
         if (running := current()) is not None:
             for name, elapsed in watch.elapsed.items():

@@ -10,7 +10,7 @@ over a few, so the limit holds for Gauss-Markov processes and bias instability t
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -23,6 +23,7 @@ from gmwm.calibration import tuning
 from gmwm.calibration.steadiness import Means
 from gmwm.estimate import Fit
 from gmwm.issues import Notice, Severity, notice
+from gmwm.process import Model
 from gmwm.variance import WaveletVariance
 
 DEPARTURES = ("step", "transient", "drift-at-start", "slow-period")
@@ -304,36 +305,28 @@ def _share(curve: FloatArray, step: float, fitted: Fit) -> float:
 # -- notices --------------------------------------------------------------------------------------
 
 
-def with_departures(
+def departure_notices(
     fitted: Fit,
-    sources: Sequence[str],
-    found: Sequence[Sequence[Departure]],
-    removed: Sequence[Sequence[Departure]],
-    curves: Sequence[Sequence[WaveletVariance]],
+    found: Sequence[Departure],
+    removed: Sequence[Departure],
+    before: WaveletVariance,
+    after: WaveletVariance,
     *,
     removing: bool = False,
-) -> Fit:
-    """A fit with a notice of each departure; not valid if one accounts for much of the noise.
+) -> list[Notice]:
+    """Notices of the departures of a recording; bad if one accounts for much of the noise.
 
-    sources: Of its recordings; named where there are several.
-    found, removed: What each recording has, and what was subtracted before the fit.
-    curves: Wavelet variances of each recording, before that was subtracted and after.
+    found, removed: What it has, and what was subtracted before the fit.
+    before, after: Its wavelet variances, before that was subtracted and after.
     removing: Whether departures were to be subtracted: those that are left cannot be.
     """
     unit = fitted.wv.unit
-    notices = [
-        replace(notice, source=source if len(sources) > 1 else "")
-        for source, there, gone, both in zip(sources, found, removed, curves, strict=True)
-        for notice in (
-            *(departure_notice(each, unit, stays=removing) for each in there),
-            *(departure_notice(each, unit, removed=True) for each in gone),
-            *(_removal_notices(gone, *both) if gone else ()),
-        )
-    ]
-    return replace(fitted, notices=(*fitted.notices, *notices)) if notices else fitted
+    notices = [_departure_notice(each, unit, stays=removing) for each in found]
+    notices += [_departure_notice(each, unit, removed=True) for each in removed]
+    return notices + (_removal_notices(removed, before, after, fitted.model) if removed else [])
 
 
-def departure_notice(
+def _departure_notice(
     found: Departure, unit: str, *, stays: bool = False, removed: bool = False
 ) -> Notice:
     """Say what it is, and whether a fit beside it is valid.
@@ -365,17 +358,18 @@ def departure_notice(
 
 
 def _removal_notices(
-    removed: Sequence[Departure], before: WaveletVariance, after: WaveletVariance
+    removed: Sequence[Departure], before: WaveletVariance, after: WaveletVariance, model: Model
 ) -> list[Notice]:
     """Say what a model lacks without what was subtracted, and whether it was noise after all."""
     levels = min(before.tau.size, after.tau.size)  # what is subtracted leaves gaps
-    rest = after.variance[:levels]
-    ratio = np.divide(before.variance[:levels], rest, out=np.zeros(levels), where=rest > 0.0)
-    lost = np.sqrt(np.maximum(ratio, 0.0))
-    most = int(np.argmax(lost))
+    taken = before.variance[:levels] - after.variance[:levels]
+    # Over the model: the coarsest level of the rest is one of few, and may be nearly zero.
+    implied = model.haar_variance(after.tau[:levels], after.dt)
+    ratio = np.divide(taken, implied, out=np.zeros(levels), where=implied > 0.0)
+    most = int(np.argmax(ratio))
     notices = []
-    if lost[most] ** 2 * (1.0 - tuning.HARMFUL_SHARE) > 1.0:
-        values = {"tau": float(after.tau[most]), "ratio": float(lost[most])}
+    if ratio[most] > tuning.HARMFUL_SHARE / (1.0 - tuning.HARMFUL_SHARE):
+        values = {"tau": float(after.tau[most]), "ratio": float(np.sqrt(1.0 + ratio[most]))}
         notices.append(notice("departures-removed", "", values, times=brief(values["ratio"])))
     if len(removed) > tuning.MOST_REMOVED:
         notices.append(notice("departures-many", "", {"removed": len(removed)}))
