@@ -7,15 +7,18 @@ standard deviations of a sample of that noise at 100 Hz (1e-3 rad/s).
     python benchmarks/departures.py power [--runs 20]
     python benchmarks/departures.py jumps [--runs 20] [--models N+K ...]
 
-"false" counts the records without departures in which one is found, and in brackets those in which
-one has more than 0.19 of the wavelet variance of the model, by least evidence. Models are selected
-where white noise and a random walk leave a departure. "power" fits the true kinds of noise and a
-random walk to noise with one departure, which the walk follows, and prints the fraction found by
-size, the same with more than 0.19 by least evidence, and in brackets the fraction of fits that
-would be valid without looking for departures. "jumps" takes departures off records of a bias that jumps between two
-levels, and of one to three steps, and prints in how many of them something is taken off, in how
-many that is noise of the sensor, so that the fit is not valid, and how many valid fits predict less
-than 0.8 of the deviation after 600 s, with and without a warning of what was taken off.
+"false" counts records of stationary noise in which a departure is found, by least evidence, and in
+brackets those in which one has more than 0.19 of the model's wavelet variance. A model is selected
+only where white noise and a random walk leave a departure.
+
+"power" fits the true kinds of noise and a random walk to noise with one departure, which the walk
+follows. It prints the per cent of records in which one is found, in which one has more than 0.19,
+by least evidence, and in brackets those whose fit would be valid without looking for departures.
+
+"jumps" takes departures off records of a bias that jumps between two levels, and of one to three
+steps, and prints in how many of them something is taken off, in how many that is noise of the
+sensor, so that the fit is not valid, and how many valid fits predict less than 0.8 of the deviation
+after 600 s, with and without a warning of what was taken off.
 """
 
 from __future__ import annotations
