@@ -37,9 +37,11 @@ class ChannelModel:
     selection: Selection | None
     largest: Model | None = None
 
-
-Found = Mapping[str, ChannelModel | Notice]
-"""Channel name -> its model, or why it has none."""
+    @property
+    def rivals(self) -> tuple[Model, ...]:
+        """Models that describe the channel equally well, that with the largest walk last."""
+        rivals = self.selection.rivals if self.selection is not None else ()
+        return (*(each.model for each in rivals), *([] if self.largest is None else [self.largest]))
 
 
 def model_of(name: str, model: GivenModels) -> Process | Model | None:
@@ -117,7 +119,9 @@ class ChannelTask:
         return ChannelModel(selection.fit, selection, with_largest_walk(selection.fit))
 
 
-def with_validity(found: Found, issues: Sequence[Notice], *, still: bool) -> Found:
+def with_validity(
+    found: Mapping[str, ChannelModel], issues: Sequence[Notice], *, still: bool
+) -> dict[str, ChannelModel]:
     """Models of channels, with fits that are not valid where the data were not fit for them.
 
     issues: Of the recordings and their channels.
@@ -131,11 +135,8 @@ def with_validity(found: Found, issues: Sequence[Notice], *, still: bool) -> Fou
             return issue.where == name
         return sensor in issue.issue.spoils and issue.where in ("", sensor)
 
-    marked: dict[str, ChannelModel | Notice] = {}
+    marked = {}
     for name, each in found.items():
-        marked[name] = each
-        if isinstance(each, Notice):
-            continue
         sensor = each.fit.wv.quantity or "gyro"
         spoiling = [issue for issue in issues if spoils(issue, name, sensor)]
         # Those of the sensor first; of one code and place, the last one.
@@ -146,29 +147,26 @@ def with_validity(found: Found, issues: Sequence[Notice], *, still: bool) -> Fou
     return marked
 
 
-def advise_cut(found: Found, length: float) -> tuple[Found, list[Notice]]:
+def advise_cut(
+    found: Mapping[str, ChannelModel], length: float
+) -> tuple[dict[str, ChannelModel], list[Notice]]:
     """Where several departures can be cut off, name the longest part without any of them.
 
     length: Of a single recording, s; 0 for several.
     Returns: the models, whose departures refer to that advice, and the advice.
     """
-    spans = []
-    departed: list[Notice] = []
-    for each in found.values():
-        for issue in () if isinstance(each, Notice) else each.fit.notices:
-            if issue.severity == "note":
-                continue
-            if issue.code == "step":
-                spans.append((issue.values["time_lower"], issue.values["time_upper"]))
-            elif issue.code == "transient":
-                spans.append((0.0, 3.0 * issue.values["time_upper"]))
-            elif issue.code == "drift-at-start":
-                spans.append((0.0, issue.values["time_upper"]))
-            else:
-                continue
-            departed.append(issue)
+    departed = [
+        issue
+        for each in found.values()
+        for issue in each.fit.notices
+        if issue.code in ("step", "transient", "drift-at-start") and issue.severity != "note"
+    ]
     if not length or len(departed) < 2:
-        return found, []
+        return dict(found), []
+    spans = []
+    for issue in departed:
+        last = issue.values["time_upper"] * (3.0 if issue.code == "transient" else 1.0)
+        spans.append((issue.values["time_lower"] if issue.code == "step" else 0.0, last))
     parts, free = [], 0.0
     for start, stop in [*sorted(spans), (length, length)]:
         parts.append((start - free, free, start))
@@ -179,15 +177,14 @@ def advise_cut(found: Found, length: float) -> tuple[Found, list[Notice]]:
     also = ", or subtract them (remove_departures=True)" if removable else ""
     advice = notice(LONGEST_PART, "", values, count=len(departed), kept=kept, also=also)
 
-    def together(issue: Notice) -> Notice:
-        if issue not in departed:
-            return issue
-        hint = "leave it out with the others, or subtract them"
-        return replace(issue, values={**issue.values, "together": True}, hint=hint)
-
-    return {
-        name: each
-        if isinstance(each, Notice)
-        else replace(each, fit=replace(each.fit, notices=tuple(map(together, each.fit.notices))))
-        for name, each in found.items()
-    }, [advice]
+    hint = "leave it out with the others, or subtract them"
+    marked = {}
+    for name, each in found.items():
+        notices = tuple(
+            replace(issue, values={**issue.values, "together": True}, hint=hint)
+            if issue in departed
+            else issue
+            for issue in each.fit.notices
+        )
+        marked[name] = replace(each, fit=replace(each.fit, notices=notices))
+    return marked, [advice]
