@@ -4,7 +4,7 @@ Records of two hours at 1 Hz with the white noise of a gyro of 1e-4 rad/s/sqrt(H
 standard deviations of a sample of that noise at 100 Hz (1e-3 rad/s).
 
     python benchmarks/departures.py false [--runs 400] [--models N+K ...]
-    python benchmarks/departures.py power [--runs 20]
+    python benchmarks/departures.py power [--runs 20] [--models N+K ...] [--kinds "step at 0.6" ...]
     python benchmarks/departures.py jumps [--runs 20] [--models N+K ...]
 
 "false" counts records of stationary noise in which a departure is found, by least evidence, and in
@@ -101,21 +101,21 @@ def _counts(counts: np.ndarray) -> str:
     return "  ".join(f"{some} ({harmful})" for some, harmful in counts.T)
 
 
-def power(runs: int, models: list[str]) -> None:
+def power(runs: int, models: list[str], kinds: list[str]) -> None:
     """Sizes found in half and in 95 % of the records, and those that make a fit not valid."""
     print("size: found, harmful with evidence of " + ", ".join(f"{e:g}" for e in EVIDENCE), end="")
     print(" (valid without looking), per cent")
     for name in models or ("N", "N+K", "N+2GM"):
         fitted = gmwm.process.as_model(NOISES[name]).opened()
         fitted = fitted if "K" in fitted.params else fitted + RandomWalk()
-        for kind, curve in KINDS.items():
+        for kind in kinds or KINDS:
             shares, rows = [], []
             for size in SIZES:
                 found = right = 0
                 harmful = np.zeros(len(EVIDENCE), int)
                 for seed in range(runs):
                     x = gmwm.simulate(NOISES[name], LENGTH, DT, 20_000 + seed)
-                    fit = gmwm.fit(fitted, x + size * SAMPLE * curve, DT)
+                    fit = gmwm.fit(fitted, x + size * SAMPLE * KINDS[kind], DT)
                     each = departures(fit)
                     found += bool(each)
                     right += fit.valid
@@ -195,13 +195,15 @@ def main() -> None:
     parser.add_argument("study", choices=["false", "power", "jumps"])
     parser.add_argument("--runs", type=int, default=0)
     parser.add_argument("--models", nargs="*", default=[])
+    parser.add_argument("--kinds", nargs="*", default=[], help="departures of power")
     given = parser.parse_args()
     warnings.simplefilter("ignore", FitWarning)
     if given.study == "false":
         false_alarms(given.runs or 400, given.models)
+    elif given.study == "power":
+        power(given.runs or 20, given.models, given.kinds)
     else:
-        study = power if given.study == "power" else jumps
-        study(given.runs or 20, given.models)
+        jumps(given.runs or 20, given.models)
 
 
 if __name__ == "__main__":
