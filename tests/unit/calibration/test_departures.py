@@ -348,7 +348,7 @@ def test_what_was_taken_off_is_what_the_model_lacks():
 
 @pytest.mark.parametrize("seed", range(3))
 def test_how_many_times_a_step_enlarges_the_deviation_is_judged_by_the_model(seed):
-    """The coarsest level of the rest has one degree of freedom, and is 0.7 to 1.8 times as large."""
+    """The coarsest level of the rest has one degree of freedom: its ratios are 12 to 20."""
     x = noise(seed, WHITE) + 0.1 * SAMPLE * STEP
     fit = gmwm.calibrate(recording(x), WhiteNoise(), remove_departures=True)["gyro_x"]
     (notice,) = [one for one in fit.notices if one.code == "departures-removed"]
