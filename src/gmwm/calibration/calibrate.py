@@ -66,8 +66,8 @@ def calibrate(
     done. A channel that is constant, or of which more than half of the samples are missing, is
     skipped; auxiliary channels (temperature, voltage, clock) have no model. After the fit, steps,
     transients at the start and slow periods are looked for beside its noise
-    (`gmwm.calibration.departures`); a fit of which they make more than a tenth of the deviation at
-    some averaging time is not valid.
+    (`gmwm.calibration.departures`); a fit of which one makes more than a tenth of the deviation at
+    some averaging time, with an evidence of 1,000 or more, is not valid.
 
     Parameters
     ----------

@@ -2,9 +2,9 @@
 
 A random walk follows all of them, so the chi-square test of a fit passes with a walk of the wrong
 size. Block means are therefore explained by white noise and a random walk, with and without the
-departure: twice the gain in log likelihood must exceed a limit that stationary noise passes in one
-of a hundred records. Over many blocks a random walk is larger than other slow noise that it matches
-over a few, so the limit holds for Gauss-Markov processes and bias instability too.
+departure: twice the gain in log likelihood must exceed a limit that this noise passes in one of a
+hundred records. Other slow noise passes it as rarely, except Gauss-Markov processes of few blocks
+and bias instability, which have bumps that look like slow periods (docs/health.md).
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ class Departure:
         its 95 % interval, s.
     size: Height of the step; of the transient or the drift at the start of the record; amplitude of
         the period; and the ends of its 95 % interval, u.
-    evidence: Stationary noise shows as much in one of so many records.
+    evidence: Stationary noise shows as much in about one of so many records.
     share: Largest fraction of the wavelet variance of the model that it accounts for.
     phase: Of a period, ``size cos(2 pi t / time - phase)``, rad.
     """
