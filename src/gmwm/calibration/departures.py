@@ -240,23 +240,22 @@ class _Test:
 
     def departure(self, fitted: Fit, means: Means) -> Departure:
         """The best one, with 95 % intervals."""
-        size = float(self.sizes[0])
-        if self.sizes.size == 2:
-            size = float(np.hypot(*self.sizes))
+        size, low, phase = float(self.sizes[0]), -np.inf, 0.0
+        if self.sizes.size == 2:  # cosine and sine of a period
+            size, low = float(np.hypot(*self.sizes)), 0.0
+            phase = float(np.arctan2(*self.sizes[::-1]))
         half = WIDE * self.error
-        low = max(size - half, 0.0) if self.sizes.size == 2 else size - half
-        phase = float(np.arctan2(*self.sizes[::-1])) if self.sizes.size == 2 else 0.0
         # The likelihood of times that are equally likely beforehand.
         times, weight = self.shape.times, np.exp(0.5 * (self.gains - self.gains[self.best]))
         order = np.argsort(times)
         ordered = times[order]
         edges = np.concatenate([ordered[:1], 0.5 * (ordered[1:] + ordered[:-1]), ordered[-1:]])
         first, last = np.searchsorted(np.cumsum(weight[order]) / np.sum(weight), [0.025, 0.975])
-        time = (times[self.best], edges[first], edges[min(last, times.size - 1) + 1])
+        last = min(last, times.size - 1) + 1
         return Departure(
             self.shape.kind,
-            (float(time[0]), float(time[1]), float(time[2])),
-            (size, low, size + half),
+            (float(times[self.best]), float(edges[first]), float(edges[last])),
+            (size, max(size - half, low), size + half),
             tuning.EVIDENT * float(np.exp(min(0.5 * self.excess, tuning.LARGEST_LOG))),
             _share(self.sizes @ self.shape.curves[self.best], means.step, fitted),
             phase,

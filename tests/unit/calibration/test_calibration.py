@@ -19,7 +19,7 @@ from gmwm import (
     Recording,
     WhiteNoise,
 )
-from gmwm.calibration import Stopwatch, tuning
+from gmwm.calibration import Stopwatch, stage, tuning
 from gmwm.issues import Notice
 from marks import slow
 from places import SHARED
@@ -291,6 +291,16 @@ def test_progress_hears_of_every_channel_once(recording):
     result = gmwm.calibrate(recording, MODELS, progress=lambda *told: heard.append(told))
     assert sorted(name for *_, name in heard[:-1]) == sorted(result.fits)
     assert heard[-1] == (len(result.fits), len(result.fits), "")
+
+
+def test_stages_are_counted_by_a_watch_that_runs(recording):
+    with Stopwatch().running() as watch:
+        gmwm.calibrate(recording, WhiteNoise())
+    assert set(watch.elapsed) == set(watch.worked) == {"health", "variance", "model", "departures"}
+    assert all(each > 0.0 for each in watch.elapsed.values())
+    with stage("not counted"):
+        pass
+    assert "not counted" not in watch.elapsed
 
 
 @pytest.mark.slow

@@ -105,7 +105,7 @@ def test_stationary_noise_has_departures_in_one_of_a_hundred_records_at_most(mod
 
 @pytest.mark.parametrize(("size", "is_valid"), [(0.11, True), (0.13, False)])
 def test_a_fit_is_not_valid_from_an_evidence_of_1000_on(size, is_valid):
-    """Of healthy records one in 500 has as much; a step has to be 7 % larger than for 100."""
+    """Of healthy records one in 740 has as much; a step has to be 10 % larger than for 100."""
     x = noise(21) + size * SAMPLE * STEP
     fit = gmwm.calibrate(recording(x), WhiteNoise() + RandomWalk(), screening=())["gyro_x"]
     (step,) = [each for each in fit.notices if each.code == "step"]
