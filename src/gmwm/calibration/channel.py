@@ -58,10 +58,8 @@ class ChannelTask:
     """A channel whose model is to be found.
 
     parts: In each recording.
-    sources: Of the recordings.
     model: Fitted; None selects one.
     extra: Terms that a selected model may have.
-    robust: Whether its wavelet variances are robust.
     removals: How many times evident departures are subtracted, and the rest fitted again.
     """
 
@@ -176,7 +174,6 @@ def advise_cut(
     values = {"start": start, "stop": stop, "of": length, "removable": removable}
     also = ", or subtract them (remove_departures=True)" if removable else ""
     advice = notice(LONGEST_PART, "", values, count=len(departed), kept=kept, also=also)
-
     hint = "leave it out with the others, or subtract them"
     marked = {}
     for name, each in found.items():

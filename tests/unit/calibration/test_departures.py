@@ -126,8 +126,8 @@ def test_a_fit_is_not_valid_from_an_evidence_of_1000_on(size, is_valid):
     ],
     ids=["step", "transient", "drift", "period", "1.5 periods", "half a period"],
 )
-def test_sizes_of_the_health_page_are_found_in_white_noise(curve, size):
-    """In docs/health.md they are found in 95 % of the records."""
+def test_sizes_of_the_study_are_found_in_white_noise(curve, size):
+    """`python benchmarks/departures.py power` finds them in 95 % of the records."""
     found = [departures(fitted(noise(seed, WHITE) + size * SAMPLE * curve)) for seed in range(4)]
     assert sum(len(each) > 0 for each in found) >= 3
 
