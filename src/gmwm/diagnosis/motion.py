@@ -102,8 +102,6 @@ def find_motion(recording: Recording) -> Motion:
     seconds by more than sensors at rest do (1 deg/s, or 1 deg of gravity) and by more than their
     own noise. Between two changes the level is static if its rate is the one nearest to zero. Slow
     motion is found where gravity turns as the gyros predict.
-
-    Returns: no moves if it is static, or too short to be examined.
     """
     size = max(round(tuning.MOTION_BLOCK / recording.dt), tuning.FEWEST_OF_MOTION)
     whole = ((0.0, recording.duration),)

@@ -243,9 +243,6 @@ def _has_band(values: FloatArray, dt: float) -> bool:
     return False
 
 
-# -- blocks of a recording -------------------------------------------------------------------------
-
-
 @dataclass(frozen=True, eq=False)
 class Blocks:
     """Blocks of a quarter of a second, of the channels that motion can be seen in."""
@@ -312,9 +309,6 @@ def blocks_of(recording: Recording) -> Blocks | None:
     return Blocks(tuple(channels[i] for i in seen), size, means[:, seen], scatter[:, seen])
 
 
-# -- stretches that scatter more than others -------------------------------------------------------
-
-
 @dataclass(frozen=True, eq=False)
 class Loudness:
     """When some axes scatter more than at their quietest."""
@@ -324,11 +318,10 @@ class Loudness:
 
 
 def loudness(scatter: FloatArray, step: FloatArray) -> Loudness:
-    """Find the loud stretches of a recording from the scatter of its blocks.
+    """Find the blocks that scatter more than others; none where that does no harm.
 
     scatter: (blocks, axes), variance within each block, u^2; NaN where it is not known.
     step: (axes,), to which samples are rounded, u; 0 where they are not.
-    Returns: no loud block where their scatter does no harm.
     """
     nothing = Loudness(np.zeros(scatter.shape[0], dtype=bool), 1.0)
     # A block that does not scatter at all is dead, not quiet, if all others do by more than a step.

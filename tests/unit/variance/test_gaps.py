@@ -132,9 +132,8 @@ def test_what_is_subtracted_is_what_missing_samples_add(process, pattern):
         square[j], truth[j] = (np.vdot(r @ covariance, r) / len(r) for r in (rows, whole))
         scarcity[j] = np.mean(np.sum(rows**2, axis=1)) - 0.5 / m
     pairs = np.stack([number, number * gaps], axis=1)
-    found, change = unmasked(square, scarcity, pairs, np.mean(lost), 0.25)
+    found, _ = unmasked(square, scarcity, pairs, np.mean(lost), 0.25)
     np.testing.assert_allclose(found, truth, rtol=0.06)
-    np.testing.assert_allclose(change, (square - found) / found)
 
 
 def test_a_drift_goes_on_through_a_gap():
