@@ -276,14 +276,17 @@ class Levels:
         return there
 
     def _masked(self, level: int) -> tuple[FloatArray, float]:
-        """Coefficients of a level without the line, and the mean of their `scarcity`."""
+        """Coefficients of a level without the line, and their mean scarcity."""
         found = np.empty(int(self.counts[level]))
         m = int(self.averaging[level])
         scarcity = masked_coefficients(self._integral, self._there, self.edges(level), m, found)
         return found, scarcity / found.size
 
     def moments(self) -> tuple[FloatArray, FloatArray]:
-        """Mean and mean square of each level's coefficients, (J, 2), and their `scarcity`, (J,)."""
+        """Mean and mean square of each level's coefficients, (J, 2), and mean scarcity, (J,).
+
+        The scarcity is a quarter of 1/C - 1/m of both halves of a window, with C of m samples.
+        """
         scarcity = np.zeros(self.averaging.size)
         if self.wavelet != "haar":
             return np.array([(np.mean(w), np.mean(w * w)) for w in self.coefficients()]), scarcity
@@ -318,15 +321,17 @@ class Levels:
             else:
                 yield self._masked(j)[0] + (0.0 if level else self._step[j])
 
-    def driftless(self, moments: FloatArray) -> FloatArray:
-        """Mean squares of the coefficients without the least-squares line, (J,)."""
-        step = self._step
-        return np.asarray(moments[:, 1] - 2.0 * step * moments[:, 0] + step**2)
+    def added(
+        self, moments: FloatArray, scarcity: FloatArray, level: FloatArray | None = None
+    ) -> tuple[FloatArray, FloatArray]:
+        """What missing samples add to the variances, and that relative to them, (J,) each.
 
-    def added(self, square: FloatArray, scarcity: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """What missing samples add to variances without the line, and that relative to them."""
+        level: (J,), variances without the series' line; by default from the moments.
+        """
         if self.plain == self.averaging.size:
-            return np.zeros((2, square.size))
+            return np.zeros(scarcity.size), np.zeros(scarcity.size)
+        step = self._step
+        square = moments[:, 1] - 2.0 * step * moments[:, 0] + step**2 if level is None else level
         gaps = self.runs.edges[1:, 0] - self.runs.edges[:-1, 1]
         lengths, number = np.unique(gaps[~self.apart], return_counts=True)
         pairs = np.stack([number, lengths * number], axis=1)

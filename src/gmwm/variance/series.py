@@ -84,14 +84,12 @@ def wavelet_variance(
     values = scaled(values, 1.0, -mean)
     levels = Levels.of(values, runs, wavelet)
     moments, scarcity = levels.moments()
-    level, driftless = levels.driftless(moments), None
+    level = None
     if robust:
         moments = _robust_moments(levels.coefficients(), efficiency)
         level = _robust_moments(levels.coefficients(level=True), efficiency)[:, 1]
-    added, change = levels.added(level, scarcity)
+    added, change = levels.added(moments, scarcity, level)
     variance = np.maximum(moments[:, 1] - added, 0.0)
-    if robust:
-        driftless = level - added
     blocks, block = levels.block_means()
     release(channel.values)
     found = None
@@ -117,7 +115,7 @@ def wavelet_variance(
         unit=channel.unit or "u",
         wavelet=wavelet,
         efficiency=efficiency,
-        driftless=driftless,
+        driftless=None if level is None else level - added,
         gaps=levels.effects(change),
         fourth_cumulant=0.0 if robust else fourth_cumulant(values),
         data_covariance=found,
