@@ -82,14 +82,6 @@ def find_still(recording: Recording) -> Still:
     Blocks of a quarter of a second whose scatter is that of the noise, in all axes together and in
     each, and whose mean rate is that of the quietest ones. A stretch in which an axis scatters more
     than in the quietest stretch, or has a narrow band of vibration, is not at rest.
-
-    Parameters
-    ----------
-    recording : Recording
-
-    Returns
-    -------
-    Still
     """
     blocks = blocks_of(recording)
     if blocks is None:
