@@ -393,19 +393,6 @@ def test_covariance_of_a_gappy_series_costs_one_of_a_complete_one():
     np.testing.assert_allclose(gappy.covariance_under(psd), expected, rtol=1e-12)
 
 
-@pytest.mark.parametrize("options", [{}, {"robust": True}, {"wavelet": "db4"}], ids=str)
-def test_a_gappy_wavelet_variance_goes_to_json_and_back(options):
-    x = with_gaps(WhiteNoise(1.0).simulate(5000, 1.0, 1), [(0, 9), (100, 400), (700, 701)])
-    wv = gmwm.wavelet_variance(x, dt=1.0, **options)
-    again = gmwm.WaveletVariance.from_dict(wv.to_dict())
-    np.testing.assert_array_equal(again.counts, wv.counts)
-    np.testing.assert_array_equal(again.covariance, wv.covariance)
-    np.testing.assert_array_equal(again.blocks, wv.blocks)
-    assert "310 of them missing" in str(wv)
-    model = Model((WhiteNoise(),))
-    assert gmwm.fit(model, again).params == gmwm.fit(model, wv).params
-
-
 def test_data_covariance_and_robust_variances_of_gappy_series():
     rng = np.random.default_rng(3)
     x = rng.standard_normal(50_000)
