@@ -13,7 +13,7 @@ from gmwm.diagnosis import tuning
 from gmwm.diagnosis.innovations import Examined, Innovations, Spans, innovations, running_scale
 from gmwm.diagnosis.motion import runs_of
 from gmwm.diagnosis.tails import Tails
-from gmwm.issues import Notice, notice
+from gmwm.issues import Notice, Severity, notice
 
 _LISTED = 3
 
@@ -134,11 +134,12 @@ def event(channel: Examined) -> Iterator[Notice]:
         others = f" (others at {times} s)"
     # The variance of n samples is known to its (2/n)^(1/2)-th part.
     shown = readable(heights[largest], channel.unit, sign=True)
-    words = {"variant": variant, "shown": shown, "others": others, "severity": "warning"}
+    words = {"variant": variant, "shown": shown, "others": others}
+    severity: Severity = "warning"
     if share <= np.sqrt(2.0 / known):
         words["hint"] = "too small to change the variance; Health.masked leaves it out"
-        words["severity"] = "note"
-    yield notice("event", name, numbers, **words)
+        severity = "note"
+    yield notice("event", name, numbers, severity=severity, **words)
 
 
 def _height(values: FloatArray, clean: FloatArray, start: int, stop: int) -> tuple[float, float]:

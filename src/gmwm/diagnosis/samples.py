@@ -44,9 +44,10 @@ def gap_notices(channels: Sequence[Channel], dt: float) -> list[Notice]:
 def length(recording: Recording) -> Iterator[Notice]:
     """Say how long a recording is, and whether that is short."""
     values = {"duration": recording.n / recording.rate, "rate": recording.rate}
-    short = values["duration"] < tuning.LONG_RECORD
-    words = {"severity": "note", "variant": "short"} if short else {"severity": "good", "hint": ""}
-    yield notice("length", "", values, n=recording.n, **words)
+    if values["duration"] < tuning.LONG_RECORD:
+        yield notice("length", "", values, severity="note", variant="short", n=recording.n)
+    else:
+        yield notice("length", "", values, severity="good", hint="", n=recording.n)
 
 
 def is_dithered(values: FloatArray, step: float) -> bool:
