@@ -361,11 +361,13 @@ class Levels:
         Those in gaps that the coarsest level contains are interpolated if less than half is there;
         those with samples of longer gaps are NaN.
         """
-        n, whole = self.runs.n, self.runs.is_complete
-        block = -(-n // (tuning.MOST_BLOCKS if whole else tuning.MOST_BLOCKS_WITH_GAPS))
+        n = self.runs.n
+        edges = np.concatenate([[0], self.edges(self.averaging.size - 1).ravel(), [n]])
+        longer = [(start, stop) for start, stop in edges.reshape(-1, 2).tolist() if stop > start]
+        block = -(-n // (tuning.MOST_BLOCKS_WITH_GAPS if longer else tuning.MOST_BLOCKS))
         ends = slice(0, (n // block) * block + 1, block)
         sums = np.diff(self._integral[ends])
-        if whole:
+        if self.runs.is_complete:
             return sums / block, block
         place, there = np.arange(sums.size), np.diff(self._there[ends])
         line = self.slope * (block * (place + 0.5) - 0.5)
@@ -375,8 +377,6 @@ class Levels:
         if not np.any(known):
             return np.full(sums.size, np.nan), block
         means = np.interp(place, place[known], sums[known] / there[known]) + line
-        longer = np.concatenate([[0], self.edges(self.averaging.size - 1).ravel(), [n]])
-        for start, stop in longer.reshape(-1, 2).tolist():
-            if stop > start:
-                means[start // block : (stop - 1) // block + 1] = np.nan
+        for start, stop in longer:
+            means[start // block : (stop - 1) // block + 1] = np.nan
         return means, block
