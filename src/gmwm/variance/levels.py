@@ -212,7 +212,7 @@ class Levels:
         apart = np.zeros(len(runs.starts) - 1, dtype=bool)
         if wavelet != "haar":
             number = known_wavelet(wavelet).levels(runs.longest)
-            return cls(values, runs, 2.0 ** np.arange(number), wavelet, apart)
+            return cls(values, runs, dyadic_levels(2**number), wavelet, apart)
         if apart.size:
             apart = level_changes(values, runs)
         found = cls(values, runs, dyadic_levels(runs.n), wavelet, apart)
