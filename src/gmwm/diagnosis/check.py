@@ -25,7 +25,7 @@ from gmwm.diagnosis.events import event, find_events, with_single_outliers
 from gmwm.diagnosis.health import ChannelHealth, Health
 from gmwm.diagnosis.innovations import Examined, crosstalk_notices, innovations
 from gmwm.diagnosis.lines import line_notices
-from gmwm.diagnosis.motion import Motion, find_motion, moves
+from gmwm.diagnosis.motion import Motion, find_motion, moves, runs_of
 from gmwm.diagnosis.resolution import rounding, step_size, widest_step
 from gmwm.diagnosis.resonances import peaks, resonance_notice
 from gmwm.diagnosis.still import vibration
@@ -92,8 +92,7 @@ def health(recording: Recording, *, progress: Progress | None = None) -> Health:
     False
     """
     require_recording(recording)
-    parts = recording.by_rate()
-    if len(parts) > 1:
+    if len(parts := recording.by_rate()) > 1:
         return _joined(recording, [health(part, progress=progress) for part in parts])
     # What is missing is counted anew, channel by channel.
     notices = [one for one in recording.notices if one.code != "missing-samples"]
@@ -153,13 +152,10 @@ def _without_copies(channel: Channel, copies: Sequence[Copy], motion: Motion) ->
     for each in copies:
         values[each.start : each.stop] = np.nan
     one = _at_own_rate(replace(channel, values=values), motion)
-    united: list[tuple[int, int]] = []
-    for start, stop in sorted([*one.facts.events, *((each.start, each.stop) for each in copies)]):
-        if united and start <= united[-1][1]:
-            start, before = united.pop()
-            stop = max(stop, before)
-        united.append((start, stop))
-    return replace(one, facts=replace(one.facts, events=tuple(united)))
+    gone = np.zeros(channel.n, dtype=bool)
+    for start, stop in (*one.facts.events, *((each.start, each.stop) for each in copies)):
+        gone[start:stop] = True
+    return replace(one, facts=replace(one.facts, events=tuple(runs_of(gone))))
 
 
 def _at_own_rate(channel: Channel, motion: Motion) -> _Found:

@@ -32,10 +32,7 @@ class Copy:
 
 @remembered
 def find_copies(recording: Recording) -> tuple[Copy, ...]:
-    """Rows that are there twice: noise does not repeat, a buffer that is sent again does.
-
-    recording: Of one rate.
-    """
+    """Rows that are there twice: noise does not repeat, a buffer that is sent again does."""
     if not recording.inertial:
         return ()
     return tuple(_copies(_row_keys(channel.values for channel in recording.inertial)))

@@ -65,10 +65,8 @@ def drift(channel: Examined) -> Iterator[Notice]:
     values = {"wander": wander, "white": white, "change": change}
     if ramp:
         shown = (readable(change, unit, sign=True), readable(wander, unit))
-        hint = "add a RateRamp to the model, or leave out the warm-up"
-        yield notice(
-            "drift", name, values, severity="warning", variant="ramp", hint=hint, shown=shown
-        )
+        words = {"hint": "add a RateRamp to the model, or leave out the warm-up", "variant": "ramp"}
+        yield notice("drift", name, values, severity="warning", shown=shown, **words)
         return
     level, times, length = readable(wander, unit), brief(ratio), size * channel.dt
     yield notice("drift", name, values, length=length, shown=level, times=times)
@@ -115,12 +113,8 @@ def _change(channel: Examined) -> Notice | None:
     counted = np.arange(tuning.TENTHS) != loudest if is_loud else np.ones(tuning.TENTHS, dtype=bool)
     halves = (counted & ~is_second, counted & is_second)
     first, second = (float(np.mean(means[half])) for half in halves)
-    numbers = {
-        "first_half": float(np.sqrt(first)),
-        "second_half": float(np.sqrt(second)),
-        "loudest_tenth": float(loudest),
-        "loudest": float(np.sqrt(means[loudest])),
-    }
+    numbers = {"first_half": float(np.sqrt(first)), "second_half": float(np.sqrt(second))}
+    numbers |= {"loudest_tenth": float(loudest), "loudest": float(np.sqrt(means[loudest]))}
     # On the logarithmic scale the ratio of two variances is nearly normal.
     parts = [np.sqrt(np.sum(spread[h])) / np.count_nonzero(h) for h in halves]
     error = norm.isf(0.5 * tuning.FALSE_ALARM) * np.hypot(parts[0] / first, parts[1] / second)

@@ -13,7 +13,7 @@ from gmwm.diagnosis import tuning
 from gmwm.diagnosis.innovations import Examined, Innovations, Spans, innovations, running_scale
 from gmwm.diagnosis.motion import runs_of
 from gmwm.diagnosis.tails import Tails
-from gmwm.issues import Notice, notice
+from gmwm.issues import Notice, Severity, notice
 
 _LISTED = 3
 
@@ -26,9 +26,6 @@ def find_events(errors: Innovations, tails: Tails | None = None) -> Spans:
     standard deviations next to it belong to the same event. In noise of heavy tails, where such
     errors are usual, more of them next to each other than independent samples have with the same
     chance are an event too.
-
-    tails: Law of the noise; Gaussian by default.
-    Returns: first sample and the one after the last, widened by a guard.
     """
     n = errors.values.size
     beyond = np.abs(errors.values) - errors.rounding
@@ -69,10 +66,6 @@ def with_single_outliers(
     Predictions from an outlier are in error too. So the first that are left out are those farther
     from the level than four standard deviations of such distances; where samples are predicted
     better than by their level, errors of prediction without these show the rest.
-
-    values: (n,), samples, NaN where missing.
-    step: To which they are rounded, u.
-    Returns: first sample and the one after the last.
     """
     place = np.arange(values.size)
     there = ~np.isnan(values)
@@ -127,14 +120,9 @@ def event(channel: Examined) -> Iterator[Notice]:
     samples = sum(b - a for a, b in events)
     energy = sum(each for _, each in found)
     share = max(energy / scatter**2 - samples, 0.0) / known if scatter > 0.0 else np.inf
-    numbers = {
-        "count": float(len(events)),
-        "time": start * dt,
-        "height": float(heights[largest]),
-        "duration": (stop - start) * dt,
-        "samples": float(samples),
-        "variance_share": float(share),
-    }
+    numbers = {"count": float(len(events)), "time": start * dt, "height": float(heights[largest])}
+    numbers |= {"duration": (stop - start) * dt, "samples": float(samples)}
+    numbers["variance_share"] = float(share)
     name, variant = channel.name, "many" if len(events) > 1 else ""
     if 2 * samples > known:
         hint, part = "look at what is done to them between the sensor and the file", samples / known
@@ -147,11 +135,11 @@ def event(channel: Examined) -> Iterator[Notice]:
     # The variance of n samples is known to its (2/n)^(1/2)-th part.
     shown = readable(heights[largest], channel.unit, sign=True)
     words = {"variant": variant, "shown": shown, "others": others}
-    if share > np.sqrt(2.0 / known):
-        yield notice("event", name, numbers, severity="warning", **words)
-    else:
+    severity: Severity = "warning"
+    if share <= np.sqrt(2.0 / known):
         words["hint"] = "too small to change the variance; Health.masked leaves it out"
-        yield notice("event", name, numbers, severity="note", **words)
+        severity = "note"
+    yield notice("event", name, numbers, severity=severity, **words)
 
 
 def _height(values: FloatArray, clean: FloatArray, start: int, stop: int) -> tuple[float, float]:

@@ -92,9 +92,7 @@ class Examined:
 def innovations(values: FloatArray, step: float) -> Innovations | None:
     """Prediction errors of a series, forwards, or backwards where nothing stands before.
 
-    values: (n,), samples, NaN where missing.
-    step: To which they are rounded, u; 0 if they are not.
-    Returns: None if the series is too short or too broken.
+    None if the series is too short or too broken. Samples are rounded to ``step`` (u), if not 0.
     """
     n = values.size
     differences = np.diff(values)
@@ -183,10 +181,8 @@ def crosstalk_notices(errors: dict[str, npt.NDArray[np.float32]]) -> list[Notice
     """Find pairs of channels whose prediction errors are correlated.
 
     The correlation of two white series has the variance 1/n, whatever the spectra of the channels
-    were; one that matters is above 0.05.
-
-    errors: Channel name -> prediction errors in units of their standard deviation, clipped, zero
-        where it is unknown, which adds nothing to a sum of products.
+    were. Prediction errors are in standard deviations, clipped, and 0 where they are unknown, which
+    adds nothing to a sum of products.
     """
     pairs, notices = list(combinations(errors, 2)), []
     for one, other in pairs:

@@ -37,8 +37,6 @@ def find_lines(spectrum: Spectrum, smooth: FloatArray) -> tuple[Line, ...]:
     the quantile of an F distribution that noise passes with `tuning.FALSE_ALARM` in all bins and
     widths together (Bonferroni); its degrees of freedom are those of the largest eigenvalue of the
     correlation between Hann bins, which rules the tail. Wider means find lines that wander.
-
-    smooth: (n // 2 + 1,), background, u^2/Hz.
     """
     last = spectrum.density.size - 1
     if last <= tuning.FIRST_BIN + 2 * tuning.UNRESOLVED:
@@ -122,8 +120,7 @@ def _scores(
     stop: int,
 ) -> tuple[FloatArray, IntArray]:
     """Largest ratio to the limit over all widths, and the width that has it, of some bins."""
-    last = ratio.size - 1
-    widths = np.array(list(limits))
+    last, widths = ratio.size - 1, np.array(list(limits))
     low, high = max(start - int(widths[-1]), 0), min(stop + int(widths[-1]), last)
     total = np.concatenate([[0.0], np.cumsum(ratio[low:high])])
     slowest = np.where(widths > tuning.UNRESOLVED, widths / tuning.NARROW, 0).astype(np.int64)

@@ -16,6 +16,7 @@ from gmwm._core.text import readable
 from gmwm._core.typing import BoolArray, FloatArray
 from gmwm._core.units import SI_UNIT, factor
 from gmwm.diagnosis import tuning
+from gmwm.diagnosis.innovations import Spans
 from gmwm.issues import Notice, notice
 from gmwm.readers import AXES, Channel, Recording, block_means, steady_turn, turning_gravity
 
@@ -58,7 +59,7 @@ class Motion:
     static: tuple[tuple[float, float], ...]
     turns_steadily: bool = False
 
-    def joined(self, events: tuple[tuple[int, int], ...], dt: float) -> tuple[tuple[int, int], ...]:
+    def joined(self, events: Spans, dt: float) -> Spans:
         """Sample intervals, those of one tilt made one: its begin and its end are shocks."""
         found: list[tuple[int, int]] = []
         tilt: Move | None = None
@@ -70,9 +71,7 @@ class Motion:
             tilt = now
         return tuple(found)
 
-    def outside(
-        self, events: tuple[tuple[int, int], ...], dt: float
-    ) -> tuple[tuple[int, int], ...]:
+    def outside(self, events: Spans, dt: float) -> Spans:
         """Sample intervals that do not touch a move: a move is not a shock."""
         if not self.static:
             return events
@@ -102,8 +101,6 @@ def find_motion(recording: Recording) -> Motion:
     seconds by more than sensors at rest do (1 deg/s, or 1 deg of gravity) and by more than their
     own noise. Between two changes the level is static if its rate is the one nearest to zero. Slow
     motion is found where gravity turns as the gyros predict.
-
-    Returns: no moves if it is static, or too short to be examined.
     """
     size = max(round(tuning.MOTION_BLOCK / recording.dt), tuning.FEWEST_OF_MOTION)
     whole = ((0.0, recording.duration),)

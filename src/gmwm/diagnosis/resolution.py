@@ -22,8 +22,7 @@ def step_size(values: FloatArray) -> float:
     Text holds steps rounded to some decimals (0.00333, 0.00667, 0.01): places may be off the
     lattice by a tenth of a step (root mean square).
 
-    values: (n,), samples, none missing.
-    Returns: a number in the unit of ``values``; 0 if there is none.
+    0 if there is none. No sample may be missing.
     """
     stride = -(-values.size // tuning.LEVELS_SAMPLED)
     part = values[::stride]
@@ -46,11 +45,7 @@ def step_size(values: FloatArray) -> float:
 
 
 def _lattice(levels: FloatArray, gaps: FloatArray, step: float) -> tuple[float, float]:
-    """Step after regression of the levels on their places, and rms distance in steps.
-
-    levels: Less their mean.
-    gaps: Between them.
-    """
+    """Step after regression of the levels on their places, and rms distance in steps."""
     places = np.concatenate([[0.0], np.cumsum(np.rint(gaps / step))])
     if places[-1] == 0.0:
         return step, np.inf
@@ -68,10 +63,8 @@ def widest_step(values: FloatArray, step: float) -> float:
     twice) as wide above a power of ten (of two) as below it. Levels out there come often while
     their neighbours at the smaller step never do.
 
-    values: (n,), samples in their order, none missing.
-    step: Of `step_size`.
-    Returns: ``step`` itself if all are as wide, or if few samples are where they are not. Where the
-        smallest values hide the lattice, there is no ``step``, but a wide one.
+    It is ``step`` itself, that of `step_size`, if all are as wide, or if few samples are where they
+    are not. Where the smallest values hide the lattice, there is no ``step``, but a wide one.
     """
     part = values[:: -(-values.size // tuning.LEVELS_SAMPLED)]
     if step == 0.0 and 2 * np.unique(part).size >= part.size:
@@ -98,8 +91,6 @@ def is_coarse(values: FloatArray, step: float) -> bool:
     Noise about the middle of a step switches between the two levels beside it: its scatter is half
     a step or more however small it is, and shows nothing. Beyond these two lie, of Gaussian noise
     of a third of a step, ``2 Q(3)`` of the samples, and more about any other mean.
-
-    values: (n,), samples, none missing; their mean may wander, but little within a block.
     """
     if not values.size:  # all of them belong to events
         return False
@@ -130,22 +121,14 @@ def rounding(channel: Examined) -> Iterator[Notice]:
     ratio = step / noise if noise > 0.0 else np.inf
     severity: Severity = "note" if ratio > 0.5 else "good"
     hint = "rounding is treated as white noise: {added:.2g%} of it"
-    variant, values = "coarse" if coarse else "", {"lsb": step, "noise": noise}
+    values = {"lsb": step, "noise": noise}
     if coarse:
         severity = "bad"
         hint = "the noise below the step cannot be estimated; use a finer range"
     elif ratio > 1.0:
         severity = "warning"
         hint = "rounding is treated as white noise: true for steps up to twice the noise"
-    words = {"step": shown, "times": brief(ratio), "shown": readable(noise, unit)}
-    added = {"added": step**2 / 12.0 / (noise**2 + step**2 / 12.0)}
-    yield notice(
-        "rounding",
-        channel.name,
-        values,
-        severity=severity,
-        variant=variant,
-        hint=hint,
-        **words,
-        **added,
-    )
+    words = {"step": shown, "times": brief(ratio), "shown": readable(noise, unit), "hint": hint}
+    words["variant"] = "coarse" if coarse else ""
+    added = step**2 / 12.0 / (noise**2 + step**2 / 12.0)
+    yield notice("rounding", channel.name, values, severity=severity, added=added, **words)

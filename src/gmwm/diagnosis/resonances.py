@@ -42,9 +42,6 @@ def find_resonances(
     A band that stands out of the running median by more than Gaussian noise would in any of them,
     and by half, is a candidate; a second-order Gauss-Markov spectrum on the background is fitted
     around it by Whittle's likelihood, which gives frequency and damping.
-
-    found, smooth: Bands without the lines, and their background at each bin, u^2/Hz.
-    left_out: (n // 2 + 1,) of bool, bins of lines.
     """
     height = found.level - found.smooth
     count = height.size
@@ -181,12 +178,7 @@ def _points(
 
 
 def peaks(values: FloatArray, dt: float) -> tuple[tuple[Line, ...], tuple[Bump, ...]]:
-    """Lines, and resonances of what they leave.
-
-    values: (n,), samples, NaN where missing.
-    dt: s.
-    Returns: None of a series that is too short, or of which more than half is missing.
-    """
+    """Lines, and resonances of what they leave; none of a series that is short or half missing."""
     known = np.count_nonzero(~np.isnan(values))
     if values.size < tuning.FEWEST_OF_SPECTRUM or known < values.size / 2:
         return (), ()

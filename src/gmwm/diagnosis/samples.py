@@ -25,12 +25,8 @@ def gap_notices(channels: Sequence[Channel], dt: float) -> list[Notice]:
         if not missing.samples:
             continue
         share = missing.samples / channel.n
-        values = {
-            "missing": float(missing.samples),
-            "share": share,
-            "gaps": float(missing.gaps),
-            "longest": missing.longest * dt,
-        }
+        values = {"missing": float(missing.samples), "share": share}
+        values |= {"gaps": float(missing.gaps), "longest": missing.longest * dt}
         severity: Severity = "note"
         hint = "the wavelet variance bridges short gaps and leaves out what others touch"
         if share > tuning.TOO_MUCH_MISSING:
@@ -38,10 +34,8 @@ def gap_notices(channels: Sequence[Channel], dt: float) -> list[Notice]:
             hint = "too few are left: record again" if share < 1.0 else "check cable and columns"
         elif share > tuning.MUCH_MISSING:
             severity = "warning"
-        name, variant, n = channel.name, "all" if share == 1.0 else "", channel.n
-        found.append(
-            notice("gap", name, values, severity=severity, variant=variant, hint=hint, n=n)
-        )
+        words = {"variant": "all" if share == 1.0 else "", "hint": hint}
+        found.append(notice("gap", channel.name, values, severity=severity, n=channel.n, **words))
     if len(found) == len(channels) > 1 and all(one.values == found[0].values for one in found):
         return [replace(found[0], where="")]
     return found
@@ -49,20 +43,15 @@ def gap_notices(channels: Sequence[Channel], dt: float) -> list[Notice]:
 
 def length(recording: Recording) -> Iterator[Notice]:
     """Say how long a recording is, and whether that is short."""
-    n, rate = recording.n, recording.rate
-    values = {"duration": n / rate, "rate": rate}
-    if n / rate < tuning.LONG_RECORD:
-        yield notice("length", "", values, severity="note", variant="short", n=n)
+    values = {"duration": recording.n / recording.rate, "rate": recording.rate}
+    if values["duration"] < tuning.LONG_RECORD:
+        yield notice("length", "", values, severity="note", variant="short", n=recording.n)
     else:
-        yield notice("length", "", values, severity="good", hint="", n=n)
+        yield notice("length", "", values, severity="good", hint="", n=recording.n)
 
 
 def is_dithered(values: FloatArray, step: float) -> bool:
-    """Whether noise is wide enough for neighbouring samples to differ by more than rounding.
-
-    values: (n,), samples in their order, none missing.
-    step: To which they are rounded, u; 0 if they are not.
-    """
+    """Whether noise is wide enough for neighbouring samples to differ by more than rounding."""
     lengths = _run_lengths(values)
     free = np.repeat(lengths < tuning.LONG_RUN, lengths)
     free = free[1:] & free[:-1]
@@ -114,13 +103,9 @@ def stuck(channel: Examined) -> Iterator[Notice]:
     worst = int(stuck[np.argmax(lengths[stuck])])
     total = int(np.sum(lengths[stuck]))
     start = int(np.sum(lengths[:worst]))
-    values = {
-        "count": float(stuck.size),
-        "longest": float(lengths[worst]),
-        "time": float(np.flatnonzero(present)[start]) * channel.dt,
-        "value": float(series[start]),
-        "samples": float(total),
-    }
+    values = {"count": float(stuck.size), "longest": float(lengths[worst])}
+    values["time"] = float(np.flatnonzero(present)[start]) * channel.dt
+    values |= {"value": float(series[start]), "samples": float(total)}
     severity: Severity = "bad" if total > tuning.MUCH_MISSING * series.size else "warning"
     shown = {"shown": readable(values["value"], channel.unit, digits=5)}
     variant, name = "often" if stuck.size > 1 else "", channel.name

@@ -73,8 +73,6 @@ def bands(spectrum: Spectrum, left_out: BoolArray | None = None) -> Bands:
 
     The mean of logarithms is little moved by lines, and the running median by bumps narrower than
     half an octave; where the spectrum rises or falls steadily the median is exact.
-
-    left_out: (n // 2 + 1,) of bool, bins that do not count.
     """
     logs = np.log(np.maximum(spectrum.density, np.finfo(float).tiny)) + np.euler_gamma
     used = np.ones(logs.size)

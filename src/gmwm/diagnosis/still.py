@@ -82,14 +82,6 @@ def find_still(recording: Recording) -> Still:
     Blocks of a quarter of a second whose scatter is that of the noise, in all axes together and in
     each, and whose mean rate is that of the quietest ones. A stretch in which an axis scatters more
     than in the quietest stretch, or has a narrow band of vibration, is not at rest.
-
-    Parameters
-    ----------
-    recording : Recording
-
-    Returns
-    -------
-    Still
     """
     blocks = blocks_of(recording)
     if blocks is None:
@@ -243,9 +235,6 @@ def _has_band(values: FloatArray, dt: float) -> bool:
     return False
 
 
-# -- blocks of a recording -------------------------------------------------------------------------
-
-
 @dataclass(frozen=True, eq=False)
 class Blocks:
     """Blocks of a quarter of a second, of the channels that motion can be seen in."""
@@ -312,9 +301,6 @@ def blocks_of(recording: Recording) -> Blocks | None:
     return Blocks(tuple(channels[i] for i in seen), size, means[:, seen], scatter[:, seen])
 
 
-# -- stretches that scatter more than others -------------------------------------------------------
-
-
 @dataclass(frozen=True, eq=False)
 class Loudness:
     """When some axes scatter more than at their quietest."""
@@ -324,11 +310,10 @@ class Loudness:
 
 
 def loudness(scatter: FloatArray, step: FloatArray) -> Loudness:
-    """Find the loud stretches of a recording from the scatter of its blocks.
+    """Find the blocks that scatter more than others; none where that does no harm.
 
     scatter: (blocks, axes), variance within each block, u^2; NaN where it is not known.
     step: (axes,), to which samples are rounded, u; 0 where they are not.
-    Returns: no loud block where their scatter does no harm.
     """
     nothing = Loudness(np.zeros(scatter.shape[0], dtype=bool), 1.0)
     # A block that does not scatter at all is dead, not quiet, if all others do by more than a step.

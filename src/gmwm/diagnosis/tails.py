@@ -25,10 +25,8 @@ _NOISE = 2.0 * float(norm.sf(tuning.FAR))  # share of Gaussian noise beyond
 
 def contamination(errors: Innovations, events: Spans) -> float:
     """Share of prediction errors beyond four robust standard deviations, each event counted once.
-
-    events: As `gmwm.diagnosis.events.find_events` finds them.
-    Returns: 0 unless it is above one in a thousand, which is 16 times that of Gaussian noise, and
-        more than Gaussian noise has in one of a thousand channels.
+    0 unless it is above one in a thousand, which is 16 times that of Gaussian noise, and more than
+    Gaussian noise has in one of a thousand channels.
     """
     outside = errors.known.copy()
     for start, stop in events:
@@ -72,9 +70,8 @@ _LAWS: dict[str, Callable[[FloatArray, float, float], FloatArray]] = {
 
 def heavy_tails(errors: Innovations) -> Tails | None:
     """The law of the prediction errors, if it has heavy tails rather than outliers.
-
-    Returns: None if Gaussian noise with outliers is as likely, large errors cluster, the law has no
-        variance or hardly one, or the noise hides in the rounding.
+    None if Gaussian noise with outliers is as likely, large errors cluster, the law has no variance
+    or hardly one, or the noise hides in the rounding.
     """
     counted = errors.known
     if errors.rounding > tuning.ROUNDING_OF_BODY * errors.level or not errors.level > 0.0:

@@ -1,10 +1,22 @@
-"""Missing samples: the runs between them, the gaps that are filled, and what gaps cost.
+"""Missing samples: the runs between them, what they add to wavelet variances, and what they cost.
 
-A coefficient of averaging time m is made of 2 m samples, so a few missing ones would take all long
-averaging times from a record. Gaps of up to m/4 samples are therefore filled before the
-coefficients of that level are computed, see `gmwm.variance.filling`. Longer gaps split the record,
+A coefficient of averaging time m is half the difference of two neighbouring means of m samples.
+Where some are missing, each is the mean of those that exist. Gaps longer than m/4 split the record,
 and so do gaps in which the level changes by more than the noise explains: coefficients that contain
 them are left out.
+
+The mean of C of m samples differs from the mean of all by a random part. As windows slide over a
+gap, samples are missing at any place equally often, so that its variance is
+
+    (1/C - 1/m) L V(L, m) m / (m - L)
+
+for gaps of L samples. V(L, m) is the variance of means of L samples about the mean of m: the sum of
+the Haar wavelet variances of averaging times from L to m/2, whatever the spectrum (analysis of
+variance; Percival & Walden 2000, sec. 8.1). For white noise that is (1/C - 1/m) times the variance
+of a sample, exactly. Gaps that follow each other closely count as shorter ones: with a share p
+missing at random, runs of missing samples have the mean 1/(1 - p) but the effect of single ones, so
+L is the length times 1 - p. All variances needed are those of finer levels, so the part is
+subtracted level by level.
 """
 
 from __future__ import annotations
@@ -62,127 +74,13 @@ class Runs:
 
 
 @dataclass(frozen=True, eq=False)
-class Gaps:
-    """Gaps within a series, with the samples around each that predict what it held.
-
-    runs: The samples that exist.
-    edges: (G, 2), first sample of each gap that has samples on both sides, and the one after its
-        last. Runs that are very short beside the gaps around them belong to the gap.
-    octave: (G,), lengths rounded up to a power of two, as its exponent.
-    apart: (G,) of bool, gaps with another level on either side, which are never filled.
-    """
-
-    runs: Runs
-    edges: IntArray
-    octave: IntArray
-    apart: BoolArray
-
-    @classmethod
-    def of(cls, runs: Runs) -> Gaps:
-        """The gaps between the first and the last sample that exist.
-
-        Those that are separated by very short runs are one.
-        """
-        edges = np.stack([runs.edges[:-1, 1], runs.edges[1:, 0]], axis=1)
-        while edges.shape[0] > 1:
-            length = edges[:, 1] - edges[:, 0]
-            apart = edges[1:, 0] - edges[:-1, 1]
-            one = tuning.ISLAND * apart < np.maximum(length[1:], length[:-1])
-            if not np.any(one):
-                break
-            starts = edges[np.concatenate([[True], ~one]), 0]
-            edges = np.stack([starts, edges[np.concatenate([~one, [True]]), 1]], axis=1)
-        octave = np.ceil(np.log2(edges[:, 1] - edges[:, 0])).astype(np.int64)
-        return cls(runs, edges, octave, np.zeros(octave.size, dtype=bool))
-
-    @property
-    def span(self) -> int:
-        """Samples from the first to the last that exist."""
-        return int(self.runs.edges[-1, 1] - self.runs.edges[0, 0])
-
-    @cached_property
-    def block(self) -> IntArray:
-        """Samples of the unit in which each gap is less than 64 long, (G,)."""
-        length = self.edges[:, 1] - self.edges[:, 0]
-        octave = np.floor(np.log2(np.maximum(2 * length / tuning.GAP_BLOCKS, 1.0)))
-        return 2 ** octave.astype(np.int64)
-
-    @cached_property
-    def length(self) -> IntArray:
-        """Length of each gap in blocks, (G,)."""
-        return np.rint((self.edges[:, 1] - self.edges[:, 0]) / self.block).astype(np.int64)
-
-    @cached_property
-    def boxes(self) -> IntArray:
-        """Number of boxes on either side that a filling is made of, (G,).
-
-        They end 1, 2, 4, 8, ... blocks from the gap, and before the next gap that is not much
-        shorter; much shorter ones are filled already. None where the record ends too near.
-        """
-        free = np.empty(self.octave.size, dtype=np.int64)
-        ends = self.runs.edges[0, 0], self.runs.edges[-1, 1]
-        for octave in np.unique(self.octave):
-            own = self.octave == octave
-            others = (self.octave > octave - tuning.PASSED_OCTAVES) | self.apart
-            edges = self.edges[others]
-            before = np.concatenate([[ends[0]], edges[:-1, 1]])
-            after = np.concatenate([edges[1:, 0], [ends[1]]])
-            room = np.minimum(edges[:, 0] - before, after - edges[:, 1])
-            free[own] = room[own[others]]
-        reach = np.minimum(free // self.block, np.maximum(4 * self.length, tuning.FILLING_REACH))
-        return np.floor(np.log2(np.maximum(reach, 0.5))).astype(np.int64) + 1
-
-    @cached_property
-    def kinds(self) -> tuple[IntArray, IntArray]:
-        """Block, length and boxes of the kinds of gaps there are, (K, 3), and each gap's, (G,)."""
-        base = 2 * tuning.GAP_BLOCKS  # more than any length or number of boxes
-        code = (self.block * base + self.length) * base + self.boxes
-        found, kind = np.unique(code, return_inverse=True)
-        return np.stack([found // base**2, found // base % base, found % base], axis=1), kind
-
-    def filled(self, m: float) -> BoolArray:
-        """Which gaps are filled for averaging times of ``m`` samples, (G,)."""
-        short = self.octave <= np.log2(m / tuning.AVERAGES_OF_GAP)
-        return np.asarray(short & (self.boxes > 0) & ~self.apart)
-
-    def joined(self, m: float) -> IntArray:
-        """Runs of samples that exist or are filled for averaging times of ``m`` samples, (P, 2)."""
-        filled = self.filled(m)
-        largest = int(np.max(self.octave, initial=-1, where=filled))
-        if largest not in self._joined:
-            starts, stops = self.runs.edges.T
-            first, last = self.edges[filled].T
-            beside = np.searchsorted(first, starts, "left") - 1
-            kept = starts[(beside < 0) | (starts > last[beside])]
-            beside = np.searchsorted(first, stops, "right") - 1
-            ends = stops[(beside < 0) | (stops >= last[beside])]
-            self._joined[largest] = np.stack([kept, ends], axis=1)
-        return self._joined[largest]
-
-    @cached_property
-    def _joined(self) -> dict[int, IntArray]:
-        """Runs by the octave of the longest gaps that are filled."""
-        return {-1: self.runs.edges}
-
-    def covered(self, m: int) -> FloatArray:
-        """Number of kept windows of 2 m samples that cover each gap filled for it, over 2 m."""
-        runs = self.joined(m)
-        edges = self.edges[self.filled(m)]
-        centre = np.sum(edges, axis=1) // 2
-        own = np.searchsorted(runs[:, 0], edges[:, 0], "right") - 1
-        first = np.maximum(runs[own, 0], centre - 2 * m + 1)
-        last = np.minimum(runs[own, 1] - 2 * m, centre)
-        return np.asarray(np.maximum(last - first + 1, 0) / (2.0 * m))
-
-
-@dataclass(frozen=True, eq=False)
 class GapEffects:
     """What gaps do to the wavelet variances of the levels.
 
     missing: Number of missing samples.
     counts: (J,), number of coefficients.
-    change: (J,), relative change of the expected variance by filling short gaps; it has been
-        subtracted. Zero where no gap was filled.
+    change: (J,), what missing samples added to the expected variance, relative to it; it has been
+        subtracted.
     inflation: (J, J), growth of the covariance over that of a complete record.
     """
 
@@ -198,6 +96,55 @@ class GapEffects:
         if not (np.all(self.counts > 0.0) and np.all(self.change > -1.0)):
             raise ValueError("gaps leave no coefficients, or less than no variance")
         check_covariance(self.inflation.tolist(), levels, "inflation")
+
+
+def bridged(runs: IntArray, apart: BoolArray, longest: float) -> IntArray:
+    """Runs to which gaps of up to ``longest`` samples belong, (P, 2), unless they are apart."""
+    split = apart | (runs[1:, 0] - runs[:-1, 1] > longest)
+    return np.stack([runs[np.append(True, split), 0], runs[np.append(split, True), 1]], axis=1)
+
+
+def unmasked(
+    square: FloatArray, scarcity: FloatArray, gaps: IntArray, missing: float, longest: float
+) -> tuple[FloatArray, FloatArray]:
+    """Variances without what missing samples add, and that relative to them, (J,) each.
+
+    square: (J,), mean squares of the coefficients.
+    scarcity: (J,), mean over windows of a quarter of 1/C - 1/m, for both halves together.
+    gaps: (G, 2), number of gaps of about the same length, and samples they have.
+    missing: Share of the samples that are missing.
+    longest: Longest gap within half a window, as a share of it.
+    """
+    samples = gaps[:, 1].astype(float)
+    length = np.maximum(samples / gaps[:, 0] * (1.0 - missing), 1.0)
+    variance, change, usual = np.zeros(square.size), np.zeros(square.size), 0.0
+    for j in range(square.size):
+        m = 2.0**j
+        within = length <= longest * m
+        added = 0.0
+        if np.any(within) and scarcity[j] > 0.0:
+            own = length[within]
+            spread = np.array([_spread(variance[:j], each) for each in own])
+            each = own * spread * m / (m - own)
+            added = scarcity[j] * float(np.average(each, weights=samples[within]))
+        variance[j] = max(square[j] - added, square[j] / (1.0 + tuning.LARGEST_CHANGE))
+        # Relative to what is expected: few windows that came out small by chance would weigh least.
+        # No level is below half of the one before but by chance, or where steps are rounded.
+        usual = max(variance[j], 0.5 * usual)
+        change[j] = added / usual if usual > 0.0 else 0.0
+    return variance, change
+
+
+def _spread(variance: FloatArray, length: float) -> float:
+    """Variance of means of ``length`` samples within the next averaging time.
+
+    Between octaves as for white noise.
+    """
+    octave = int(np.log2(length))
+    if octave >= variance.size:
+        return 0.0
+    part = 2.0 ** (octave + 1) / length - 1.0
+    return float(part * variance[octave] + np.sum(variance[octave + 1 :]))
 
 
 def window_count(runs: IntArray, width: float) -> float:

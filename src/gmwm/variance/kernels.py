@@ -11,7 +11,7 @@ CHUNK = 1 << 14
 FINE = 12  # levels of averaging times 1 ... 2048 samples, of one chunk at a time
 _TILE = 1 << 16  # samples of the other levels that stay in the cache
 _LEAST_COLUMNS = 8
-_ROW = 1 << FINE  # shortest averaging time of the other levels
+ROW = 1 << FINE  # shortest averaging time of the other levels
 _PIECE = 256
 
 ANY_ORDER = {"reassoc", "contract", "nsz"}
@@ -98,34 +98,34 @@ def coarse_moments(
     averaging: IntArray,
     found: FloatArray,
 ) -> None:
-    """The same for longer averaging times, for some columns of the run in rows of `_ROW` samples.
+    """The same for longer averaging times, for some columns of the run in rows of `ROW` samples.
 
     All levels use a tile of some columns that stays in the cache: one read of the data.
 
     integral: (n + 1,), cumulative sum of the series, starting with 0.
     start, end: Of the run.
-    columns: The first, and the one after the last, of `_ROW`.
-    averaging: (L,), multiples of `_ROW`, in samples.
+    columns: The first, and the one after the last, of `ROW`.
+    averaging: (L,), multiples of `ROW`, in samples.
     found: (L, 3), to which number, sum and sum of squares of the coefficients are added.
     """
     length = end - start + 1
-    most = (length - 1) // _ROW + 1
+    most = (length - 1) // ROW + 1
     width = max(_TILE // most, _LEAST_COLUMNS)
     tile = np.empty(most * width)
-    longer = (length - 1) % _ROW + 1  # columns that have one row more than the others
+    longer = (length - 1) % ROW + 1  # columns that have one row more than the others
     for part in range(2):
         low = max(columns[0], longer if part else 0)
-        high = min(columns[1], _ROW if part else longer)
+        high = min(columns[1], ROW if part else longer)
         rows = most - part
         for first in range(low, high, width):
             own = min(width, high - first)
             for r in range(rows):
-                place = start + r * _ROW + first
+                place = start + r * ROW + first
                 for i in range(own):
                     tile[r * own + i] = integral[place + i]
             for level in range(averaging.size):
                 m = averaging[level]
-                shift = m // _ROW * own
+                shift = m // ROW * own
                 count = rows * own - 2 * shift
                 if count <= 0:
                     break
@@ -152,6 +152,29 @@ def haar_coefficients(integral: FloatArray, start: int, stop: int, m: int) -> Fl
         t = start + i
         result[i] = scale * (integral[t + 2 * m] - 2.0 * integral[t + m] + integral[t])
     return result
+
+
+@compiled()
+def masked_coefficients(
+    integral: FloatArray, there: IntArray, runs: IntArray, m: int, result: FloatArray
+) -> float:
+    """Half the differences of neighbouring means of the samples that exist, within runs.
+
+    integral, there: (n + 1,), cumulative sum and number of the samples that exist, from 0 on.
+    m: Averaging time in samples, longer than any gap within a run.
+    result: To which the coefficients are written, run by run.
+    Returns: the sum of a quarter of 1/C - 1/m over all halves of windows, with C of m samples.
+    """
+    scarcity, place = 0.0, 0
+    for run in range(runs.shape[0]):
+        for t in range(runs[run, 0], runs[run, 1] - 2 * m + 1):
+            before = 1.0 / (there[t + m] - there[t])
+            after = 1.0 / (there[t + 2 * m] - there[t + m])
+            first = (integral[t + m] - integral[t]) * before
+            result[place] = 0.5 * ((integral[t + 2 * m] - integral[t + m]) * after - first)
+            scarcity += before + after - 2.0 / m
+            place += 1
+    return 0.25 * scarcity
 
 
 def cumulative(values: FloatArray, mean: float) -> FloatArray:
@@ -293,42 +316,6 @@ def weighted_series(correlation: FloatArray, weight: FloatArray, series: FloatAr
 
 
 @compiled()
-def fill(
-    values: FloatArray,
-    integral: FloatArray,
-    edges: IntArray,
-    block: IntArray,
-    boxes: IntArray,
-    weights: FloatArray,
-    slope: float,
-) -> None:
-    """Fill gaps with a weighted mean of the samples on either side, and a line of no mean.
-
-    values: (n,), changed in place.
-    integral: (n + 1,), their cumulative sum before, starting with 0.
-    edges: (G, 2), first sample of each gap, and the one after its last.
-    block: (G,), samples of the nearest box on either side.
-    boxes: (G,), number of boxes: they end at 1, 2, 4, 8, ... blocks from the gap.
-    weights: (G, most boxes), of the mean of each pair of boxes.
-    slope: Per sample.
-    """
-    for g in range(edges.shape[0]):
-        start, stop = edges[g, 0], edges[g, 1]
-        mean = 0.0
-        near = 0
-        far = block[g]
-        for i in range(boxes[g]):
-            left = integral[start - near] - integral[start - far]
-            right = integral[stop + far] - integral[stop + near]
-            mean += weights[g, i] * (left + right) / (2.0 * (far - near))
-            near = far
-            far = 2 * far
-        centre = 0.5 * (start + stop - 1)
-        for k in range(start, stop):
-            values[k] = mean + slope * (k - centre)
-
-
-@compiled()
 def pairs_at_lag(first: IntArray, second: IntArray, lag: int) -> int:
     """Number of places t within the first intervals such that t + lag is within the second.
 
@@ -346,23 +333,3 @@ def pairs_at_lag(first: IntArray, second: IntArray, lag: int) -> int:
             j += 1
         j = min(j, second.shape[0] - 1)
     return total
-
-
-@compiled()
-def neighbours(centre: IntArray, kind: IntArray, kinds: int, reach: int) -> IntArray:
-    """Number of pairs of gaps by kinds and distance, (kinds, kinds, reach).
-
-    centre: (G,), ascending, in half samples.
-    kind: (G,), from 0; negative ones are left out.
-    reach: Half samples.
-    """
-    number = np.zeros((kinds, kinds, reach), dtype=np.int64)
-    for g in range(centre.size):
-        if kind[g] < 0:
-            continue
-        other = g + 1
-        while other < centre.size and centre[other] - centre[g] < reach:
-            if kind[other] >= 0:
-                number[kind[g], kind[other], centre[other] - centre[g]] += 1
-            other += 1
-    return number

@@ -1,35 +1,37 @@
-"""The levels of a series: which samples exist or are filled for each, and the coefficients."""
+"""The levels of a series, their coefficients, and the spectrum that they imply."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
 import numpy as np
 
-from gmwm._core.typing import BoolArray, FloatArray, IntArray
+from gmwm._core.distributions import student
+from gmwm._core.typing import BoolArray, FloatArray, IntArray, inner
 from gmwm.process import PSD, Panels, node_weights, wavelet as known_wavelet
 from gmwm.variance import tuning
 from gmwm.variance.covariance.haar import dyadic_levels
-from gmwm.variance.filling import Filling, levels_apart
 from gmwm.variance.gaps import (
     GapEffects,
-    Gaps,
     Runs,
+    bridged,
     common_share,
     pair_factor,
+    unmasked,
     window_centres,
     window_count,
 )
 from gmwm.variance.kernels import (
-    FINE,
+    ROW,
     coarse_moments,
     cumulative,
     fine_moments,
     haar_coefficients,
+    masked_coefficients,
     slope,
 )
 from gmwm.variance.modwt import coefficients
@@ -106,9 +108,6 @@ class _Places:
         return np.asarray(inside + np.clip(slope, -2.0, 0.0) * self._below)
 
 
-_ROW = 1 << FINE
-
-
 def haar_moments(
     values: FloatArray, integral: FloatArray, runs: IntArray, averaging: FloatArray
 ) -> FloatArray:
@@ -121,8 +120,8 @@ def haar_moments(
     """
     m = averaging.astype(np.int64)
     first = int(m[0]).bit_length() - 1
-    fine = m[m < _ROW]
-    coarse = m[m >= _ROW]
+    fine = m[m < ROW]
+    coarse = m[m >= ROW]
     long = runs[runs[:, 1] - runs[:, 0] >= 2 * m[0]]
     levels = first + fine.size
 
@@ -133,7 +132,7 @@ def haar_moments(
             if fine.size:
                 fine_moments(values, edges[0], edges[1], stop, levels, found[:levels])
             if coarse.size and stop - start >= 2 * coarse[0]:
-                columns = (_ROW * part // parts, _ROW * (part + 1) // parts)
+                columns = (ROW * part // parts, ROW * (part + 1) // parts)
                 coarse_moments(integral, start, stop, columns, coarse, found[first + fine.size :])
         return found[first:]
 
@@ -148,118 +147,99 @@ def haar_moments(
     return found[:, 1:] / found[:, :1]
 
 
+def level_changes(values: FloatArray, runs: Runs) -> BoolArray:
+    """Gaps in which the level of a series changes by what its noise does not explain, (runs - 1,).
+
+    A Student's t test of the difference of the means on both sides. Its variance is at most four
+    times the largest of the Haar wavelet variances of about that averaging time, from the windows
+    between gaps; beyond the longest known one it grows as that of a random walk. Noise has one such
+    gap in a series with a probability of `tuning.APART`. A change of the level lasts, a narrow peak
+    of the spectrum does not: it must show in means over wider stretches as well.
+
+    values: (n,), NaN where samples are missing.
+    """
+    m = dyadic_levels(runs.longest)
+    counts = np.array([window_count(runs.edges, 2.0 * each) for each in m])
+    m = m[: max(int(np.sum(np.cumprod(counts >= 2.0 * tuning.PILOT_WINDOWS * m))), 1)]
+    sums = cumulative(values, 0.0)
+    mean, square = haar_moments(values, sums, runs.edges, m).T
+    drift = slope(values, runs.edges[:, 0])
+    noise = np.pad(square - drift * m * mean + (0.5 * drift * m) ** 2, 1, mode="edge")
+    noise = np.maximum(np.maximum(noise[:-2], noise[2:]), noise[1:-1])
+    there = np.zeros(values.size + 1, dtype=np.int64)
+    np.cumsum(~np.isnan(values), out=there[1:])
+    first, last = runs.edges[:-1, 1], runs.edges[1:, 0]
+    room = np.minimum(first - runs.starts[0], runs.stops[-1] - last)
+
+    def is_large(width: IntArray) -> BoolArray:
+        """Whether means of up to ``width`` samples differ by more than noise does."""
+        width = np.minimum(width, room)
+        left, right = (there[a + width] - there[a] for a in (first - width, last))
+        before, after = (sums[a + width] - sums[a] for a in (first - width, last))
+        apart = last - first + width
+        known = np.minimum(np.log2(width).astype(int), m.size - 1)
+        variance = 4.0 * noise[known] * width / np.minimum(left, right)
+        variance *= np.maximum(apart / m[-1], 1.0)
+        windows = np.maximum(runs.present / (2.0 * np.minimum(width, m[-1])), 1.0)
+        limit = student.isf(0.5 * tuning.APART / first.size, windows)
+        change = np.abs(after / right - before / left - drift * apart)
+        return np.asarray(change > limit * np.sqrt(variance))
+
+    width = tuning.STRETCH_OF_GAP * 2 ** np.ceil(np.log2(last - first)).astype(np.int64)
+    width = np.maximum(width, tuning.LEAST_STRETCH)
+    return is_large(width) & is_large(tuning.WIDER * width)
+
+
 @dataclass(frozen=True, eq=False)
 class Levels:
-    """The levels of a series, gaps included.
+    """The levels of a series with at least one coefficient, gaps included.
 
     values: (n,), about their mean; NaN where samples are missing.
     runs: The samples that exist.
-    averaging: (J,), averaging times, in samples, of the levels with a coefficient.
-    filling: How short gaps are filled; ``None`` where none are.
-    change: (J,), relative change of the expected variances by filling.
-    error: (J,), relative wavelet variances of the error of the filling.
-    filled: (J,) of bool, levels for which gaps are filled.
-    parts: (P,), first samples of parts with levels of their own, between which its line jumps.
+    averaging: (J,), averaging times, in samples.
+    apart: (runs - 1,), gaps in which the level changes, which no coefficient contains.
     """
 
     values: FloatArray
     runs: Runs
     averaging: FloatArray
     wavelet: str
-    filling: Filling | None
-    change: FloatArray
-    error: FloatArray
-    filled: BoolArray
-    parts: IntArray = field(default_factory=lambda: np.zeros(1, dtype=np.int64))
+    apart: BoolArray
 
     @classmethod
-    def of(cls, values: FloatArray, runs: Runs, wavelet: str, dt: float) -> Levels:
-        """The levels with a coefficient; for the Haar wavelet, with short gaps filled."""
-        m = dyadic_levels(runs.longest)
+    def of(cls, values: FloatArray, runs: Runs, wavelet: str) -> Levels:
+        """The levels of a series about its mean."""
+        apart = np.zeros(len(runs.starts) - 1, dtype=bool)
         if wavelet != "haar":
-            kind = known_wavelet(wavelet)
-            m = m[[kind.width(j + 1) <= runs.longest for j in range(m.size)]]
-        none = np.zeros(m.size)
-        plain = cls(values, runs, m, wavelet, None, none, none, none > 0.0)
-        if runs.is_complete or wavelet != "haar":
-            return plain
-        gaps = Gaps.of(runs)
-        m = dyadic_levels(gaps.span)
-        if not np.any(gaps.filled(m[-1])):
-            return plain
-        between = replace(plain, parts=runs.edges[:, 0])
-        variance = between._pilot_variance(0)
-        known = plain.averaging[: variance.size]
-        psd, longest = pilot_psd(variance, known, dt), float(known[-1])
-        gaps = replace(gaps, apart=levels_apart(gaps, values, between.slope, psd, dt, longest))
-        if np.any(gaps.apart):
-            parts = np.concatenate([[0], gaps.edges[gaps.apart, 1]])
-            plain = replace(plain, parts=parts)
-            if not np.any(gaps.filled(m[-1])):
-                return plain
-        none = np.zeros(m.size)
-        whole = replace(plain, averaging=m, change=none, error=none, filled=none == 0.0)
-        variance = plain._pilot_variance(0)
-        fine = [not np.any(gaps.filled(each)) for each in plain.averaging]
-        scarcity = float(np.min((plain.averaging / plain.counts)[fine]))
-        first = whole._filled_under(variance, scarcity, gaps, dt)
-        variance = np.append(variance, first._pilot_variance(variance.size))
-        return whole._filled_under(variance, scarcity, gaps, dt)
-
-    def _pilot_variance(self, start: int) -> FloatArray:
-        """Driftless variances of the well-known levels from ``start`` on; the finest always is."""
-        windows = self.counts / (2.0 * self.averaging)
-        known = max(int(np.sum(np.cumprod(windows >= tuning.PILOT_WINDOWS))), 1)
-        part = replace(
-            self,
-            averaging=self.averaging[start:known],
-            change=self.change[start:known],
-            error=self.error[start:known],
-            filled=self.filled[start:known],
-        )
-        return np.maximum(part.driftless(part.moments()), np.finfo(float).tiny)
-
-    def _filled_under(self, variance: FloatArray, scarcity: float, gaps: Gaps, dt: float) -> Levels:
-        """With the gaps filled under the spectrum that these variances of fine levels imply.
-
-        The averaging time over the number of windows is proportional to the relative sampling
-        variance. Where that of the fine levels, ``scarcity``, leaves the change less certain than
-        the level itself, the level is not filled: hardly two samples follow each other there.
-        """
-        psd = pilot_psd(variance, self.averaging[: variance.size], dt)
-        filling = Filling.under(psd, dt, gaps)
-        found = replace(self, filling=filling)
-        change, error = filling.change(self.averaging)
-        own = self.averaging / np.maximum(found.counts, 1.0)
-        filled = np.abs(change) <= tuning.LARGEST_CHANGE
-        filled &= change**2 * scarcity <= (1.0 + change) ** 2 * own
-        # The pilot knows too little of the coarsest levels to decide anew.
-        decided = max(
-            int(np.sum(found.counts >= tuning.DECIDING_WINDOWS * 2.0 * self.averaging)), 1
-        )
-        filled[decided:] = filled[decided - 1]
-        change = np.minimum(change, tuning.LARGEST_CHANGE)
-        change, error = np.where(filled, (change, error), 0.0)
-        found = replace(found, change=change, error=error, filled=filled)
+            number = known_wavelet(wavelet).levels(runs.longest)
+            return cls(values, runs, dyadic_levels(2**number), wavelet, apart)
+        if apart.size:
+            apart = level_changes(values, runs)
+        found = cls(values, runs, dyadic_levels(runs.n), wavelet, apart)
         exist = int(np.sum(np.cumprod(found.counts > 0.0)))
-        return replace(
-            found,
-            averaging=self.averaging[:exist],
-            change=change[:exist],
-            error=error[:exist],
-            filled=filled[:exist],
-        )
+        return cls(values, runs, found.averaging[:exist], wavelet, apart)
 
     @cached_property
     def slope(self) -> float:
-        """Slope of the least-squares line through the samples that exist, per sample."""
-        return slope(self.values, self.parts)
+        """Slope of the least-squares line through the samples that exist, per sample.
+
+        The line jumps in gaps in which the level does.
+        """
+        return slope(self.values, self.runs.edges[np.append(True, self.apart), 0])
+
+    @property
+    def _step(self) -> FloatArray:
+        """Coefficients of the line, (J,)."""
+        return 0.5 * self.slope * self.averaging
 
     def edges(self, level: int) -> IntArray:
-        """Runs of samples that exist or are filled for a level, (P, 2)."""
-        if self.filling is None or not self.filled[level]:
-            return self.runs.edges
-        return self.filling.gaps.joined(self.averaging[level])
+        """Runs within which the coefficients of a level lie, (P, 2)."""
+        return bridged(self.runs.edges, self.apart, self._longest_gap * self.averaging[level])
+
+    @property
+    def _longest_gap(self) -> float:
+        """Longest gap in a coefficient, as a share of the averaging time."""
+        return tuning.LONGEST_GAP if self.wavelet == "haar" else 0.0
 
     @property
     def width(self) -> FloatArray:
@@ -274,49 +254,53 @@ class Levels:
         """Number of coefficients, (J,)."""
         return np.array([window_count(self.edges(j), width) for j, width in enumerate(self.width)])
 
-    def effects(self) -> GapEffects | None:
-        """What the gaps do to the variances; ``None`` for a complete series."""
-        n = self.runs.n
-        if self.runs.is_complete:
-            return None
-        widths = self.width
-        centres = [window_centres(self.edges(j), int(width)) for j, width in enumerate(widths)]
-        if self.wavelet == "haar":
-            pairs = zip(centres, self.averaging.astype(int).tolist(), strict=True)
-            growth = np.array([pair_factor(own, m, n) for own, m in pairs])
-        else:
-            growth = (n - widths + 1.0) / self.counts
-        deviation = np.sqrt(growth) * (1.0 + self.error)
-        inflation = np.outer(deviation, deviation) * common_share(centres, widths, n)
-        return GapEffects(n - self.runs.present, self.counts, self.change, inflation)
+    @cached_property
+    def plain(self) -> int:
+        """Number of levels, the finest, whose coefficients contain no missing sample."""
+        gaps = self.runs.edges[1:, 0] - self.runs.edges[:-1, 1]
+        shortest = np.min(gaps, initial=self.runs.n, where=~self.apart)
+        return int(np.sum(self._longest_gap * self.averaging < shortest))
 
     @cached_property
     def _integral(self) -> FloatArray:
-        """Cumulative sum of the series without filled gaps."""
-        return cumulative(self.values, 0.0)
+        """Cumulative sum of the series; where coefficients contain gaps, without its line."""
+        if self.plain == self.averaging.size:
+            return cumulative(self.values, 0.0)
+        return cumulative(self.values - self.slope * np.arange(self.runs.n), 0.0)
 
-    def _series(self) -> Iterator[tuple[IntArray, FloatArray, FloatArray]]:
-        """Levels in groups, the series that they are made of, and its cumulative sum."""
-        if self.filling is None:
-            yield np.arange(self.averaging.size), self.values, self._integral
-            return
-        series = self.filling.series(self.values, self._integral, self.averaging, self.slope)
-        for levels, values, integral in series:
-            for own in np.split(levels, np.flatnonzero(np.diff(self.filled[levels])) + 1):
-                if own.size and self.filled[own[0]]:
-                    yield own, values, integral
-                elif own.size:
-                    yield own, self.values, self._integral
+    @cached_property
+    def _there(self) -> IntArray:
+        """Cumulative number of samples that exist, (n + 1,)."""
+        there = np.zeros(self.runs.n + 1, dtype=np.int64)
+        np.cumsum(~np.isnan(self.values), out=there[1:])
+        return there
 
-    def moments(self) -> FloatArray:
-        """Mean and mean square of each level's coefficients, (J, 2)."""
+    def _masked(self, level: int) -> tuple[FloatArray, float]:
+        """Coefficients of a level without the line, and their mean scarcity."""
+        found = np.empty(int(self.counts[level]))
+        m = int(self.averaging[level])
+        scarcity = masked_coefficients(self._integral, self._there, self.edges(level), m, found)
+        return found, scarcity / found.size
+
+    def moments(self) -> tuple[FloatArray, FloatArray]:
+        """Mean and mean square of each level's coefficients, (J, 2), and mean scarcity, (J,).
+
+        The scarcity is a quarter of 1/C - 1/m of both halves of a window, with C of m samples.
+        """
+        scarcity = np.zeros(self.averaging.size)
         if self.wavelet != "haar":
-            return np.array([(np.mean(w), np.mean(w * w)) for w in self.coefficients()])
-        found = [
-            haar_moments(values, integral, self.edges(int(levels[0])), self.averaging[levels])
-            for levels, values, integral in self._series()
-        ]
-        return np.concatenate([np.zeros((0, 2)), *found])
+            return np.array([(np.mean(w), np.mean(w * w)) for w in self.coefficients()]), scarcity
+        moments = np.empty((self.averaging.size, 2))
+        whole = self.plain == self.averaging.size
+        integral = self._integral if whole else cumulative(self.values, 0.0)
+        plain = self.averaging[: self.plain]
+        moments[: plain.size] = haar_moments(self.values, integral, self.runs.edges, plain)
+        for j in range(self.plain, self.averaging.size):
+            w, scarcity[j] = self._masked(j)
+            step = self._step[j]
+            mean = float(np.mean(w))
+            moments[j] = mean + step, inner(w, w) / w.size + 2.0 * step * mean + step**2
+        return moments, scarcity
 
     def coefficients(self, *, level: bool = False) -> Iterator[FloatArray]:
         """The coefficients of each level, over all runs; without the series' line if ``level``."""
@@ -330,37 +314,69 @@ class Levels:
             for _ in range(number):
                 yield np.concatenate([next(part, np.zeros(0)) for part in parts])
             return
-        for levels, values, integral in self._series():
-            own = cumulative(values - line, 0.0) if level else integral
-            for j in levels:
-                m = int(self.averaging[j])
+        own = cumulative(self.values - line, 0.0)
+        for j, m in enumerate(self.averaging.astype(int).tolist()):
+            if j < self.plain:
                 yield np.concatenate([haar_coefficients(own, a, b, m) for a, b in self.edges(j)])
+            else:
+                yield self._masked(j)[0] + (0.0 if level else self._step[j])
 
-    def driftless(self, moments: FloatArray) -> FloatArray:
-        """Expected variances without the filling and without the least-squares line, (J,)."""
-        step = 0.5 * self.slope * self.averaging
-        return np.asarray(
-            (moments[:, 1] - 2.0 * step * moments[:, 0] + step**2) / (1.0 + self.change)
-        )
+    def added(
+        self, moments: FloatArray, scarcity: FloatArray, level: FloatArray | None = None
+    ) -> tuple[FloatArray, FloatArray]:
+        """What missing samples add to the variances, and that relative to them, (J,) each.
 
-    def unfilled(self, moments: FloatArray) -> FloatArray:
-        """Variances without what filling added, (J,); it took nothing from a drift."""
-        if not np.any(self.change):
-            return moments[:, 1]
-        return moments[:, 1] - self.change * self.driftless(moments)
+        level: (J,), variances without the series' line; by default from the moments.
+        """
+        if self.plain == self.averaging.size:
+            return np.zeros(scarcity.size), np.zeros(scarcity.size)
+        step = self._step
+        square = moments[:, 1] - 2.0 * step * moments[:, 0] + step**2 if level is None else level
+        gaps = self.runs.edges[1:, 0] - self.runs.edges[:-1, 1]
+        lengths, number = np.unique(gaps[~self.apart], return_counts=True)
+        pairs = np.stack([number, lengths * number], axis=1)
+        missing = 1.0 - self.runs.present / self.runs.n
+        variance, change = unmasked(square, scarcity, pairs, missing, tuning.LONGEST_GAP)
+        return square - variance, change
+
+    def effects(self, change: FloatArray) -> GapEffects | None:
+        """What the gaps do to the variances; ``None`` for a complete series."""
+        n = self.runs.n
+        if self.runs.is_complete:
+            return None
+        widths = self.width
+        centres = [window_centres(self.edges(j), int(width)) for j, width in enumerate(widths)]
+        if self.wavelet == "haar":
+            pairs = zip(centres, self.averaging.astype(int).tolist(), strict=True)
+            growth = np.array([pair_factor(own, m, n) for own, m in pairs])
+        else:
+            growth = (n - widths + 1.0) / self.counts
+        deviation = np.sqrt(growth) * (1.0 + change)
+        inflation = np.outer(deviation, deviation) * common_share(centres, widths, n)
+        return GapEffects(n - self.runs.present, self.counts, change, inflation)
 
     def block_means(self) -> tuple[FloatArray, int]:
-        """Means of blocks, NaN where a gap is not filled for the coarsest level, and their size."""
-        values, integral = self.values, self._integral
-        if self.filling is not None and self.filled[-1]:
-            coarsest = self.averaging[-1:]
-            *_, (_, values, integral) = self.filling.series(values, integral, coarsest, self.slope)
+        """Means of blocks of what exists, and their size.
+
+        Those in gaps that the coarsest level contains are interpolated if less than half is there;
+        those with samples of longer gaps are NaN.
+        """
         n = self.runs.n
-        whole = self.runs.is_complete or not np.any(np.isnan(values))
-        most = tuning.MOST_BLOCKS if whole else tuning.MOST_BLOCKS_WITH_GAPS
-        block = -(-n // most)
-        end = (n // block) * block
-        means = np.diff(integral[: end + 1 : block]) / block
-        if not whole:
-            means[np.any(np.isnan(values[:end]).reshape(-1, block), axis=1)] = np.nan
+        edges = np.concatenate([[0], self.edges(self.averaging.size - 1).ravel(), [n]])
+        longer = [(start, stop) for start, stop in edges.reshape(-1, 2).tolist() if stop > start]
+        block = -(-n // (tuning.MOST_BLOCKS_WITH_GAPS if longer else tuning.MOST_BLOCKS))
+        ends = slice(0, (n // block) * block + 1, block)
+        sums = np.diff(self._integral[ends])
+        if self.runs.is_complete:
+            return sums / block, block
+        place, there = np.arange(sums.size), np.diff(self._there[ends])
+        line = self.slope * (block * (place + 0.5) - 0.5)
+        if self.plain == self.averaging.size:
+            sums -= line * there
+        known = there >= max(tuning.LEAST_OF_BLOCK * block, 1)
+        if not np.any(known):
+            return np.full(sums.size, np.nan), block
+        means = np.interp(place, place[known], sums[known] / there[known]) + line
+        for start, stop in longer:
+            means[start // block : (stop - 1) // block + 1] = np.nan
         return means, block

@@ -37,10 +37,10 @@ def wavelet_variance(
     """MODWT wavelet variance of a channel or an array.
 
     All levels with at least one coefficient free of end effects are given; the mean of the series
-    does not matter. Missing samples are NaN: with the Haar wavelet, gaps of up to a quarter of an
-    averaging time are filled from the samples around them, and the bias of the filling is
-    subtracted (`gmwm.variance.filling`). Coefficients that contain other missing samples are left
-    out.
+    does not matter. Missing samples are NaN: a Haar coefficient is the difference of means of the
+    samples that exist, and what missing ones add to its variance is subtracted
+    (`gmwm.variance.gaps`). Coefficients with a gap of more than a quarter of the averaging time,
+    or with any gap for other wavelets, are left out.
 
     Parameters
     ----------
@@ -82,22 +82,20 @@ def wavelet_variance(
     wavelet = "haar" if wavelet == "db1" else wavelet
     _check_width(channel, runs, wavelet)
     values = scaled(values, 1.0, -mean)
-    levels = Levels.of(values, runs, wavelet, channel.dt)
-    moments, driftless = levels.moments(), None
+    levels = Levels.of(values, runs, wavelet)
+    moments, scarcity = levels.moments()
+    level = None
     if robust:
         moments = _robust_moments(levels.coefficients(), efficiency)
-        level = _robust_moments(levels.coefficients(level=True), efficiency)
-        driftless = level[:, 1] / (1.0 + levels.change)
+        level = _robust_moments(levels.coefficients(level=True), efficiency)[:, 1]
+    added, change = levels.added(moments, scarcity, level)
+    variance = np.maximum(moments[:, 1] - added, 0.0)
     blocks, block = levels.block_means()
     release(channel.values)
     found = None
     if data_covariance is not None:
         longest = int(np.max(levels.counts))
         found = covariance_of_data(levels.coefficients(), longest, data_covariance)
-        # The bias of the filling is subtracted, its error stays.
-        factor = (1.0 + levels.error) / (1.0 + levels.change)
-        found = found * np.outer(factor, factor)
-    variance = levels.unfilled(moments)
     if not np.any(variance > 0.0):
         raise InputError(
             f"{where_of(channel)} changes only where samples are missing: a dead channel has no "
@@ -117,8 +115,8 @@ def wavelet_variance(
         unit=channel.unit or "u",
         wavelet=wavelet,
         efficiency=efficiency,
-        driftless=driftless,
-        gaps=levels.effects(),
+        driftless=None if level is None else level - added,
+        gaps=levels.effects(change),
         fourth_cumulant=0.0 if robust else fourth_cumulant(values),
         data_covariance=found,
     )

@@ -3,21 +3,15 @@
 Row k of `Rows` holds the means of aligned blocks of 2^k samples. A row is worked off when it has
 `CHUNK` new values: windows that end in them are added to the sums, pairs of them go to the next row
 as means, and `HALO` values stay for the windows of the next chunk.
-
-`Marks` are running sums at certain samples. They give the few windows of the coarsest levels of a
-record that is hardly longer than such a window. A window of 2 m samples begins at t, has its middle
-at t + m and ends at t + 2 m, so sums near 0 and near the latest powers of two are all they need.
 """
 
 from __future__ import annotations
 
-from functools import cache
 from typing import NamedTuple
 
 import numpy as np
 
 from gmwm._core.compiled import compiled
-from gmwm._core.frozen import frozen
 from gmwm._core.typing import FloatArray, IntArray
 from gmwm.variance import tuning
 from gmwm.variance.kernels import ANY_ORDER, summed, summed_with_moments
@@ -33,11 +27,6 @@ FILLED, ORIGIN, GAPPY, OLD = range(4)  # of `Rows.state`
 COUNT, MEAN, SQUARE, SCARCITY, LOST_MEAN, LOST_SQUARE = range(6)  # of `Sums.levels`
 REFERENCE, LOWEST, HIGHEST, SUM, LOST_SUM, FOURTH, LOST_FOURTH = range(7)  # of `Sums.totals`
 N, MISSING, RUN, BLOCKS, OCTAVE = range(5)  # of `Sums.tallies`
-
-_DENSE = tuning.STREAMING_PLACES  # marks in an octave; the first octaves have all samples
-PLACES = 2 * _DENSE + _DENSE * tuning.STREAMING_OCTAVES
-SLOTS = 4  # 0 and three powers of two
-_NEVER = 1 << 62
 
 _EDGE, _LEAST_EDGE = tuning.STREAMING_EDGE, tuning.STREAMING_LEAST_EDGE
 _LEAST = tuning.STREAMING_LEAST
@@ -67,8 +56,6 @@ class Sums(NamedTuple):
     tallies: (5,) of int, samples, missing ones, missing ones at the end, blocks and their row.
     gaps: (63, 2) of int, number of gaps of up to 2^i samples, and samples they have.
     blocks: (2, MOST_BLOCKS), all values of one row, and samples they are made of.
-    marks: (SLOTS, 1 + PLACES), a sample, and the sums before samples after it; NaN if not known.
-        0 is in the first slot, powers of two are in the three others in turn.
     """
 
     levels: FloatArray
@@ -76,7 +63,6 @@ class Sums(NamedTuple):
     tallies: IntArray
     gaps: IntArray
     blocks: FloatArray
-    marks: FloatArray
 
 
 @compiled(fastmath=ANY_ORDER)
@@ -215,69 +201,6 @@ def gappy_windows(
             add(sums.totals, FOURTH, LOST_FOURTH, fourth)
 
 
-# -- marks -----------------------------------------------------------------------------------------
-
-
-@cache
-def offsets() -> IntArray:
-    """Distances of the places from their mark, (PLACES,): dense at first, then octaves apart."""
-    octaves = np.arange(tuning.STREAMING_OCTAVES)[:, None]
-    rest = (np.arange(_DENSE) + _DENSE) << octaves + 1
-    found: IntArray = frozen(np.concatenate([np.arange(2 * _DENSE), rest.ravel()]))
-    return found
-
-
-@compiled()
-def _offset(place: int) -> int:
-    if place < 2 * _DENSE:
-        return place
-    if place >= PLACES:
-        return _NEVER
-    octave = place // _DENSE - 1
-    return (place % _DENSE + _DENSE) << octave
-
-
-@compiled()
-def _next_place(offset: int) -> int:
-    """The first place that is no nearer than an offset."""
-    if offset < 2 * _DENSE:
-        return max(offset, 0)
-    octave = 0
-    while offset >> octave >= 2 * _DENSE:
-        octave += 1
-    unit = 1 << octave
-    return (octave + 1) * _DENSE + ((offset + unit - 1) >> octave) - _DENSE
-
-
-@compiled()
-def _mark(values: FloatArray, begin: int, before: float, marks: FloatArray) -> None:
-    """Keep the sums before places within the values, and before the one after the last.
-
-    begin: Index of the first value within the record.
-    before: Sum of the samples before it.
-    """
-    end = begin + values.size
-    octave = 0
-    while (2 << octave) <= end:
-        octave += 1
-    for j in range(max(octave - 2, 0), octave + 1):
-        if marks[1 + j % 3, 0] != 1 << j:
-            marks[1 + j % 3, 0] = 1 << j
-            marks[1 + j % 3, 1:] = np.nan
-    for i in range(SLOTS):
-        at = int(marks[i, 0])
-        if at < 0:
-            continue
-        place = _next_place(begin - at)
-        done, known = begin, before
-        index = at + _offset(place)
-        while index <= end:
-            known += sum_of(values[done - begin : index - begin])
-            marks[i, 1 + place] = known
-            done, place = index, place + 1
-            index = at + _offset(place)
-
-
 # -- rows ------------------------------------------------------------------------------------------
 
 
@@ -327,8 +250,6 @@ def work_off(least: int, rows: Rows, sums: Sums, scratch: FloatArray) -> None:
             continue
         values = data[row, :filled]
         if row == 0:
-            before = sums.totals[SUM] + sums.totals[LOST_SUM]
-            _mark(values[old:], state[row, ORIGIN] + old, before, sums.marks)
             add(sums.totals, SUM, LOST_SUM, sum_of(values[old:]))
         if state[row, GAPPY]:
             gappy_windows(values, present[row, :filled], old, row, sums, scratch)

@@ -1,18 +1,7 @@
 """Wavelet variance of a stream: samples come in blocks, and are not kept.
 
-Half a window that has C of its m samples has their mean. Samples are missing at any place of the
-half window equally often, as windows slide over a gap, so that mean differs from the mean of all
-samples by a random part of variance
-
-    (1/C - 1/m) L V(L, m) m / (m - L)
-
-for gaps of L samples. V(L, m) is the variance of means of L samples about the mean of m: the sum of
-the Haar wavelet variances of averaging times from L to m/2, whatever the spectrum (analysis of
-variance; Percival & Walden 2000, sec. 8.1). For white noise that is (1/C - 1/m) times the variance
-of a sample, exactly. Gaps that follow each other closely count as shorter ones: with a share p
-missing at random, runs of missing samples have the mean 1/(1 - p) but the effect of single ones, so
-L is the length times 1 - p. All variances needed are those of finer levels, so the part is
-subtracted level by level.
+Missing samples are treated as in `gmwm.variance.gaps`, but for which windows are left out: those
+with half a window of too few samples, or of none at either end, so that gaps lie within it.
 """
 
 from __future__ import annotations
@@ -33,7 +22,7 @@ from gmwm.errors import InputError
 from gmwm.readers import Channel
 from gmwm.variance import stream_kernels as kernels, tuning
 from gmwm.variance.covariance.haar import dyadic_levels
-from gmwm.variance.gaps import GapEffects
+from gmwm.variance.gaps import GapEffects, unmasked
 from gmwm.variance.series import MIN_SAMPLES, check_varies, cumulant_of_powers, where_of
 from gmwm.variance.stream_kernels import (
     BLOCKS,
@@ -54,7 +43,6 @@ from gmwm.variance.stream_kernels import (
     N,
     Sums,
     coarsened,
-    offsets,
 )
 from gmwm.variance.wavelet import WaveletVariance
 
@@ -86,11 +74,14 @@ def variance_of(sums: Sums, channel: Channel, confidence: float) -> WaveletVaria
     cumulant = cumulant_of_powers(4.0 * float(square[0]), fourth, float(windows[0]))
     gaps = None
     if missing:
-        square, change = unmasked(square, levels[:, SCARCITY] / windows, sums.gaps, missing / n)
+        square, change = unmasked(
+            square,
+            levels[:, SCARCITY] / windows,
+            sums.gaps[sums.gaps[:, 0] > 0],
+            missing / n,
+            tuning.LONGEST_WITHIN,
+        )
         gaps = effects(n, missing, sums.gaps, windows, change)
-    else:
-        for level in range(max(size - 2, 0), size):
-            mean[level], square[level] = _of_few_windows(level, mean[level], square[level], sums)
     blocks, block = _block_means(sums)
     return WaveletVariance(
         tau=dyadic_levels(2**size) * channel.dt,
@@ -123,89 +114,6 @@ def _block_means(sums: Sums) -> tuple[FloatArray, int]:
     mean = float(sums.totals[SUM] + sums.totals[LOST_SUM]) / (n - missing)
     enough = there[:count] >= tuning.LEAST_OF_BLOCK * 2**octave
     return np.where(enough, values[:count] - mean, np.nan), 1 << octave
-
-
-def _of_few_windows(level: int, mean: float, square: float, sums: Sums) -> tuple[float, float]:
-    """Means of the coefficients of one of the two coarsest levels, and of their squares.
-
-    Where there are few windows, nearly all of them are known from the marks; between those that
-    are, lines are straight. Where there are many, those at multiples of 1/512 of the averaging time
-    are known. The first and the last of these stand for half as many others, and the last also for
-    those after it.
-
-    mean, square: Over the windows at multiples.
-    """
-    m = 1 << level
-    count = int(sums.tallies[N]) - 2 * m + 1
-    if m <= tuning.STREAMING_STARTS:
-        return mean, square
-    begins = offsets()[: int(np.searchsorted(offsets(), count))]
-    marked = sums.marks[:, 0].tolist()
-    if not {0, m, 2 * m} <= set(marked):
-        return mean, square
-    first, middle, last = (sums.marks[marked.index(at), 1:][: begins.size] for at in (0, m, 2 * m))
-    w = (last - 2.0 * middle + first) * (0.5 / m)
-    if not np.all(np.isfinite(w)):
-        return mean, square
-    if count <= tuning.FEW_WINDOWS * m:
-        steps = np.diff(begins, append=count)
-        weights = np.append(0.5 * (steps[:-1] + 1.0), float(steps[-1]))
-        weights[1:] += 0.5 * (steps[:-1] - 1.0)
-        return float(weights @ w / count), float(weights @ w**2 / count)
-    step = m // tuning.STREAMING_STARTS
-    multiples, rest = divmod(count - 1, step)
-    ends = np.array([-0.5 * (step - 1), rest - 0.5 * (step - 1)])
-    known = step * (multiples + 1)
-    return (
-        float(known * mean + ends @ w[[0, -1]]) / count,
-        float(known * square + ends @ w[[0, -1]] ** 2) / count,
-    )
-
-
-# -- missing samples -------------------------------------------------------------------------------
-
-
-def unmasked(
-    square: FloatArray, scarcity: FloatArray, gaps: IntArray, missing: float
-) -> tuple[FloatArray, FloatArray]:
-    """Variances without what missing samples add, and that relative to them, (J,) each.
-
-    square: (J,), mean squares of the coefficients.
-    scarcity: (J,), mean over windows of a quarter of 1/C - 1/m, for both halves together.
-    gaps: (G, 2), number of gaps of up to 2^i samples, and samples they have.
-    missing: Share of the samples that are missing.
-    """
-    there = gaps[:, 0] > 0
-    samples = gaps[there, 1].astype(float)
-    length = np.maximum(samples / gaps[there, 0] * (1.0 - missing), 1.0)
-    variance, change, usual = np.zeros(square.size), np.zeros(square.size), 0.0
-    for j in range(square.size):
-        m = 2.0**j
-        within = length < tuning.LONGEST_WITHIN * m
-        added = 0.0
-        if np.any(within) and scarcity[j] > 0.0:
-            own = length[within]
-            spread = np.array([_spread(variance[:j], each) for each in own])
-            each = own * spread * m / (m - own)
-            added = scarcity[j] * float(np.average(each, weights=samples[within]))
-        variance[j] = max(square[j] - added, square[j] / (1.0 + tuning.STREAMING_LARGEST_CHANGE))
-        # Relative to what is expected: few windows that came out small by chance would weigh least.
-        # No level is below half of the one before but by chance, or where steps are rounded.
-        usual = max(variance[j], 0.5 * usual)
-        change[j] = added / usual if usual > 0.0 else 0.0
-    return variance, change
-
-
-def _spread(variance: FloatArray, length: float) -> float:
-    """Variance of means of ``length`` samples within the next averaging time.
-
-    Between octaves as for white noise.
-    """
-    octave = int(np.log2(length))
-    if octave >= variance.size:
-        return 0.0
-    part = 2.0 ** (octave + 1) / length - 1.0
-    return float(part * variance[octave] + np.sum(variance[octave + 1 :]))
 
 
 def effects(
@@ -244,9 +152,8 @@ class StreamingVariance:
     """Haar wavelet variance of live samples that come in blocks, in memory that does not grow.
 
     Averaging times of up to 512 samples see all windows. Longer ones see those that begin at
-    multiples of 1/512 of them, which raises the sampling variance by 5e-6. Where a record without
-    missing samples has room for few of the longest windows, nearly all of these count. A channel
-    takes some 4 MB, however long the record. The sums do not depend, to the last bit, on how the
+    multiples of 1/512 of them, which raises the sampling variance by 5e-6. A channel takes some
+    4 MB, however long the record. The sums do not depend, to the last bit, on how the
     samples are divided into blocks; a large offset does no harm.
 
     Missing samples are NaN. Half windows are means of the samples they have, if these are at least
@@ -439,11 +346,9 @@ class _Series:
             tallies=np.zeros(5, dtype=np.int64),
             gaps=np.zeros((63, 2), dtype=np.int64),
             blocks=np.zeros((2, kernels.MOST_BLOCKS)),
-            marks=np.full((kernels.SLOTS, 1 + kernels.PLACES), np.nan),
         )
         limits = [kernels.REFERENCE, kernels.LOWEST, kernels.HIGHEST]
         self.sums.totals[limits] = np.nan, np.inf, -np.inf
-        self.sums.marks[:, 0] = 0.0, -1.0, -1.0, -1.0
         self._scratch = np.empty((2, kernels.ROOM + 1))
 
     def absorb(self, samples: FloatArray) -> None:

@@ -21,34 +21,20 @@ HAAR_PEAK = 0.37  # the Haar gain of averaging time tau peaks at f = 0.37/tau
 
 # -- gaps -----------------------------------------------------------------------------------------
 
-AVERAGES_OF_GAP = 4
-"""A gap is filled for averaging times of at least 4 times its length: the Haar autocorrelation is a
-straight line there, and the error of the filling is small beside the coefficient."""
+LONGEST_GAP = 0.25
+"""Longest gap in a coefficient, as a share of the averaging time. With half of it, gaps of 18
+samples make levels 45 % less certain, and no less biased."""
 
-FILLING_REACH = 32
-"""Blocks on either side that a filling uses, at least; four lengths of the gap if that is more.
-Farther ones reduce the error of a random walk or of white noise by little."""
+LARGEST_CHANGE = 10.0
+"""Largest relative change of a variance by gaps: half of white noise missing singly has 1, so few
+windows may come out at less. Bounded by 1.5, three coarse levels were 11 % too large."""
 
-GAP_BLOCKS = 64  # most blocks in a gap; longer gaps have blocks of several samples
-ISLAND = 32  # a run shorter than this share (1/32) of a gap beside it is lost with the gap
-PASSED_OCTAVES = 3  # a filling uses samples beyond another gap that is this many octaves shorter
+STRETCH_OF_GAP, LEAST_STRETCH = 4, 32
+"""Lengths of a gap, and fewest samples, on either side that show whether the level changes."""
+
 APART = 1e-3  # probability that noise has a gap in a series that passes for a change of the level
 WIDER = 16  # a change of the level must also show over stretches 16 times as wide
-NEIGHBOURHOOD = 128  # half samples within which gaps have correlated errors
-
-PAIRED_KINDS = 24
-"""Kinds of gaps, the most frequent, whose pairs are counted; twice as many change no expected
-variance by 1 % where half of the samples are missing."""
-
-LARGEST_CHANGE = 1.5
-"""Relative change of an expected variance by filling: half of white noise missing singly has 1.35,
-and a bias of 2 %."""
-
-PILOT_WINDOWS = 8.0
-"""Windows without overlap that a level needs to contribute to the spectrum for filling."""
-
-DECIDING_WINDOWS = 32.0
-"""Windows without overlap that show whether a level can be filled; coarser levels follow it."""
+PILOT_WINDOWS = 8.0  # windows without overlap of a level whose noise is known
 
 LAGS_PER_AVERAGE = 8  # lags per averaging time at which pairs of coefficients are counted
 MOST_BLOCKS = 2048  # means of blocks from which a drift is estimated
@@ -94,11 +80,6 @@ STREAMING_STARTS = 512
 STREAMING_ROWS = 32
 """Octaves beyond that: 2^32 averaging times of 512 samples are more than any recording has."""
 
-STREAMING_PLACES, STREAMING_OCTAVES, FEW_WINDOWS = 128, 23, 0.5
-"""Places per octave at which windows of the coarsest level may begin, and octaves. They are used
-for records with windows over up to half an averaging time; beyond, 256 windows at multiples of
-1/512 are as good."""
-
 STREAMING_EDGE = 16
 """The first and the last 1/16 of half a window must have a sample, so that gaps lie within it."""
 
@@ -107,10 +88,6 @@ STREAMING_LEAST_EDGE = 4  # least samples of such a part, but for shorter averag
 STREAMING_LEAST = 0.375
 """Least share of the samples of half a window; with half of all samples missing singly, 32 of 64,
 that is four standard deviations less."""
-
-STREAMING_LARGEST_CHANGE = 10.0
-"""Largest relative change of a variance by gaps: half of white noise missing singly has 1, so few
-windows may come out at less. Bounded by 1.5, three coarse levels were 11 % too large."""
 
 LONGEST_WITHIN = 0.625  # longest gap within half a window, as a share: the rest of what must exist
 

@@ -159,17 +159,6 @@ def test_twice_the_frequency_is_a_harmonic_and_the_golden_ratio_is_none():
     }
 
 
-def test_many_lines_are_summed_up():
-    n = 50_000
-    t = DT * np.arange(n)
-    x = np.random.default_rng(4).normal(size=n)
-    for frequency in (3.1, 4.37, 7.71, 13.3, 19.9, 31.1, 43.0):
-        x += 0.3 * np.sin(2 * np.pi * frequency * t)
-    notices = line_notices("accel_x", "m/s^2", lines(x))
-    assert [f.severity for f in notices] == ["warning"] * 4 + ["note"]
-    assert notices[-1].values["count"] == 3
-
-
 def test_a_line_on_a_resonance():
     x = simulated(NOISES["resonance"], 60_000, 5)
     x += 0.5 * np.sin(2 * np.pi * 20.5 * DT * np.arange(x.size))
@@ -188,15 +177,6 @@ def test_gaps_do_not_hide_or_make_lines():
     (line,) = lines(noise + 0.5 * np.sin(2 * np.pi * 3.3 * DT * np.arange(n)))
     assert line.frequency == pytest.approx(3.3, abs=0.002)
     assert line.amplitude == pytest.approx(0.5, rel=0.1)
-
-
-@pytest.mark.parametrize("n", [512, 513, 600])
-def test_short_records(n):
-    t = DT * np.arange(n)
-    x = np.random.default_rng(7).normal(size=n)
-    assert not lines(x)
-    (line,) = lines(x + 5.0 * np.sin(2 * np.pi * 20.0 * t))
-    assert line.frequency == pytest.approx(20.0, abs=0.1)
 
 
 def test_health_gives_lines_to_programs(record):

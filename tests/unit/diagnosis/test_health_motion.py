@@ -215,14 +215,6 @@ def test_an_accelerometer_that_wanders_is_no_slow_tilt(record, seed):
     assert find_motion(record(**series)).moves == ()
 
 
-def test_too_short_to_be_examined(record):
-    step = np.repeat([0.0, 1.0], 1000)
-    recording = record(gyro_x=step)
-    found = find_motion(recording)
-    assert found.moves == ()
-    assert found.static == ((0.0, recording.duration),)
-
-
 def test_what_moved_is_calibrated_from_its_stretches_at_rest(moved):
     recording = moved(turn(30_000, 100, 200, 60.0, (0, 0, 1)))
     cal = gmwm.calibrate(recording, WhiteNoise())

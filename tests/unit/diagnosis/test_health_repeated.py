@@ -152,17 +152,6 @@ def test_chance_explains_equal_neighbours_of_rounded_noise(step, law):
         assert share < 0.01
 
 
-@pytest.mark.parametrize(("step", "error"), [(0.0, 0.01), (0.1, 0.02), (0.5, 0.04)])
-def test_the_share_of_samples_written_again_is_found(step, error):
-    rng = np.random.default_rng(4)
-    noise = rng.normal(size=5000)
-    last = np.where(rng.random(5000) < 0.15, 0, np.arange(5000))
-    values = (np.rint(noise / step) * step if step else noise)[np.maximum.accumulate(last)]
-    share, chance, _ = held_samples(examined(values, step=step))
-    assert share == pytest.approx(0.15, abs=error)
-    assert chance == pytest.approx(0.85 * step / np.sqrt(4.0 * np.pi), abs=0.01)
-
-
 def test_a_sensor_that_is_held_keeps_the_samples_that_were_measured(record):
     noise = np.random.default_rng(5).normal(size=5000)
     values = noise.copy()

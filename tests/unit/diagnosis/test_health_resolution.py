@@ -2,11 +2,10 @@
 
 import numpy as np
 import pytest
-from examining import examined, only
 from hypothesis import given, settings, strategies as st
 
 import gmwm
-from gmwm.diagnosis.resolution import rounding, step_size, widest_step
+from gmwm.diagnosis.resolution import step_size, widest_step
 
 
 @settings(max_examples=60, deadline=None)
@@ -29,15 +28,12 @@ def test_text_with_few_decimals_does_not_hide_the_step(step, decimals):
     assert step_size(written) == pytest.approx(step, rel=2e-2)
 
 
-def test_common_divisor_of_levels_that_leave_some_out():
-    # Differences of 2 and 3 steps only: the step is 1.
-    levels = np.cumsum([0, 2, 3, 2, 2, 3, 3, 2, 3, 2, 3, 2]) * 0.25
-    x = np.random.default_rng(2).choice(levels, size=2000)
-    assert step_size(x) == pytest.approx(0.25, rel=1e-9)
-
-
-def test_the_smallest_difference_may_be_six_steps():
-    levels = np.cumsum([0, 6, 6, 7, 11, 6, 7, 11, 6, 6, 11, 7, 6]) * 0.25
+@pytest.mark.parametrize(
+    "differences",
+    [[0, 2, 3, 2, 2, 3, 3, 2, 3, 2, 3, 2], [0, 6, 6, 7, 11, 6, 7, 11, 6, 6, 11, 7, 6]],
+)
+def test_the_common_divisor_of_differences_is_the_step(differences):
+    levels = np.cumsum(differences) * 0.25
     x = np.random.default_rng(2).choice(levels, size=2000)
     assert step_size(x) == pytest.approx(0.25, rel=1e-9)
 
@@ -124,28 +120,11 @@ def test_few_digits_of_noise_far_below_their_wide_step_are_not_valid():
     assert rounding.severity == "bad"
 
 
-@pytest.mark.parametrize("n", [100, 4097, 200_000])
-@pytest.mark.parametrize("seed", range(5))
-def test_there_is_no_step_in_numbers_at_random(n, seed):
-    assert step_size(np.random.default_rng(seed).normal(size=n)) == 0.0
-
-
-@pytest.mark.parametrize("n", [2, 3, 4, 5, 7])
-def test_few_numbers_at_random_have_no_step(n):
-    assert step_size(np.random.default_rng(n).normal(size=n)) == 0.0
-
-
-def test_constant_has_no_step():
-    assert step_size(np.full(100, 3.3)) == 0.0
-
-
-def test_severity_rises_with_the_step():
-    def severity(ratio):
-        scatter = np.sqrt(1.0 + ratio**2 / 12.0)
-        fine = np.random.default_rng(1).integers(-9, 9, 2000) * ratio
-        return only(rounding(examined(fine, step=ratio, scatter=scatter))).severity
-
-    assert [severity(r) for r in (0.1, 0.8, 1.5, 5.0)] == ["good", "note", "warning", "bad"]
+@pytest.mark.parametrize("n", [2, 3, 4, 5, 7, 100, 4097, 200_000])
+def test_there_is_no_step_in_numbers_at_random_or_a_constant(n):
+    for seed in range(5):
+        assert step_size(np.random.default_rng(seed).normal(size=n)) == 0.0
+    assert step_size(np.full(n, 3.3)) == 0.0
 
 
 @pytest.mark.parametrize(

