@@ -10,11 +10,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
-from gmwm._core.typing import FloatArray, IntArray
+from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.estimate import tuning
 from gmwm.estimate.moments.kernels import Shaped
@@ -26,14 +26,6 @@ MOST_SHAPES = 3
 
 _STEP = 1e-5  # of central differences in z, whose natural scale is 1
 _SIMULATED_STEP = 0.05  # where a simulation may move in jumps
-
-
-class Compiled(NamedTuple):
-    """The part of a design that `gmwm.estimate.moments.kernels.refined` takes."""
-
-    terms: Shaped
-    owners: IntArray
-    levels: tuple[Any, ...]
 
 
 class Design:
@@ -197,7 +189,7 @@ class Design:
         return self._parts[key]
 
     @cached_property
-    def compiled(self) -> Compiled | None:
+    def compiled(self) -> Shaped | None:
         """What compiled code needs to know; ``None`` if some curve is not known there."""
         shaped = [self.terms[i] for i in self.shaped]
         if self.scales.wavelet != "haar" or not all(
@@ -215,10 +207,9 @@ class Design:
             lower[s, :size] = [p.lower for p in term.process.shape_parameters]
             upper[s, :size] = [p.upper for p in term.process.shape_parameters]
         first = np.cumsum([0, *counts])[:-1]
-        owners = np.array([self.linear.index(i) for i in self.owners])
         levels = compiled_levels(self.scales.tau, self.scales.dt, frozenset(kinds.tolist()))
-        terms = Shaped(kinds, np.array(self.shaped), first, free, lower, upper)
-        return Compiled(terms, owners, levels)
+        owners = np.array([self.linear.index(i) for i in self.owners])
+        return Shaped(kinds, np.array(self.shaped), first, free, lower, upper, owners, levels)
 
     # -- curves -----------------------------------------------------------------------------------
 
