@@ -175,14 +175,21 @@ def _slopes(z: FloatArray, terms: Shaped, shapes: FloatArray, rows: int) -> tupl
 
 @compiled()
 def linearized(
-    z: FloatArray, problem: Weighted, terms: Shaped, shapes: FloatArray, fixed: FloatArray
+    z: FloatArray,
+    bounds: tuple[FloatArray, FloatArray],
+    problem: Weighted,
+    terms: Shaped,
+    shapes: FloatArray,
+    fixed: FloatArray,
 ) -> tuple[bool, FloatArray, FloatArray, FloatArray]:
     """Free amplitudes, weighted residuals and their Jacobian (J, z) at coordinates z.
 
+    bounds: Lowest and highest coordinates, between which z is brought.
     shapes: (S, 3), shapes of the shaped terms, of which the fixed parameters count.
     fixed: (J, terms), curves of the other terms.
     Returns: first of all whether the curves are known in compiled form.
     """
+    z = np.minimum(np.maximum(z, bounds[0]), bounds[1])
     is_known, curves = _curves(z, terms, shapes, fixed)
     if is_known:
         is_known, slopes = _slopes(z, terms, shapes, fixed.shape[0])

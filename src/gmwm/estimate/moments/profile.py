@@ -81,8 +81,8 @@ class Profile:
         z0 = design.pack(shapes)
         if z0.size == 0 or z0.size > self.target.size:
             return self.at(shapes)
-        low = np.maximum(design.bounds[0], z0 - reach)
-        high = np.minimum(design.bounds[1], z0 + reach)
+        low, high = design.bounds
+        bounds = np.maximum(low, z0 - reach), np.minimum(high, z0 + reach)
         compiled = design.compiled
         own, fixed = self._start_of_compiled(shapes)
         visited: dict[bytes, Any] = {}  # the last point: MINPACK asks for parts of it several times
@@ -91,12 +91,11 @@ class Profile:
             """Amplitudes, residuals and their Jacobian."""
             if z.tobytes() not in visited:
                 visited.clear()
-                inside = np.minimum(np.maximum(z, low), high)
                 is_known = False
                 if compiled is not None:
-                    is_known, *found = linearized(inside, self._problem, compiled, own, fixed)
+                    is_known, *found = linearized(z, bounds, self._problem, compiled, own, fixed)
                 if not is_known:
-                    moved = design.unpack(inside, shapes)
+                    moved = design.unpack(np.clip(z, *bounds), shapes)
                     columns, x, residual = profiled(self._problem, self._curves(moved))
                     factor = design.amplitudes(x[: len(design.linear)])[design.owners]
                     slopes = design.shape_derivatives(moved)
@@ -114,7 +113,7 @@ class Profile:
             **tolerances,
         )[0]
         x, residual, _ = at(z)
-        moved = design.unpack(np.clip(z, low, high), shapes)
+        moved = design.unpack(np.clip(z, *bounds), shapes)
         point = Point(moved, x, float(residual @ residual))
         return point if point.objective <= start.objective else start
 
