@@ -36,7 +36,6 @@ from gmwm.calibration.stages import Stopwatch, current, stage
 from gmwm.calibration.summary import unresolved_notice
 from gmwm.diagnosis import first_in_common, thinned
 from gmwm.errors import InputError
-from gmwm.estimate import compile_steps
 from gmwm.issues import Notice, notice
 from gmwm.process import Model, Process
 from gmwm.readers import Channel, Recording, is_frame, read, require_recording
@@ -154,7 +153,6 @@ def _calibrated(
         _Channel(name, parts, name in robust, models[name], sources[name], offered[name], removals)
         for name, parts in alive.items()
     ]
-    workers.during_startup(compile_steps)
     found = _models_found(channels, progress)
     issues: list[Notice] = []  # sensors with rates of their own share those of the reader
     for one in treated:

@@ -12,6 +12,7 @@ from gmwm._core import checks
 from gmwm._core.compiled import compiled
 from gmwm._core.documents import Array, Document, Interval, Samples, Text, check_covariance
 from gmwm._core.frozen import freeze
+from gmwm._core.tables import cell, plain_table
 from gmwm._core.text import per_cent, wrapped
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
@@ -104,22 +105,18 @@ class CramerRao(Document):
 
     def __str__(self) -> str:
         how = "exact Gaussian information" if self.exact else "spectral information"
-        lines = [
-            *wrapped(self.model.title(), indent=2),
-            f"{self.n:,} samples at {1.0 / self.dt:g} Hz; {how}",
-            "",
-            f"{'parameter':<14} {'value':>11} {'Cramer-Rao':>12} {'wavelet var.':>13} {'ratio':>7}",
-        ]
-        params, best, moments = self.model.params, self.stderr, self.wavelet_stderr
-        for key in self.keys:
-            value = float(params[key] or 0.0)
-            unit = abs(value) if value else 1.0
-            lines.append(
-                f"{key:<14} {value:>11.5g} {per_cent(best[key] / unit, 3):>12} "
-                f"{per_cent(moments[key] / unit, 3):>13} {moments[key] / best[key]:>7.3f}"
-            )
-        lines += ["", "bounds are standard errors in per cent of the value"]
-        return "\n".join(lines)
+        title = wrapped(self.model.title(), indent=2)
+        rows = []
+        for key, best, moments in zip(
+            self.keys, self.stderr.values(), self.wavelet_stderr.values(), strict=True
+        ):
+            value = float(self.model.params[key] or 0.0)
+            shares = [per_cent(error / (abs(value) or 1.0), 3) for error in (best, moments)]
+            rows.append([key, cell(value, 5), *shares, f"{moments / best:.3f}"])
+        heads = ["parameter", "value", "Cramer-Rao", "wavelet var.", "ratio"]
+        size = f"{self.n:,} samples at {1.0 / self.dt:g} Hz; {how}"
+        end = "bounds are standard errors in per cent of the value"
+        return "\n".join([*title, size, "", plain_table(heads, rows), "", end])
 
 
 def cramer_rao(model: Process | Model, n: int, dt: float) -> CramerRao:

@@ -9,7 +9,7 @@ are regressors, see `gmwm.estimate.problem.ramp`.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -50,12 +50,11 @@ class Design:
                 )
         self.linear = tuple(i for i, term in enumerate(self.terms) if term.free_scale)
         self.shaped = tuple(i for i, term in enumerate(self.terms) if term.n_shapes)
-        self._curve_of = [self._curve_at(i) for i in range(len(self.terms))]
-        self._slopes_of = {
-            i: scales.unit_slopes(self.terms[i].process)
-            for i in self.shaped
-            if self.terms[i].free_scale
-        }
+        # Functions without the lookups that each step would repeat.
+        self._curve_of = [
+            scales.unit_curves(term.process) if term.free_scale else partial(self._given_curve, i)
+            for i, term in enumerate(self.terms)
+        ]
         self.owners = [i for i, is_amplitude in self.coordinates.owners if not is_amplitude]
         self._own: dict[Any, Any] = {}
         self._last: dict[int, tuple[Shape, FloatArray]] = {}
@@ -89,12 +88,8 @@ class Design:
             known = self._last[i] = shape, self._curve_of[i](shape)
         return known[1]
 
-    def _curve_at(self, i: int) -> Callable[[Shape], FloatArray]:
-        """The function of `curve` for one term, without lookups that each step would repeat."""
-        term = self.terms[i]
-        if term.free_scale:
-            return self.scales.unit_curves(term.process)
-        return lambda shape: self.scales.curve(self.at_shape(i, shape))
+    def _given_curve(self, i: int, shape: Shape) -> FloatArray:
+        return self.scales.curve(self.at_shape(i, shape))
 
     def grid(self, i: int) -> list[Shape]:
         """Starting shapes of term ``i``, with fixed parameters at their value; see `_cached`."""
@@ -236,11 +231,6 @@ class Design:
         column = 0
         for i in self.shaped:
             term = self.terms[i]
-            closed = self._slopes_of[i](shapes[i]) if term.free_scale else None
-            if closed is not None:
-                result[:, column : column + term.n_shapes] = closed[:, term.free_shape]
-                column += term.n_shapes
-                continue
             z = term.process.shape_to_free(shapes[i])
             width = _SIMULATED_STEP if self.scales.is_simulated(term.process) else _STEP
             for k in np.flatnonzero(term.free_shape):

@@ -143,12 +143,6 @@ def compile_search() -> None:
     profile.refine(profile.at([(), (1.0,)]))
 
 
-def compile_steps() -> None:
-    """Compile the loop that `compile_search` reaches last, for a process that waits for it."""
-    vector, matrix = np.ones(2), np.eye(2)
-    projected(matrix, matrix, vector, matrix, vector)
-
-
 def search(profile: Profile, known: Sequence[Shape | None] | None = None) -> Point:
     """Global minimum for fixed weights, by adding terms one at a time and exchanging them.
 

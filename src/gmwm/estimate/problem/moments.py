@@ -124,12 +124,6 @@ class Scales:
         found = frozen(process.unit_wavelet_variance((), self.tau, self.dt, self.wavelet))
         return lambda _: found
 
-    def unit_slopes(self, process: Process) -> Callable[[Shape], FloatArray | None]:
-        """Derivative of `unit_curves` by the coordinates of the shape, (J, s), where known."""
-        if self.wavelet != "haar" or self.is_simulated(process):
-            return lambda shape: None
-        return lambda shape: process.unit_haar_slopes(shape, self.tau, self.dt)
-
     def is_simulated(self, process: Process) -> bool:
         """Whether the curve of a process is simulated."""
         return self.simulate_all or not process.has_spectrum()

@@ -22,8 +22,6 @@ from gmwm.variance import WaveletVariance
 
 Kind = Literal["estimated", "bound", "fixed", "undefined"]
 
-HEAD = f"{'parameter':<16} {'estimate':>11} {'std. error':>10}  {'95 % interval':<22} unit"
-
 
 @dataclass(frozen=True)
 class InUnit:
@@ -81,8 +79,9 @@ class Estimate:
             return self.field[0]
         return InUnit(self.value, self.lower, self.upper, self.unit)
 
-    def __str__(self) -> str:
-        """A line under `HEAD`."""
+    @property
+    def cells(self) -> tuple[str, ...]:
+        """Of the table of ``str(fit)``: key, estimate, standard error, 95 % interval and unit."""
         error, value = "", f"{self.value:.5g}"
         if self.kind == "undefined":
             value, interval = "-", "term has no amplitude"
@@ -93,9 +92,10 @@ class Estimate:
         else:
             interval = f"{self.lower:.4g} .. {self.upper:.4g}"
             error = f"{self.stderr:.2g}"
-        # A long name takes the blanks before its value.
-        name = f"{self.key} "
-        return f"{name}{value:>{max(28 - len(name), 0)}} {error:>10}  {interval:<22} {self.unit}"
+        return self.key, value, error, interval, self.unit
+
+    def __str__(self) -> str:
+        return "  ".join(filter(None, self.cells))
 
     def to_dict(self) -> dict[str, Any]:
         """The columns of `Fit.to_frame`, in JSON types."""

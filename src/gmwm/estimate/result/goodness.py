@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gmwm._core.distributions import norm
+from gmwm._core.tables import cell, plain_table
 from gmwm._core.text import per_cent, wrapped
 from gmwm._core.typing import FloatArray
 from gmwm.estimate import tuning
@@ -183,19 +184,28 @@ class Goodness:
         )
 
     def __str__(self) -> str:
-        head = f"{'tau [s]':>10} {f'data [{self.unit}]':>14} {f'model [{self.unit}]':>14}"
-        lines = [
-            f"{self.name or 'series'}: Allan deviation of data and model",
-            f"{head} {'misfit':>9} {'residual':>9} {'allowed':>8} {'dof':>8}",
-        ]
-        for j, misfit in enumerate(self.misfit):
-            form = "+.2f" if abs(misfit) < 10.0 else "+,.0f" if abs(misfit) < 1e3 else "+.2g"
-            share = f"{100.0 * misfit:{form}} %"
-            lines.append(
-                f"{self.tau[j]:>10.5g} {self.data[j]:>14.4g} {self.model[j]:>14.4g} {share:>9} "
-                f"{self.residual[j]:>+9.2f} {self.allowed[j]:>+8.2f} {self.dof[j]:>8.3g}"
+        heads = ["tau [s]", f"data [{self.unit}]", f"model [{self.unit}]", "misfit"]
+        rows = [
+            [f"{tau:.5g}", cell(data), cell(model), f"{100.0 * misfit:+.2g} %"]
+            + [cell(value, 3) for value in rest]
+            for tau, data, model, misfit, *rest in zip(
+                self.tau,
+                self.data,
+                self.model,
+                self.misfit,
+                self.residual,
+                self.allowed,
+                self.dof,
+                strict=True,
             )
-        return "\n".join([*lines, *wrapped(self.sentence, indent=2)])
+        ]
+        return "\n".join(
+            [
+                f"{self.name or 'series'}: Allan deviation of data and model",
+                plain_table([*heads, "residual", "allowed", "dof"], rows),
+                *wrapped(self.sentence, indent=2),
+            ]
+        )
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Standardised residuals by level, with the misfit written at each; returns the axes."""
