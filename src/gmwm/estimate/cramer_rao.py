@@ -18,12 +18,10 @@ from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.estimate.likelihood import (
     Columns,
-    Regression,
     arrays_of,
     filtered,
     regular_inverse,
     stacked,
-    whitened,
 )
 from gmwm.estimate.problem import (
     Coordinates,
@@ -178,10 +176,7 @@ def cramer_rao(model: Process | Model, n: int, dt: float) -> CramerRao:
     ramp = next((term for term in model.terms if term.is_drift), None)
     slope = None
     if ramp is not None:
-        try:
-            slope = Slope(ramp.drift_rate(), _slope_variance(processes, n, dt))
-        except MemoryError:
-            raise InputError(f"n = {n:,}: too long for the bound of a ramp, give less") from None
+        slope = Slope(ramp.drift_rate(), _slope_variance(processes, n, dt))
     moments = _held_to(information, _wavelet_information(coordinates, processes, n, dt, slope))
     transform = coordinates.jacobian(processes)
     keys = coordinates.fitted(processes)[1]
@@ -211,9 +206,7 @@ def _is_short(coordinates: Coordinates, processes: Sequence[Process], n: int, dt
 
 def _slope_variance(processes: Sequence[Process], n: int, dt: float) -> float:
     """Variance of the generalized least-squares slope, (u/s)^2."""
-    columns = Columns(np.zeros(n), dt, None, True)
-    innovations, _, _ = whitened(columns, processes)
-    return columns.slope(Regression.of(innovations.T @ innovations))[1]
+    return Columns(np.zeros(n), dt, None, True).slope(processes).variance
 
 
 def _wavelet_information(

@@ -387,7 +387,7 @@ def _conclude(
         notices.append(notice("not-converged", variant="no-maximum", hint=hint))
     slope = None
     if columns.drift_is_free:
-        slope = Slope(*columns.slope(likelihood.regression(left)))
+        slope = columns.slope(left)
     if iteration.in_state and slope is not None:
         slope = Slope(float(stage.drive[0]) / iteration.dt, slope.variance)
         first = next(p for p in processes if not p.is_white)

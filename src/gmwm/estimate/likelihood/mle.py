@@ -39,7 +39,6 @@ from gmwm.estimate.problem import (
     Coordinates,
     Moments,
     Scales,
-    Slope,
     solve_nonnegative,
     spectral_information,
 )
@@ -199,8 +198,7 @@ def _fit(series: Series, climb: Climb, method: str) -> Fit:
         notices.append(notice("no-curvature"))
     slope = None
     if series.columns.drift_is_free:
-        regression = KalmanLikelihood(series.columns).regression(top.processes)
-        slope = Slope(*series.columns.slope(regression))
+        slope = series.columns.slope(top.processes)
     report = Report(method, top.maximum.value, notices)
     return conclude_likelihood(series, processes, absent, top, slope, report)
 

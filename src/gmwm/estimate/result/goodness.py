@@ -186,26 +186,20 @@ class Goodness:
     def __str__(self) -> str:
         heads = ["tau [s]", f"data [{self.unit}]", f"model [{self.unit}]", "misfit"]
         rows = [
-            [f"{tau:.5g}", cell(data), cell(model), f"{100.0 * misfit:+.2g} %"]
-            + [cell(value, 3) for value in rest]
-            for tau, data, model, misfit, *rest in zip(
-                self.tau,
-                self.data,
-                self.model,
-                self.misfit,
-                self.residual,
-                self.allowed,
-                self.dof,
-                strict=True,
-            )
-        ]
-        return "\n".join(
             [
-                f"{self.name or 'series'}: Allan deviation of data and model",
-                plain_table([*heads, "residual", "allowed", "dof"], rows),
-                *wrapped(self.sentence, indent=2),
+                f"{tau:.5g}",
+                cell(self.data[j]),
+                cell(self.model[j]),
+                f"{100.0 * self.misfit[j]:+.3g} %",
+                f"{self.residual[j]:+.2f}",
+                f"{self.allowed[j]:+.2f}",
+                cell(self.dof[j], 3),
             ]
-        )
+            for j, tau in enumerate(self.tau)
+        ]
+        title = f"{self.name or 'series'}: Allan deviation of data and model"
+        table = plain_table([*heads, "residual", "allowed", "dof"], rows)
+        return "\n".join([title, table, *wrapped(self.sentence, indent=2)])
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Standardised residuals by level, with the misfit written at each; returns the axes."""
