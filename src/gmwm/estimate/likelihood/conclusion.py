@@ -169,23 +169,15 @@ class Top:
     likelihood: LogLikelihood
 
 
-@dataclass(frozen=True, eq=False)
-class Report:
-    """The part of a `Fit` that only the method itself knows."""
-
-    method: str
-    log_likelihood: float
-    notices: Sequence[Notice] = ()
-    trace: Sequence[float] = ()
-
-
 def conclude_likelihood(
     series: Series,
     processes: Sequence[Process],
     absent: Sequence[int],
     top: Top,
-    slope: Slope | None,
-    report: Report,
+    method: str,
+    notices: Sequence[Notice] = (),
+    trace: Sequence[float] = (),
+    drift: float | None = None,
 ) -> Fit:
     """Make the `Fit` of a maximum.
 
@@ -194,17 +186,22 @@ def conclude_likelihood(
     processes: All noise terms with their values.
     absent: Those among them that the likelihood can do without.
     top: The maximum over the other terms.
+    notices, trace: What only the method itself knows.
+    drift: Slope (u/s) that it has estimated in place of the regression.
     """
+    slope = series.columns.slope(top.processes) if series.columns.drift_is_free else None
+    if slope is not None and drift is not None:
+        slope = Slope(drift, slope.variance)
     found = Estimates(
         coordinates=series.coordinates,
         processes=[p.with_amplitude(0.0) if i in absent else p for i, p in enumerate(processes)],
         covariance=regular_inverse(top.information),
         absent={i: _upper_limit(processes[i], top, series.columns) for i in absent},
         slope=slope,
-        method=report.method,
-        notices=report.notices,
-        log_likelihood=report.log_likelihood,
-        trace=report.trace,
+        method=method,
+        notices=notices,
+        log_likelihood=trace[-1] if trace else top.maximum.value,
+        trace=trace,
     )
     wv = series.wv
     moments = Moments.of(wv, found.coordinates.model)

@@ -27,7 +27,6 @@ from gmwm.errors import InputError
 from gmwm.estimate import tuning
 from gmwm.estimate.likelihood.conclusion import (
     Maximum,
-    Report,
     Top,
     conclude_likelihood,
     observed_information,
@@ -43,7 +42,7 @@ from gmwm.estimate.likelihood.likelihood import (
     objective_of,
     stacked,
 )
-from gmwm.estimate.problem import Slope, spectral_information
+from gmwm.estimate.problem import spectral_information
 from gmwm.estimate.result import Fit
 from gmwm.issues import notice
 from gmwm.process import Model, Process, StateSpace, as_model
@@ -385,13 +384,10 @@ def _conclude(
     if not is_maximum:
         hint = "lower the tolerance"
         notices.append(notice("not-converged", variant="no-maximum", hint=hint))
-    slope = None
-    if columns.drift_is_free:
-        slope = columns.slope(left)
-    if iteration.in_state and slope is not None:
-        slope = Slope(float(stage.drive[0]) / iteration.dt, slope.variance)
+    drift = None
+    if iteration.in_state:
+        drift = float(stage.drive[0]) / iteration.dt
         first = next(p for p in processes if not p.is_white)
         if not first.is_walk:
             notices.append(notice("drift-in-state", term=first.title()))
-    report = Report("em", trace[-1], notices, trace)
-    return conclude_likelihood(series, processes, absent, top, slope, report)
+    return conclude_likelihood(series, processes, absent, top, "em", notices, trace, drift)

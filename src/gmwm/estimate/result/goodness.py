@@ -15,7 +15,7 @@ import numpy as np
 from gmwm._core.distributions import norm
 from gmwm._core.tables import cell, plain_table
 from gmwm._core.text import per_cent, wrapped
-from gmwm._core.typing import FloatArray
+from gmwm._core.typing import BoolArray, FloatArray
 from gmwm.estimate import tuning
 from gmwm.estimate.problem import FittedMoments, chi_square
 from gmwm.variance import WaveletVariance
@@ -86,11 +86,14 @@ class Goodness:
         Among levels of more than 30 degrees of freedom, where chance moves the deviation by less
         than 13 % (one sigma); None if there is none.
         """
-        known = np.flatnonzero(self.dof > tuning.WELL_KNOWN_DOF)
-        if not self.is_tested or known.size == 0:
+        worst = self._largest(self.misfit, self.dof > tuning.WELL_KNOWN_DOF)
+        return None if worst is None else (float(self.misfit[worst]), float(self.tau[worst]))
+
+    def _largest(self, values: FloatArray, among: BoolArray) -> int | None:
+        """Level of the largest absolute value among some; None without a test or any of them."""
+        if not self.is_tested or not np.any(among):
             return None
-        worst = known[int(np.argmax(np.abs(self.misfit[known])))]
-        return float(self.misfit[worst]), float(self.tau[worst])
+        return int(np.argmax(np.where(among, np.abs(values), -1.0)))
 
     @property
     def known_to(self) -> float:
@@ -104,10 +107,9 @@ class Goodness:
 
         Among levels whose residual exceeds 2.5 statistical standard errors under the model.
         """
-        far = np.abs(self.residual) > tuning.BEYOND_CHANCE
-        if not self.is_tested or not np.any(far):
+        worst = self._largest(self.misfit, np.abs(self.residual) > tuning.BEYOND_CHANCE)
+        if worst is None:
             return None
-        worst = np.flatnonzero(far)[int(np.argmax(np.abs(self.misfit[far])))]
         return float(self.misfit[worst]), float(self.tau[worst]), float(self.residual[worst])
 
     @property
@@ -132,11 +134,8 @@ class Goodness:
 
         Among all levels that the model gives a variance; None if there is none.
         """
-        judged = self.judged
-        if not self.is_tested or np.all(np.isnan(judged)):
-            return None
-        largest = int(np.nanargmax(np.abs(judged)))
-        return float(judged[largest]), float(self.tau[largest])
+        largest = self._largest(self.judged, ~np.isnan(self.judged))
+        return None if largest is None else (float(self.judged[largest]), float(self.tau[largest]))
 
     @property
     def largest_p(self) -> float:
