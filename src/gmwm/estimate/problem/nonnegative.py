@@ -14,26 +14,13 @@ _TOLERANCE = 1e-14  # of |y|: a correlation with the residuals that is rounding
 
 
 def solve_nonnegative(columns: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Non-negative least squares with columns brought to unit length; amplitudes and residuals.
-
-    columns: (J, k).
-    y: (J,).
-    Returns: amplitudes (k,); residuals (J,).
-    """
-    if columns.shape[1] == 0:
-        return np.zeros(0), y
+    """Amplitudes (k,) of columns (J, k) that come nearest to y (J,), and the residuals (J,)."""
     amplitudes, residuals = solve_columns(np.ascontiguousarray(columns), np.ascontiguousarray(y))
     return amplitudes, residuals
 
 
 def objectives_with(columns: FloatArray, candidates: FloatArray, y: FloatArray) -> FloatArray:
-    """Sums of squares that are left with each candidate in turn beside the columns.
-
-    columns: (J, k).
-    candidates: (J, G).
-    y: (J,).
-    Returns: (G,).
-    """
+    """Sums of squares (G,) of y (J,) that each candidate (J, G) leaves beside columns (J, k)."""
     arrays = (np.ascontiguousarray(each) for each in (columns, candidates, y))
     return np.asarray(_each(*arrays))
 
@@ -174,7 +161,7 @@ def _unit(columns: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 @compiled()
 def solve_columns(columns: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """`solve_nonnegative`, for compiled code; the arrays are contiguous."""
+    """`solve_nonnegative` of columns brought to unit length, for contiguous arrays."""
     unit, length = _unit(columns)
     x = _solve(unit, y)
     residual = y.copy()
