@@ -85,34 +85,35 @@ class Profile:
         bounds = np.maximum(low, z0 - reach), np.minimum(high, z0 + reach)
         compiled = design.compiled
         own, fixed = self._start_of_compiled(shapes)
-        visited: dict[bytes, Any] = {}  # the last point: MINPACK asks for parts of it several times
+        visited: dict[bytes, list[Any]] = {}  # the last point, of which MINPACK asks repeatedly
 
-        def at(z: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-            """Amplitudes, residuals and their Jacobian."""
+        def at(z: FloatArray) -> list[Any]:
+            """Amplitudes, residuals, their Jacobian if it came with them, and weighted columns."""
             if z.tobytes() not in visited:
                 visited.clear()
                 is_known = False
                 if compiled is not None:
                     is_known, *found = linearized(z, bounds, self._problem, compiled, own, fixed)
                 if not is_known:
-                    moved = design.unpack(np.clip(z, *bounds), shapes)
-                    columns, x, residual = profiled(self._problem, self._curves(moved))
-                    factor = design.amplitudes(x[: len(design.linear)])[design.owners]
-                    slopes = design.shape_derivatives(moved)
-                    found = x, residual, projected(self.root, columns, x, slopes, factor)
+                    curves = self._curves(design.unpack(np.clip(z, *bounds), shapes))
+                    columns, x, residual = profiled(self._problem, curves)
+                    found = [x, residual, None, columns]
                 visited[z.tobytes()] = found
             return visited[z.tobytes()]
 
+        def jacobian(z: FloatArray) -> FloatArray:
+            found = at(z)
+            if found[2] is None:
+                factor = design.amplitudes(found[0][: len(design.linear)])[design.owners]
+                slopes = design.shape_derivatives(design.unpack(np.clip(z, *bounds), shapes))
+                found[2] = projected(self.root, found[3], found[0], slopes, factor)
+            return np.asarray(found[2])
+
         tolerances = {"xtol": _XTOL, "ftol": _FTOL, "gtol": _GTOL}
         z = leastsq(
-            lambda z: -at(z)[1],
-            z0,
-            Dfun=lambda z: at(z)[2],
-            maxfev=_MOST,
-            full_output=True,
-            **tolerances,
+            lambda z: -at(z)[1], z0, Dfun=jacobian, maxfev=_MOST, full_output=True, **tolerances
         )[0]
-        x, residual, _ = at(z)
+        x, residual = at(z)[:2]
         moved = design.unpack(np.clip(z, *bounds), shapes)
         point = Point(moved, x, float(residual @ residual))
         return point if point.objective <= start.objective else start
