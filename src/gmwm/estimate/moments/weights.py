@@ -211,6 +211,10 @@ class Reference:
     curve: FloatArray
     discrepancy: float
 
+    def weights(self, target: FloatArray, discrepancy: float) -> FloatArray:
+        """Covariance of the wavelet variances with a discrepancy, u^4, (J, J)."""
+        return self.covariance + np.diag((discrepancy * target) ** 2)
+
 
 _references: WeakKeyDictionary[WaveletVariance, dict[Any, Reference]] = WeakKeyDictionary()
 """Mixtures that were fitted: candidate models ask for the same one repeatedly."""
