@@ -326,20 +326,18 @@ def _gauss_markov(process: Process, like: Process, m: StateMoments, dt: float) -
     loss = Polynomial([0.0, 2.0, -1.0])  # 1 - phi^2
     squares = m.later - 2.0 * m.cross * drift + m.earlier * drift**2
     if like.values["tau"] is None:
+        total = squares + m.first * loss
         if sigma is None:
-            total = squares + m.first * loss
             condition = n * total.deriv() * loss - total * loss.deriv()
-
-            def log_likelihood(delta: float) -> float:
-                return float(-0.5 * (n * np.log(total(delta)) - np.log(loss(delta))))
         else:
-            variance = sigma**2
-            condition = m.steps * variance * loss.deriv() * loss
+            condition = m.steps * sigma**2 * loss.deriv() * loss
             condition = condition + squares.deriv() * loss - squares * loss.deriv()
 
-            def log_likelihood(delta: float) -> float:
-                size = float(loss(delta))
-                return -0.5 * (m.steps * np.log(size) + float(squares(delta)) / variance / size)
+        def log_likelihood(delta: float) -> float:
+            size = float(loss(delta))
+            if sigma is None:
+                return float(-0.5 * (n * np.log(total(delta)) - np.log(size)))
+            return -0.5 * (m.steps * np.log(size) + float(squares(delta)) / sigma**2 / size)
 
         # The root between 0 and 1 of highest likelihood; the present value where there is none.
         inside = [
