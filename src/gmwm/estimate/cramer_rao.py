@@ -27,6 +27,7 @@ from gmwm.estimate.problem import (
     Coordinates,
     Slope,
     detrended_covariance,
+    difference,
     drift_key,
     in_model_order,
     spectral_information,
@@ -224,18 +225,18 @@ def _wavelet_information(
         means = mean_covariance(noise.psd, n, dt)
         covariance = detrended_covariance(covariance, means, 0.5 * tau, slope)
     z = coordinates.pack(processes)
-    columns = []
+
+    def curves(at: FloatArray) -> FloatArray:
+        return np.array([p.haar_variance(tau, dt) for p in coordinates.processes(at, processes)])
+
+    def taken(at: FloatArray) -> FloatArray:
+        variance = _slope_variance(coordinates.processes(at, processes), n, dt)
+        return np.asarray((0.5 * tau) ** 2 * variance)
+
+    columns, own = [], curves(z)
     for k, (i, is_amplitude) in enumerate(coordinates.owners):
-        ends = [coordinates.processes(z + step, processes) for step in _steps(z.size, k)]
-        if is_amplitude:
-            column = processes[i].haar_variance(tau, dt)
-        else:
-            pair = [end[i].haar_variance(tau, dt) for end in ends]
-            column = (pair[0] - pair[1]) / (2.0 * _STEP)
-        if slope is not None:
-            up, down = (_slope_variance(end, n, dt) for end in ends)
-            column = column - (0.5 * tau) ** 2 * (up - down) / (2.0 * _STEP)
-        columns.append(column)
+        column = own[i] if is_amplitude else difference(curves, z, k, _STEP)[i]
+        columns.append(column if slope is None else column - difference(taken, z, k, _STEP))
     slopes = weight_root(covariance) @ np.stack(columns, axis=1)
     return np.asarray(slopes.T @ slopes)
 
@@ -274,16 +275,11 @@ def _exact_information(
 
     slopes = []
     for k in range(z.size):
-        up, down = (run(z + step) for step in _steps(z.size, k))
+        move = _STEP * np.eye(z.size)[k]
+        up, down = run(z + move), run(z - move)
         slopes.append([(a - b) / (2.0 * _STEP) for a, b in zip(up, down, strict=True)])
     derivatives = _Recursion(*(np.stack(part) for part in zip(*slopes, strict=True)))
     return np.asarray(_accumulate(run(z), derivatives))
-
-
-def _steps(size: int, k: int) -> tuple[FloatArray, FloatArray]:
-    step = np.zeros(size)
-    step[k] = _STEP
-    return step, -step
 
 
 class _Recursion(NamedTuple):

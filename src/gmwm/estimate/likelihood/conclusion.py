@@ -19,7 +19,7 @@ from gmwm.estimate.likelihood.likelihood import (
     objective_of,
 )
 from gmwm.estimate.moments import suffices
-from gmwm.estimate.problem import Coordinates, Moments, Slope, density, frequency_nodes
+from gmwm.estimate.problem import Coordinates, Moments, Slope, density, difference, frequency_nodes
 from gmwm.estimate.result import Comparison, Estimates, Fit, conclude
 from gmwm.issues import Notice, notice
 from gmwm.process import Model, Process
@@ -136,12 +136,8 @@ def deviations(information: FloatArray) -> FloatArray:
 
 def gradient(objective: Objective, z: FloatArray, scale: FloatArray) -> FloatArray:
     """Central differences in steps that are small against ``scale`` (d,)."""
-    result = np.empty(z.size)
-    for i in range(z.size):
-        step = np.zeros(z.size)
-        step[i] = _GRADIENT_STEP * min(scale[i], 1.0)
-        result[i] = (objective(z + step) - objective(z - step)) / (2.0 * step[i])
-    return result
+    steps = _GRADIENT_STEP * np.minimum(scale, 1.0)
+    return np.array([difference(objective, z, i, step) for i, step in enumerate(steps)])
 
 
 _CLOSE = 0.02  # twice the error of the profile likelihood

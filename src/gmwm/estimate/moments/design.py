@@ -18,7 +18,7 @@ from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.estimate import tuning
 from gmwm.estimate.moments.kernels import Shaped
-from gmwm.estimate.problem import Coordinates, Scales, is_plain, shape_of
+from gmwm.estimate.problem import Coordinates, Scales, difference, is_plain, shape_of
 from gmwm.process import Model, Process, Shape, compiled_levels
 
 MOST_SHAPES = 3
@@ -233,13 +233,12 @@ class Design:
             term = self.terms[i]
             z = term.process.shape_to_free(shapes[i])
             width = _SIMULATED_STEP if self.scales.is_simulated(term.process) else _STEP
+
+            def curve(z: FloatArray, i: int = i) -> FloatArray:
+                return self.curve(i, self.terms[i].process.shape_from_free(z))
+
             for k in np.flatnonzero(term.free_shape):
-                pair = []
-                for step in (width, -width):
-                    moved = z.copy()
-                    moved[k] += step
-                    pair.append(self.curve(i, term.process.shape_from_free(moved)))
-                result[:, column] = (pair[0] - pair[1]) / (2.0 * width)
+                result[:, column] = difference(curve, z, k, width)
                 column += 1
         return result
 
