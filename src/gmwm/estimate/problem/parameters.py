@@ -21,7 +21,7 @@ from gmwm.process import Model, Parameter, Process, Shape
 _STEP = 1e-6  # of central differences of a process's own map
 
 
-def difference(function: Callable[[FloatArray], Any], z: FloatArray, k: int, step: float) -> Any:
+def difference(function: Callable[[FloatArray], Any], z: FloatArray, k: Any, step: float) -> Any:
     """Derivative of a function by coordinate k of z, as a central difference."""
     move = np.zeros(z.size)
     move[k] = step
