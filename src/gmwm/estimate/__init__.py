@@ -20,6 +20,5 @@ from gmwm.estimate.moments import (
     GMWM as GMWM,
     SimulatedMoments as SimulatedMoments,
     compile_search as compile_search,
-    compile_steps as compile_steps,
 )
 from gmwm.estimate.result import Estimate as Estimate, Fit as Fit, JointFit as JointFit

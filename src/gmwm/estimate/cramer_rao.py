@@ -12,22 +12,22 @@ from gmwm._core import checks
 from gmwm._core.compiled import compiled
 from gmwm._core.documents import Array, Document, Interval, Samples, Text, check_covariance
 from gmwm._core.frozen import freeze
+from gmwm._core.tables import cell, plain_table
 from gmwm._core.text import per_cent, wrapped
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.estimate.likelihood import (
     Columns,
-    Regression,
     arrays_of,
     filtered,
     regular_inverse,
     stacked,
-    whitened,
 )
 from gmwm.estimate.problem import (
     Coordinates,
     Slope,
     detrended_covariance,
+    difference,
     drift_key,
     in_model_order,
     spectral_information,
@@ -104,22 +104,18 @@ class CramerRao(Document):
 
     def __str__(self) -> str:
         how = "exact Gaussian information" if self.exact else "spectral information"
-        lines = [
-            *wrapped(self.model.title(), indent=2),
-            f"{self.n:,} samples at {1.0 / self.dt:g} Hz; {how}",
-            "",
-            f"{'parameter':<14} {'value':>11} {'Cramer-Rao':>12} {'wavelet var.':>13} {'ratio':>7}",
-        ]
-        params, best, moments = self.model.params, self.stderr, self.wavelet_stderr
-        for key in self.keys:
-            value = float(params[key] or 0.0)
-            unit = abs(value) if value else 1.0
-            lines.append(
-                f"{key:<14} {value:>11.5g} {per_cent(best[key] / unit, 3):>12} "
-                f"{per_cent(moments[key] / unit, 3):>13} {moments[key] / best[key]:>7.3f}"
-            )
-        lines += ["", "bounds are standard errors in per cent of the value"]
-        return "\n".join(lines)
+        title = wrapped(self.model.title(), indent=2)
+        rows = []
+        for key, best, moments in zip(
+            self.keys, self.stderr.values(), self.wavelet_stderr.values(), strict=True
+        ):
+            value = float(self.model.params[key] or 0.0)
+            shares = [per_cent(error / (abs(value) or 1.0), 3) for error in (best, moments)]
+            rows.append([key, cell(value, 5), *shares, f"{moments / best:.3f}"])
+        heads = ["parameter", "value", "Cramer-Rao", "wavelet var.", "ratio"]
+        size = f"{self.n:,} samples at {1.0 / self.dt:g} Hz; {how}"
+        end = "bounds are standard errors in per cent of the value"
+        return "\n".join([*title, size, "", plain_table(heads, rows), "", end])
 
 
 def cramer_rao(model: Process | Model, n: int, dt: float) -> CramerRao:
@@ -181,10 +177,7 @@ def cramer_rao(model: Process | Model, n: int, dt: float) -> CramerRao:
     ramp = next((term for term in model.terms if term.is_drift), None)
     slope = None
     if ramp is not None:
-        try:
-            slope = Slope(ramp.drift_rate(), _slope_variance(processes, n, dt))
-        except MemoryError:
-            raise InputError(f"n = {n:,}: too long for the bound of a ramp, give less") from None
+        slope = Slope(ramp.drift_rate(), _slope_variance(processes, n, dt))
     moments = _held_to(information, _wavelet_information(coordinates, processes, n, dt, slope))
     transform = coordinates.jacobian(processes)
     keys = coordinates.fitted(processes)[1]
@@ -214,9 +207,7 @@ def _is_short(coordinates: Coordinates, processes: Sequence[Process], n: int, dt
 
 def _slope_variance(processes: Sequence[Process], n: int, dt: float) -> float:
     """Variance of the generalized least-squares slope, (u/s)^2."""
-    columns = Columns(np.zeros(n), dt, None, True)
-    innovations, _, _ = whitened(columns, processes)
-    return columns.slope(Regression.of(innovations.T @ innovations))[1]
+    return Columns(np.zeros(n), dt, None, True).slope(processes).variance
 
 
 def _wavelet_information(
@@ -234,18 +225,18 @@ def _wavelet_information(
         means = mean_covariance(noise.psd, n, dt)
         covariance = detrended_covariance(covariance, means, 0.5 * tau, slope)
     z = coordinates.pack(processes)
-    columns = []
+
+    def curves(at: FloatArray) -> FloatArray:
+        return np.array([p.haar_variance(tau, dt) for p in coordinates.processes(at, processes)])
+
+    def taken(at: FloatArray) -> FloatArray:
+        variance = _slope_variance(coordinates.processes(at, processes), n, dt)
+        return np.asarray((0.5 * tau) ** 2 * variance)
+
+    columns, own = [], curves(z)
     for k, (i, is_amplitude) in enumerate(coordinates.owners):
-        ends = [coordinates.processes(z + step, processes) for step in _steps(z.size, k)]
-        if is_amplitude:
-            column = processes[i].haar_variance(tau, dt)
-        else:
-            pair = [end[i].haar_variance(tau, dt) for end in ends]
-            column = (pair[0] - pair[1]) / (2.0 * _STEP)
-        if slope is not None:
-            up, down = (_slope_variance(end, n, dt) for end in ends)
-            column = column - (0.5 * tau) ** 2 * (up - down) / (2.0 * _STEP)
-        columns.append(column)
+        column = own[i] if is_amplitude else difference(curves, z, k, _STEP)[i]
+        columns.append(column if slope is None else column - difference(taken, z, k, _STEP))
     slopes = weight_root(covariance) @ np.stack(columns, axis=1)
     return np.asarray(slopes.T @ slopes)
 
@@ -284,16 +275,11 @@ def _exact_information(
 
     slopes = []
     for k in range(z.size):
-        up, down = (run(z + step) for step in _steps(z.size, k))
+        move = _STEP * np.eye(z.size)[k]
+        up, down = run(z + move), run(z - move)
         slopes.append([(a - b) / (2.0 * _STEP) for a, b in zip(up, down, strict=True)])
     derivatives = _Recursion(*(np.stack(part) for part in zip(*slopes, strict=True)))
     return np.asarray(_accumulate(run(z), derivatives))
-
-
-def _steps(size: int, k: int) -> tuple[FloatArray, FloatArray]:
-    step = np.zeros(size)
-    step[k] = _STEP
-    return step, -step
 
 
 class _Recursion(NamedTuple):

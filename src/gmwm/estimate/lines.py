@@ -35,21 +35,15 @@ from gmwm.process import (
 from gmwm.variance import WaveletVariance
 
 # A region is a run of octaves (from one level to the next) that is straight as far as the data
-# show, and that the data distinguish from a corner.
+# show: each slope differs from the nominal one, and from that of its neighbours, by no more than
+# the tolerance of reading a plot by eye and a share of noise, itself held to that tolerance. Else
+# corners would pass for plateaus, the more of them the shorter the record, and one record in three
+# of white noise, random walk and ramp would show a slope of +1/2 where there is none. Levels of
+# fewer than 30 degrees of freedom, known to no better than 13 %, show no slope.
 #
-# - The slope of each octave differs from the nominal one by no more than the tolerance (that of
-#   reading a plot by eye) and the share of noise. Noise is allowed no more than the tolerance:
-#   otherwise more corners would pass for plateaus, the shorter the record.
-# - From octave to octave the slope changes by no more than that either. At a corner between
-#   neighbouring slopes it changes by up to 0.3. Without this rule one record in three of white
-#   noise, random walk and ramp shows a region of slope +1/2 where there is none.
-# - Levels of fewer than 30 degrees of freedom, known to no better than 13 %, show no slope.
-#
-# Measured on simulated records with all five parameters wanted: of one process alone (1000 and 6000
-# samples) none of 300 shows a second region; of white noise, random walk and ramp (6000 samples)
-# none of 300 shows a random walk. At a corner of white noise and random walk one or two in a
-# hundred show a plateau, and one in ten where its levels have but a hundred degrees of freedom.
-# The broad top of a Gauss-Markov process does pass for a plateau: over two octaves they look alike.
+# So of 300 records of one process, none shows a second region; at a corner of white noise and
+# random walk one or two in a hundred show a plateau, one in ten where its levels have but a hundred
+# degrees of freedom. The broad top of a Gauss-Markov process does pass for a plateau.
 
 
 @dataclass(frozen=True)
@@ -250,20 +244,14 @@ def _given_runs(
 
 def _two_times(key: str, region: Sequence[float]) -> tuple[float, float]:
     is_pair = isinstance(region, Sequence | np.ndarray) and len(region) == 2
-    if not is_pair or not all(isinstance(end, Real) and np.isfinite(end) for end in region):
-        raise InputError(
-            f"regions[{key!r}] = {region!r}: give two numbers, first and last averaging time in s"
-        )
-    first, last = float(region[0]), float(region[1])
-    if first < 0.0:
-        raise InputError(
-            f"regions[{key!r}] starts at {first:g} s: give an averaging time above zero"
-        )
-    if first > last:
-        raise InputError(
-            f"regions[{key!r}] starts at {first:g} s, after its end at {last:g} s: swap them"
-        )
-    return first, last
+    if is_pair and all(isinstance(end, Real) and np.isfinite(end) for end in region):
+        first, last = float(region[0]), float(region[1])
+        if 0.0 <= first <= last:
+            return first, last
+    raise InputError(
+        f"regions[{key!r}] = {region!r}: give first and last averaging time in s, two rising "
+        "numbers above zero"
+    )
 
 
 def _found_runs(

@@ -235,8 +235,8 @@ def test_text_is_readable_at_80_columns():
         "white noise + Gauss-Markov + rate ramp",
         "6,000 samples at 1 Hz; exact Gaussian information",
         "",
-        "parameter            value   Cramer-Rao  wavelet var.   ratio",
-        "N                      0.8      0.956 %       0.956 %   1.000",
+        "parameter  value  Cramer-Rao  wavelet var.  ratio",
+        "N            0.8     0.956 %       0.956 %  1.000",
     ]
     assert max(map(len, str(bound).splitlines())) <= 80
 

@@ -245,15 +245,6 @@ def test_other_processes_are_refused(corner):
         ({"Q": (1, 8)}, r"no parameter 'Q' to estimate, only N"),
         ({"N": (5, 7)}, r"no level lies between 5 and 7 s"),
         ({"N": (1e6, 1e7)}, r"no level lies between"),
-        ({"N": (-4, -1)}, r"starts at -4 s: give an averaging time above zero"),
-        ({"N": (8, 1)}, r"starts at 8 s, after its end at 1 s"),
-        ({"N": (1, 2, 3)}, r"give two numbers"),
-        ({"N": (1,)}, r"give two numbers"),
-        ({"N": 8}, r"give two numbers"),
-        ({"N": "18"}, r"give two numbers"),
-        ({"N": None}, r"give two numbers"),
-        ({"N": (1, float("nan"))}, r"give two numbers"),
-        ({"N": (1, float("inf"))}, r"give two numbers"),
         ([("N", (1, 8))], r"by key"),
         ("N", r"by key"),
     ],
@@ -265,9 +256,12 @@ def test_bad_regions_are_refused(corner, regions, words):
     assert "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize("region", [(8, 1), (-4, -1), (1,), "18", (1, float("nan"))])
+@pytest.mark.parametrize(
+    "region",
+    [(8, 1), (-4, -1), (1,), (1, 2, 3), 8, "18", None, (1, float("nan")), (1, float("inf"))],
+)
 def test_a_bad_region_is_refused_before_there_are_data(region):
-    with pytest.raises(InputError, match=r"regions\['K'\]"):
+    with pytest.raises(InputError, match=r"regions\['K'\] = .*: give first and last"):
         gmwm.AllanLines(regions={"N": (1, 8), "K": region})
 
 

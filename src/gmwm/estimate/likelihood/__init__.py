@@ -6,9 +6,7 @@ from gmwm.estimate.likelihood.kalman import filtered as filtered
 from gmwm.estimate.likelihood.likelihood import (
     Columns as Columns,
     KalmanLikelihood as KalmanLikelihood,
-    Regression as Regression,
     arrays_of as arrays_of,
     stacked as stacked,
-    whitened as whitened,
 )
 from gmwm.estimate.likelihood.mle import MLE as MLE, Whittle as Whittle

@@ -19,7 +19,7 @@ from gmwm.estimate.likelihood.likelihood import (
     objective_of,
 )
 from gmwm.estimate.moments import suffices
-from gmwm.estimate.problem import Coordinates, Moments, Slope, density, frequency_nodes
+from gmwm.estimate.problem import Coordinates, Moments, Slope, density, difference, frequency_nodes
 from gmwm.estimate.result import Comparison, Estimates, Fit, conclude
 from gmwm.issues import Notice, notice
 from gmwm.process import Model, Process
@@ -136,12 +136,8 @@ def deviations(information: FloatArray) -> FloatArray:
 
 def gradient(objective: Objective, z: FloatArray, scale: FloatArray) -> FloatArray:
     """Central differences in steps that are small against ``scale`` (d,)."""
-    result = np.empty(z.size)
-    for i in range(z.size):
-        step = np.zeros(z.size)
-        step[i] = _GRADIENT_STEP * min(scale[i], 1.0)
-        result[i] = (objective(z + step) - objective(z - step)) / (2.0 * step[i])
-    return result
+    steps = _GRADIENT_STEP * np.minimum(scale, 1.0)
+    return np.array([difference(objective, z, i, step) for i, step in enumerate(steps)])
 
 
 _CLOSE = 0.02  # twice the error of the profile likelihood
@@ -169,23 +165,15 @@ class Top:
     likelihood: LogLikelihood
 
 
-@dataclass(frozen=True, eq=False)
-class Report:
-    """The part of a `Fit` that only the method itself knows."""
-
-    method: str
-    log_likelihood: float
-    notices: Sequence[Notice] = ()
-    trace: Sequence[float] = ()
-
-
 def conclude_likelihood(
     series: Series,
     processes: Sequence[Process],
     absent: Sequence[int],
     top: Top,
-    slope: Slope | None,
-    report: Report,
+    method: str,
+    notices: Sequence[Notice] = (),
+    trace: Sequence[float] = (),
+    drift: float | None = None,
 ) -> Fit:
     """Make the `Fit` of a maximum.
 
@@ -194,17 +182,22 @@ def conclude_likelihood(
     processes: All noise terms with their values.
     absent: Those among them that the likelihood can do without.
     top: The maximum over the other terms.
+    notices, trace: What only the method itself knows.
+    drift: Slope (u/s) that it has estimated in place of the regression.
     """
+    slope = series.columns.slope(top.processes) if series.columns.drift_is_free else None
+    if slope is not None and drift is not None:
+        slope = Slope(drift, slope.variance)
     found = Estimates(
         coordinates=series.coordinates,
         processes=[p.with_amplitude(0.0) if i in absent else p for i, p in enumerate(processes)],
         covariance=regular_inverse(top.information),
         absent={i: _upper_limit(processes[i], top, series.columns) for i in absent},
         slope=slope,
-        method=report.method,
-        notices=report.notices,
-        log_likelihood=report.log_likelihood,
-        trace=report.trace,
+        method=method,
+        notices=notices,
+        log_likelihood=trace[-1] if trace else top.maximum.value,
+        trace=trace,
     )
     wv = series.wv
     moments = Moments.of(wv, found.coordinates.model)

@@ -27,7 +27,6 @@ from gmwm.errors import InputError
 from gmwm.estimate import tuning
 from gmwm.estimate.likelihood.conclusion import (
     Maximum,
-    Report,
     Top,
     conclude_likelihood,
     observed_information,
@@ -43,7 +42,7 @@ from gmwm.estimate.likelihood.likelihood import (
     objective_of,
     stacked,
 )
-from gmwm.estimate.problem import Slope, spectral_information
+from gmwm.estimate.problem import spectral_information
 from gmwm.estimate.result import Fit
 from gmwm.issues import notice
 from gmwm.process import Model, Process, StateSpace, as_model
@@ -327,20 +326,18 @@ def _gauss_markov(process: Process, like: Process, m: StateMoments, dt: float) -
     loss = Polynomial([0.0, 2.0, -1.0])  # 1 - phi^2
     squares = m.later - 2.0 * m.cross * drift + m.earlier * drift**2
     if like.values["tau"] is None:
+        total = squares + m.first * loss
         if sigma is None:
-            total = squares + m.first * loss
             condition = n * total.deriv() * loss - total * loss.deriv()
-
-            def log_likelihood(delta: float) -> float:
-                return float(-0.5 * (n * np.log(total(delta)) - np.log(loss(delta))))
         else:
-            variance = sigma**2
-            condition = m.steps * variance * loss.deriv() * loss
+            condition = m.steps * sigma**2 * loss.deriv() * loss
             condition = condition + squares.deriv() * loss - squares * loss.deriv()
 
-            def log_likelihood(delta: float) -> float:
-                size = float(loss(delta))
-                return -0.5 * (m.steps * np.log(size) + float(squares(delta)) / variance / size)
+        def log_likelihood(delta: float) -> float:
+            size = float(loss(delta))
+            if sigma is None:
+                return float(-0.5 * (n * np.log(total(delta)) - np.log(size)))
+            return -0.5 * (m.steps * np.log(size) + float(squares(delta)) / sigma**2 / size)
 
         # The root between 0 and 1 of highest likelihood; the present value where there is none.
         inside = [
@@ -385,13 +382,10 @@ def _conclude(
     if not is_maximum:
         hint = "lower the tolerance"
         notices.append(notice("not-converged", variant="no-maximum", hint=hint))
-    slope = None
-    if columns.drift_is_free:
-        slope = Slope(*columns.slope(likelihood.regression(left)))
-    if iteration.in_state and slope is not None:
-        slope = Slope(float(stage.drive[0]) / iteration.dt, slope.variance)
+    drift = None
+    if iteration.in_state:
+        drift = float(stage.drive[0]) / iteration.dt
         first = next(p for p in processes if not p.is_white)
         if not first.is_walk:
             notices.append(notice("drift-in-state", term=first.title()))
-    report = Report("em", trace[-1], notices, trace)
-    return conclude_likelihood(series, processes, absent, top, slope, report)
+    return conclude_likelihood(series, processes, absent, top, "em", notices, trace, drift)

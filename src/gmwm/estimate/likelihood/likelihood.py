@@ -20,6 +20,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -30,7 +31,7 @@ from gmwm.errors import InputError
 from gmwm.estimate import tuning
 from gmwm.estimate.likelihood.kalman import Space, whiten
 from gmwm.estimate.moments import GMWM
-from gmwm.estimate.problem import Coordinates, density
+from gmwm.estimate.problem import Coordinates, Slope, density, keys_by_term
 from gmwm.estimate.result import Fit
 from gmwm.process import Model, Process, StateSpace, as_model
 from gmwm.readers import Channel
@@ -42,7 +43,6 @@ Objective = Callable[[FloatArray], float]
 _NO_VARIANCE = 1e-12  # of a first sample, as a share of that of one step
 _SINGLE = 2048  # lowest frequencies kept one by one
 _BINS_PER_OCTAVE = 256  # above them
-_CHUNK = 4096
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,11 +127,13 @@ class Columns:
             series = series + self._removed * self.matrix[:, -1]
         return series - np.nanmean(series)
 
-    def slope(self, regression: Regression) -> tuple[float, float]:
-        """Slope (u/s) and its variance ((u/s)^2) from the last regressor."""
+    def slope(self, processes: Sequence[Process]) -> Slope:
+        """The slope of the last regressor under a sum of processes."""
+        innovations, _, _ = whitened(self, processes)
+        regression = Regression.of(innovations.T @ innovations)
         unit = 1.0 / (self._half * self.dt)
         value = (self._removed + float(regression.beta[-1])) * unit
-        return value, float(regression.covariance[-1, -1]) * unit**2
+        return Slope(value, float(regression.covariance[-1, -1]) * unit**2)
 
 
 def stacked(processes: Sequence[Process], dt: float) -> StateSpace:
@@ -166,11 +168,6 @@ class KalmanLikelihood:
         """Log-likelihood of these processes; a constant of the regressors is left out."""
         innovations, log_variance, count = whitened(self.columns, processes)
         return Regression.of(innovations.T @ innovations).log_likelihood(count, log_variance)
-
-    def regression(self, processes: Sequence[Process]) -> Regression:
-        """Constant and slope under these processes."""
-        innovations, _, _ = whitened(self.columns, processes)
-        return Regression.of(innovations.T @ innovations)
 
 
 class WhittleLikelihood:
@@ -240,17 +237,12 @@ def _edges(count: int) -> npt.NDArray[np.intp]:
 def _transfer(space: StateSpace, frequency: FloatArray) -> FloatArray:
     """Spectrum of a state space at ``frequency`` (cycles per sample), u^2 per cycle per sample."""
     p = space.n_states
-    result = np.full(frequency.size, space.measurement_noise)
-    if p == 0:
-        return result
-    for start in range(0, frequency.size, _CHUNK):
-        part = slice(start, start + _CHUNK)
-        turn = np.exp(2j * np.pi * frequency[part])
-        matrices = turn[:, None, None] * np.eye(p) - space.transition
-        rows = np.broadcast_to(space.output, (turn.size, p))[:, :, None]
-        gain = np.linalg.solve(matrices.transpose(0, 2, 1), rows)[:, :, 0]
-        result[part] += np.einsum("ki,ij,kj->k", gain, space.process_noise, gain.conj()).real
-    return result
+    turn = np.exp(2j * np.pi * frequency)
+    matrices = turn[:, None, None] * np.eye(p) - space.transition
+    rows = np.broadcast_to(space.output, (turn.size, p))[:, :, None]
+    gain = np.linalg.solve(matrices.transpose(0, 2, 1), rows)[:, :, 0]
+    states = np.einsum("ki,ij,kj->k", gain, space.process_noise, gain.conj()).real
+    return np.asarray(space.measurement_noise + states)
 
 
 def defined(likelihood: LogLikelihood, processes: Sequence[Process]) -> float:
@@ -314,13 +306,21 @@ class Series:
                     f"{type(term).__name__} has no state-space form, which a likelihood needs: "
                     'take method = "gmwm"'
                 )
-        missing = _missing(channel)
+        values = np.asarray(channel.values, dtype=float)
+        # The wavelet variance reports what is no series.
+        is_series = values.ndim == 1 and not np.any(np.isinf(values))
+        missing = int(np.sum(np.isnan(values))) if is_series else 0
+        if missing and values.size - missing < MIN_SAMPLES:
+            where = f"channel {channel.name!r}" if channel.name else "the series"
+            raise InputError(
+                f"{where} has {values.size - missing} samples that are not missing: give "
+                f"{MIN_SAMPLES} or more"
+            )
         if missing and not gaps:
             raise InputError(
                 f"the series misses {missing:,} samples, which a Fourier transform needs: take "
                 'method = "mle" or "gmwm"'
             )
-        values = np.asarray(channel.values, dtype=float)
         bridged, is_bridged = channel, False
         if missing:
             # Scattered gaps leave no wavelet coefficients at coarse levels, or none at all.
@@ -342,70 +342,57 @@ class Series:
         return cls(columns, wv, is_bridged, coordinates, first, is_valid)
 
 
-def _missing(channel: Channel) -> int:
-    """Number of missing samples of a series that has enough of them.
-
-    Raises InputError if hardly any sample is there.
-    """
-    values = np.asarray(channel.values, dtype=float)
-    if values.ndim != 1 or np.any(np.isinf(values)):
-        return 0  # no series: the wavelet variance reports it
-    missing = int(np.sum(np.isnan(values)))
-    if missing and values.size - missing < MIN_SAMPLES:
-        where = f"channel {channel.name!r}" if channel.name else "the series"
-        raise InputError(
-            f"{where} has {values.size - missing} samples that are not missing: give "
-            f"{MIN_SAMPLES} or more"
-        )
-    return missing
-
-
 def _from_moments(fit: Fit, coordinates: Coordinates) -> tuple[Process, ...]:
     """Estimates by the method of moments, with amplitudes of zero replaced by small ones."""
     level = float(np.sqrt(np.min(fit.wv.variance)))
-    fitted = list(fit.model.terms)
-    # The model has sorted its terms; any with the kind and the given values will do.
+    keys, places = keys_by_term(fit.model), {id(p): k for k, p in enumerate(fit.model.terms)}
     found = []
-    for term in coordinates.noise:
-        match = next(p for p in fitted if _same_given(term, p))
-        fitted.remove(match)
-        linear = match.linear_parameter
-        if linear is not None and match.values[linear.name] == 0.0:
-            key = next(
-                item.key
-                for item in fit.model.parameters
-                if fit.model.terms[item.term] is match and item.parameter.name == linear.name
-            )
-            limit = fit.upper_bounds.get(key, np.inf)
+    for match in _filled(coordinates.noise, fit.model):
+        if match is not None and _scale(match) == 0.0:
+            name = match.linear_parameter.name
+            limit = fit.upper_bounds.get(keys[places[id(match)], name], np.inf)
             small = tuning.SMALL_START * limit if 0.0 < limit < np.inf else 1e-3 * level
-            match = match.with_values(**{linear.name: small})
+            match = match.with_values(**{name: small})
         found.append(match)
     return tuple(found)
-
-
-def _same_given(term: Process, fitted: Process) -> bool:
-    """Whether ``fitted`` is ``term`` with its open parameters filled in."""
-    if type(term) is not type(fitted) or term.values.keys() != fitted.values.keys():
-        return False
-    return all(v is None or v == fitted.values[k] for k, v in term.values.items())
 
 
 def _from_user(model: Model, start: Model, coordinates: Coordinates) -> tuple[Process, ...]:
-    kept = [term for term in start.terms if not term.is_drift]
-    terms: Sequence[Process] = coordinates.noise
-    found = []
-    for term in terms:
-        match = next((p for p in kept if _same_given(term, p)), None)
-        if match is None or match.is_open:
-            raise InputError(
-                f"start = {start!r} does not give every term of {model!r} a value: repeat the "
-                "model with numbers"
-            )
-        kept.remove(match)
-        linear = match.linear_parameter
-        if linear is not None and not (match.values[linear.name] or 0.0) > 0.0:
-            raise InputError(f"start = {start!r}: {linear.name} must be positive")
-        found.append(match)
-    if kept:
-        raise InputError(f"start = {start!r} has a term that {model!r} has not: {kept[0]!r}")
+    found = _filled(coordinates.noise, start)
+    if any(match is None or match.is_open for match in found):
+        raise InputError(
+            f"start = {start!r} does not give every term of {model!r} a value: repeat the model "
+            "with numbers"
+        )
+    for match in found:
+        if not _scale(match) > 0.0:
+            raise InputError(f"start = {start!r}: {match.linear_parameter.name} must be positive")
+    more = [term for term in start.terms if not (term.is_drift or any(term is p for p in found))]
+    if more:
+        raise InputError(f"start = {start!r} has a term that {model!r} has not: {more[0]!r}")
     return tuple(found)
+
+
+def _filled(terms: Sequence[Process], model: Model) -> list[Any]:
+    """For each term the one of a model that is it with its open parameters filled in, or None.
+
+    The model has sorted its terms; any with the kind and the given values will do.
+    """
+    left, found = list(model.terms), []
+    for term in terms:
+        same = (
+            p
+            for p in left
+            if type(p) is type(term)
+            and p.values.keys() == term.values.keys()
+            and all(v is None or v == p.values[k] for k, v in term.values.items())
+        )
+        found.append(next(same, None))
+        left = [p for p in left if p is not found[-1]]
+    return found
+
+
+def _scale(process: Process) -> float:
+    """Value of the linear parameter; 1 where there is none."""
+    linear = process.linear_parameter
+    return 1.0 if linear is None else process.values[linear.name] or 0.0

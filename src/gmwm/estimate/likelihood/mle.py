@@ -13,7 +13,6 @@ from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.estimate import tuning
 from gmwm.estimate.likelihood.conclusion import (
-    Report,
     Top,
     conclude_likelihood,
     deviations,
@@ -39,7 +38,6 @@ from gmwm.estimate.problem import (
     Coordinates,
     Moments,
     Scales,
-    Slope,
     solve_nonnegative,
     spectral_information,
 )
@@ -197,12 +195,7 @@ def _fit(series: Series, climb: Climb, method: str) -> Fit:
         notices.append(notice("not-converged"))
     if np.any(np.linalg.eigvalsh(top.information) <= 0.0):
         notices.append(notice("no-curvature"))
-    slope = None
-    if series.columns.drift_is_free:
-        regression = KalmanLikelihood(series.columns).regression(top.processes)
-        slope = Slope(*series.columns.slope(regression))
-    report = Report(method, top.maximum.value, notices)
-    return conclude_likelihood(series, processes, absent, top, slope, report)
+    return conclude_likelihood(series, processes, absent, top, method, notices)
 
 
 def _rescaled(processes: tuple[Process, ...], series: Series) -> tuple[float, tuple[Process, ...]]:

@@ -6,7 +6,6 @@ from gmwm.estimate.moments.profile import (
     Point as Point,
     Profile as Profile,
     compile_search as compile_search,
-    compile_steps as compile_steps,
     search as search,
 )
 from gmwm.estimate.moments.weights import (

@@ -81,15 +81,7 @@ def conclude_moments(
     limits = {}
     for i in absent:
         estimate = _unrestricted(jacobian, curves[:, i], target - implied, end.covariance)
-        others = [k for k in absent if k != i]
-        part = [k for k in range(len(design.terms)) if k not in others]
-        limit = upper_amplitude(
-            design.coordinates.without(others),
-            [processes[k] for k in part],
-            part.index(i),
-            (*estimate, 0.0),
-            wv,
-        )
+        limit = upper_amplitude(design.coordinates, processes, i, (*estimate, 0.0), wv, absent)
         limits[i] = float(max(limit, 0.0) ** (1.0 / design.terms[i].linear.power))
     notices = limit_notices(design, point)
     if target.size < design.n_free:

@@ -9,16 +9,16 @@ are regressors, see `gmwm.estimate.problem.ramp`.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import cached_property
-from typing import Any, NamedTuple
+from functools import cached_property, partial
+from typing import Any
 
 import numpy as np
 
-from gmwm._core.typing import FloatArray, IntArray
+from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.estimate import tuning
 from gmwm.estimate.moments.kernels import Shaped
-from gmwm.estimate.problem import Coordinates, Scales, is_plain, shape_of
+from gmwm.estimate.problem import Coordinates, Scales, difference, is_plain, shape_of
 from gmwm.process import Model, Process, Shape, compiled_levels
 
 MOST_SHAPES = 3
@@ -26,14 +26,6 @@ MOST_SHAPES = 3
 
 _STEP = 1e-5  # of central differences in z, whose natural scale is 1
 _SIMULATED_STEP = 0.05  # where a simulation may move in jumps
-
-
-class Compiled(NamedTuple):
-    """The part of a design that `gmwm.estimate.moments.kernels.refined` takes."""
-
-    terms: Shaped
-    owners: IntArray
-    levels: tuple[Any, ...]
 
 
 class Design:
@@ -58,12 +50,11 @@ class Design:
                 )
         self.linear = tuple(i for i, term in enumerate(self.terms) if term.free_scale)
         self.shaped = tuple(i for i, term in enumerate(self.terms) if term.n_shapes)
-        self._curve_of = [self._curve_at(i) for i in range(len(self.terms))]
-        self._slopes_of = {
-            i: scales.unit_slopes(self.terms[i].process)
-            for i in self.shaped
-            if self.terms[i].free_scale
-        }
+        # Functions without the lookups that each step would repeat.
+        self._curve_of = [
+            scales.unit_curves(term.process) if term.free_scale else partial(self._given_curve, i)
+            for i, term in enumerate(self.terms)
+        ]
         self.owners = [i for i, is_amplitude in self.coordinates.owners if not is_amplitude]
         self._own: dict[Any, Any] = {}
         self._last: dict[int, tuple[Shape, FloatArray]] = {}
@@ -97,12 +88,8 @@ class Design:
             known = self._last[i] = shape, self._curve_of[i](shape)
         return known[1]
 
-    def _curve_at(self, i: int) -> Callable[[Shape], FloatArray]:
-        """The function of `curve` for one term, without lookups that each step would repeat."""
-        term = self.terms[i]
-        if term.free_scale:
-            return self.scales.unit_curves(term.process)
-        return lambda shape: self.scales.curve(self.at_shape(i, shape))
+    def _given_curve(self, i: int, shape: Shape) -> FloatArray:
+        return self.scales.curve(self.at_shape(i, shape))
 
     def grid(self, i: int) -> list[Shape]:
         """Starting shapes of term ``i``, with fixed parameters at their value; see `_cached`."""
@@ -197,7 +184,7 @@ class Design:
         return self._parts[key]
 
     @cached_property
-    def compiled(self) -> Compiled | None:
+    def compiled(self) -> Shaped | None:
         """What compiled code needs to know; ``None`` if some curve is not known there."""
         shaped = [self.terms[i] for i in self.shaped]
         if self.scales.wavelet != "haar" or not all(
@@ -215,10 +202,9 @@ class Design:
             lower[s, :size] = [p.lower for p in term.process.shape_parameters]
             upper[s, :size] = [p.upper for p in term.process.shape_parameters]
         first = np.cumsum([0, *counts])[:-1]
-        owners = np.array([self.linear.index(i) for i in self.owners])
         levels = compiled_levels(self.scales.tau, self.scales.dt, frozenset(kinds.tolist()))
-        terms = Shaped(kinds, np.array(self.shaped), first, free, lower, upper)
-        return Compiled(terms, owners, levels)
+        owners = np.array([self.linear.index(i) for i in self.owners])
+        return Shaped(kinds, np.array(self.shaped), first, free, lower, upper, owners, levels)
 
     # -- curves -----------------------------------------------------------------------------------
 
@@ -245,20 +231,14 @@ class Design:
         column = 0
         for i in self.shaped:
             term = self.terms[i]
-            closed = self._slopes_of[i](shapes[i]) if term.free_scale else None
-            if closed is not None:
-                result[:, column : column + term.n_shapes] = closed[:, term.free_shape]
-                column += term.n_shapes
-                continue
             z = term.process.shape_to_free(shapes[i])
             width = _SIMULATED_STEP if self.scales.is_simulated(term.process) else _STEP
+
+            def curve(z: FloatArray, i: int = i) -> FloatArray:
+                return self.curve(i, self.terms[i].process.shape_from_free(z))
+
             for k in np.flatnonzero(term.free_shape):
-                pair = []
-                for step in (width, -width):
-                    moved = z.copy()
-                    moved[k] += step
-                    pair.append(self.curve(i, term.process.shape_from_free(moved)))
-                result[:, column] = (pair[0] - pair[1]) / (2.0 * width)
+                result[:, column] = difference(curve, z, k, width)
                 column += 1
         return result
 

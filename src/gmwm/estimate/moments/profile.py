@@ -18,21 +18,16 @@ from gmwm._core.typing import FloatArray
 from gmwm.estimate import tuning
 from gmwm.estimate.moments.design import MOST_SHAPES, Design
 from gmwm.estimate.moments.kernels import (
-    FTOL,
-    GTOL,
-    XTOL,
-    Bounds,
-    Curves,
     Weighted,
-    damped_step,
+    linearized,
     profiled,
     projected,
-    refined,
 )
 from gmwm.estimate.problem import Scales, objectives_with, shape_of, solve_nonnegative
 from gmwm.process import GaussMarkov, Shape, WhiteNoise
 
 _MOST = 200  # evaluations of a search
+_XTOL, _FTOL, _GTOL = 1e-7, 1e-9, 1e-9  # tolerances at which MINPACK ends it
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,60 +77,60 @@ class Profile:
 
     def refine(self, start: Point, reach: float = np.inf) -> Point:
         """Local minimum reached from ``start``, at most so far from it; never worse than it."""
-        z0 = self.design.pack(start.shapes)
+        design, shapes = self.design, start.shapes
+        z0 = design.pack(shapes)
         if z0.size == 0 or z0.size > self.target.size:
-            return self.at(start.shapes)
-        low, high = self.design.bounds
+            return self.at(shapes)
+        low, high = design.bounds
         bounds = np.maximum(low, z0 - reach), np.minimum(high, z0 + reach)
-        point = self._compiled(z0, start, bounds) or self._stepwise(z0, start, bounds)
-        return point if point.objective <= start.objective else start
-
-    def _compiled(self, z0: FloatArray, start: Point, bounds: Bounds) -> Point | None:
-        """The local minimum, if all curves are known in compiled form."""
-        design = self.design
         compiled = design.compiled
-        if compiled is None:
-            return None
-        shapes = np.zeros((len(design.shaped), MOST_SHAPES))
-        for row, i in zip(shapes, design.shaped, strict=True):
-            row[: len(start.shapes[i])] = start.shapes[i]
-        fixed = np.zeros((self.target.size, len(design.terms) + self._beside.shape[1]))
-        fixed[:, len(design.terms) :] = self._beside
-        for i, term in enumerate(design.terms):
-            if not term.n_shapes:
-                fixed[:, i] = design.curve(i, start.shapes[i])
-        curves = Curves(shapes, fixed, compiled.levels, compiled.owners)
-        found, z, x, objective = refined(z0, bounds, compiled.terms, curves, self._problem, _MOST)
-        return Point(design.unpack(z, start.shapes), x, objective) if found else None
+        own, fixed = self._start_of_compiled(shapes)
+        visited: dict[bytes, list[Any]] = {}  # the last point, of which MINPACK asks repeatedly
 
-    def _stepwise(self, z0: FloatArray, start: Point, bounds: Bounds) -> Point:
-        """The local minimum for curves of any process."""
-        design = self.design
-        # The Jacobian is asked for where the residuals were, and the first one twice.
-        visited: dict[bytes, Any] = {}
-        slopes: dict[bytes, FloatArray] = {}
-
-        def at(z: FloatArray) -> Any:
+        def at(z: FloatArray) -> list[Any]:
+            """Amplitudes, residuals, their Jacobian if it came with them, and weighted columns."""
             if z.tobytes() not in visited:
-                shapes = design.unpack(np.clip(z, *bounds), start.shapes)
                 visited.clear()
-                visited[z.tobytes()] = shapes, *profiled(self._problem, self._curves(shapes))
+                is_known = False
+                if compiled is not None:
+                    is_known, *found = linearized(z, bounds, self._problem, compiled, own, fixed)
+                if not is_known:
+                    curves = self._curves(design.unpack(np.clip(z, *bounds), shapes))
+                    columns, x, residual = profiled(self._problem, curves)
+                    found = [x, residual, None, columns]
+                visited[z.tobytes()] = found
             return visited[z.tobytes()]
 
         def jacobian(z: FloatArray) -> FloatArray:
-            if z.tobytes() not in slopes:
-                shapes, columns, x, _ = at(z)
-                factor = design.amplitudes(x[: len(design.linear)])[design.owners]
-                own = design.shape_derivatives(shapes)
-                slopes.clear()
-                slopes[z.tobytes()] = projected(self.root, columns, x, own, factor)
-            return slopes[z.tobytes()]
+            found = at(z)
+            if found[2] is None:
+                factor = design.amplitudes(found[0][: len(design.linear)])[design.owners]
+                slopes = design.shape_derivatives(design.unpack(np.clip(z, *bounds), shapes))
+                found[2] = projected(self.root, found[3], found[0], slopes, factor)
+            return np.asarray(found[2])
 
-        tolerances = {"xtol": XTOL, "ftol": FTOL, "gtol": GTOL}
-        found = leastsq(
-            lambda z: -at(z)[3], z0, Dfun=jacobian, maxfev=_MOST, full_output=True, **tolerances
+        tolerances = {"xtol": _XTOL, "ftol": _FTOL, "gtol": _GTOL}
+        z = leastsq(
+            lambda z: -at(z)[1], z0, Dfun=jacobian, maxfev=_MOST, full_output=True, **tolerances
         )[0]
-        return self.at(design.unpack(np.clip(found, *bounds), start.shapes))
+        x, residual = at(z)[:2]
+        moved = design.unpack(np.clip(z, *bounds), shapes)
+        point = Point(moved, x, float(residual @ residual))
+        return point if point.objective <= start.objective else start
+
+    def _start_of_compiled(self, shapes: Sequence[Shape]) -> tuple[FloatArray, FloatArray]:
+        """Shapes of the shaped terms, and the curves of the others, as `linearized` takes them."""
+        design = self.design
+        own = np.zeros((len(design.shaped), MOST_SHAPES))
+        fixed = np.zeros((self.target.size, len(design.terms) + self._beside.shape[1]))
+        fixed[:, len(design.terms) :] = self._beside
+        if design.compiled is not None:
+            for row, i in zip(own, design.shaped, strict=True):
+                row[: len(shapes[i])] = shapes[i]
+            for i, term in enumerate(design.terms):
+                if not term.n_shapes:
+                    fixed[:, i] = design.curve(i, shapes[i])
+        return own, fixed
 
 
 def compile_search() -> None:
@@ -147,13 +142,6 @@ def compile_search() -> None:
     design = Design(model, Scales(tau, 1.0, 32))
     profile = Profile(design, np.ones(4), np.eye(4))
     profile.refine(profile.at([(), (1.0,)]))
-
-
-def compile_steps() -> None:
-    """Compile the loops that `compile_search` reaches last, for a process that waits for it."""
-    vector, matrix = np.ones(2), np.eye(2)
-    projected(matrix, matrix, vector, matrix, vector)
-    damped_step(matrix, vector, vector, 1.0, 0.0, True)
 
 
 def search(profile: Profile, known: Sequence[Shape | None] | None = None) -> Point:

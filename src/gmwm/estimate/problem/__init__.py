@@ -26,6 +26,7 @@ from gmwm.estimate.problem.nonnegative import (
 from gmwm.estimate.problem.parameters import (
     Coordinates as Coordinates,
     Term as Term,
+    difference as difference,
     drift_key as drift_key,
     in_model_order as in_model_order,
     keys_by_term as keys_by_term,

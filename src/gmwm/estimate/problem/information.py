@@ -17,7 +17,7 @@ import numpy as np
 from gmwm._core.frozen import frozen
 from gmwm._core.typing import FloatArray
 from gmwm.estimate import tuning
-from gmwm.estimate.problem.parameters import Coordinates, keys_by_term
+from gmwm.estimate.problem.parameters import Coordinates, difference, keys_by_term
 from gmwm.process import Model, Process, evaluated, legendre
 
 _STEP = 1e-5
@@ -56,15 +56,11 @@ def _slopes(
     rows = np.empty((len(coordinates.owners), f.size))
     z = coordinates.pack(processes)
     for k, (i, is_amplitude) in enumerate(coordinates.owners):
-        if is_amplitude:
-            rows[k] = own[i]
-            continue
-        pair = []
-        for step in (_STEP, -_STEP):
-            moved = z.copy()
-            moved[k] += step
-            pair.append(coordinates.process(i, moved, processes[i]).psd(f, dt))
-        rows[k] = (pair[0] - pair[1]) / (2.0 * _STEP)
+
+        def spectrum(at: FloatArray, i: int = i) -> FloatArray:
+            return coordinates.process(i, at, processes[i]).psd(f, dt)
+
+        rows[k] = own[i] if is_amplitude else difference(spectrum, z, k, _STEP)
     return own, rows
 
 

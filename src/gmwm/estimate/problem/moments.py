@@ -124,12 +124,6 @@ class Scales:
         found = frozen(process.unit_wavelet_variance((), self.tau, self.dt, self.wavelet))
         return lambda _: found
 
-    def unit_slopes(self, process: Process) -> Callable[[Shape], FloatArray | None]:
-        """Derivative of `unit_curves` by the coordinates of the shape, (J, s), where known."""
-        if self.wavelet != "haar" or self.is_simulated(process):
-            return lambda shape: None
-        return lambda shape: process.unit_haar_slopes(shape, self.tau, self.dt)
-
     def is_simulated(self, process: Process) -> bool:
         """Whether the curve of a process is simulated."""
         return self.simulate_all or not process.has_spectrum()
@@ -193,10 +187,9 @@ class Moments:
         """The moments with the slope moved by ``part`` of the way to its estimate under a noise."""
         if self.slope is None or not self.slope_is_free:
             return self
-        psd = self.scales.spectrum(noise)
-        if not _has_power(psd, self.wv.dt):
+        if not _has_power(noise):
             return self
-        new, old = gls_slope(self.wv, psd), self.slope
+        new, old = gls_slope(self.wv, self.scales.spectrum(noise)), self.slope
         moved = Slope(
             (1.0 - part) * old.value + part * new.value,
             (1.0 - part) * old.variance + part * new.variance,
@@ -206,9 +199,9 @@ class Moments:
     def covariance(self, noise: Model) -> FloatArray:
         """Covariance of `target` that a noise implies, u^4, (J, J)."""
         wv = self.wv
-        psd = self.scales.spectrum(noise)
-        if not _has_power(psd, wv.dt):
+        if not _has_power(noise):
             return wv.covariance
+        psd = self.scales.spectrum(noise)
         covariance = wv.covariance_under(psd, noise.lines())
         if self.slope_is_free and self.slope is not None:
             means = wv.mean_covariance_under(psd)
@@ -267,8 +260,10 @@ class FittedMoments:
         return self.statistical + np.diag((self.discrepancy * self.implied) ** 2)
 
 
-def _has_power(psd: PSD, dt: float) -> bool:
-    return bool(np.any(psd(np.array([1e-6, 0.01, 0.25]) / dt, dt) > 0.0))
+def _has_power(noise: Model) -> bool:
+    """Whether some term has an amplitude."""
+    linear = [(term, term.linear_parameter) for term in noise.terms]
+    return any(found is None or term.values[found.name] != 0.0 for term, found in linear)
 
 
 def weight_root(covariance: FloatArray) -> FloatArray:

@@ -7,9 +7,10 @@ are regressors and have no coordinate.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -18,6 +19,13 @@ from gmwm.errors import InputError
 from gmwm.process import Model, Parameter, Process, Shape
 
 _STEP = 1e-6  # of central differences of a process's own map
+
+
+def difference(function: Callable[[FloatArray], Any], z: FloatArray, k: Any, step: float) -> Any:
+    """Derivative of a function by coordinate k of z, as a central difference."""
+    move = np.zeros(z.size)
+    move[k] = step
+    return (function(z + move) - function(z - move)) / (2.0 * step)
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,15 +81,12 @@ class Term:
 
     def shape_jacobian(self, shape: Shape) -> FloatArray:
         """Derivative of the free shape parameters by their coordinates, (s, s)."""
-        z = self.process.shape_to_free(shape)
-        columns = np.flatnonzero(self.free_shape)
-        block = np.empty((columns.size, columns.size))
-        for column, k in enumerate(columns):
-            step = np.zeros(z.size)
-            step[k] = _STEP
-            up, down = (np.array(self.process.shape_from_free(z + s)) for s in (step, -step))
-            block[:, column] = ((up - down) / (2.0 * _STEP))[columns]
-        return block
+        z, free = self.process.shape_to_free(shape), np.flatnonzero(self.free_shape)
+
+        def found(z: FloatArray) -> FloatArray:
+            return np.array(self.process.shape_from_free(z))[free]
+
+        return np.stack([difference(found, z, k, _STEP) for k in free], axis=1)
 
 
 def shape_of(process: Process) -> Shape:

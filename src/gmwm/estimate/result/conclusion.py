@@ -152,7 +152,6 @@ def conclude(
 def _upper_limits(found: Estimates, keys: Sequence[str], wv: WaveletVariance) -> dict[str, float]:
     """95 % upper limits of amplitudes that are zero, or have no shape and are not significant."""
     coordinates = found.coordinates
-    present = [j for j in range(len(coordinates.terms)) if j not in found.absent]
     rows = {k: row for row, k in enumerate(found.present)}
     limits = {}
     for k, (i, is_amplitude) in enumerate(coordinates.owners):
@@ -165,13 +164,8 @@ def _upper_limits(found: Estimates, keys: Sequence[str], wv: WaveletVariance) ->
         if term.n_shapes or not deviation > 1.0 / tuning.SIGNIFICANT:
             continue
         amplitude = float(found.processes[i].values[term.linear.name] or 0.0) ** term.linear.power
-        limit = upper_amplitude(
-            coordinates.without(list(found.absent)),
-            [found.processes[j] for j in present],
-            present.index(i),
-            (amplitude, deviation * amplitude, amplitude),
-            wv,
-        )
+        estimate = (amplitude, deviation * amplitude, amplitude)
+        limit = upper_amplitude(coordinates, found.processes, i, estimate, wv, found.absent)
         limits[keys[k]] = limit ** (1.0 / term.linear.power)
     return limits
 

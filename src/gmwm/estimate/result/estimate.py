@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Annotated, Any, ClassVar, Literal
@@ -21,8 +21,6 @@ from gmwm.process import Model, Parameter, Process
 from gmwm.variance import WaveletVariance
 
 Kind = Literal["estimated", "bound", "fixed", "undefined"]
-
-HEAD = f"{'parameter':<16} {'estimate':>11} {'std. error':>10}  {'95 % interval':<22} unit"
 
 
 @dataclass(frozen=True)
@@ -81,8 +79,9 @@ class Estimate:
             return self.field[0]
         return InUnit(self.value, self.lower, self.upper, self.unit)
 
-    def __str__(self) -> str:
-        """A line under `HEAD`."""
+    @property
+    def cells(self) -> tuple[str, ...]:
+        """Of the table of ``str(fit)``: key, estimate, standard error, 95 % interval and unit."""
         error, value = "", f"{self.value:.5g}"
         if self.kind == "undefined":
             value, interval = "-", "term has no amplitude"
@@ -93,9 +92,10 @@ class Estimate:
         else:
             interval = f"{self.lower:.4g} .. {self.upper:.4g}"
             error = f"{self.stderr:.2g}"
-        # A long name takes the blanks before its value.
-        name = f"{self.key} "
-        return f"{name}{value:>{max(28 - len(name), 0)}} {error:>10}  {interval:<22} {self.unit}"
+        return self.key, value, error, interval, self.unit
+
+    def __str__(self) -> str:
+        return "  ".join(filter(None, self.cells))
 
     def to_dict(self) -> dict[str, Any]:
         """The columns of `Fit.to_frame`, in JSON types."""
@@ -235,6 +235,7 @@ def upper_amplitude(
     term: int,
     estimate: tuple[float, float, float],
     wv: WaveletVariance,
+    absent: Collection[int] = (),
 ) -> float:
     """95 % upper limit of a term's amplitude, in the power that the spectrum is linear in.
 
@@ -244,27 +245,30 @@ def upper_amplitude(
     spread of a chi-square with the degrees of freedom by which the amplitude raises that error. It
     does not exceed the amplitude that explains all of the variance at any level.
 
-    coordinates: Of the terms that have an amplitude, and this one.
-    processes: These terms with values.
+    coordinates, processes: Of all noise terms, which have values.
     term: Index of the term.
     estimate: The amplitude without the restriction to positive values, its standard error, and the
         amplitude at which that standard error holds.
     wv: The data.
+    absent: Terms without an amplitude.
     """
+    kept = [i for i in range(len(processes)) if i == term or i not in absent]
+    coordinates = coordinates.without([i for i in absent if i != term])
+    processes, term = [processes[i] for i in kept], kept.index(term)
     centre, deviation, at = estimate
     most = _all_of_the_variance(processes[term], wv)
     plain = min(quantile_above_zero(centre, deviation), most)
     if not (np.isfinite(plain) and plain > 0.0 and all(p.has_spectrum() for p in processes)):
         return plain
     owners = coordinates.owners
-    kept = [k for k, (i, is_amplitude) in enumerate(owners) if i != term or is_amplitude]
-    place = kept.index(owners.index((term, True)))
+    free = [k for k, (i, is_amplitude) in enumerate(owners) if i != term or is_amplitude]
+    place = free.index(owners.index((term, True)))
     present = [p.with_amplitude(plain) if i == term else p for i, p in enumerate(processes)]
     information_at = information_with(coordinates, present, term, wv.n, wv.dt)
 
     def error(amplitude: float) -> float:
         """Standard error of the amplitude where it is the true one, at the present shape."""
-        information = information_at(amplitude)[np.ix_(kept, kept)]
+        information = information_at(amplitude)[np.ix_(free, free)]
         scale = 1.0 / np.sqrt(np.maximum(np.diag(information), 1e-300))
         inverse = np.linalg.pinv(information * np.outer(scale, scale), rcond=1e-10)
         variance = inverse[place, place]

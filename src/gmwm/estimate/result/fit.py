@@ -14,14 +14,13 @@ from gmwm._core import checks
 from gmwm._core.distributions import chi2, norm
 from gmwm._core.documents import Array, Document, OrInfinity, OrNaN, Text, check_covariance
 from gmwm._core.frozen import freeze, frozen
-from gmwm._core.tables import frame
+from gmwm._core.tables import frame, plain_table
 from gmwm._core.text import Printed, bullets, per_cent, wrapped
 from gmwm._core.typing import FloatArray
 from gmwm._core.units import shown_unit
 from gmwm.errors import InputError, MissingNameError
 from gmwm.estimate.problem import FittedMoments, Scales, drift_key, error_growth
 from gmwm.estimate.result.estimate import (
-    HEAD,
     Estimate,
     Region,
     confidence_interval,
@@ -349,7 +348,8 @@ class Fit(Document, Printed):
         elif self.trace:
             how += f", {len(self.trace)} iterations"
         lines += wrapped(f"{self._size()}, {self.wv.tau.size} levels; {how}", indent=2)
-        lines += ["", HEAD, *map(str, self.estimates), ""]
+        heads = ["parameter", "estimate", "std. error", "95 % interval", "unit"]
+        lines += ["", plain_table(heads, [each.cells for each in self.estimates]), ""]
         fitness = f"objective {self.objective:.4g} on {self.dof} degrees of freedom"
         if np.isfinite(self.p_value):
             fitness += f", p = {self.p_value:.2g}"

@@ -13,8 +13,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gmwm._core.distributions import norm
+from gmwm._core.tables import cell, plain_table
 from gmwm._core.text import per_cent, wrapped
-from gmwm._core.typing import FloatArray
+from gmwm._core.typing import BoolArray, FloatArray
 from gmwm.estimate import tuning
 from gmwm.estimate.problem import FittedMoments, chi_square
 from gmwm.variance import WaveletVariance
@@ -85,11 +86,14 @@ class Goodness:
         Among levels of more than 30 degrees of freedom, where chance moves the deviation by less
         than 13 % (one sigma); None if there is none.
         """
-        known = np.flatnonzero(self.dof > tuning.WELL_KNOWN_DOF)
-        if not self.is_tested or known.size == 0:
+        worst = self._largest(self.misfit, self.dof > tuning.WELL_KNOWN_DOF)
+        return None if worst is None else (float(self.misfit[worst]), float(self.tau[worst]))
+
+    def _largest(self, values: FloatArray, among: BoolArray) -> int | None:
+        """Level of the largest absolute value among some; None without a test or any of them."""
+        if not self.is_tested or not np.any(among):
             return None
-        worst = known[int(np.argmax(np.abs(self.misfit[known])))]
-        return float(self.misfit[worst]), float(self.tau[worst])
+        return int(np.argmax(np.where(among, np.abs(values), -1.0)))
 
     @property
     def known_to(self) -> float:
@@ -103,10 +107,9 @@ class Goodness:
 
         Among levels whose residual exceeds 2.5 statistical standard errors under the model.
         """
-        far = np.abs(self.residual) > tuning.BEYOND_CHANCE
-        if not self.is_tested or not np.any(far):
+        worst = self._largest(self.misfit, np.abs(self.residual) > tuning.BEYOND_CHANCE)
+        if worst is None:
             return None
-        worst = np.flatnonzero(far)[int(np.argmax(np.abs(self.misfit[far])))]
         return float(self.misfit[worst]), float(self.tau[worst]), float(self.residual[worst])
 
     @property
@@ -131,11 +134,8 @@ class Goodness:
 
         Among all levels that the model gives a variance; None if there is none.
         """
-        judged = self.judged
-        if not self.is_tested or np.all(np.isnan(judged)):
-            return None
-        largest = int(np.nanargmax(np.abs(judged)))
-        return float(judged[largest]), float(self.tau[largest])
+        largest = self._largest(self.judged, ~np.isnan(self.judged))
+        return None if largest is None else (float(self.judged[largest]), float(self.tau[largest]))
 
     @property
     def largest_p(self) -> float:
@@ -183,19 +183,22 @@ class Goodness:
         )
 
     def __str__(self) -> str:
-        head = f"{'tau [s]':>10} {f'data [{self.unit}]':>14} {f'model [{self.unit}]':>14}"
-        lines = [
-            f"{self.name or 'series'}: Allan deviation of data and model",
-            f"{head} {'misfit':>9} {'residual':>9} {'allowed':>8} {'dof':>8}",
+        heads = ["tau [s]", f"data [{self.unit}]", f"model [{self.unit}]", "misfit"]
+        rows = [
+            [
+                f"{tau:.5g}",
+                cell(self.data[j]),
+                cell(self.model[j]),
+                f"{100.0 * self.misfit[j]:+.3g} %",
+                f"{self.residual[j]:+.2f}",
+                f"{self.allowed[j]:+.2f}",
+                cell(self.dof[j], 3),
+            ]
+            for j, tau in enumerate(self.tau)
         ]
-        for j, misfit in enumerate(self.misfit):
-            form = "+.2f" if abs(misfit) < 10.0 else "+,.0f" if abs(misfit) < 1e3 else "+.2g"
-            share = f"{100.0 * misfit:{form}} %"
-            lines.append(
-                f"{self.tau[j]:>10.5g} {self.data[j]:>14.4g} {self.model[j]:>14.4g} {share:>9} "
-                f"{self.residual[j]:>+9.2f} {self.allowed[j]:>+8.2f} {self.dof[j]:>8.3g}"
-            )
-        return "\n".join([*lines, *wrapped(self.sentence, indent=2)])
+        title = f"{self.name or 'series'}: Allan deviation of data and model"
+        table = plain_table([*heads, "residual", "allowed", "dof"], rows)
+        return "\n".join([title, table, *wrapped(self.sentence, indent=2)])
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Standardised residuals by level, with the misfit written at each; returns the axes."""

@@ -12,6 +12,7 @@ from annotated_types import MinLen
 from gmwm._core.distributions import chi2
 from gmwm._core.documents import NotNegative, Probability, Text
 from gmwm._core.frozen import freeze
+from gmwm._core.tables import cell, plain_table
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.estimate import tuning
@@ -21,7 +22,6 @@ from gmwm.issues import notice
 from gmwm.process import Model
 from gmwm.variance import PooledVariance, WaveletVariance
 
-_CELLS = 4  # numbers in a line of the table
 _LEAST_SHARE = 1e-9  # smallest share of the weight that all recordings but one must have
 
 
@@ -57,20 +57,14 @@ class JointFit(Fit):
         freeze(self, "spread")
 
     def __str__(self) -> str:
-        lines = [super().__str__(), "", self.agreement]
-        lines.append(f"{'parameter':<20} {'spread':>8}  of each recording")
-        positive = _positive(self.model)
+        positive, rows = _positive(self.model), []
         for key in self.keys:
-            spread = "-"
-            if key in self.spread:
-                value = self.spread[key]
-                spread = f"{100.0 * value:.1f} %" if key in positive else f"{value:.2g}"
-            head = f"{key:<20} {spread:>8}"
-            cells = [f" {part.params.get(key, np.nan):>10.4g}" for part in self.parts]
-            for start in range(0, len(cells), _CELLS):
-                lines.append(f"{head:<29}{''.join(cells[start : start + _CELLS])}")
-                head = ""
-        return "\n".join(lines)
+            spread = self.spread.get(key)
+            scale, unit = (100.0, " %") if key in positive and spread is not None else (1.0, "")
+            values = "  ".join(cell(part.params.get(key)) for part in self.parts)
+            rows.append([key, cell(spread, 3, scale) + unit, values])
+        table = plain_table(["parameter", "spread", "of each recording"], rows)
+        return "\n".join([super().__str__(), "", self.agreement, table])
 
     def _size(self) -> str:
         pooled = f"{len(self.parts)} recordings, {self.wv.n_all:,} samples in all"

@@ -1,4 +1,4 @@
-"""The compiled search for shapes beside that of MINPACK, and what of fits is found once."""
+"""The search for shapes by compiled curves and by any others; what of fits is found once."""
 
 import gc
 import weakref
@@ -12,8 +12,6 @@ from gmwm.estimate.moments import (
     Design,
     Profile,
     dictionary_fit,
-    profile,
-    search,
 )
 from gmwm.estimate.problem import Scales, weight_root
 from gmwm.process import compiled_levels, quadrature, shaped_curve, shaped_slope
@@ -67,33 +65,11 @@ def test_a_subclass_is_no_compiled_kind():
     assert Design(gmwm.WhiteNoise() + Mine(), Scales(TAU, 0.01, 400_000)).compiled is None
 
 
-@pytest.mark.parametrize(
-    "model",
-    [
-        gmwm.WhiteNoise() + gmwm.GaussMarkov(),
-        gmwm.WhiteNoise() + gmwm.RandomWalk(K=1e-4) + 2 * gmwm.GaussMarkov(),
-        gmwm.LowPassNoise(order=2.0, damping=0.7) + gmwm.GaussMarkov(),
-        gmwm.LowPassNoise(damping=0.7) + gmwm.Resonance(damping=0.05) + gmwm.GaussMarkov(),
-    ],
-    ids=str,
-)
-def test_the_compiled_search_ends_where_minpack_does(model, wv):
+def by_any_curves(model, wv, root, beside=None):
+    """The problem as for processes whose curves compiled code does not know."""
     design = Design(model, Scales.of(wv))
-    root = weight_root(dictionary_fit(wv, wv.variance).covariance)
-    profile = Profile(design, wv.variance, root)
-    best = search(profile)
-    rng = np.random.default_rng(4)
-    for _ in range(4):
-        z = design.pack(best.shapes) + 0.3 * rng.standard_normal(len(design.owners))
-        start = profile.at(design.unpack(z, best.shapes))
-        compiled = profile._compiled(z, start, profile.design.bounds)
-        stepwise = profile._stepwise(z, start, profile.design.bounds)
-        assert compiled.objective <= start.objective
-        assert compiled.objective == pytest.approx(stepwise.objective, rel=1e-7)
-        np.testing.assert_allclose(
-            design.pack(compiled.shapes), design.pack(stepwise.shapes), atol=1e-4
-        )
-        np.testing.assert_allclose(compiled.x, profile.at(compiled.shapes).x, rtol=1e-8)
+    design.compiled = None
+    return Profile(design, wv.variance, root, beside)
 
 
 @pytest.mark.parametrize(
@@ -102,6 +78,7 @@ def test_the_compiled_search_ends_where_minpack_does(model, wv):
         (gmwm.WhiteNoise() + gmwm.GaussMarkov(), [(), (1e3,)]),
         (gmwm.WhiteNoise() + gmwm.GaussMarkov(), [(), (1e-2,)]),
         (gmwm.WhiteNoise() + 2 * gmwm.GaussMarkov(), [(), (0.3,), (0.2,)]),
+        (gmwm.WhiteNoise() + 2 * gmwm.GaussMarkov(), [(), (0.3,), (0.3,)]),  # one has all
         (
             gmwm.WhiteNoise() + gmwm.RandomWalk(K=1e-4) + 2 * gmwm.GaussMarkov(),
             [(), (), (30.0,), (900.0,)],
@@ -115,20 +92,16 @@ def test_the_compiled_search_ends_where_minpack_does(model, wv):
     ],
     ids=str,
 )
-def test_the_compiled_search_goes_where_minpack_goes_step_by_step(model, shapes, wv, monkeypatch):
-    """From far away, with steps that are rejected and such that are held back."""
-    design = Design(model, Scales.of(wv))
+def test_compiled_and_other_curves_lead_to_the_same_minimum(model, shapes, wv):
     root = weight_root(dictionary_fit(wv, wv.variance).covariance)
-    search_of = Profile(design, wv.variance, root)
-    start = search_of.at(shapes)
-    z = design.pack(shapes)
-    for evaluations in range(2, 32):
-        monkeypatch.setattr(profile, "_MOST", evaluations)
-        compiled = search_of._compiled(z, start, design.bounds)
-        stepwise = search_of._stepwise(z, start, design.bounds)
-        np.testing.assert_allclose(
-            design.pack(compiled.shapes), design.pack(stepwise.shapes), atol=3e-9
-        )
+    compiled = Profile(Design(model, Scales.of(wv)), wv.variance, root)
+    start = compiled.at(shapes)
+    found, other = (each.refine(start) for each in (compiled, by_any_curves(model, wv, root)))
+    assert found.objective < start.objective
+    assert found.objective == pytest.approx(other.objective, rel=1e-7)
+    pack = compiled.design.pack
+    np.testing.assert_allclose(pack(found.shapes), pack(other.shapes), atol=1e-4)
+    np.testing.assert_allclose(found.x, compiled.at(found.shapes).x, rtol=1e-8)
 
 
 def test_curves_beside_a_term_are_those_of_terms_of_a_model(wv):
@@ -145,28 +118,13 @@ def test_curves_beside_a_term_are_those_of_terms_of_a_model(wv):
     found = alone.refine(start)
     together = Profile(whole, wv.variance, root)
     expected = together.refine(together.at(shapes))
-    stepwise = alone._stepwise(design.pack(start.shapes), start, design.bounds)
+    stepwise = by_any_curves(gmwm.Model((low_pass,)), wv, root, beside).refine(start)
     for other in (expected, stepwise):
         assert found.objective == pytest.approx(other.objective, rel=1e-7)
         assert found.shapes[0][0] == pytest.approx(other.shapes[0][0], rel=1e-4)
     assert abs(np.log(found.shapes[0][0] / 6.0)) > 0.2
     near = alone.refine(start, 0.1)
     assert abs(np.log(near.shapes[0][0] / 6.0)) == pytest.approx(0.1, rel=1e-6)
-
-
-def test_a_term_without_an_amplitude_does_not_hold_up_the_others(wv):
-    """Its column of the Jacobian is zero, as long as it has none."""
-    design = Design(gmwm.WhiteNoise() + 2 * gmwm.GaussMarkov(), Scales.of(wv))
-    profile = Profile(design, wv.variance, np.diag(1.0 / wv.variance))
-    start = profile.at([(), (0.3,), (0.3,)])  # of two alike, one has all
-    z = design.pack(start.shapes)
-    compiled, stepwise = (
-        profile._compiled(z, start, profile.design.bounds),
-        profile._stepwise(z, start, profile.design.bounds),
-    )
-    assert np.count_nonzero(start.x) == 2
-    assert compiled.objective < start.objective
-    assert compiled.objective == pytest.approx(stepwise.objective, rel=1e-7)
 
 
 def test_an_estimation_is_searched_once_and_does_not_keep_the_series(monkeypatch):
