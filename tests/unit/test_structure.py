@@ -114,7 +114,7 @@ def test_outsiders_import_faces_only():
 
 LINES = {
     "": 920, "_core": 2180, "process": 3190, "readers": 5570, "plotting": 700, "variance": 4080,
-    "diagnosis": 3360, "estimate": 6950, "selection": 1110, "calibration": 2120,
+    "diagnosis": 3360, "estimate": 6950, "selection": 1110, "calibration": 2050,
     "filter_numbers": 3460, "ins": 10060, "population": 2250, "export": 1870, "report": 2250,
     "study": 1700, "cli": 2370,
 }  # fmt: skip

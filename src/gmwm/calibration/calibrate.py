@@ -128,7 +128,6 @@ def _calibrated(
             given = [part for each in given for part in stretches_at_rest(each)]
         treated = [screened(part, screening) for each in given for part in each.by_rate()]
     tasks, skipped = _tasks(treated, model, tuning.REMOVALS if remove_departures else 0)
-    workers.during_startup(compile_steps)
     found = _models_found(tasks, progress)
     done = {name: each for name, each in found.items() if isinstance(each, ChannelModel)}
     skipped |= {name: each for name, each in found.items() if isinstance(each, Notice)}
@@ -189,7 +188,6 @@ def _tasks(
         if each.n < MIN_SAMPLES:
             raise InputError(f"{each.n} samples are too few: record at least {MIN_SAMPLES}")
     robust = frozenset[str]().union(*(each.robust for each in treated))
-<<<<<<< HEAD
     tasks = []
     for name, parts in alive.items():
         extra = next((e.extra[name] for e in treated if e.extra.get(name)), ())
@@ -198,71 +196,6 @@ def _tasks(
         )
         tasks.append(task)
     return tasks, dead
-=======
-    removals = tuning.REMOVALS if remove_departures else 0
-    channels = [
-        _Channel(name, parts, name in robust, models[name], sources[name], offered[name], removals)
-        for name, parts in alive.items()
-    ]
-    found = _models_found(channels, progress)
-    issues: list[Notice] = []  # sensors with rates of their own share those of the reader
-    for one in treated:
-        for issue in one.notices:
-            named = replace(issue, source=one.recording.source) if len(given) > 1 else issue
-            if named not in issues:
-                issues.append(named)
-    chosen = {name: each.fit.model for name, each in found.items() if not isinstance(each, Notice)}
-    models_of, advice = advise_cut(found, given[0].n * given[0].dt if len(given) == 1 else 0.0)
-    issues += advice
-    return _calibration_of(
-        with_validity(models_of, issues, still=still),
-        dead,
-        with_outcomes(issues, chosen, offered if model is None else {}),
-        given,
-        _left_out(given[0], recordings[0]) if len(recordings) == 1 else {},
-    )
-
-
-def _calibration_of(
-    models: Mapping[str, ChannelModel | Notice],
-    dead: Mapping[str, Notice],
-    issues: Sequence[Notice],
-    given: Sequence[Recording],
-    left_out: Mapping[str, tuple[tuple[int, int], ...]],
-) -> Calibration:
-    """Put together what was found of the channels.
-
-    models: Of each channel that was worked on.
-    dead: Why others were not.
-    Raises InputError if no channel has a model.
-    """
-    source = ", ".join(each.source for each in given)
-    done = {name: each for name, each in models.items() if isinstance(each, ChannelModel)}
-    skipped = {name: each for name, each in models.items() if isinstance(each, Notice)}
-    skipped = {**dead, **skipped}
-    if not done:
-        why = "; ".join(f"{name}: {each.text}" for name, each in skipped.items())
-        raise InputError(f"{source or 'the recording'}: {why}")
-    rivals: dict[str, list[Model]] = {}
-    tied, left_open = [], []
-    for name, each in done.items():
-        if each.selection is not None and each.selection.rivals:
-            rivals[name] = [rival.model for rival in each.selection.rivals]
-            tied.append(_ambiguity(name, each.selection))
-        if each.largest is not None:
-            rivals.setdefault(name, []).append(each.largest)
-            left_open.append(unresolved_notice(name, each.fit, each.largest))
-    return Calibration(
-        fits={name: each.fit for name, each in done.items()},
-        skipped=skipped,
-        source=source,
-        rate=given[0].rate,
-        n=sum(each.n for each in given),
-        notices=(*issues, *tied, *left_open),
-        rivals={name: tuple(models) for name, models in rivals.items()},
-        left_out=left_out,
-    )
->>>>>>> refs/heads/estimate
 
 
 def _ambiguity(name: str, selection: Selection) -> Notice:
