@@ -13,6 +13,7 @@ from gmwm.calibration.numbers import (
     AxisNumbers as AxisNumbers,
     SensorNumbers as SensorNumbers,
     axis_numbers as axis_numbers,
+    fast_density as fast_density,
 )
 from gmwm.calibration.removal import without_departures as without_departures
 from gmwm.calibration.screening import SCREENING as SCREENING
