@@ -211,9 +211,9 @@ def si_parameter_unit(parameter_unit: str, quantity: str | None) -> str:
     base = SI_UNIT.get(quantity or "", "u")
     if not parameter_unit.startswith("u"):
         return parameter_unit
-    return {"u s": f"{base} s", "u": base, "u^2": f"({base})^2"}.get(
-        parameter_unit, base + parameter_unit[1:]
-    )
+    spelled = {"u s": f"{base} s", "u": base, "u^2": f"({base})^2"}
+    text = spelled.get(parameter_unit, base + parameter_unit[1:])
+    return text.replace("rad/s/s", "rad/s^2").replace("m/s^2/s", "m/s^3")
 
 
 def field_units(parameter_unit: str, quantity: str | None) -> tuple[FieldUnit, ...]:

@@ -237,8 +237,7 @@ def _random_walk(fit: Fit, key: str) -> Estimate:
 def _bias_instability(fit: Fit, rivals: Sequence[Model]) -> tuple[Estimate, float]:
     """B from the lowest fitted Allan deviation at averaging times with data, and that time.
 
-    A model that runs below the data is not believed: where it does, the lower end of the data's
-    interval (95 %) counts; and where it is lowest below all the data, the lowest of these.
+    Where the model runs below the 95 % interval of the data, its lower end counts.
     """
     at, wv = fit.goodness, fit.wv
     known = np.sqrt(np.array([wv.lower, wv.upper]) / np.maximum(wv.variance, _TINY))
@@ -250,10 +249,8 @@ def _bias_instability(fit: Fit, rivals: Sequence[Model]) -> tuple[Estimate, floa
         limit = float(highest[lowest]) / PLATEAU
         found = Estimate.of(PROCESSES["B"], "bound", 0.0, None, (0.0, limit), wv)
         return found, float(wv.tau[lowest])
-    lowest, seen = int(np.argmin(deviation)), int(np.argmin(at.data))
-    if deviation[lowest] < at.data[seen]:
-        lowest, deviation, low, high = seen, at.data, *(at.data * known)
-    elif deviation[lowest] > fitted[lowest]:
+    lowest = int(np.argmin(deviation))
+    if deviation[lowest] > fitted[lowest]:
         low, high = deviation * known
     b, *ends = (float(each[lowest]) / PLATEAU for each in (deviation, low, high))
     interval = (ends[0], ends[1])
