@@ -211,9 +211,10 @@ def si_parameter_unit(parameter_unit: str, quantity: str | None) -> str:
     base = SI_UNIT.get(quantity or "", "u")
     if not parameter_unit.startswith("u"):
         return parameter_unit
-    spelled = {"u s": f"{base} s", "u": base, "u^2": f"({base})^2"}
-    text = spelled.get(parameter_unit, base + parameter_unit[1:])
-    return text.replace("rad/s/s", "rad/s^2").replace("m/s^2/s", "m/s^3")
+    rate = {"rad/s": "rad/s^2", "m/s^2": "m/s^3"}.get(base, f"{base}/s")
+    spelled = {"u s": f"{base} s", "u^2": f"({base})^2", "u/s": rate}
+    spelled["u/s/sqrt(Hz)"] = f"{rate}/sqrt(Hz)"
+    return spelled.get(parameter_unit, base + parameter_unit[1:])
 
 
 def field_units(parameter_unit: str, quantity: str | None) -> tuple[FieldUnit, ...]:
