@@ -80,7 +80,7 @@ def _filter(calibration: Calibration) -> list[str]:
         for key, value in values.items():
             limit = "<= " if key != "start" and triad.is_upper(key) else ""
             unit = si_parameter_unit(units[key], triad.quantity)
-            row += f" {key} {limit}{value:.3g} {unit} "
+            row += f" {key} {limit}{value:.2e} {unit} "
         lines.append(row.rstrip())
         lines += wrapped(_about(triad, calibration), first=" " * 7, indent=7)
     return lines
@@ -107,7 +107,7 @@ def _about(triad: Triad, calibration: Calibration) -> str:
     nees = [each.get(SHOWN, np.nan) for each in (triad.shared_nees or {}).values()]
     known = [value for value in nees if np.isfinite(value)]
     if known:
-        parts.append(f"predicted NEES {min(known):.2g} to {max(known):.2g}")
+        parts.append(f"NEES {min(known):.2g} to {max(known):.2g}")
     invalid = [axis.name for axis in triad.axes if not calibration[axis.name].valid]
     if invalid:
         parts.append(f"do not use for {', '.join(invalid)}")
@@ -132,8 +132,7 @@ def _actions(calibration: Calibration) -> list[str]:
     for place, text in enumerate(texts[:_ACTIONS], 1):
         shown = wrapped(text, first=f"{place}. ", indent=3)
         lines += shown[:_LINES]
-    left = len(texts) - _ACTIONS
-    return [*lines, f"{left} more: -v"] if left > 0 else lines
+    return lines
 
 
 def _action(group: Sequence[Notice], cut: str) -> str:
