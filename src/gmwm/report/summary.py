@@ -80,10 +80,15 @@ def _filter(calibration: Calibration) -> list[str]:
         for key, value in values.items():
             limit = "<= " if key != "start" and triad.is_upper(key) else ""
             unit = si_parameter_unit(units[key], triad.quantity)
-            row += f" {key} {limit}{value:.2e} {unit} "
+            row += f" {key} {limit}{_short(value)} {unit} "
         lines.append(row.rstrip())
         lines += wrapped(_about(triad, calibration), first=" " * 7, indent=7)
     return lines
+
+
+def _short(value: float) -> str:
+    """Three digits: ``8.10e-4``."""
+    return f"{value:.2e}".replace("e-0", "e-").replace("e+0", "e") if value else "0"
 
 
 def _about(triad: Triad, calibration: Calibration) -> str:
