@@ -190,26 +190,28 @@ def axis_numbers(fit: Fit, rivals: Sequence[Model] = ()) -> AxisNumbers:
 
 
 def fast_density(model: Model, dt: float) -> float:
-    """Density at low frequencies of the terms that average out within a second, u^2/Hz.
+    """Density at low frequencies of the terms that average out, u^2/Hz.
 
-    Quantization noise and periodic lines leave none: their integrals stay bounded.
+    These are the terms with at least half of this density at the corner frequency of a Gauss-Markov
+    process of 0.1 s. Quantization noise and periodic lines leave none: their integrals stay bounded.
 
-    dt: Sampling interval, s.
+    dt: Sampling interval, s; where it is long, the corner is at a quarter of the Nyquist frequency.
     """
-    tau = np.array([1.0, 2.0]) * max(tuning.REFERENCE_TIME, 4.0 * dt)
-    low = tuning.LOW_FREQUENCY / tau
+    corner = 1.0 / (2.0 * np.pi * max(tuning.FAST, 4.0 * dt / np.pi))
     total = 0.0
     for term in model.terms:
         if term.is_line:
             continue
-        first, second = term.haar_variance(tau, dt)
-        if not (first > 0.0 and second < tuning.WHITE_RATIO * first):
-            continue
         if not term.has_spectrum():
-            total += 2.0 * tau[0] * first
+            tau = np.array([1.0, 2.0]) / corner
+            first, second = term.haar_variance(tau, dt)
+            total += 2.0 * tau[0] * first if second < tuning.WHITE_RATIO * first else 0.0
             continue
-        density, lower = term.psd(low, dt)
-        total += float(density) if lower > tuning.FLAT * density else 0.0
+        lower, low, there = term.psd(
+            corner * np.array([0.5, 1.0, 1.0 / tuning.LOW]) * tuning.LOW, dt
+        )
+        is_fast = lower > tuning.FLAT * low and there >= 0.5 * low
+        total += float(low) if is_fast else 0.0
     return total
 
 
