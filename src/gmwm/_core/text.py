@@ -5,13 +5,15 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Iterable
 from html import escape
+from math import floor, log10
 
 from gmwm._core.units import factor
 
 WIDTH = 80
 
 _UNITS = {"rad/s": ("deg/s",), "m/s^2": ("mg", "g")}
-_LARGE, _HUGE = 1000.0, 1e6
+_LARGE, _HUGE, _SMALL = 1000.0, 1e6, 1e-2
+_WIDE = 0.3  # of the value: wider intervals are not symmetric
 
 
 class Printed:
@@ -46,6 +48,26 @@ def brief(value: float, digits: int = 2) -> str:
 def per_cent(share: float, digits: int = 2) -> str:
     """A share with its sign: ``118 %``."""
     return f"{brief(100.0 * share, digits)} %"
+
+
+def with_error(value: float, lower: float, upper: float) -> str:
+    """A value with its interval: ``2.66 +-0.01``; ``150 (40 to 290)`` where it is wide.
+
+    The error has one digit, or two if the first is a 1.
+    """
+    error = 0.5 * (upper - lower)
+    if not (0.0 < error < float("inf")):
+        return brief(value, 4)
+    if error > _WIDE * abs(value):
+        return f"{brief(value)} ({brief(lower)} to {brief(upper)})"
+    first = floor(log10(error))
+    place = first - 1 if error < 2.0 * 10.0**first else first
+    if abs(value) < _SMALL:
+        power = floor(log10(abs(value)))
+        digits = max(0, power - place)
+        return f"{value:.{digits}e} +-{error:.{max(0, first - place)}e}"
+    digits = max(0, -place)
+    return f"{round(value, -place):,.{digits}f} +-{round(error, -place):,.{digits}f}"
 
 
 def bullets(items: Iterable[object]) -> list[str]:

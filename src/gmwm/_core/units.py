@@ -54,9 +54,9 @@ _USUAL = {
         "deg/sqrt(h)": 0.0002908882086657216, "deg/h/sqrt(Hz)": 4.84813681109536e-06,
     },
     "rad/sqrt(s)": {"deg/sqrt(h)": 0.0002908882086657216},
-    "rad/s/s/sqrt(Hz)": {"deg/h/sqrt(h)": 8.080228018492267e-08},
+    "rad/s^2/sqrt(Hz)": {"deg/h/sqrt(h)": 8.080228018492267e-08},
     "m/s^2/sqrt(Hz)": {"ug/sqrt(Hz)": 9.806649999999999e-06, "m/s/sqrt(h)": 0.016666666666666666},
-    "m/s^2/s/sqrt(Hz)": {"ug/sqrt(h)": 1.6344416666666664e-07},
+    "m/s^3/sqrt(Hz)": {"ug/sqrt(h)": 1.6344416666666664e-07},
     "rad": {"deg": 0.017453292519943295}, "m": {"m": 1.0}, "m/s": {"m/s": 1.0},
     "s": {"s": 1.0, "ms": 0.001, "us": 1e-06, "ns": 1e-09},
 }  # fmt: skip
@@ -211,9 +211,10 @@ def si_parameter_unit(parameter_unit: str, quantity: str | None) -> str:
     base = SI_UNIT.get(quantity or "", "u")
     if not parameter_unit.startswith("u"):
         return parameter_unit
-    return {"u s": f"{base} s", "u": base, "u^2": f"({base})^2"}.get(
-        parameter_unit, base + parameter_unit[1:]
-    )
+    rate = {"rad/s": "rad/s^2", "m/s^2": "m/s^3"}.get(base, f"{base}/s")
+    spelled = {"u s": f"{base} s", "u^2": f"({base})^2", "u/s": rate}
+    spelled["u/s/sqrt(Hz)"] = f"{rate}/sqrt(Hz)"
+    return spelled.get(parameter_unit, base + parameter_unit[1:])
 
 
 def field_units(parameter_unit: str, quantity: str | None) -> tuple[FieldUnit, ...]:

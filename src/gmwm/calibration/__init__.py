@@ -8,6 +8,13 @@ from gmwm.calibration.departures import (
     Departure as Departure,
     departures as departures,
 )
+from gmwm.calibration.numbers import (
+    PLATEAU as PLATEAU,
+    AxisNumbers as AxisNumbers,
+    SensorNumbers as SensorNumbers,
+    axis_numbers as axis_numbers,
+    fast_density as fast_density,
+)
 from gmwm.calibration.removal import without_departures as without_departures
 from gmwm.calibration.screening import SCREENING as SCREENING
 from gmwm.calibration.stages import Stopwatch as Stopwatch, stage as stage

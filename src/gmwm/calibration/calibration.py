@@ -5,17 +5,19 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from annotated_types import Ge
 
+from gmwm._core import checks
 from gmwm._core.documents import Document, Rate, Samples, Text, load_document
 from gmwm._core.frozen import freeze
 from gmwm._core.pages import make
 from gmwm._core.tables import frame
 from gmwm._core.text import wrapped
-from gmwm.calibration.summary import sentence
+from gmwm.calibration.numbers import SensorNumbers, axis_numbers
 from gmwm.errors import InputError, MissingNameError
 from gmwm.estimate import Estimate, Fit
 from gmwm.issues import Notice
@@ -112,6 +114,13 @@ class Calibration(Mapping[str, Fit], Document):
         """Whether the recording was examined before the fits."""
         return any(notice.code == "length" for notice in self.notices)
 
+    @cached_property
+    def numbers(self) -> SensorNumbers:
+        """N, B and K of every axis: what a data sheet states."""
+        return SensorNumbers(
+            {name: axis_numbers(fit, self.rivals.get(name, ())) for name, fit in self.items()}
+        )
+
     def __repr__(self) -> str:
         channels = [name if fit.valid else f"{name} (not valid)" for name, fit in self.items()]
         channels += [f"{name} (skipped)" for name in self.skipped]
@@ -122,18 +131,15 @@ class Calibration(Mapping[str, Fit], Document):
         return html
 
     def __str__(self) -> str:
-        """One line a channel; ``print(cal["gyro_x"])`` shows its parameters."""
-        width = max(map(len, (*self.fits, *self.skipped)), default=0)
+        """The sensor numbers; ``print(cal["gyro_x"])`` shows the terms of a model."""
         size = f"{self.duration:.6g} s at {self.rate:g} Hz, {self.n:,} samples a channel"
         lines = wrapped(f"{self.source or 'a recording'}: {size}", indent=2)
-        for name, fit in self.items():
-            verdict = "valid" if fit.valid else "NOT VALID"
-            text = f"{fit.model.title()}. {sentence(fit)}"
-            lines += wrapped(text, first=f"{name:<{width}}  {verdict:<9}  ", indent=2)
+        health = make("verdict", self)
+        lines += [*wrapped(f"{health['word']}: {health['text']}.", indent=2), ""]
+        lines += str(self.numbers).splitlines()
         for name, notice in self.skipped.items():
             lines += wrapped(f"{name}: skipped, {notice.text}", indent=2)
-        health = make("verdict", self)
-        return "\n".join([*lines, *wrapped(f"{health['word']}: {health['text']}.", indent=2)])
+        return "\n".join(lines)
 
     def plot(self, channels: Iterable[str] | None = None, *, units: str = "field") -> Figure:
         """Allan deviations with their models, three channels a row; see `Fit.plot`.
@@ -165,14 +171,27 @@ class Calibration(Mapping[str, Fit], Document):
             ax.remove()
         return figure
 
-    def to_frame(self) -> pandas.DataFrame:
-        """A table of the parameters of all channels, one a row, in SI units; needs pandas."""
+    def to_frame(self, content: str = "numbers", *, units: str = "field") -> pandas.DataFrame:
+        """A table of the sensor numbers, or of the terms of all models; needs pandas.
+
+        Parameters
+        ----------
+        content : {"numbers", "terms"}, optional
+            A row per channel and number (N, B, K), or per channel and parameter of its model.
+        units : {"field", "si"}, optional
+            Data-sheet units, or SI.
+        """
+        if checks.choice("content", content, ("numbers", "terms")) == "numbers":
+            return self.numbers.to_frame(units=units)
         rows = [
-            {"channel": name, **estimate.to_dict(), "valid": fit.valid}
+            {"channel": name, **estimate.to_dict(units), "valid": fit.valid}
             for name, fit in self.fits.items()
             for estimate in fit.estimates
         ]
         return frame(rows, ("channel", *Estimate.COLUMNS, "valid"))
+
+    def derived(self) -> dict[str, Any]:
+        return {"numbers": self.numbers.to_dict()}
 
     # -- files ------------------------------------------------------------------------------------
 

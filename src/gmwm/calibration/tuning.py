@@ -19,10 +19,11 @@ SAME_FREQUENCY = 0.02  # relative; lines of engines wander by about as much (doc
 
 # -- sensor numbers -------------------------------------------------------------------------------
 
-REFERENCE_TIME = 1.0  # s at which white noise is read from an Allan plot (IEEE Std 952)
-WHITE_RATIO = 0.6  # of wavelet variances at 2 s and 1 s; white noise has 0.5
-LOW_FREQUENCY = 0.01  # over 1 / reference time: where the spectrum of fast terms is flat ...
-FLAT = 0.8  # ... if it has this share of its density at half that frequency
+REFERENCE_TIME, LOW_FREQUENCY = 1.0, 0.01  # s; 1/s
+FAST = 0.1  # s: correlation times up to this average out before a filter corrects its bias
+LOW, FLAT = 0.01, 0.8  # of the corner frequency; share of the density there at half of that
+WHITE_RATIO = 0.6  # of wavelet variances at an averaging time and half of it; white noise has 0.5
+NO_OTHER = 1e-9  # of N^2 beside a white noise: rounding errors
 
 # A random walk that the record leaves open is reported if the deviation at the longest outage of
 # the report grows by as much as a valid fit may miss.

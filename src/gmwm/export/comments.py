@@ -134,7 +134,6 @@ def _table(imu: ImuNumbers, triad: Triad) -> list[str]:
             row += [cell(own, 3)] if shared is None else [cell(together.get(time), 3), cell(own, 3)]
         rows.append(row)
     units = ", ".join(f"{key} [{si_parameter_unit(u, triad.quantity)}]" for key, u in columns)
-    units = units.replace("rad/s/s/", "rad/s^2/").replace("m/s^2/s/", "m/s^3/")
     title = f"{triad.quantity}: {units}"
     title += "; NEES" if shared is not None and times else ""
     return [*wrapped(title), *plain_table(heads, rows).splitlines()]

@@ -160,9 +160,9 @@ def test_field_units(quantity, parameter_unit, expected):
             {
                 "u": "rad/s",
                 "u s": "rad/s s",
-                "u/s": "rad/s/s",
+                "u/s": "rad/s^2",
                 "u/sqrt(Hz)": "rad/s/sqrt(Hz)",
-                "u/s/sqrt(Hz)": "rad/s/s/sqrt(Hz)",
+                "u/s/sqrt(Hz)": "rad/s^2/sqrt(Hz)",
             },
         ),
         (
@@ -170,9 +170,9 @@ def test_field_units(quantity, parameter_unit, expected):
             {
                 "u": "m/s^2",
                 "u s": "m/s^2 s",
-                "u/s": "m/s^2/s",
+                "u/s": "m/s^3",
                 "u/sqrt(Hz)": "m/s^2/sqrt(Hz)",
-                "u/s/sqrt(Hz)": "m/s^2/s/sqrt(Hz)",
+                "u/s/sqrt(Hz)": "m/s^3/sqrt(Hz)",
             },
         ),
         (None, {"u": "u", "u s": "u s", "u/s": "u/s", "u/sqrt(Hz)": "u/sqrt(Hz)"}),

@@ -11,6 +11,7 @@ from gmwm.estimate.result.conclusion import (
 from gmwm.estimate.result.estimate import (
     Estimate as Estimate,
     InUnit as InUnit,
+    Kind as Kind,
     Region as Region,
     confidence_interval as confidence_interval,
     estimates_of as estimates_of,

@@ -12,9 +12,10 @@ from annotated_types import Ge, Le
 from scipy.optimize import brentq
 from scipy.special import gammaincinv, lambertw, ndtr, ndtri
 
+from gmwm._core import checks
 from gmwm._core.distributions import student as t
 from gmwm._core.documents import Positive, Text
-from gmwm._core.units import field_units, si_parameter_unit
+from gmwm._core.units import customary_unit, field_units, si_parameter_unit
 from gmwm.estimate import tuning
 from gmwm.estimate.problem import Coordinates, Scales, information_with
 from gmwm.process import Model, Parameter, Process
@@ -72,10 +73,38 @@ class Estimate:
     meaning: str
     field: tuple[InUnit, ...] = ()
 
+    @classmethod
+    def of(
+        cls,
+        process: Process,
+        kind: Kind,
+        value: float,
+        stderr: float | None,
+        interval: tuple[float, float],
+        wv: WaveletVariance,
+    ) -> Estimate:
+        """An estimate of the parameter of a process that has one, SI; ``wv`` has the units."""
+        (parameter,) = process.parameters
+        unit, meaning = parameter.unit, parameter.meaning
+        usual, per_si = customary_unit(unit, wv.quantity, wv.unit)
+        field = (InUnit(value * per_si, interval[0] * per_si, interval[1] * per_si, usual),)
+        si = si_parameter_unit(unit, wv.quantity)
+        return cls(parameter.name, kind, value, stderr, *interval, si, meaning, field)
+
     @property
     def usual(self) -> InUnit:
         """The estimate in the unit that data sheets use."""
-        if self.field:
+        return self.in_units("field")
+
+    def in_units(self, units: str) -> InUnit:
+        """The estimate in the unit that data sheets use ("field"), or in SI ("si").
+
+        Raises
+        ------
+        InputError
+            If the units are neither.
+        """
+        if checks.choice("units", units, ("field", "si")) == "field" and self.field:
             return self.field[0]
         return InUnit(self.value, self.lower, self.upper, self.unit)
 
@@ -97,9 +126,13 @@ class Estimate:
     def __str__(self) -> str:
         return "  ".join(filter(None, self.cells))
 
-    def to_dict(self) -> dict[str, Any]:
-        """The columns of `Fit.to_frame`, in JSON types."""
-        return {name: getattr(self, name) for name in self.COLUMNS}
+    def to_dict(self, units: str = "si") -> dict[str, Any]:
+        """The columns of `Fit.to_frame`, in JSON types; in SI, or in data-sheet units ("field")."""
+        shown = self.in_units(units)
+        values = {name: getattr(self, name) for name in self.COLUMNS}
+        if self.stderr is not None and self.value:
+            values["stderr"] = self.stderr * (shown.value / self.value)
+        return values | {name: getattr(shown, name) for name in ("value", "lower", "upper", "unit")}
 
 
 def estimates_of(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self
@@ -302,22 +302,35 @@ class Fit(Document, Printed):
         tau = np.asarray(tau, dtype=float)
         scales = replace(Scales.of(self.wv), tau=tau)
         curve = scales.curve(self.model)
-        errors = np.sqrt(np.diag(self.covariance))
-        gradient = np.zeros((len(self.keys), tau.size))
-        for i, key in enumerate(self.keys):
-            step = 1e-3 * min(errors[i], abs(self.params[key]) or errors[i])
-            if step == 0.0:
-                continue  # at a limit, where it is not estimated
-            pair = [
-                scales.curve(self.model.with_params({key: self.params[key] + sign * step}))
-                for sign in (1.0, -1.0)
-            ]
-            gradient[i] = ((pair[0] - pair[1]) / (2.0 * step) / (2.0 * curve)).ravel()
-        spread = np.sqrt(np.einsum("ij,ik,kj->j", gradient, self.covariance, gradient))
+        spread = 0.5 * self.logarithmic_error(lambda model: scales.curve(model).ravel())
         value = np.sqrt(2.0 * curve)
         ratio = np.exp(norm.ppf(0.5 + 0.5 * level) * spread.reshape(tau.shape))
         all_ = np.array([value, *(np.sqrt(2.0 * scales.curve(each)) for each in rivals)])
         return value, np.min(all_, axis=0) / ratio, np.max(all_, axis=0) * ratio
+
+    def logarithmic_error(self, value: Callable[[Model], FloatArray]) -> FloatArray:
+        """Standard error of the logarithm of a positive function of the model, (k,).
+
+        By linear propagation of the parameters' covariance.
+
+        Parameters
+        ----------
+        value : callable
+            Model with values -> array of k numbers.
+        """
+        errors = np.sqrt(np.diag(self.covariance))
+        here = value(self.model)
+        gradient = np.zeros((len(self.keys), here.size))
+        for i, key in enumerate(self.keys):
+            step = 1e-3 * min(errors[i], abs(self.params[key]) or errors[i])
+            if step == 0.0:
+                continue  # at a limit, where it is not estimated
+            up, down = (
+                value(self.model.with_params({key: self.params[key] + sign * step}))
+                for sign in (1.0, -1.0)
+            )
+            gradient[i] = (up - down) / (2.0 * step) / here
+        return np.sqrt(np.einsum("ij,ik,kj->j", gradient, self.covariance, gradient))
 
     # -- looks ------------------------------------------------------------------------------------
 
@@ -397,9 +410,15 @@ class Fit(Document, Printed):
 
     # -- tables and files -------------------------------------------------------------------------
 
-    def to_frame(self) -> pandas.DataFrame:
-        """A table of the parameters, one a row, in SI units; needs pandas."""
-        return frame((estimate.to_dict() for estimate in self.estimates), Estimate.COLUMNS)
+    def to_frame(self, *, units: str = "field") -> pandas.DataFrame:
+        """A table of the parameters, one a row; needs pandas.
+
+        Parameters
+        ----------
+        units : {"field", "si"}, optional
+            Data-sheet units, or SI.
+        """
+        return frame((estimate.to_dict(units) for estimate in self.estimates), Estimate.COLUMNS)
 
     def derived(self) -> dict[str, Any]:
         return {

@@ -1,0 +1,259 @@
+"""Sensor numbers: N, B and K of every axis with their 95 % intervals, as data sheets state them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+
+from gmwm._core.tables import frame, plain_table
+from gmwm._core.text import Printed, brief, with_error
+from gmwm._core.typing import FloatArray
+from gmwm.calibration import tuning
+from gmwm.errors import MissingNameError
+from gmwm.estimate import Estimate, Fit, estimate
+from gmwm.estimate.result import confidence_interval
+from gmwm.process import BiasInstability, Model, Process, RandomWalk, WhiteNoise
+
+if TYPE_CHECKING:
+    import pandas
+
+PLATEAU = float(np.sqrt(2.0 * np.log(2.0) / np.pi))
+"""Allan deviation of bias instability over B, 0.664 (IEEE Std 952)."""
+
+PROCESSES: Mapping[str, Process] = {"N": WhiteNoise(), "B": BiasInstability(), "K": RandomWalk()}
+"""The process that has each sensor number as its parameter."""
+
+_WALKS = {"gyro": "angle random walk", "accel": "velocity random walk"}
+_TINY = np.finfo(float).tiny
+
+
+@dataclass(frozen=True)
+class AxisNumbers:
+    """N, B and K of one axis.
+
+    Attributes
+    ----------
+    N : Estimate
+        Angle or velocity random walk, u/sqrt(Hz): the density at low frequencies of all that
+        averages out within a second: white, low-pass and averaged noise, resonances, Gauss-Markov
+        terms faster than 0.1 s.
+    B : Estimate
+        Bias instability, u: the lowest Allan deviation over 0.664 (IEEE Std 952). An upper limit
+        where the deviation still falls at the longest averaging time.
+    K : Estimate
+        Rate random walk, u/s/sqrt(Hz).
+    tau : float
+        Averaging time of the lowest Allan deviation, s.
+    valid : bool
+        Whether the fit is valid.
+    quantity : str
+        "gyro", "accel" or empty.
+
+    Notes
+    -----
+    A number that the record only limits has the kind "bound"; ``upper`` is its 95 % upper limit,
+    infinite if the record is too short for one.
+    """
+
+    N: Estimate
+    B: Estimate
+    K: Estimate
+    tau: float
+    valid: bool
+    quantity: str
+
+    def __iter__(self) -> Iterator[Estimate]:
+        return iter((self.N, self.B, self.K))
+
+    def text(self, letter: str, *, units: str = "field") -> str:
+        """``2.66 +-0.01``, or ``<= 41.9`` for an upper limit; without the unit.
+
+        Parameters
+        ----------
+        letter : {"N", "B", "K"}
+        units : {"field", "si"}, optional
+        """
+        number: Estimate = getattr(self, letter)
+        shown = number.in_units(units)
+        if number.kind == "bound":
+            return f"<= {shown.upper:.3g}" if np.isfinite(shown.upper) else "-"
+        return with_error(shown.value, shown.lower, shown.upper)
+
+
+class SensorNumbers(Mapping[str, AxisNumbers], Printed):
+    """N, B and K of every axis of a sensor: channel -> `AxisNumbers`; see `Calibration.numbers`."""
+
+    COLUMNS: ClassVar = (
+        "channel",
+        "number",
+        "kind",
+        "value",
+        "lower",
+        "upper",
+        "unit",
+        "tau",
+        "valid",
+    )
+
+    def __init__(self, axes: Mapping[str, AxisNumbers]) -> None:
+        self._axes = dict(axes)
+
+    def __getitem__(self, name: str) -> AxisNumbers:
+        if name not in self._axes:
+            known = ", ".join(self._axes)
+            raise MissingNameError(f"there is no channel {name!r}: there are {known}")
+        return self._axes[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._axes)
+
+    def __len__(self) -> int:
+        return len(self._axes)
+
+    def __repr__(self) -> str:
+        return f"<SensorNumbers of {', '.join(self)}>"
+
+    def __str__(self) -> str:
+        return self.text()
+
+    def text(self, *, units: str = "field", invalid: Mapping[str, str] | None = None) -> str:
+        """A table of the numbers with their 95 % intervals.
+
+        Parameters
+        ----------
+        units : {"field", "si"}, optional
+            Data-sheet units, or SI.
+        invalid : dict of str to str, optional
+            Channel -> what stands in place of numbers that are not valid; "not valid" by default.
+        """
+        rows: list[Sequence[str]] = []
+        for quantity in dict.fromkeys(axis.quantity for axis in self.values()):
+            own = {name: axis for name, axis in self.items() if axis.quantity == quantity}
+            walk = _WALKS.get(quantity, "random walk")
+            rows.append((quantity, f"N, {walk}", "B, bias instability", "K, rate random walk"))
+            rows.append(("", *(number.in_units(units).unit for number in next(iter(own.values())))))
+            for name, axis in own.items():
+                n, b, k = (axis.text(letter, units=units) for letter in "NBK")
+                b = f"{b} at {brief(axis.tau, 3)} s"
+                mark = "" if axis.valid else (invalid or {}).get(name, "not valid")
+                rows.append((name, mark or n, b if not mark else "", k if not mark else ""))
+        return plain_table(rows[0], rows[1:])
+
+    def rows(self, units: str = "field") -> list[dict[str, Any]]:
+        """A row per channel and number, in data-sheet units or with "si" in SI."""
+        rows = []
+        for name, axis in self.items():
+            for number in axis:
+                shown = number.in_units(units)
+                found = number.kind != "bound"
+                values = (name, number.key, number.kind, shown.value if found else None)
+                limits = (shown.lower, shown.upper if np.isfinite(shown.upper) else None)
+                tau = axis.tau if number.key == "B" else None
+                row = (*values, *limits, shown.unit, tau, axis.valid)
+                rows.append(dict(zip(self.COLUMNS, row, strict=True)))
+        return rows
+
+    def to_dict(self) -> dict[str, Any]:
+        """Channel -> letter -> value with its interval, SI, in JSON types."""
+        found: dict[str, Any] = {name: {"valid": axis.valid} for name, axis in self.items()}
+        for row in self.rows("si"):
+            keys = ("kind", "value", "lower", "upper", "unit", "tau")
+            known = {key: row[key] for key in keys if key != "tau" or row["number"] == "B"}
+            found[row["channel"]][row["number"]] = known
+        return found
+
+    def to_frame(self, *, units: str = "field") -> pandas.DataFrame:
+        """A table with a row per channel and number; needs pandas.
+
+        Parameters
+        ----------
+        units : {"field", "si"}, optional
+            Data-sheet units, or SI.
+        """
+        return frame(self.rows(units), self.COLUMNS)
+
+
+# -- one axis --------------------------------------------------------------------------------------
+
+
+def axis_numbers(fit: Fit, rivals: Sequence[Model] = ()) -> AxisNumbers:
+    """The sensor numbers of a fitted model.
+
+    rivals: Models that fit equally well; the interval of B covers them.
+    """
+    bias, tau = _bias_instability(fit, rivals)
+    n, k = (_random_walk(fit, letter) for letter in "NK")
+    return AxisNumbers(n, bias, k, tau, fit.valid, fit.wv.quantity or "")
+
+
+def fast_density(model: Model, dt: float) -> float:
+    """Density at low frequencies of the terms that average out, u^2/Hz.
+
+    These are the terms with at least half of this density at the corner frequency of a Gauss-Markov
+    process of 0.1 s. Quantization noise and periodic lines leave none: their integrals stay bounded.
+
+    dt: Sampling interval, s; where it is long, the corner is at a quarter of the Nyquist frequency.
+    """
+    corner = 1.0 / (2.0 * np.pi * max(tuning.FAST, 4.0 * dt / np.pi))
+    total = 0.0
+    for term in model.terms:
+        if term.is_line:
+            continue
+        if not term.has_spectrum():
+            tau = np.array([1.0, 2.0]) / corner
+            first, second = term.haar_variance(tau, dt)
+            total += 2.0 * tau[0] * first if second < tuning.WHITE_RATIO * first else 0.0
+            continue
+        lower, low, there = term.psd(
+            corner * np.array([0.5, 1.0, 1.0 / tuning.LOW]) * tuning.LOW, dt
+        )
+        is_fast = lower > tuning.FLAT * low and there >= 0.5 * low
+        total += float(low) if is_fast else 0.0
+    return total
+
+
+def _random_walk(fit: Fit, key: str) -> Estimate:
+    """N or K of a fit: that of its own term, for N the density of fast terms, or an upper limit."""
+    process, own = PROCESSES[key], fit.params.get(key, 0.0)
+
+    def density(model: Model) -> FloatArray:
+        return np.array([fast_density(model, fit.wv.dt)])
+
+    total = float(density(fit.model)[0]) if key == "N" else own**2
+    if own > 0.0 and total <= (1.0 + tuning.NO_OTHER) * own**2:
+        return fit[key]
+    if total > 0.0:
+        error = 0.5 * float(fit.logarithmic_error(density)[0]) * total**0.5
+        interval = confidence_interval(process.parameters[0], total**0.5, error, 0.95)
+        return Estimate.of(process, "estimated", total**0.5, error, interval, fit.wv)
+    # Given shapes, such as that of a line or of a low-pass, stay as they are.
+    opened = fit.model.with_params(dict.fromkeys([*fit.keys, *fit.upper_bounds]))
+    again = estimate(opened if key in fit.params else opened + process, fit.wv)
+    limit = float(again.interval()[key][1])
+    return Estimate.of(process, "bound", 0.0, None, (0.0, limit), fit.wv)
+
+
+def _bias_instability(fit: Fit, rivals: Sequence[Model]) -> tuple[Estimate, float]:
+    """B from the lowest fitted Allan deviation at averaging times with data, and that time.
+
+    Where the model runs below the 95 % interval of the data, its lower end counts.
+    """
+    at, wv = fit.goodness, fit.wv
+    known = np.sqrt(np.array([wv.lower, wv.upper]) / np.maximum(wv.variance, _TINY))
+    fitted, low, high = fit.deviation_interval(wv.tau, rivals=rivals)
+    deviation, highest = (np.fmax(each, at.data * known[0]) for each in (fitted, high))
+    if np.argmin(deviation) == wv.tau.size - 1:
+        # The lowest is no higher than any of them.
+        lowest = int(np.argmin(highest))
+        limit = float(highest[lowest]) / PLATEAU
+        found = Estimate.of(PROCESSES["B"], "bound", 0.0, None, (0.0, limit), wv)
+        return found, float(wv.tau[lowest])
+    lowest = int(np.argmin(deviation))
+    if deviation[lowest] > fitted[lowest]:
+        low, high = deviation * known
+    b, *ends = (float(each[lowest]) / PLATEAU for each in (deviation, low, high))
+    interval = (ends[0], ends[1])
+    return Estimate.of(PROCESSES["B"], "estimated", b, None, interval, wv), float(wv.tau[lowest])
