@@ -47,6 +47,8 @@ class Issue:
         it makes that of its own channel invalid.
     masks: Whether samples are left out for it.
     user_only: Whether only the user can follow the hint.
+    repeats: "reader": notices of the reader, or reasons to skip a channel, say the same;
+        "diagnosis": findings of the examination have the same numbers.
     """
 
     code: str
@@ -59,6 +61,7 @@ class Issue:
     spoils: tuple[str, ...] = ()
     masks: bool = False
     user_only: bool = False
+    repeats: Literal["", "reader", "diagnosis"] = ""
 
 
 @dataclass(frozen=True)
@@ -178,6 +181,11 @@ def notice(
     )
 
 
+def failure(code: str, where: str, text: str) -> Notice:
+    """A bad notice of what could not be done, by the code and the sentence of an `InputError`."""
+    return Notice(code, "bad", where, text)
+
+
 class _Text(Formatter):
     """`str.format` with shares in per cent and plurals."""
 
@@ -271,7 +279,7 @@ _READERS = (
           "all": "{each}all {n:,} samples missing",
           "one": "{each}{missing:,} of {n:,} samples missing, in one gap",
           "many": "{each}{missing:,} of {n:,} samples missing, in {gaps:,} gaps, the longest "
-                  "{longest:,} sample{longest:s?}"}, topic="reading"),
+                  "{longest:,} sample{longest:s?}"}, topic="reading", repeats="diagnosis"),
     Issue("part", "the part from {start:.6g} to {stop:.6g} s is used; times count from its start",
           topic="reading"),
     Issue("partial-record", "the last record is cut off, {bytes} of its {size} bytes are there: "
@@ -334,7 +342,8 @@ _DIAGNOSIS = (
           severity="warning", topic="samples"),
     Issue("dead", "every sample is {shown}: the channel is dead",
           "check sensor and columns; the calibration skips it",
-          severity="bad", topic="samples", lacks="samples_change", spoils=("channel",)),
+          severity="bad", topic="samples", lacks="samples_change", spoils=("channel",),
+          repeats="reader"),
     Issue("drift",
           {"": "means of {length:.3g} s wander by {shown} rms, {times} times what the fast noise "
                "leaves",
@@ -350,7 +359,7 @@ _DIAGNOSIS = (
           severity="warning", topic="samples", masks=True),
     Issue("events-left-out",
           "{samples:,} samples of {copies}spikes, shocks or lost packets left out",
-          topic="samples"),
+          topic="samples", repeats="diagnosis"),
     Issue("filled",
           "{share:.2g%} of the samples lie on straight lines between others: put there for samples "
           "that were lost or sorted out",
@@ -361,7 +370,7 @@ _DIAGNOSIS = (
           {"": "{missing:,.0f} of {n:,} samples missing ({share:.2g%}) in {gaps:,.0f} "
                "gap{gaps:s?}, the longest {longest:.3g} s",
            "all": "all samples missing"},
-          severity="bad", topic="samples"),
+          severity="bad", topic="samples", repeats="reader"),
     Issue("heavy-tails",
           {"student": "the noise has heavy tails, like Student's t with {shape:.2g} degrees of "
                       "freedom: large samples belong to it",
@@ -376,7 +385,7 @@ _DIAGNOSIS = (
           lacks="samples_measured", reason="samples that repeat the one before",
           spoils=("channel",), masks=True, user_only=True),
     Issue("infinite", "{count:,} infinite samples", "repair them, or set them to NaN for missing",
-          severity="bad", topic="samples"),
+          severity="bad", topic="samples", repeats="reader"),
     Issue("interpolated",
           "{share:.2g%} of the samples lie on straight lines between others: interpolated from "
           "about {rate:.3g} Hz, so the noise is not the sensor's",
@@ -497,9 +506,10 @@ _CALIBRATION = (
           "leave it out{back}", severity="bad", topic="departure", lacks="stationary",
           reason="drift after switching on"),
     Issue("fit-not-valid", {
-        "": "{text}",
+        "": "the fit failed; do not use these numbers",
+        "filter": "the fit{count:s?} {are} not valid: do not use these numbers in a filter",
         "compared": "its own fit is not valid ({reasons})",
-    }, topic="recording"),
+    }, "read its notices first", severity="warning", topic="recording"),
     Issue("longest-part",
           "the longest part without the {count} steps and drifts is {kept:,.0f} s of {of:,.0f} s, "
           "from {start:.6g} s to {stop:.6g} s",

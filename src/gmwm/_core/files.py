@@ -50,6 +50,16 @@ def written(path: str | os.PathLike[str]) -> Iterator[TextIO]:
         yield stream
 
 
+def write_text(path: str | os.PathLike[str], text: str) -> Path:
+    """Write a text file, with a line end at its end, whole or not at all; returns its path.
+
+    Raises InputError if it cannot be written.
+    """
+    with written(path) as stream:
+        stream.write(text if text.endswith("\n") else f"{text}\n")
+    return Path(path)
+
+
 @contextmanager
 def moved_together(folder: Path) -> Iterator[Path]:
     """A temporary folder to be filled; its files take their places together when all went well.

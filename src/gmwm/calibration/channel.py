@@ -11,7 +11,7 @@ from gmwm.calibration.steadiness import steadiness_notice
 from gmwm.calibration.summary import with_largest_walk
 from gmwm.errors import InputError
 from gmwm.estimate import Fit, estimate
-from gmwm.issues import Notice, notice
+from gmwm.issues import Notice, failure
 from gmwm.process import Model, Process
 from gmwm.selection import Selection, select
 from gmwm.variance import WaveletVariance
@@ -44,12 +44,14 @@ Found = Mapping[str, ChannelModel | Notice]
 
 
 def model_of(name: str, model: GivenModels) -> Process | Model | None:
-    """The model given for a channel."""
+    """The model given for a channel: its own, its sensor's, or that of "" for all."""
     if not isinstance(model, Mapping):
         return model
-    if name not in model:
-        raise InputError(f"no model is given for channel {name!r}: add one to the mapping")
-    return model[name]
+    for key in (name, name.partition("_")[0], ""):
+        if key in model:
+            return model[key]
+    hint = "add one to the mapping"
+    raise InputError(f"no model is given for {name}", "model-missing", hint, {"channel": name})
 
 
 def channel_model(
@@ -84,7 +86,7 @@ def channel_model(
                 break
             removed = [gone + more for gone, more in zip(removed, there, strict=True)]
     except InputError as error:
-        return Notice(error.code or "not-estimable", "bad", name, str(error))
+        return failure(error.code or "not-estimable", name, str(error))
     curves = list(zip(before, parts, strict=True))
     fit = with_departures(found.fit, sources, there, removed, curves, removing=removals > 0)
     with stage("departures"):

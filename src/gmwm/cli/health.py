@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
 import click
 
+from gmwm.cli.console import print_result
 from gmwm.cli.options import (
+    FILE_TO_WRITE,
     PATH,
-    memory_option,
-    output_file,
+    options,
     part_options,
     printing_options,
     read_recording,
@@ -21,10 +21,17 @@ from gmwm.cli.options import (
 
 @click.command()
 @click.argument("file", type=PATH)
-@output_file("Write all findings with their numbers, in SI units, to this file.")
+@options(
+    """
+    -o --output FILE  Write all findings with their numbers, in SI units, to this file.
+    """,
+    output=FILE_TO_WRITE,
+)
 @reading_options
 @part_options
-@memory_option
+@options("""
+    --memory
+    """)
 @printing_options
 def health(
     file: Path,
@@ -50,12 +57,6 @@ def health(
     with limited(memory):
         recording = read_recording(file, **reading)
     found = examine(recording)
-    # The file first: who pipes the table into head must not lose it.
-    if output is not None:
+    if output is not None:  # first: who pipes the table into head must not lose it
         found.save(output)
-    if as_json:
-        click.echo(json.dumps(found.to_dict(), allow_nan=False))
-    elif not quiet:
-        click.echo(found)
-        if output is not None:
-            click.echo(f"\nwrote {output}")
+    print_result(found, output, as_json=as_json, quiet=quiet)

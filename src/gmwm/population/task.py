@@ -22,7 +22,7 @@ from gmwm._core.memory import OUT_OF_MEMORY
 from gmwm.calibration import SCREENING, calibrate, floor, noise_density, random_walk
 from gmwm.errors import InputError, printable
 from gmwm.estimate import Fit
-from gmwm.issues import Notice
+from gmwm.issues import Notice, failure
 from gmwm.population.unit import DERIVED, Number, Unit
 from gmwm.process import Model, as_model
 from gmwm.readers import read
@@ -135,14 +135,8 @@ class Task:
             )
         before, digest = _state(item.path), digest_of(item.path)
         recording = read(item.path, **self.reading).part(self.start, self.stop)
-        models = {}
-        for name in (channel.name for channel in recording.inertial):
-            keys = [key for key in (name, name.partition("_")[0], "") if key in self.models]
-            if keys:
-                models[name] = self.models[keys[0]]
-        model = models if self.models else None
         calibration = calibrate(
-            recording, model, screening=self.screening, still=self.still, jobs=1
+            recording, self.models or None, screening=self.screening, still=self.still, jobs=1
         )
         if _state(item.path) != before:
             raise InputError(
@@ -154,7 +148,7 @@ class Task:
 
 
 def _failed(item: Item, code: str, text: str) -> Unit:
-    return Unit(item.path, item.name, Notice(code, "bad", item.name, text))
+    return Unit(item.path, item.name, failure(code, item.name, text))
 
 
 def _state(path: str) -> list[tuple[int, int]]:

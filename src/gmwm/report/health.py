@@ -22,8 +22,6 @@ from gmwm.report.numbers import SHOWN
 _COUNTED = {"bad": "severe issue", "warning": "warning", "note": "note"}
 _LEAST_CHANGE = 1e-3
 _LABELS = {"bad": "severe"}
-_COUNTED_ELSEWHERE = ("missing-samples", "events-left-out")
-"""Of an examined recording, notices of gaps and events have the same numbers."""
 
 
 def health(calibration: Calibration) -> dict[str, Any]:
@@ -65,7 +63,7 @@ def _of_recording(calibration: Calibration) -> list[Notice]:
         notice
         for notice in gathered(calibration.notices)
         if notice.code not in (AMBIGUITY, LONGEST_PART)
-        and not (calibration.is_examined and notice.code in _COUNTED_ELSEWHERE)
+        and not (calibration.is_examined and notice.issue.repeats == "diagnosis")
     ]
 
 
