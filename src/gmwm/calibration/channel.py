@@ -11,7 +11,7 @@ from gmwm.calibration.steadiness import steadiness_notice
 from gmwm.calibration.summary import with_largest_walk
 from gmwm.errors import InputError
 from gmwm.estimate import Fit, estimate
-from gmwm.issues import Notice, failure
+from gmwm.issues import Notice, failure, notice
 from gmwm.process import Model, Process
 from gmwm.selection import Selection, select
 from gmwm.variance import WaveletVariance

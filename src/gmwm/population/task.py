@@ -22,7 +22,7 @@ from gmwm._core.memory import OUT_OF_MEMORY
 from gmwm.calibration import SCREENING, calibrate, floor, noise_density, random_walk
 from gmwm.errors import InputError, printable
 from gmwm.estimate import Fit
-from gmwm.issues import Notice, failure
+from gmwm.issues import failure
 from gmwm.population.unit import DERIVED, Number, Unit
 from gmwm.process import Model, as_model
 from gmwm.readers import read
