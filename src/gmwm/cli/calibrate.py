@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,16 +15,7 @@ from gmwm._core.files import folder_to_fill, moved_together, replaceable
 from gmwm._core.text import wrapped
 from gmwm.cli.console import command_line, new_console, new_table, print_whole, progress_bar
 from gmwm.cli.hints import in_options, with_option
-from gmwm.cli.options import (
-    PATH,
-    estimating_options,
-    folder_to_write,
-    options,
-    part_options,
-    printing_options,
-    read_recording,
-    reading_options,
-)
+from gmwm.cli.options import PATH, folder_to_write, options, read_recording
 from gmwm.errors import InputError
 
 if TYPE_CHECKING:
@@ -48,20 +39,19 @@ kept on disk is calibrated by one process."""
 _FILES = ("calibration.json", "report.html", "imu.yaml")
 
 
-def output_option(default: str) -> Callable[[Any], Any]:
-    """Of a folder for what `write_files` writes."""
-    usage = f"\n    -o --output  Folder for {', '.join(_FILES)}."
-    return options(usage, output=folder_to_write(default, _FILES))
+def folder_of_results(default: str) -> dict[str, Any]:
+    """Settings of the option of a folder for what `write_files` writes."""
+    return folder_to_write(default, _FILES)
 
 
 @click.command()
 @click.argument("files", metavar="FILE...", nargs=-1, required=True, type=PATH)
-@output_option("gmwm-out")
-@reading_options
-@part_options
-@estimating_options
 @options(
     """
+    -o --output  Folder for calibration.json, report.html, imu.yaml.
+    --reading
+    --part
+    --estimating
     --remove-departures  Subtract steps, transients at the start and slow periods that are found,
         and calibrate what is left.
     --export NAME  Also write the file of this program into the folder; see gmwm export --list.
@@ -69,11 +59,13 @@ def output_option(default: str) -> Callable[[Any], Any]:
     --jobs N  Processes at most; short recordings take one.
     --timings  Print where the time went, stage by stage.
     --memory
+    --json
+    --quiet
     """,
+    output=folder_of_results("gmwm-out"),
     export={"name": "target"},
     jobs={"default": 2},
 )
-@printing_options
 def calibrate(
     files: Sequence[Path],
     output: Path,

@@ -9,15 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from gmwm.cli.console import command_line, print_result, progress_bar
-from gmwm.cli.options import (
-    FILE_TO_WRITE,
-    PATH,
-    options,
-    part_options,
-    printing_options,
-    read_recording,
-    reading_options,
-)
+from gmwm.cli.options import FILE_TO_WRITE, PATH, options, read_recording
 
 if TYPE_CHECKING:
     from gmwm.calibration import Calibration
@@ -30,12 +22,13 @@ if TYPE_CHECKING:
     -o --output HTML  Page to write, of two printed ones.
     --horizon
     --datasheet
+    --reading
+    --part
+    --json
+    --quiet
     """,
     output=FILE_TO_WRITE,
 )
-@reading_options
-@part_options
-@printing_options
 def compare(
     files: Sequence[Path],
     output: Path | None,

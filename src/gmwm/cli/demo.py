@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from gmwm._core.files import folder_to_fill, moved_together
-from gmwm.cli.calibrate import output_option, write_files
+from gmwm.cli.calibrate import folder_of_results, write_files
 from gmwm.cli.console import new_console, new_table, print_whole, progress_bar
 from gmwm.cli.options import options
 
@@ -18,14 +18,15 @@ if TYPE_CHECKING:
 
 
 @click.command()
-@output_option("gmwm-demo")
 @options(
     """
+    -o --output  Folder for calibration.json, report.html, imu.yaml.
     --hours NUMBER  Length of the simulated recording in hours.
     --seed N  Of the noise.
     --files  Only write files to try the other commands with: static.csv of a sensor at rest,
         imu.csv and fixes.csv of a drive with it.
     """,
+    output=folder_of_results("gmwm-demo"),
     hours={"type": click.FloatRange(0.01, 100.0), "default": 1.0},
     seed={"type": int, "default": 1},
 )

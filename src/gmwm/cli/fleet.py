@@ -11,15 +11,7 @@ import click
 from gmwm.cli.calibrate import exit_unless
 from gmwm.cli.console import print_result, progress_bar
 from gmwm.cli.hints import with_hint
-from gmwm.cli.options import (
-    arguments_of_read,
-    estimating_options,
-    folder_to_write,
-    options,
-    part_options,
-    printing_options,
-    reading_options,
-)
+from gmwm.cli.options import arguments_of_read, folder_to_write, options
 from gmwm.errors import InputError
 
 _PARTS = ("start", "stop", "screening", "still", "horizon", "resume", "jobs", "cluster")
@@ -34,13 +26,14 @@ _PARTS = ("start", "stop", "screening", "still", "horizon", "resume", "jobs", "c
     --cluster
     --resume
     --horizon
+    --reading
+    --part
+    --estimating
+    --json
+    --quiet
     """,
     output=folder_to_write("gmwm-fleet"),
 )
-@reading_options
-@part_options
-@estimating_options
-@printing_options
 def fleet(
     patterns: Sequence[str],
     output: Path,

@@ -8,15 +8,7 @@ from typing import Any
 import click
 
 from gmwm.cli.console import print_result
-from gmwm.cli.options import (
-    FILE_TO_WRITE,
-    PATH,
-    options,
-    part_options,
-    printing_options,
-    read_recording,
-    reading_options,
-)
+from gmwm.cli.options import FILE_TO_WRITE, PATH, options, read_recording
 
 
 @click.command()
@@ -24,15 +16,14 @@ from gmwm.cli.options import (
 @options(
     """
     -o --output FILE  Write all findings with their numbers, in SI units, to this file.
+    --reading
+    --part
+    --memory
+    --json
+    --quiet
     """,
     output=FILE_TO_WRITE,
 )
-@reading_options
-@part_options
-@options("""
-    --memory
-    """)
-@printing_options
 def health(
     file: Path,
     output: Path | None,

@@ -12,15 +12,7 @@ import click
 from gmwm._core.files import folder_to_fill, write_text
 from gmwm.cli.console import print_result, progress_bar
 from gmwm.cli.hints import with_option
-from gmwm.cli.options import (
-    PATH,
-    READING,
-    arguments_of_read,
-    folder_to_write,
-    numbers,
-    options,
-    reading_options,
-)
+from gmwm.cli.options import PATH, READING, arguments_of_read, folder_to_write, numbers, options
 from gmwm.errors import InputError
 
 _NEEDED = (
@@ -125,6 +117,7 @@ def _sensors(flag: str, texts: Sequence[str]) -> str | dict[str, str]:
     --gyro-bias VALUE  Bias of a gyro at switch-on, 1 sigma.  [default: 0.1 deg/s]
     --accel-bias VALUE  The same of an accelerometer.  [default: 0.1 m/s^2]
     --json
+    --reading
     """,
     truth=_key(_absolute),
     filter=_key(_named, name="filters", multiple=True),
@@ -142,7 +135,6 @@ def _sensors(flag: str, texts: Sequence[str]) -> str | dict[str, str]:
     position_sd=_key(_sd),
     velocity_sd=_key(_sd),
 )
-@reading_options
 def navigate(
     file: Path | None, output: Path, as_json: bool, imu_start: float | None, **keys: Any
 ) -> None:

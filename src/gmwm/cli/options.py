@@ -41,67 +41,45 @@ def options(declared: str, **settings: dict[str, Any]) -> Decorator:
     """The options of a command, declared as its help shows them.
 
     declared: On each line flags, what is to be given after them, if it is no switch, two blanks
-        and the help, which may go on on further lines; or only the flag of an option of `_SHARED`.
+        and the help, which may go on on further lines; or only the name of an option or a group of
+        `_SHARED`, as a flag.
     settings: Of `click.option`, by the name of the last flag; ``name`` is that of the argument.
     """
+    given = _group(declared, settings)
 
     def decorated(command: Any) -> Any:
-        for name, entry in reversed(_entries(declared).items()):
-            own = settings.get(name, {})
-            if not entry[2] and name in _SHARED:
-                entry, own = _SHARED[name], _SETTINGS.get(name, {})
-            command = _option(*entry, **own)(command)
+        for each in reversed(given):
+            command = each(command)
         return command
 
     return decorated
 
 
-def _entries(declared: str) -> dict[str, tuple[list[str], str, str]]:
-    """Name -> flags, what is to be given, and help."""
+def _declared(declared: str, settings: dict[str, dict[str, Any]]) -> dict[str, list[Decorator]]:
+    """The option or the group of each name."""
     found = {}
     for entry in re.split(r"\n +(?=-)", declared)[1:]:
         usage, _, text = entry.strip().partition("  ")
         flags = [word for word in usage.split() if word.startswith("-")]
-        name = flags[-1].lstrip("-").replace("-", "_")
-        found[name] = flags, usage.removeprefix(" ".join(flags)).strip(), " ".join(text.split())
+        key = flags[-1].lstrip("-").replace("-", "_")
+        if not text and key in _SHARED:
+            found[key] = _SHARED[key]
+            continue
+        metavar, own = usage.removeprefix(" ".join(flags)).strip(), dict(settings.get(key, {}))
+        # A default is added to the help, unless it is zero or settings hide it.
+        usual: dict[str, Any] = {"show_default": bool(own.get("default"))}
+        if metavar in _TYPES:
+            usual["type"] = _TYPES[metavar]
+        elif not metavar and "type" not in own:
+            usual["is_flag"] = True
+        names = [*flags, own.pop("name")] if "name" in own else flags
+        usual |= {"metavar": metavar or None, "help": " ".join(text.split())}
+        found[key] = [click.option(*names, **(usual | own))]
     return found
 
 
-def _option(
-    flags: list[str], metavar: str, text: str, name: str = "", **settings: Any
-) -> Decorator:
-    """An option; a default is added to its help, unless it is zero or settings hide it."""
-    usual: dict[str, Any] = {"show_default": bool(settings.get("default"))}
-    if metavar in _TYPES:
-        usual["type"] = _TYPES[metavar]
-    elif not metavar and "type" not in settings:
-        usual["is_flag"] = True
-    names = [*flags, name] if name else flags
-    return click.option(*names, metavar=metavar or None, help=text or None, **(usual | settings))
-
-
-_SHARED = _entries("""
-    --jobs N  Processes; one a core by default.
-    --cluster ADDRESS  Dask scheduler that does the work, e.g. tcp://10.0.0.1:8786; its workers read
-        the files.
-    --resume  Go on with what the folder holds; what changed is done again.
-    --horizon S  Longest outage that the filter numbers cover, in seconds.
-    --datasheet YAML  N, B and K by sensor or channel, each with its unit, to be drawn over the
-        curves of the report: 'gyro: {N: 0.15 deg/sqrt(h), B: 7 deg/h}'.
-    --memory GB  For the samples: those of a longer file are kept on disk, in TMPDIR, and about
-        three times one channel is in memory. By default 1 GB.
-    --units  Units of the table; files and JSON are in SI.
-    --json  Print the result as JSON, in SI units.
-    -q --quiet  Print nothing but errors.
-    """)
-_SETTINGS: dict[str, dict[str, Any]] = {
-    "jobs": {"default": lambda: os.cpu_count() or 1, "show_default": False},
-    "horizon": {"default": 60.0},
-    "memory": {"type": float},
-    "units": {"type": click.Choice(["field", "si"]), "default": "field"},
-    "json": {"name": "as_json"},
-}
-"""Options of several commands, and their settings."""
+def _group(declared: str, settings: dict[str, dict[str, Any]]) -> list[Decorator]:
+    return [each for group in _declared(declared, settings).values() for each in group]
 
 
 def _terms() -> str:
@@ -139,7 +117,11 @@ def seconds(flag: str, text: str) -> list[float]:
     return numbers(flag, text, "seconds, e.g. 1,10,60")
 
 
-reading_options = options(
+READING = ("rate", "gyro_unit", "accel_unit", "channel", "time", "format", "layout", "damaged")
+"""Arguments of the options of a file."""
+
+_SHARED: dict[str, list[Decorator]] = {}
+_SHARED["reading"] = _group(
     f"""
     --rate NUMBER  Sampling rate in Hz; needed without a time column.
     --gyro-unit TEXT  Unit of the gyro columns: rad/s, deg/s, deg/h, ...
@@ -154,15 +136,9 @@ reading_options = options(
     --damaged  Use the readable part of a text or a flight log that is cut off or damaged; it is
         rejected otherwise.
     """,
-    channel={"multiple": True},
-    format={"type": click.Choice(FORMATS)},
+    {"channel": {"multiple": True}, "format": {"type": click.Choice(FORMATS)}},
 )
-"""What the file is, for `read_recording`."""
-
-READING = ("rate", "gyro_unit", "accel_unit", "channel", "time", "format", "layout", "damaged")
-"""Their arguments."""
-
-part_options = options(
+_SHARED["part"] = _group(
     """
     --topic NAME  Topic of a bag or a flight log; needed where several have an IMU. Repeat for gyros
         and accelerometers in topics of their own.
@@ -171,13 +147,13 @@ part_options = options(
     --start S  Leave out samples before this time, in seconds.
     --stop S  Leave out samples after this time, in seconds.
     """,
-    topic={"multiple": True},
-    clock={"type": click.Choice(CLOCKS), "default": CLOCKS[0]},
-    start={"default": 0.0},
+    {
+        "topic": {"multiple": True},
+        "clock": {"type": click.Choice(CLOCKS), "default": CLOCKS[0]},
+        "start": {"default": 0.0},
+    },
 )
-"""Topics, channels and a stretch, for `read_recording`."""
-
-estimating_options = options(
+_SHARED["estimating"] = _group(  # named as arguments of `gmwm.calibrate`
     """
     --model [NAME=]MODEL  Fit this in place of selecting: terms {terms}, e.g. 'N + K + 2 GM'; or
         'gyro=N + 2 GM' for a sensor or channel; repeat.
@@ -187,36 +163,53 @@ estimating_options = options(
     --all  Take everything as static; by default only the stretches at rest of a log that moves are
         used.
     """,
-    model={
-        "cls": _ModelOption,
-        "name": "models",
-        "multiple": True,
-        "callback": lambda _, __, texts: written_models(texts),
+    {
+        "model": {
+            "cls": _ModelOption,
+            "name": "models",
+            "multiple": True,
+            "callback": lambda _, __, texts: written_models(texts),
+        },
+        "leave": {
+            "name": "screening",
+            "multiple": True,
+            "type": click.Choice([*_SCREENING, "all"]),
+            "callback": lambda _, __, left: [
+                each for each in _SCREENING if each not in left and "all" not in left
+            ],
+        },
+        "all": {"name": "still", "callback": lambda _, __, everything: not everything},
     },
-    leave={
-        "name": "screening",
-        "multiple": True,
-        "type": click.Choice([*_SCREENING, "all"]),
-        "callback": lambda _, __, left: [
-            each for each in _SCREENING if each not in left and "all" not in left
-        ],
-    },
-    all={"name": "still", "callback": lambda _, __, everything: not everything},
 )
-"""What is fitted, and to which samples; named as arguments of `gmwm.calibrate`."""
-
-
-printing_options = options("""
-    --json
-    --quiet
-    """)
-"""How results are printed."""
+_SHARED |= _declared(
+    """
+    --jobs N  Processes; one a core by default.
+    --cluster ADDRESS  Dask scheduler that does the work, e.g. tcp://10.0.0.1:8786.
+    --resume  Go on with what the folder holds.
+    --horizon S  Longest outage that the filter numbers cover, in seconds.
+    --datasheet YAML  N, B and K by sensor or channel, each with its unit, to be drawn over the
+        curves of the report: 'gyro: {N: 0.15 deg/sqrt(h), B: 7 deg/h}'.
+    --memory GB  For the samples: those of a longer file are kept on disk, in TMPDIR, and about
+        three times one channel is in memory. By default 1 GB.
+    --units  Units of the table; files and JSON are in SI.
+    --json  Print the result as JSON, in SI units.
+    -q --quiet  Print nothing but errors.
+    """,
+    {
+        "jobs": {"default": lambda: os.cpu_count() or 1, "show_default": False},
+        "horizon": {"default": 60.0},
+        "memory": {"type": float},
+        "units": {"type": click.Choice(["field", "si"]), "default": "field"},
+        "json": {"name": "as_json"},
+    },
+)
+"""Options and groups of options that several commands have."""
 
 
 def read_recording(
     file: Path, *, start: float = 0.0, stop: float | None = None, **reading: Any
 ) -> Recording:
-    """Read a recording as `reading_options` and, where there are some, `part_options` say.
+    """Read a recording as the options of its reading, and of its part where there are some, say.
 
     Raises InputError if an option or the file cannot be used.
     """

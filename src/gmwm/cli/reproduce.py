@@ -10,7 +10,7 @@ import click
 
 from gmwm._core.files import folder_to_fill, moved_into_place, write_text
 from gmwm.cli.console import print_result, progress_bar
-from gmwm.cli.options import folder_to_write, options, read_recording, reading_options
+from gmwm.cli.options import folder_to_write, options, read_recording
 from gmwm.errors import InputError
 
 _SIMULATED = (
@@ -41,6 +41,7 @@ Found = tuple[str, Sequence[Path]]
         is calibrated, the others are navigated with; repeat.
     --rotate  fig8, fig9: calibrate every recording in turn and navigate with the others; further
         filters, intervals over recordings.
+    --reading
     """,
     output=folder_to_write("gmwm-study"),
     runs={"type": click.IntRange(min=2)},
@@ -48,7 +49,6 @@ Found = tuple[str, Sequence[Path]]
     method={"multiple": True},
     recording={"multiple": True},
 )
-@reading_options
 def reproduce(
     experiment: str, output: Path, recording: Sequence[Path], rotate: bool, **options: Any
 ) -> None:

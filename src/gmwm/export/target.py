@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from typing import Any, ClassVar
 
 from gmwm._core import checks
-from gmwm._core.files import written
+from gmwm._core.files import write_text
 from gmwm.errors import InputError
 from gmwm.export.comments import above, below, comment, wrapped
 from gmwm.export.imu import ImuNumbers
@@ -63,16 +63,11 @@ class Target(ABC):
         """
 
     def save(
-        self,
-        path: str | os.PathLike[str],
-        given: Sequence[Any],
-        horizon: float | None,
-        form: str | None,
+        self, path: str | os.PathLike[str], given: Sequence[Any], horizon: float | None, form: Any
     ) -> str:
         """Write the file whole or not at all; returns its text."""
         text = self.export(given, horizon, form)
-        with written(path) as stream:
-            stream.write(text)
+        write_text(path, text)
         return text
 
 

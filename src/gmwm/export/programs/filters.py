@@ -75,13 +75,7 @@ class Gtsam(ImuFile):
     horizon = KEYFRAME
     file_name = "gtsam_imu.py"
     keys = WalkKeys(
-        (
-            "gyroscopeCovariance",
-            "biasOmegaCovariance",
-            "accelerometerCovariance",
-            "biasAccCovariance",
-        ),
-        power=2,
+        "gyroscopeCovariance biasOmegaCovariance accelerometerCovariance biasAccCovariance", power=2
     )
 
     @staticmethod
@@ -151,7 +145,7 @@ class KfGins(ImuFile):
     warnings = ("gsstd and asstd, of the scale factors, are not in a static recording: keep yours",)
     file_name = "kf-gins.yaml"
     keys = MemoryKeys(
-        ("arw", "gbstd", "corrtime", "vrw", "abstd", "corrtime"),
+        "arw gbstd corrtime vrw abstd corrtime",
         (ARW, DEG_H, _HOUR, 1.0 / 60.0, _MGAL, _HOUR),
     )
 
@@ -186,7 +180,7 @@ class Basalt(JsonFile):
     )
     horizon = KEYFRAME
     file_name = "basalt.json"
-    keys = WalkKeys(("gyro_noise_std", "gyro_bias_std", "accel_noise_std", "accel_bias_std"))
+    keys = WalkKeys("gyro_noise_std gyro_bias_std accel_noise_std accel_bias_std")
 
     def body(self, imu: ImuNumbers) -> dict[str, Any]:
         values = {
