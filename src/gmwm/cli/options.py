@@ -235,7 +235,7 @@ def arguments_of_read(
     units = {"gyro": gyro_unit, "accel": accel_unit}
     found = {
         "units": {kind: unit for kind, unit in units.items() if unit is not None},
-        "channels": _chosen(_columns(channel), channels),
+        "channels": _channels(channel, channels),
         "time": False if (time or "").lower() == "none" else time and _column(time),
         "damaged": damaged or None,
         **others,
@@ -243,38 +243,31 @@ def arguments_of_read(
     return {name: each for name, each in found.items() if each not in (None, {}, ())}
 
 
-def _columns(pairs: Sequence[str]) -> dict[str, str | int] | None:
-    """Channel name -> column, of NAME=COLUMN."""
-    found: dict[str, str | int] = {}
+def _channels(
+    pairs: Sequence[str], only: str | None
+) -> dict[str, str | int] | list[str]:
+    """Channel name -> column, of NAME=COLUMN; of some names only, or these names alone."""
+    columns: dict[str, str | int] = {}
     for pair in pairs:
         name, _, column = pair.partition("=")
         if not (name and column):
             raise InputError(f"--channel {pair}: write NAME=COLUMN, e.g. gyro_x=wx or accel_z=5")
-        if name in found:
+        if name in columns:
             raise InputError(f"--channel {name}=... is given twice: a channel has one column")
-        found[name] = _column(column)
-    return found or None
-
-
-def _column(text: str) -> str | int:
-    return int(text) if text.isascii() and text.isdigit() else text
-
-
-def _chosen(
-    columns: dict[str, str | int] | None, only: str | None
-) -> dict[str, str | int] | list[str] | None:
-    """Channels with their columns, or their names alone."""
+        columns[name] = _column(column)
     if only is None:
         return columns
     names = [name.strip() for name in only.split(",") if name.strip()]
     if not names:
         raise InputError("--channels names no channel: write names, e.g. gyro_x,accel_z")
-    if columns is None:
-        return names
-    for name in names:
+    for name in names if columns else ():
         if name not in columns:
             raise InputError(f"--channels {only}: add --channel {name}=COLUMN, or leave it out")
-    return {name: columns[name] for name in names}
+    return {name: columns[name] for name in names} if columns else names
+
+
+def _column(text: str) -> str | int:
+    return int(text) if text.isascii() and text.isdigit() else text
 
 
 # -- models ---------------------------------------------------------------------------------------
