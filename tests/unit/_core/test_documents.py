@@ -114,7 +114,12 @@ def test_a_wrong_value_is_named_with_its_place(stored, tmp_path, kind, place, va
 def test_every_result_comes_back(stored, tmp_path, kind):
     result = stored[kind]
     path = result.save(tmp_path / "stored.json")
-    assert gmwm.load(path).to_dict() == result.to_dict()
+    found = gmwm.load(path)
+    assert type(found) is type(result)
+    assert found.to_dict() == type(result).load(path).to_dict() == result.to_dict()
+    if kind == "health":
+        with pytest.raises(InputError, match=r"stored\.json: this is not a calibration"):
+            gmwm.Calibration.load(path)
     again = copy.deepcopy(result.to_dict()) | {"of a later version": 1}
     assert type(result).from_dict(again).to_dict() == result.to_dict()
 
