@@ -36,6 +36,7 @@ class Target(ABC):
     horizon: Time without aiding unless another is given, s.
     warnings: What to know before use.
     file_name: How `gmwm calibrate` calls the file; by default name.yaml.
+    to_copy: Title by which reports offer the text to copy; empty where they do not.
     keys: By which the numbers are read back; None if they cannot be.
     """
 
@@ -48,6 +49,7 @@ class Target(ABC):
     horizon: ClassVar[float] = OUTAGE
     warnings: ClassVar[tuple[str, ...]] = ()
     file_name: ClassVar[str] = ""
+    to_copy: ClassVar[str] = ""
     keys: ClassVar[Keys | None] = None
 
     def __init_subclass__(cls) -> None:

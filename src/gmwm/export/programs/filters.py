@@ -73,7 +73,7 @@ class Gtsam(ImuFile):
         "integrateMeasurement; PreintegrationCombinedParams.h"
     )
     horizon = KEYFRAME
-    file_name = "gtsam_imu.py"
+    file_name, to_copy = "gtsam_imu.py", "Python, GTSAM"
     keys = WalkKeys(
         "gyroscopeCovariance biasOmegaCovariance accelerometerCovariance biasAccCovariance", power=2
     )
@@ -106,7 +106,7 @@ class GtsamCpp(Gtsam):
 
     name, title = "gtsam-cpp", "GTSAM (C++)"
     mark = "//"
-    file_name = "gtsam_imu.h"
+    file_name, to_copy = "gtsam_imu.h", "C++, GTSAM"
 
     def body(self, imu: ImuNumbers) -> list[str]:
         make = "gtsam::PreintegrationCombinedParams::MakeSharedU(9.81)"

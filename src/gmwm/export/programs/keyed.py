@@ -82,7 +82,7 @@ class Kalibr(KeyedFile):
         "accelerometer_noise_density accelerometer_random_walk"
     )
     template = "{values}\nrostopic: {topic}\nupdate_rate: {rate}  # Hz"
-    file_name = "imu.yaml"
+    file_name, to_copy = "imu.yaml", "YAML, Kalibr"
 
 
 class OpenVins(KeyedFile):

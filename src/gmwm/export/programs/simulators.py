@@ -130,7 +130,7 @@ class Matlab(ImuFile):
     )
     source = "manual of imuSensor, Algorithms; gyroparams, NoiseType"
     mark = "%"
-    file_name = "imu_noise.m"
+    file_name, to_copy = "imu_noise.m", "MATLAB"
 
     def body(self, imu: ImuNumbers) -> list[str]:
         lines = []
