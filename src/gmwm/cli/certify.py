@@ -58,17 +58,7 @@ _IN_SI = {
     **{name: {"default": 0.0} for name in _IN_SI},
 )
 def certify(
-    file: Path,
-    imu: Path | None,
-    white: str | None,
-    walk: str | None,
-    outages: str,
-    keyframe: float,
-    motion: str | None,
-    output: Path | None,
-    units: str,
-    as_json: bool,
-    **errors: float,
+    file: Path, output: Path | None, units: str, as_json: bool, motion: str | None, **given: Any
 ) -> None:
     """Predict how consistent a filter is with the numbers in use.
 
@@ -87,14 +77,14 @@ def certify(
     from gmwm.readers import read
 
     calibration = Calibration.load(file)
-    imperfections = Imperfections(**{name: errors[name] * _IN_SI[name] for name in errors})
+    imperfections = Imperfections(**{name: given[name] * unit for name, unit in _IN_SI.items()})
     if imperfections.needs_motion and motion is None:
         raise InputError("errors that come with motion do nothing at rest: add --motion drone")
     found = run(
         calibration,
-        _numbers(imu, white, walk, calibration),
-        outages=seconds("--outages", outages),
-        keyframe=keyframe,
+        _numbers(given["imu"], given["white"], given["walk"], calibration),
+        outages=seconds("--outages", given["outages"]),
+        keyframe=given["keyframe"],
         imperfections=imperfections,
         motion=read(motion) if motion is not None and Path(motion).is_file() else motion,
     )

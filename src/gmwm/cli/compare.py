@@ -30,13 +30,7 @@ if TYPE_CHECKING:
     output=FILE_TO_WRITE,
 )
 def compare(
-    files: Sequence[Path],
-    output: Path | None,
-    horizon: float,
-    datasheet: Path | None,
-    as_json: bool,
-    quiet: bool,
-    **reading: Any,
+    files: Sequence[Path], output: Path | None, as_json: bool, quiet: bool, **given: Any
 ) -> None:
     """Compare recordings of a sensor, or units of a kind.
 
@@ -52,9 +46,10 @@ def compare(
     from gmwm.population import compare as run, labelled
     from gmwm.report import read_datasheet
 
+    horizon, datasheet = given.pop("horizon"), given.pop("datasheet")
     if datasheet is not None:  # rejected before the work
         read_datasheet(datasheet)
-    calibrations = [_calibration(file, reading, quiet) for file in files]
+    calibrations = [_calibration(file, given, quiet) for file in files]
     if datasheet is not None:
         quantities = {n: fit.wv.quantity or "" for each in calibrations for n, fit in each.items()}
         read_datasheet(datasheet, quantities)

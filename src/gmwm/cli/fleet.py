@@ -35,12 +35,7 @@ _PARTS = ("start", "stop", "screening", "still", "horizon", "resume", "jobs", "c
     output=folder_to_write("gmwm-fleet"),
 )
 def fleet(
-    patterns: Sequence[str],
-    output: Path,
-    models: dict[str, Any],
-    as_json: bool,
-    quiet: bool,
-    **given: Any,
+    patterns: Sequence[str], output: Path, models: Any, as_json: bool, quiet: bool, **given: Any
 ) -> None:
     """Calibrate many units of a sensor and compare them.
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,34 +17,33 @@ if TYPE_CHECKING:
     from gmwm.filter_numbers import SensorNumbers
 
 
-def _number_options(command: Any) -> Any:
-    """The argument, and options of what is found and how it is printed."""
-    decorated = options(
-        """
-        --form TEXT  N+K, N+GM or N+K+GM; for gmwm reduce N+2GM too.
-        --shared  The same numbers for all axes of a sensor.
-        --tau S  Correlation time of the Gauss-Markov process in seconds; "shared": the one for all
-            axes that costs least. Each axis has its own by default.
-        --gyro-bias RAD/S  Standard deviation of the turn-on bias of a gyro.
-        --accel-bias M/S^2  Standard deviation of the turn-on bias of an accelerometer.
-        -o --output JSON  File to save the numbers in.
-        --units
-        --json
-        """,
-        form={"default": "N+K"},
-        tau={"type": str, "callback": _tau},
-        gyro_bias={"default": 0.0},
-        accel_bias={"default": 0.0},
-        output=FILE_TO_WRITE,
-    )
-    return click.argument("file", type=PATH)(decorated(command))
-
-
-def _tau(_: click.Context, flag: click.Parameter, text: str | None) -> float | str | None:
-    return text if text in (None, "shared") else seconds(flag.opts[0], text or "")[0]
+_number_options = options(
+    """
+    --form TEXT  N+K, N+GM or N+K+GM; for gmwm reduce N+2GM too.
+    --shared  The same numbers for all axes of a sensor.
+    --tau S  Correlation time of the Gauss-Markov process in seconds; "shared": the one for all
+        axes that costs least. Each axis has its own by default.
+    --gyro-bias RAD/S  Standard deviation of the turn-on bias of a gyro.
+    --accel-bias M/S^2  Standard deviation of the turn-on bias of an accelerometer.
+    -o --output JSON  File to save the numbers in.
+    --units
+    --json
+    """,
+    form={"default": "N+K"},
+    tau={
+        "type": str,
+        "callback": lambda _, __, text: (
+            text if text in (None, "shared") else seconds("--tau", text)[0]
+        ),
+    },
+    gyro_bias={"default": 0.0},
+    accel_bias={"default": 0.0},
+    output=FILE_TO_WRITE,
+)
 
 
 @click.command()
+@click.argument("file", type=PATH)
 @_number_options
 @options(
     """
@@ -65,10 +65,11 @@ def bound(file: Path, **options: Any) -> None:
     from gmwm.calibration import Calibration
     from gmwm.filter_numbers import bound as run
 
-    _show(lambda **given: run(Calibration.load(file), **given), **options)
+    _show(partial(run, Calibration.load(file)), **options)
 
 
 @click.command()
+@click.argument("file", type=PATH)
 @_number_options
 @options(
     """
@@ -92,7 +93,7 @@ def reduce(file: Path, outages: str, **options: Any) -> None:
     calibration, times = Calibration.load(file), seconds("--outages", outages)
     with progress_bar("reducing", "channels") as bar:
         options |= {"outages": times, "progress": bar}
-        _show(lambda **given: run(calibration, **given), **options)
+        _show(partial(run, calibration), **options)
 
 
 @click.command()

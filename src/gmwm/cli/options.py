@@ -243,9 +243,7 @@ def arguments_of_read(
     return {name: each for name, each in found.items() if each not in (None, {}, ())}
 
 
-def _channels(
-    pairs: Sequence[str], only: str | None
-) -> dict[str, str | int] | list[str]:
+def _channels(pairs: Sequence[str], only: str | None) -> dict[str, str | int] | list[str]:
     """Channel name -> column, of NAME=COLUMN; of some names only, or these names alone."""
     columns: dict[str, str | int] = {}
     for pair in pairs:
