@@ -51,7 +51,9 @@ def model_of(name: str, model: GivenModels) -> Process | Model | None:
         if key in model:
             return model[key]
     hint = "add one to the mapping"
-    raise InputError(f"no model is given for {name}", "model-missing", hint, {"channel": name})
+    raise InputError(
+        f"no model is given for channel {name!r}", "model-missing", hint, {"channel": name}
+    )
 
 
 def channel_model(

@@ -67,7 +67,16 @@ def folder_of_results(default: str) -> dict[str, Any]:
     jobs={"default": 2},
 )
 def calibrate(
-    files: Sequence[Path], output: Path, models: Any, as_json: bool, quiet: bool, **given: Any
+    files: Sequence[Path],
+    output: Path,
+    models: dict[str, Any],
+    target: str | None,
+    datasheet: Path | None,
+    timings: bool,
+    memory: float | None,
+    as_json: bool,
+    quiet: bool,
+    **given: Any,
 ) -> None:
     """Find an error model for every channel of a recording at rest.
 
@@ -88,9 +97,6 @@ def calibrate(
       gmwm calibrate a.csv b.csv --rate 100 --gyro-unit deg/s --accel-unit g
       gmwm calibrate static.bag --export kalibr -o out
     """
-    target, datasheet, timings, memory = (
-        given.pop(name) for name in ("target", "datasheet", "timings", "memory")
-    )
     _start_workers(files, given["jobs"], memory)
     from gmwm._core.memory import limited
     from gmwm.calibration import Stopwatch, calibrate as run, stage
