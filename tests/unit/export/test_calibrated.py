@@ -4,6 +4,7 @@ import json
 import re
 import xml.etree.ElementTree as ElementTree
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -93,7 +94,7 @@ def test_noise_density_is_that_of_the_noisiest_axis(calibration, content):
 def test_a_walk_that_was_not_found_is_called_an_upper_bound(text):
     # Only where the model has no slow term.
     lines = text.splitlines()
-    after = {line.partition(":")[0]: below for line, below in zip(lines, lines[1:], strict=False)}
+    after = {line.partition(":")[0]: below for line, below in pairwise(lines)}
     told = {key for key in NUMBERS if "no random walk was found: this is the" in after[key]}
     assert told == {"accelerometer_random_walk"}
     assert text.count("95 % upper limit") == 1
