@@ -33,8 +33,11 @@ FILE_TO_WRITE = {"type": PATH, "callback": lambda _, __, path: path and writable
 
 def folder_to_write(default: str, names: Sequence[str] = ()) -> dict[str, Any]:
     """Settings of the option of a folder to fill with files of these names, checked likewise."""
-    callback = lambda _, __, path: writable_folder(path, names)  # noqa: E731
-    return {"type": PATH, "default": Path(default), "callback": callback}
+
+    def checked(_: click.Context, __: click.Parameter, path: Path) -> Path:
+        return writable_folder(path, names)
+
+    return {"type": PATH, "default": Path(default), "callback": checked}
 
 
 def options(declared: str, **settings: dict[str, Any]) -> Decorator:
@@ -57,7 +60,7 @@ def options(declared: str, **settings: dict[str, Any]) -> Decorator:
 
 def _declared(declared: str, settings: dict[str, dict[str, Any]]) -> dict[str, list[Decorator]]:
     """The option or the group of each name."""
-    found = {}
+    found: dict[str, list[Decorator]] = {}
     for entry in re.split(r"\n +(?=-)", declared)[1:]:
         usage, _, text = entry.strip().partition("  ")
         flags = [word for word in usage.split() if word.startswith("-")]
@@ -75,6 +78,8 @@ def _declared(declared: str, settings: dict[str, dict[str, Any]]) -> dict[str, l
         names = [*flags, own.pop("name")] if "name" in own else flags
         usual |= {"metavar": metavar or None, "help": " ".join(text.split())}
         found[key] = [click.option(*names, **(usual | own))]
+    if unknown := settings.keys() - found.keys():
+        raise KeyError(f"settings of options that are not declared: {unknown}")
     return found
 
 
