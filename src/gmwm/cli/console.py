@@ -26,8 +26,8 @@ def print_result(
     if as_json:
         click.echo(json.dumps(result.to_dict(), allow_nan=False))
     elif not quiet:
-        lines = [f"wrote {path}" for path in written if path is not None]
-        click.echo("\n".join([text or str(result), *([""] if lines else []), *lines]))
+        wrote = "\n".join(f"wrote {path}" for path in written if path is not None)
+        click.echo("\n\n".join(filter(None, (text or str(result), wrote))))
 
 
 def command_line() -> str:

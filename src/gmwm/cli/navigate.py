@@ -169,7 +169,7 @@ def navigate(
     if isinstance(keys["sensors"], dict):
         keys["compare"] = keys.pop("sensors")
     keys["bias"] = {kind: sd for kind, sd in bias.items() if sd is not None} or None
-    keys["outages"] = length or spans
+    keys["outages"] = spans if length is None else length
     given = {name: each for name, each in keys.items() if each is not None}
     if file is None and not given:
         raise InputError(_NEEDED)
