@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from gmwm._core import checks
 from gmwm._core.files import folder_to_fill, moved_together, replaceable
 from gmwm._core.text import wrapped
 from gmwm.cli.console import command_line, new_console, new_table, print_whole, progress_bar
@@ -104,6 +103,7 @@ def calibrate(
 
     work = {name: given.pop(name) for name in ("screening", "still", "remove_departures", "jobs")}
     if target is not None:
+        from gmwm._core import checks
         from gmwm.export import TARGETS
 
         checks.choice("--export", target, tuple(TARGETS))
