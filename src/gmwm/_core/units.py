@@ -11,7 +11,6 @@ import re
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from gmwm._core import checks
 from gmwm.errors import InputError
 
 if TYPE_CHECKING:
@@ -234,6 +233,6 @@ def shown_unit(quantity: str | None, unit: str, units: str) -> tuple[str, float]
 
     Raises InputError if ``units`` is neither "field" nor "si".
     """
-    if checks.choice("units", units, ("field", "si")) == "field":
-        return customary_unit("u", quantity, unit)
-    return unit or "u", 1.0
+    if units not in ("field", "si"):
+        raise InputError(f"units = {units!r}: give 'field' or 'si'")
+    return customary_unit("u", quantity, unit) if units == "field" else (unit or "u", 1.0)

@@ -102,7 +102,7 @@ def test_units_of_the_field_or_si(fit):
     ratio = field.containers[0].lines[0].get_ydata() / si.containers[0].lines[0].get_ydata()
     np.testing.assert_allclose(ratio, 180.0 / np.pi * 3600.0)
     for result in (fit, fit.wv):
-        with pytest.raises(gmwm.InputError, match="'imperial': known are field, si"):
+        with pytest.raises(gmwm.InputError, match="'imperial': give 'field' or 'si'"):
             result.plot(units="imperial")
 
 
