@@ -20,7 +20,11 @@ if TYPE_CHECKING:
 
 
 def print_result(
-    result: Any, *written: Path | None, text: str = "", as_json: bool = False, quiet: bool = False
+    result: Any,
+    *written: str | Path | None,
+    text: str = "",
+    as_json: bool = False,
+    quiet: bool = False,
 ) -> None:
     """Print a result as text, with the files that were written, or as JSON."""
     if as_json:
