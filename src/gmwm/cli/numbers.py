@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -65,7 +64,8 @@ def bound(file: Path, **options: Any) -> None:
     from gmwm.calibration import Calibration
     from gmwm.filter_numbers import bound as run
 
-    _show(partial(run, Calibration.load(file)), **options)
+    calibration = Calibration.load(file)
+    _show(lambda **given: run(calibration, **given), **options)
 
 
 @click.command()
@@ -93,7 +93,7 @@ def reduce(file: Path, outages: str, **options: Any) -> None:
     calibration, times = Calibration.load(file), seconds("--outages", outages)
     with progress_bar("reducing", "channels") as bar:
         options |= {"outages": times, "progress": bar}
-        _show(partial(run, calibration), **options)
+        _show(lambda **given: run(calibration, **given), **options)
 
 
 @click.command()

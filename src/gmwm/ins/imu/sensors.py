@@ -88,8 +88,8 @@ class SensorModels:
             return ()
         axes, count = ", ".join(self.not_valid), len(self.not_valid)
         hint = "read the notices of the calibration first"
-        words = {"count": count, "are": "are" if count > 1 else "is"}
-        return (notice("fit-not-valid", axes, variant="filter", hint=hint, **words),)
+        are = "are" if count > 1 else "is"
+        return (notice("fit-not-valid", axes, variant="filter", hint=hint, count=count, are=are),)
 
     def simulate(self, n: int, dt: float, rng: np.random.Generator) -> SensorErrors:
         """Draw the errors of all axes over ``n`` samples; constant biases are drawn too.
