@@ -390,11 +390,10 @@ def test_the_file_is_plain_json_in_si(calibration, tmp_path):
 
 
 def test_interrupted_write_leaves_nothing(calibration, tmp_path, monkeypatch):
-    def interrupted(content, stream, **options):
-        stream.write('{"schema": ')
+    def interrupted(source, target):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("gmwm._core.documents.json.dump", interrupted)
+    monkeypatch.setattr("gmwm._core.files.os.replace", interrupted)
     path = tmp_path / "cal.json"
     with pytest.raises(KeyboardInterrupt):
         calibration.save(path)
