@@ -3,17 +3,22 @@
 Records of two hours at 1 Hz with the white noise of a gyro of 1e-4 rad/s/sqrt(Hz). Sizes are in
 standard deviations of a sample of that noise at 100 Hz (1e-3 rad/s).
 
-    python benchmarks/departures.py false [--runs 60] [--models N+K ...]
-    python benchmarks/departures.py power [--runs 20]
+    python benchmarks/departures.py false [--runs 400] [--models N+K ...]
+    python benchmarks/departures.py power [--runs 20] [--models N+K ...] [--kinds "step at 0.6" ...]
     python benchmarks/departures.py jumps [--runs 20] [--models N+K ...]
 
-"false" selects the model of noise without departures and counts what is found. "power" fits the
-true kinds of noise and a random walk to noise with one departure, which the walk follows, and
-prints the fraction found by size, and in brackets the fraction of fits that would be valid without
-looking for departures. "jumps" takes departures off records of a bias that jumps between two
-levels, and of one to three steps, and prints in how many of them something is taken off, in how
-many that is noise of the sensor, so that the fit is not valid, and how many valid fits predict less
-than 0.8 of the deviation after 600 s, with and without a warning of what was taken off.
+"false" counts records of stationary noise in which a departure is found, by least evidence, and in
+brackets those in which one has more than 0.19 of the model's wavelet variance. A model is selected
+only where white noise and a random walk leave a departure.
+
+"power" fits the true kinds of noise and a random walk to noise with one departure, which the walk
+follows. It prints the per cent of records in which one is found, in which one has more than 0.19,
+by least evidence, and in brackets those whose fit would be valid without looking for departures.
+
+"jumps" takes departures off records of a bias that jumps between two levels, and of one to three
+steps, and prints in how many of them something is taken off, in how many that is noise of the
+sensor, so that the fit is not valid, and how many valid fits predict less than 0.8 of the deviation
+after 600 s, with and without a warning of what was taken off.
 """
 
 from __future__ import annotations
@@ -22,6 +27,7 @@ import argparse
 import warnings
 
 import numpy as np
+from scipy.stats import beta
 
 import gmwm
 from gmwm import BiasInstability, FitWarning, GaussMarkov, RandomWalk, WhiteNoise
@@ -39,7 +45,12 @@ NOISES = {
     "N+B": WHITE + BiasInstability(1.5e-5),
     "N+2GM": WHITE + GaussMarkov(3e-5, 5.0) + GaussMarkov(2e-5, 300.0),
     "N+2GM slow": WHITE + GaussMarkov(3e-5, 20.0) + GaussMarkov(4e-5, 1500.0),
+    "N+GM 150 s": WHITE + GaussMarkov(3e-5, 150.0),  # as gyros of docs/real-data.md have it
+    "B": WhiteNoise(1e-5) + BiasInstability(5e-5),
 }
+GAPPED = ("N", "N+K", "N+2GM slow")
+EVIDENCE = (100.0, 200.0, 500.0, 1000.0, 2000.0)
+HARM = 0.19  # share of the wavelet variance above which a departure can make a fit not valid
 TIME = DT * np.arange(LENGTH)
 KINDS = {
     "step at 0.6": TIME > 0.6 * LENGTH * DT,
@@ -50,47 +61,75 @@ KINDS = {
     "1.5 periods": np.sin(3.0 * np.pi * TIME / (LENGTH * DT)),
     "half a period": np.sin(np.pi * TIME / (LENGTH * DT)),
 }
-SIZES = np.array([0.02, 0.03, 0.05, 0.08, 0.12, 0.2, 0.3, 0.5, 1.0])
+SIZES = np.array([0.03, 0.05, 0.1, 0.2, 0.3, 0.5, 1.0])
 
 
 def false_alarms(runs: int, models: list[str]) -> None:
     """Departures found in noise that has none."""
-    for name in models or NOISES:
-        some, harmful, kinds = 0, 0, []
+    print(f"{'':<22}found (harmful) with evidence of " + ", ".join(f"{e:g}" for e in EVIDENCE))
+    labels = [*NOISES, *(f"{name}, gaps" for name in GAPPED)]
+    total, records = np.zeros((2, len(EVIDENCE)), int), 0
+    free = gmwm.fit(WhiteNoise() + RandomWalk(), WHITE.simulate(LENGTH, DT, seed=1), DT)
+    for label in models or labels:
+        name, _, gaps = label.partition(", ")
+        counts, kinds, invalid = np.zeros_like(total), [], 0
         for seed in range(runs):
             x = gmwm.simulate(NOISES[name], LENGTH, DT, 10_000 + seed)
-            found = departures(gmwm.select(x, DT).fit)
-            some += bool(found)
-            harmful += any(one.share > 0.19 for one in found)
-            kinds += [one.kind for one in found]
-        print(f"{name:<12} found in {some} of {runs} ({harmful} not valid) {kinds}", flush=True)
+            if gaps:
+                x[np.random.default_rng(seed).random(LENGTH) < 0.005] = np.nan
+                x[2000:2400] = np.nan
+            if not departures(free, gmwm.wavelet_variance(x, dt=DT)):
+                continue
+            recording = gmwm.Recording.from_arrays({"gyro_x": x}, 1.0 / DT, {"gyro": "rad/s"})
+            fit = gmwm.calibrate(recording, screening=(), still=False)["gyro_x"]
+            found = [each for each in fit.notices if "evidence" in each.values]
+            kinds += [f"{each.code} {each.values['evidence']:.0f}" for each in found]
+            invalid += not fit.reasons["stationary"]
+            for i, least in enumerate((0.0, HARM)):
+                most = max(
+                    (e.values["evidence"] for e in found if e.values["share"] > least), default=0.0
+                )
+                counts[i] += most >= np.array(EVIDENCE)
+        total, records = total + counts, records + runs
+        print(f"{label:<22}{_counts(counts)}  of {runs}, {invalid} not valid {kinds}", flush=True)
+    upper = 100.0 * beta.ppf(0.95, total + 1, records - total)
+    limits = "  ".join(f"{some:.2f} ({harmful:.2f})" for some, harmful in upper.T)
+    print(f"{'all':<22}{_counts(total)}  of {records}; 95 % limits, per cent: {limits}")
 
 
-def power(runs: int, models: list[str]) -> None:
-    """Sizes found in half and in 95 % of the records."""
-    for name in models or ("N", "N+K", "N+3K", "N+GM 60 s", "N+2GM"):
+def _counts(counts: np.ndarray) -> str:
+    return "  ".join(f"{some} ({harmful})" for some, harmful in counts.T)
+
+
+def power(runs: int, models: list[str], kinds: list[str]) -> None:
+    """Sizes found in half and in 95 % of the records, and those that make a fit not valid."""
+    print("size: found, harmful with evidence of " + ", ".join(f"{e:g}" for e in EVIDENCE), end="")
+    print(" (valid without looking), per cent")
+    for name in models or ("N", "N+K", "N+2GM"):
         fitted = gmwm.process.as_model(NOISES[name]).opened()
         fitted = fitted if "K" in fitted.params else fitted + RandomWalk()
-        for kind, curve in KINDS.items():
-            shares, valid = [], []
+        for kind in kinds or KINDS:
+            shares, rows = [], []
             for size in SIZES:
                 found = right = 0
+                harmful = np.zeros(len(EVIDENCE), int)
                 for seed in range(runs):
                     x = gmwm.simulate(NOISES[name], LENGTH, DT, 20_000 + seed)
-                    fit = gmwm.fit(fitted, x + size * SAMPLE * curve, DT)
-                    found += bool(departures(fit))
+                    fit = gmwm.fit(fitted, x + size * SAMPLE * KINDS[kind], DT)
+                    each = departures(fit)
+                    found += bool(each)
                     right += fit.valid
+                    evidence = max((e.evidence for e in each if e.share > HARM), default=0.0)
+                    harmful += evidence >= np.array(EVIDENCE)
                 shares.append(found / runs)
-                valid.append(right / runs)
-                if len(shares) > 1 and min(shares[-2:]) == 1.0:
+                parts = " ".join(f"{100 * part / runs:.0f}" for part in harmful)
+                rows.append(f"{size:g}: {100 * shares[-1]:.0f}, {parts} ({100 * right / runs:.0f})")
+                if len(shares) > 1 and min(shares[-2:]) == 1.0 and harmful[-1] == runs:
                     break
             sizes = SIZES[: len(shares)]
             half, most = (_reached(sizes, np.array(shares), part) for part in (0.5, 0.95))
-            rows = "  ".join(
-                f"{size:g}: {100 * a:.0f} % ({100 * b:.0f} %)"
-                for size, a, b in zip(sizes, shares, valid, strict=True)
-            )
-            print(f"{name:<10} {kind:<15} 50 % {half:.2g}  95 % {most:.2g}   {rows}", flush=True)
+            print(f"{name:<6} {kind:<15} 50 % {half:.2g}  95 % {most:.2g}", flush=True)
+            print("  " + "\n  ".join(rows), flush=True)
 
 
 def jumps(runs: int, models: list[str]) -> None:
@@ -156,13 +195,15 @@ def main() -> None:
     parser.add_argument("study", choices=["false", "power", "jumps"])
     parser.add_argument("--runs", type=int, default=0)
     parser.add_argument("--models", nargs="*", default=[])
+    parser.add_argument("--kinds", nargs="*", default=[], help="departures of power")
     given = parser.parse_args()
     warnings.simplefilter("ignore", FitWarning)
     if given.study == "false":
-        false_alarms(given.runs or 60, given.models)
+        false_alarms(given.runs or 400, given.models)
+    elif given.study == "power":
+        power(given.runs or 20, given.models, given.kinds)
     else:
-        study = power if given.study == "power" else jumps
-        study(given.runs or 20, given.models)
+        jumps(given.runs or 20, given.models)
 
 
 if __name__ == "__main__":

@@ -2,7 +2,7 @@
 
 Run with ``python examples/real_data.py FOLDER -o OUT``. FOLDER holds ``adis16405_1.csv.gz`` to
 ``adis16405_4.csv.gz``: an ADIS16405 at rest, 100 Hz, gyros in deg/s, accelerometers in g. OUT gets
-the pictures and the five calibrations, which are used again if they are there.
+the pictures and the calibrations, which are used again if they are there.
 """
 
 from __future__ import annotations
@@ -57,12 +57,20 @@ def main() -> None:
         kept(given.output / f"calibration_{r.number}.json", lambda r=r: gmwm.calibrate(r.raw))
         for r in recorded
     ]
+    removed = [
+        kept(
+            given.output / f"calibration_{r.number}_removed.json",
+            lambda r=r: gmwm.calibrate(r.raw, remove_departures=True),
+        )
+        for r in recorded
+    ]
     together = kept(
         given.output / "calibration_joint.json", lambda: gmwm.calibrate([r.raw for r in recorded])
     )
     for table in (
         model_table(own, together), parameter_table(together), density_table(together),
-        misfit_table(own), joint_table(together), budget_table(own, together),
+        misfit_table(own), validity_table(own), validity_table(removed, "departures removed: "),
+        joint_table(together), budget_table(own, together),
     ):  # fmt: skip
         print(table)
     pictures = {
@@ -212,6 +220,18 @@ def misfit_of(fit: Fit) -> str:
     residual = goodness.residual[int(np.argmin(np.abs(goodness.tau - tau)))]
     valid = "" if fit.valid else " not valid"
     return f"{100.0 * misfit:+.1f} % {tau:.4g} s ({residual:+.1f}){valid}"
+
+
+def validity_table(own: Sequence[Calibration], how: str = "") -> str:
+    """How many fits are valid, and why the others are not."""
+    fits = [fit for calibration in own for fit in calibration.values()]
+    lines = [f"Own models, {how}{sum(fit.valid for fit in fits)} of {len(fits)} are valid"]
+    for number, calibration in zip(NUMBERS, own, strict=True):
+        for name, fit in calibration.items():
+            lacks = [reason for reason, has in fit.reasons.items() if not has]
+            if lacks:
+                lines.append(f"{number} {name}: {', '.join(lacks)}")
+    return "\n".join([*lines, ""])
 
 
 def joint_table(together: Calibration) -> str:

@@ -243,7 +243,7 @@ BAD = {
     "initial_sd: number": ({"initial_sd": 5}, "initial_sd: 5: write KEY: VALUE"),
     "initial_sd: key": ({"initial_sd": {"roll": 1}}, "'roll' is unknown"),
     "initial_sd: unit": ({"initial_sd": {"tilt": "1 m"}}, "same as rad"),
-    "initial_sd: zero": ({"initial_sd": {"tilt": 0}}, "initial tilt = 0.0: give a positive"),
+    "initial_sd: zero": ({"initial_sd": {"tilt": 0}}, "tilt: 0: input should be greater than 0"),
     "runs: part": ({"runs": 1.5}, "runs: 1.5: input should be a valid integer"),
     "seed: negative": ({"seed": -1}, "seed: -1: input should be greater"),
 }  # fmt: skip

@@ -119,10 +119,26 @@ def test_peaks_of_gyro_and_accelerometer_wander_together():
 
 
 def test_model_of_a_gyro_axis():
+    """Its step at 2,500 s is real, and too little evidence for a single axis to be not valid."""
     fit = gmwm.calibrate(recording(1, "gyro_x"))["gyro_x"]
     misfit, _ = fit.goodness.worst
     assert fit.valid
     assert abs(misfit) < 0.1
+    (step,) = [each for each in fit.notices if each.code == "step"]
+    assert step.severity == "warning" and 100.0 < step.values["evidence"] < 1000.0
+    assert step.values["time"] == pytest.approx(2500.0, abs=60.0)
+
+
+def test_the_step_of_that_axis_is_on_all_axes():
+    """Means of 200 s before and after fall on all six: as much is rare at other times."""
+    for name, channel in recording(1).items():
+        means = np.asarray(channel.values, dtype=float).reshape(-1, 1000).mean(axis=1)
+        level = np.convolve(means, np.full(20, 1.0 / 20.0), "valid")
+        change = level[20:] - level[:-20]
+        time = 200.0 + 10.0 * np.arange(change.size)
+        here = np.min(change[np.abs(time - 2504.0) <= 40.0])
+        assert here < 0.0, name
+        assert np.mean(np.abs(change) >= -here) < 0.04, name
 
 
 @pytest.mark.slow

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Collection, Iterable, Iterator, Sequence
+from dataclasses import replace
 from itertools import combinations
 from typing import Any
 
@@ -18,13 +18,12 @@ from gmwm.calibration import tuning
 from gmwm.calibration.calibration import Calibration
 from gmwm.calibration.channel import (
     ChannelModel,
+    ChannelTask,
     GivenModels,
     advise_cut,
-    channel_model,
     model_of,
     with_validity,
 )
-from gmwm.calibration.removal import variance_without
 from gmwm.calibration.screening import (
     SCREENING,
     Screened,
@@ -32,13 +31,12 @@ from gmwm.calibration.screening import (
     stretches_at_rest,
     with_outcomes,
 )
-from gmwm.calibration.stages import Stopwatch, current, stage
+from gmwm.calibration.stages import current, stage
 from gmwm.calibration.summary import unresolved_notice
 from gmwm.diagnosis import first_in_common, thinned
 from gmwm.errors import InputError
 from gmwm.estimate import compile_steps
 from gmwm.issues import Notice, notice
-from gmwm.process import Model, Process
 from gmwm.readers import Channel, Recording, is_frame, read, require_recording
 from gmwm.selection import Selection, wider_ranges
 from gmwm.variance import MIN_SAMPLES
@@ -68,8 +66,8 @@ def calibrate(
     done. A channel that is constant, or of which more than half of the samples are missing, is
     skipped; auxiliary channels (temperature, voltage, clock) have no model. After the fit, steps,
     transients at the start and slow periods are looked for beside its noise
-    (`gmwm.calibration.departures`); a fit of which they make more than a tenth of the deviation at
-    some averaging time is not valid.
+    (`gmwm.calibration.departures`); a fit of which one makes more than a tenth of the deviation at
+    some averaging time, with an evidence of 1,000 or more, is not valid.
 
     Parameters
     ----------
@@ -130,6 +128,53 @@ def _calibrated(
         if still and screening:
             given = [part for each in given for part in stretches_at_rest(each)]
         treated = [screened(part, screening) for each in given for part in each.by_rate()]
+    tasks, skipped = _tasks(treated, model, tuning.REMOVALS if remove_departures else 0)
+    workers.during_startup(compile_steps)
+    found = _models_found(tasks, progress)
+    done = {name: each for name, each in found.items() if isinstance(each, ChannelModel)}
+    skipped |= {name: each for name, each in found.items() if isinstance(each, Notice)}
+    source = ", ".join(each.source for each in given)
+    if not done:
+        why = "; ".join(f"{name}: {each.text}" for name, each in skipped.items())
+        raise InputError(f"{source or 'the recording'}: {why}")
+    issues: list[Notice] = []  # sensors with rates of their own share those of the reader
+    for one in treated:
+        for issue in one.notices:
+            named = replace(issue, source=one.recording.source) if len(given) > 1 else issue
+            if named not in issues:
+                issues.append(named)
+    done, advice = advise_cut(done, given[0].n * given[0].dt if len(given) == 1 else 0.0)
+    issues += advice
+    done = with_validity(done, issues, still=still)
+    chosen = {name: each.fit.model for name, each in done.items()}
+    offered = {} if model is not None else {task.name: task.extra for task in tasks}
+    rivals = {name: each.rivals for name, each in done.items() if each.rivals}
+    tied = [
+        _ambiguity(name, each.selection)
+        for name, each in done.items()
+        if each.selection is not None and each.selection.rivals
+    ]
+    left_open = [
+        unresolved_notice(name, each.fit, each.largest)
+        for name, each in done.items()
+        if each.largest is not None
+    ]
+    return Calibration(
+        fits={name: each.fit for name, each in done.items()},
+        skipped=skipped,
+        source=source,
+        rate=given[0].rate,
+        n=sum(each.n for each in given),
+        notices=(*with_outcomes(issues, chosen, offered), *tied, *left_open),
+        rivals=rivals,
+        left_out=_left_out(given[0], treated[0].recording) if len(treated) == 1 else {},
+    )
+
+
+def _tasks(
+    treated: Sequence[Screened], model: GivenModels, removals: int
+) -> tuple[list[ChannelTask], dict[str, Notice]]:
+    """The channels that can be used in some recording, and why others are skipped."""
     recordings = [each.recording for each in treated]
     alive, dead, sources = _usable(treated)
     models = {name: model_of(name, model) for name in alive}
@@ -144,75 +189,15 @@ def _calibrated(
     for each in recordings:
         if each.n < MIN_SAMPLES:
             raise InputError(f"{each.n} samples are too few: record at least {MIN_SAMPLES}")
-
-    offered = {
-        name: next((e.extra[name] for e in treated if e.extra.get(name)), ()) for name in alive
-    }
     robust = frozenset[str]().union(*(each.robust for each in treated))
-    removals = tuning.REMOVALS if remove_departures else 0
-    channels = [
-        _Channel(name, parts, name in robust, models[name], sources[name], offered[name], removals)
-        for name, parts in alive.items()
-    ]
-    workers.during_startup(compile_steps)
-    found = _models_found(channels, progress)
-    issues: list[Notice] = []  # sensors with rates of their own share those of the reader
-    for one in treated:
-        for issue in one.notices:
-            named = replace(issue, source=one.recording.source) if len(given) > 1 else issue
-            if named not in issues:
-                issues.append(named)
-    chosen = {name: each.fit.model for name, each in found.items() if not isinstance(each, Notice)}
-    models_of, advice = advise_cut(found, given[0].n * given[0].dt if len(given) == 1 else 0.0)
-    issues += advice
-    return _calibration_of(
-        with_validity(models_of, issues, still=still),
-        dead,
-        with_outcomes(issues, chosen, offered if model is None else {}),
-        given,
-        _left_out(given[0], recordings[0]) if len(recordings) == 1 else {},
-    )
-
-
-def _calibration_of(
-    models: Mapping[str, ChannelModel | Notice],
-    dead: Mapping[str, Notice],
-    issues: Sequence[Notice],
-    given: Sequence[Recording],
-    left_out: Mapping[str, tuple[tuple[int, int], ...]],
-) -> Calibration:
-    """Put together what was found of the channels.
-
-    models: Of each channel that was worked on.
-    dead: Why others were not.
-    Raises InputError if no channel has a model.
-    """
-    source = ", ".join(each.source for each in given)
-    done = {name: each for name, each in models.items() if isinstance(each, ChannelModel)}
-    skipped = {name: each for name, each in models.items() if isinstance(each, Notice)}
-    skipped = {**dead, **skipped}
-    if not done:
-        why = "; ".join(f"{name}: {each.text}" for name, each in skipped.items())
-        raise InputError(f"{source or 'the recording'}: {why}")
-    rivals: dict[str, list[Model]] = {}
-    tied, left_open = [], []
-    for name, each in done.items():
-        if each.selection is not None and each.selection.rivals:
-            rivals[name] = [rival.model for rival in each.selection.rivals]
-            tied.append(_ambiguity(name, each.selection))
-        if each.largest is not None:
-            rivals.setdefault(name, []).append(each.largest)
-            left_open.append(unresolved_notice(name, each.fit, each.largest))
-    return Calibration(
-        fits={name: each.fit for name, each in done.items()},
-        skipped=skipped,
-        source=source,
-        rate=given[0].rate,
-        n=sum(each.n for each in given),
-        notices=(*issues, *tied, *left_open),
-        rivals={name: tuple(models) for name, models in rivals.items()},
-        left_out=left_out,
-    )
+    tasks = []
+    for name, parts in alive.items():
+        extra = next((e.extra[name] for e in treated if e.extra.get(name)), ())
+        task = ChannelTask(
+            name, parts, sources[name], models[name], extra, name in robust, removals
+        )
+        tasks.append(task)
+    return tasks, dead
 
 
 def _ambiguity(name: str, selection: Selection) -> Notice:
@@ -227,37 +212,8 @@ def _ambiguity(name: str, selection: Selection) -> Notice:
     return notice(AMBIGUITY, name, values, titles="; ".join(models), also=also)
 
 
-@dataclass(frozen=True, eq=False)
-class _Channel:
-    """A channel whose model is to be found, and how."""
-
-    name: str
-    parts: Sequence[Channel]
-    robust: bool
-    given: Process | Model | None
-    sources: Sequence[str]
-    offered: Sequence[Process]
-    removals: int
-
-    def model_found(self) -> tuple[ChannelModel | Notice, Stopwatch]:
-        """The model, with the time that it took."""
-        with Stopwatch().running() as watch:
-            found = channel_model(
-                self.name,
-                lambda removed: [
-                    variance_without(part, gone, robust=self.robust)
-                    for part, gone in zip(self.parts, removed, strict=True)
-                ],
-                self.given,
-                self.sources,
-                extra=self.offered,
-                removals=self.removals,
-            )
-        return found, watch
-
-
 def _models_found(
-    channels: Sequence[_Channel], progress: Progress | None
+    channels: Sequence[ChannelTask], progress: Progress | None
 ) -> dict[str, ChannelModel | Notice]:
     """The model of each channel, or why it has none; shared with the processes beside."""
     found: dict[str, ChannelModel | Notice] = {}
@@ -266,13 +222,13 @@ def _models_found(
         if progress is not None:
             progress(len(found), len(channels), name)
 
-    def begun() -> Iterator[_Channel]:
+    def begun() -> Iterator[ChannelTask]:
         # Each term offered doubles the candidates: those that take longest are not begun last.
-        for channel in sorted(channels, key=lambda each: -len(each.offered)):
+        for channel in sorted(channels, key=lambda each: -len(each.extra)):
             report(channel.name)
             yield channel
 
-    for channel, (one, watch) in workers.shared(_Channel.model_found, begun()):
+    for channel, (one, watch) in workers.shared(ChannelTask.timed_model, begun()):
         found[channel.name] = one
         if (running := current()) is not None:
             for name, elapsed in watch.elapsed.items():
@@ -319,33 +275,33 @@ def _usable(
     treated: Sequence[Screened],
 ) -> tuple[dict[str, list[Channel]], dict[str, Notice], dict[str, list[str]]]:
     """Each channel in the recordings where it can be used, why others are skipped, and which."""
-    interval: dict[str, float] = {}
     alive: dict[str, list[Channel]] = {}
     sources: dict[str, list[str]] = {}
     dead: dict[str, Notice] = {}
+    interval: dict[str, float] = {}
     for each in treated:
         for channel in each.recording.inertial:
-            straight = (n for n in each.notices if n.code == "interpolated")
-            why = next((n for n in straight if n.where == channel.name), None)
-            why = why or _reason_to_skip(channel, each.notices)
-            if why is not None:
-                dead.setdefault(channel.name, why)
-            else:
-                channel = replace(channel, dt=interval.setdefault(channel.name, channel.dt))
-                repeated = each.repeated.get(channel.name)
-                own = thinned(channel, repeated) if repeated else channel
-                alive.setdefault(channel.name, []).append(own)
-                sources.setdefault(channel.name, []).append(each.recording.source)
+            name = channel.name
+            if (why := _reason_to_skip(channel, each.notices)) is not None:
+                dead.setdefault(name, why)
+                continue
+            channel = replace(channel, dt=interval.setdefault(name, channel.dt))
+            repeated = each.repeated.get(name)
+            alive.setdefault(name, []).append(thinned(channel, repeated) if repeated else channel)
+            sources.setdefault(name, []).append(each.recording.source)
     return alive, {name: why for name, why in dead.items() if name not in alive}, sources
 
 
 def _reason_to_skip(channel: Channel, notices: Iterable[Notice]) -> Notice | None:
     """Why a channel is skipped, if it is, and what took missing samples, if that was said."""
+    about = [each for each in notices if each.where in ("", channel.name)]
+    for each in about:
+        if each.code == "interpolated" and each.where:
+            return each
     values = {"missing": channel.missing}
     if 2 * channel.missing > channel.n:
         code = "all-missing" if channel.missing == channel.n else "mostly-missing"
-        causes = (n for n in notices if n.where in ("", channel.name) and n.issue.masks)
-        why = "".join(f": {cause.text}" for cause in causes)
+        why = "".join(f": {cause.text}" for cause in about if cause.issue.masks)
         return notice(code, channel.name, values, severity="bad", n=channel.n, why=why)
     if channel.is_constant:
         return notice("constant", channel.name, values, value=channel.mean, unit=channel.unit)

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from gmwm.calibration.departures import Departure, departures, with_departures
-from gmwm.calibration.stages import stage
+from gmwm.calibration.departures import Departure, departure_notices, departures
+from gmwm.calibration.removal import variance_without
+from gmwm.calibration.stages import Stopwatch, stage
 from gmwm.calibration.steadiness import steadiness_notice
 from gmwm.calibration.summary import with_largest_walk
 from gmwm.errors import InputError
 from gmwm.estimate import Fit, estimate
 from gmwm.issues import Notice, failure, notice
 from gmwm.process import Model, Process
+from gmwm.readers import Channel
 from gmwm.selection import Selection, select
 from gmwm.variance import WaveletVariance
 
@@ -21,9 +23,6 @@ LONGEST_PART = "longest-part"
 
 GivenModels = Process | Model | Mapping[str, Process | Model] | None
 """Models as the user gives them."""
-
-Removed = Sequence[Sequence[Departure]]
-"""Departures of each recording that were subtracted."""
 
 
 @dataclass(frozen=True)
@@ -38,9 +37,11 @@ class ChannelModel:
     selection: Selection | None
     largest: Model | None = None
 
-
-Found = Mapping[str, ChannelModel | Notice]
-"""Channel name -> its model, or why it has none."""
+    @property
+    def rivals(self) -> tuple[Model, ...]:
+        """Models that describe the channel equally well, that with the largest walk last."""
+        rivals = self.selection.rivals if self.selection is not None else ()
+        return (*(each.model for each in rivals), *([] if self.largest is None else [self.largest]))
 
 
 def model_of(name: str, model: GivenModels) -> Process | Model | None:
@@ -56,63 +57,73 @@ def model_of(name: str, model: GivenModels) -> Process | Model | None:
     )
 
 
-def channel_model(
-    name: str,
-    variances: Callable[[Removed], Sequence[WaveletVariance]],
-    model: Process | Model | None,
-    sources: Sequence[str],
-    *,
-    extra: Sequence[Process] = (),
-    removals: int = 0,
-) -> ChannelModel | Notice:
-    """The model of a channel, or why it has none.
+@dataclass(frozen=True, eq=False)
+class ChannelTask:
+    """A channel whose model is to be found.
 
-    variances: Wavelet variances of each recording without the departures that it is given.
+    parts: In each recording.
     model: Fitted; None selects one.
-    sources: Of the recordings.
     extra: Terms that a selected model may have.
     removals: How many times evident departures are subtracted, and the rest fitted again.
     """
-    removed: list[tuple[Departure, ...]] = [()] * len(sources)
-    before: Sequence[WaveletVariance] = ()
-    try:
-        for left in range(removals, -1, -1):
+
+    name: str
+    parts: Sequence[Channel]
+    sources: Sequence[str]
+    model: Process | Model | None
+    extra: Sequence[Process]
+    robust: bool
+    removals: int
+
+    def timed_model(self) -> tuple[ChannelModel | Notice, Stopwatch]:
+        """The model of the channel, or why it has none, and the time that it took."""
+        with Stopwatch().running() as watch:
+            try:
+                found: ChannelModel | Notice = self._model()
+            except InputError as error:
+                found = failure(error.code or "not-estimable", self.name, str(error))
+        return found, watch
+
+    def _model(self) -> ChannelModel:
+        removed: list[tuple[Departure, ...]] = [()] * len(self.parts)
+        before: list[WaveletVariance] = []
+        for left in range(self.removals, -1, -1):
             with stage("variance"):
-                parts = variances(removed)
-                before = before or parts
+                both = zip(self.parts, removed, strict=True)
+                after = [variance_without(part, gone, robust=self.robust) for part, gone in both]
+                before = before or after
             with stage("model"):
-                found = _fitted(parts[0] if len(parts) == 1 else parts, model, extra)
+                found = self._fitted(after[0] if len(after) == 1 else after)
             with stage("departures"):
-                there = [departures(found.fit, part) for part in parts]
+                there = [departures(found.fit, each) for each in after]
             if not left or not any(there):
                 break
             removed = [gone + more for gone, more in zip(removed, there, strict=True)]
-    except InputError as error:
-        return failure(error.code or "not-estimable", name, str(error))
-    curves = list(zip(before, parts, strict=True))
-    fit = with_departures(found.fit, sources, there, removed, curves, removing=removals > 0)
-    with stage("departures"):
-        changes = [
-            replace(change, source=source if len(sources) > 1 else "")
-            for part, known, source in zip(parts, there, sources, strict=True)
-            if (change := steadiness_notice(found.fit, part, known)) is not None
+        fit, removing = found.fit, self.removals > 0
+        records = list(zip(there, removed, before, after, strict=True))
+        notices = [departure_notices(fit, *each, removing=removing) for each in records]
+        with stage("departures"):
+            changes = [steadiness_notice(fit, wv, known) for known, _, _, wv in records]
+        notices += [[each] if each else [] for each in changes]
+        sources = self.sources if len(records) > 1 else [""]
+        named = [
+            replace(each, source=source)
+            for source, issues in zip([*sources, *sources], notices, strict=True)
+            for each in issues
         ]
-    return replace(found, fit=replace(fit, notices=(*fit.notices, *changes)))
+        return replace(found, fit=replace(fit, notices=(*fit.notices, *named)))
+
+    def _fitted(self, data: WaveletVariance | Sequence[WaveletVariance]) -> ChannelModel:
+        if self.model is not None:
+            return ChannelModel(estimate(self.model, data), None)
+        selection = select(data, extra=self.extra)
+        _ = selection.rivals  # found here, where channels are done side by side
+        return ChannelModel(selection.fit, selection, with_largest_walk(selection.fit))
 
 
-def _fitted(
-    data: WaveletVariance | Sequence[WaveletVariance],
-    model: Process | Model | None,
-    extra: Sequence[Process],
-) -> ChannelModel:
-    if model is not None:
-        return ChannelModel(estimate(model, data), None)
-    selection = select(data, extra=extra)
-    _ = selection.rivals  # found here, where channels are done side by side
-    return ChannelModel(selection.fit, selection, with_largest_walk(selection.fit))
-
-
-def with_validity(found: Found, issues: Sequence[Notice], *, still: bool) -> Found:
+def with_validity(
+    found: Mapping[str, ChannelModel], issues: Sequence[Notice], *, still: bool
+) -> dict[str, ChannelModel]:
     """Models of channels, with fits that are not valid where the data were not fit for them.
 
     issues: Of the recordings and their channels.
@@ -126,11 +137,8 @@ def with_validity(found: Found, issues: Sequence[Notice], *, still: bool) -> Fou
             return issue.where == name
         return sensor in issue.issue.spoils and issue.where in ("", sensor)
 
-    marked: dict[str, ChannelModel | Notice] = {}
+    marked = {}
     for name, each in found.items():
-        marked[name] = each
-        if isinstance(each, Notice):
-            continue
         sensor = each.fit.wv.quantity or "gyro"
         spoiling = [issue for issue in issues if spoils(issue, name, sensor)]
         # Those of the sensor first; of one code and place, the last one.
@@ -141,29 +149,26 @@ def with_validity(found: Found, issues: Sequence[Notice], *, still: bool) -> Fou
     return marked
 
 
-def advise_cut(found: Found, length: float) -> tuple[Found, list[Notice]]:
+def advise_cut(
+    found: Mapping[str, ChannelModel], length: float
+) -> tuple[dict[str, ChannelModel], list[Notice]]:
     """Where several departures can be cut off, name the longest part without any of them.
 
     length: Of a single recording, s; 0 for several.
     Returns: the models, whose departures refer to that advice, and the advice.
     """
-    spans = []
-    departed: list[Notice] = []
-    for each in found.values():
-        for issue in () if isinstance(each, Notice) else each.fit.notices:
-            if issue.severity == "note":
-                continue
-            if issue.code == "step":
-                spans.append((issue.values["time_lower"], issue.values["time_upper"]))
-            elif issue.code == "transient":
-                spans.append((0.0, 3.0 * issue.values["time_upper"]))
-            elif issue.code == "drift-at-start":
-                spans.append((0.0, issue.values["time_upper"]))
-            else:
-                continue
-            departed.append(issue)
+    departed = [
+        issue
+        for each in found.values()
+        for issue in each.fit.notices
+        if issue.code in ("step", "transient", "drift-at-start") and issue.severity != "note"
+    ]
     if not length or len(departed) < 2:
-        return found, []
+        return dict(found), []
+    spans = []
+    for issue in departed:
+        last = issue.values["time_upper"] * (3.0 if issue.code == "transient" else 1.0)
+        spans.append((issue.values["time_lower"] if issue.code == "step" else 0.0, last))
     parts, free = [], 0.0
     for start, stop in [*sorted(spans), (length, length)]:
         parts.append((start - free, free, start))
@@ -173,16 +178,14 @@ def advise_cut(found: Found, length: float) -> tuple[Found, list[Notice]]:
     values = {"start": start, "stop": stop, "of": length, "removable": removable}
     also = ", or subtract them (remove_departures=True)" if removable else ""
     advice = notice(LONGEST_PART, "", values, count=len(departed), kept=kept, also=also)
-
-    def together(issue: Notice) -> Notice:
-        if issue not in departed:
-            return issue
-        hint = "leave it out with the others, or subtract them"
-        return replace(issue, values={**issue.values, "together": True}, hint=hint)
-
-    return {
-        name: each
-        if isinstance(each, Notice)
-        else replace(each, fit=replace(each.fit, notices=tuple(map(together, each.fit.notices))))
-        for name, each in found.items()
-    }, [advice]
+    hint = "leave it out with the others, or subtract them"
+    marked = {}
+    for name, each in found.items():
+        notices = tuple(
+            replace(issue, values={**issue.values, "together": True}, hint=hint)
+            if issue in departed
+            else issue
+            for issue in each.fit.notices
+        )
+        marked[name] = replace(each, fit=replace(each.fit, notices=notices))
+    return marked, [advice]

@@ -2,15 +2,15 @@
 
 A random walk follows all of them, so the chi-square test of a fit passes with a walk of the wrong
 size. Block means are therefore explained by white noise and a random walk, with and without the
-departure: twice the gain in log likelihood must exceed a limit that stationary noise passes in one
-of a hundred records. Over many blocks a random walk is larger than other slow noise that it matches
-over a few, so the limit holds for Gauss-Markov processes and bias instability too.
+departure: twice the gain in log likelihood must exceed a limit that this noise passes in one of a
+hundred records. Other slow noise passes it as rarely, except Gauss-Markov processes of few blocks
+and bias instability, which have bumps that look like slow periods (docs/health.md).
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -23,6 +23,7 @@ from gmwm.calibration import tuning
 from gmwm.calibration.steadiness import Means
 from gmwm.estimate import Fit
 from gmwm.issues import Notice, Severity, notice
+from gmwm.process import Model
 from gmwm.variance import WaveletVariance
 
 DEPARTURES = ("step", "transient", "drift-at-start", "slow-period")
@@ -41,7 +42,7 @@ class Departure:
         its 95 % interval, s.
     size: Height of the step; of the transient or the drift at the start of the record; amplitude of
         the period; and the ends of its 95 % interval, u.
-    evidence: Stationary noise shows as much in one of so many records.
+    evidence: Stationary noise shows as much in about one of so many records.
     share: Largest fraction of the wavelet variance of the model that it accounts for.
     phase: Of a period, ``size cos(2 pi t / time - phase)``, rad.
     """
@@ -239,23 +240,22 @@ class _Test:
 
     def departure(self, fitted: Fit, means: Means) -> Departure:
         """The best one, with 95 % intervals."""
-        size = float(self.sizes[0])
-        if self.sizes.size == 2:
-            size = float(np.hypot(*self.sizes))
+        size, low, phase = float(self.sizes[0]), -np.inf, 0.0
+        if self.sizes.size == 2:  # cosine and sine of a period
+            size, low = float(np.hypot(*self.sizes)), 0.0
+            phase = float(np.arctan2(*self.sizes[::-1]))
         half = WIDE * self.error
-        low = max(size - half, 0.0) if self.sizes.size == 2 else size - half
-        phase = float(np.arctan2(*self.sizes[::-1])) if self.sizes.size == 2 else 0.0
         # The likelihood of times that are equally likely beforehand.
         times, weight = self.shape.times, np.exp(0.5 * (self.gains - self.gains[self.best]))
         order = np.argsort(times)
         ordered = times[order]
         edges = np.concatenate([ordered[:1], 0.5 * (ordered[1:] + ordered[:-1]), ordered[-1:]])
         first, last = np.searchsorted(np.cumsum(weight[order]) / np.sum(weight), [0.025, 0.975])
-        time = (times[self.best], edges[first], edges[min(last, times.size - 1) + 1])
+        last = min(last, times.size - 1) + 1
         return Departure(
             self.shape.kind,
-            (float(time[0]), float(time[1]), float(time[2])),
-            (size, low, size + half),
+            (float(times[self.best]), float(edges[first]), float(edges[last])),
+            (size, max(size - half, low), size + half),
             tuning.EVIDENT * float(np.exp(min(0.5 * self.excess, tuning.LARGEST_LOG))),
             _share(self.sizes @ self.shape.curves[self.best], means.step, fitted),
             phase,
@@ -304,36 +304,28 @@ def _share(curve: FloatArray, step: float, fitted: Fit) -> float:
 # -- notices --------------------------------------------------------------------------------------
 
 
-def with_departures(
+def departure_notices(
     fitted: Fit,
-    sources: Sequence[str],
-    found: Sequence[Sequence[Departure]],
-    removed: Sequence[Sequence[Departure]],
-    curves: Sequence[Sequence[WaveletVariance]],
+    found: Sequence[Departure],
+    removed: Sequence[Departure],
+    before: WaveletVariance,
+    after: WaveletVariance,
     *,
     removing: bool = False,
-) -> Fit:
-    """A fit with a notice of each departure; not valid if one accounts for much of the noise.
+) -> list[Notice]:
+    """Notices of the departures of a recording; bad if one accounts for much of the noise.
 
-    sources: Of its recordings; named where there are several.
-    found, removed: What each recording has, and what was subtracted before the fit.
-    curves: Wavelet variances of each recording, before that was subtracted and after.
+    found, removed: What it has, and what was subtracted before the fit.
+    before, after: Its wavelet variances, before that was subtracted and after.
     removing: Whether departures were to be subtracted: those that are left cannot be.
     """
     unit = fitted.wv.unit
-    notices = [
-        replace(notice, source=source if len(sources) > 1 else "")
-        for source, there, gone, both in zip(sources, found, removed, curves, strict=True)
-        for notice in (
-            *(departure_notice(each, unit, stays=removing) for each in there),
-            *(departure_notice(each, unit, removed=True) for each in gone),
-            *(_removal_notices(gone, *both) if gone else ()),
-        )
-    ]
-    return replace(fitted, notices=(*fitted.notices, *notices)) if notices else fitted
+    notices = [_departure_notice(each, unit, stays=removing) for each in found]
+    notices += [_departure_notice(each, unit, removed=True) for each in removed]
+    return notices + (_removal_notices(removed, before, after, fitted.model) if removed else [])
 
 
-def departure_notice(
+def _departure_notice(
     found: Departure, unit: str, *, stays: bool = False, removed: bool = False
 ) -> Notice:
     """Say what it is, and whether a fit beside it is valid.
@@ -365,17 +357,18 @@ def departure_notice(
 
 
 def _removal_notices(
-    removed: Sequence[Departure], before: WaveletVariance, after: WaveletVariance
+    removed: Sequence[Departure], before: WaveletVariance, after: WaveletVariance, model: Model
 ) -> list[Notice]:
     """Say what a model lacks without what was subtracted, and whether it was noise after all."""
     levels = min(before.tau.size, after.tau.size)  # what is subtracted leaves gaps
-    rest = after.variance[:levels]
-    ratio = np.divide(before.variance[:levels], rest, out=np.zeros(levels), where=rest > 0.0)
-    lost = np.sqrt(np.maximum(ratio, 0.0))
-    most = int(np.argmax(lost))
+    taken = before.variance[:levels] - after.variance[:levels]
+    # Over the model: the coarsest level of the rest is one of few, and may be nearly zero.
+    implied = model.haar_variance(after.tau[:levels], after.dt)
+    ratio = np.divide(taken, implied, out=np.zeros(levels), where=implied > 0.0)
+    most = int(np.argmax(ratio))
     notices = []
-    if lost[most] ** 2 * (1.0 - tuning.HARMFUL_SHARE) > 1.0:
-        values = {"tau": float(after.tau[most]), "ratio": float(lost[most])}
+    if ratio[most] > tuning.HARMFUL_SHARE / (1.0 - tuning.HARMFUL_SHARE):
+        values = {"tau": float(after.tau[most]), "ratio": float(np.sqrt(1.0 + ratio[most]))}
         notices.append(notice("departures-removed", "", values, times=brief(values["ratio"])))
     if len(removed) > tuning.MOST_REMOVED:
         notices.append(notice("departures-many", "", {"removed": len(removed)}))

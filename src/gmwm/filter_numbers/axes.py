@@ -6,6 +6,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Concatenate, ParamSpec, Protocol, cast, overload
 
+import numpy as np
+
 from gmwm._core import checks
 from gmwm._core.units import SI_UNIT
 from gmwm.calibration import Calibration
@@ -123,6 +125,10 @@ class SensorAxes:
             return cls(axes, source.source, rate, source.duration, False)
         return cls(axes, "", 1.0 / axes[0].dt, float("nan"), False)
 
+    def as_given(self, numbers: SensorNumbers) -> FilterNumbers | SensorNumbers:
+        """The numbers of the one axis, or of all by channel."""
+        return next(iter(numbers.values())) if self.single else numbers
+
     def check_interval(self, name: str, shortest: float) -> None:
         """Raise `InputError` if a time (s) is below two sampling intervals of an axis."""
         least = 2.0 * max(axis.dt for axis in self.axes)
@@ -143,15 +149,8 @@ class SensorAxes:
 
     def numbers(
         self, found: Callable[[tuple[AxisModel, ...]], Sequence[FilterNumbers]], shared: bool
-    ) -> FilterNumbers | SensorNumbers:
-        """The result of `bound` and `reduce`, given the numbers of axes that share them."""
-        numbers = self.sensor(found, shared)
-        return next(iter(numbers.values())) if self.single else numbers
-
-    def sensor(
-        self, found: Callable[[tuple[AxisModel, ...]], Sequence[FilterNumbers]], shared: bool
     ) -> SensorNumbers:
-        """The same as a mapping, also of one axis."""
+        """The numbers by channel, given those of axes that share them."""
         by_name = {
             axis.name: each
             for group in self.sharing(shared)
@@ -177,12 +176,13 @@ def given_tau(form: str, tau: float | str | None) -> float | str | None:
     return SHARED if tau == SHARED else checks.positive("tau", tau, hint)
 
 
-def given_outages(outages: Sequence[float]) -> list[float]:
-    """Times without aiding as users give them, rising; raises InputError if there is none."""
-    times = sorted({checks.positive("outage", each) for each in outages})
-    if not times:
-        raise InputError("outages: give one length at least, s")
-    return times
+def given_times(name: str, times: Sequence[float]) -> tuple[float, ...]:
+    """Times (s) as users give them, rising; raises InputError if there is none."""
+    hint = "give positive numbers of seconds, e.g. (1, 60)"
+    rising = sorted({checks.positive(name, each, hint) for each in np.ravel(times).tolist()})
+    if not rising:
+        raise InputError(f"{name}: give one length at least, s")
+    return tuple(rising)
 
 
 def _axis(name: str, item: object, dt: float | None, bias_sd: Sd) -> AxisModel:

@@ -102,7 +102,8 @@ def bound(
     if isinstance(tau, str):
         problems = [_problem(group, horizon, level) for group in axes.sharing(shared)]
         tau = correlation_time(problems, form)
-    return axes.numbers(lambda group: bound_of(group, form, horizon, level, tau), shared)
+    given = (form, horizon, level, tau)
+    return axes.as_given(axes.numbers(lambda group: bound_of(group, *given), shared))
 
 
 @lru_cache(maxsize=64)
@@ -154,12 +155,17 @@ def bound_of(
 
 def _problem(group: Sequence[AxisModel], horizon: float, level: float | None) -> Problem:
     """The spectra that the numbers of axes have to dominate."""
-    targets = tuple(RequiredSpectrum.of(axis.model, axis.dt, horizon, axis.unit) for axis in group)
+    targets = required(group, horizon)
     region: list[RequiredSpectrum] = []
     for axis, target in zip(group, targets, strict=True):
         if level is not None and axis.fit is not None:
             region += region_spectra(target, axis.fit, level)
     return Problem(targets, horizon, tuple(region))
+
+
+def required(group: Sequence[AxisModel], horizon: float) -> tuple[RequiredSpectrum, ...]:
+    """What the numbers of axes have to dominate, without the uncertainty of fits."""
+    return tuple(RequiredSpectrum.of(each.model, each.dt, horizon, each.unit) for each in group)
 
 
 def start_sd(

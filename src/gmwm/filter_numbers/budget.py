@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
-from typing import TYPE_CHECKING, Any, Protocol
+from itertools import cycle
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from gmwm._core.tables import plain_table
 from gmwm._core.text import brief, bullets
 from gmwm._core.typing import BoolArray, FloatArray
-from gmwm._core.units import factor
+from gmwm._core.units import SI_UNIT, factor
 from gmwm.errors import InputError
 from gmwm.estimate import Fit
+from gmwm.filter_numbers.axes import AxisModel, One, SensorAxes, Several, given_times
 from gmwm.filter_numbers.integrals import integral_rms
-from gmwm.process import Model, Process, as_model
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -49,31 +50,16 @@ _CURVE_POINTS = 33
 _HORIZONTAL_CHANNELS = ("gyro_x", "gyro_y", "accel_x", "accel_y")
 
 
-class _Fits(Protocol):
-    @property
-    def fits(self) -> Mapping[str, Fit]: ...
-
-
-Source = Fit | _Fits | Mapping[str, Process | Model | Fit]
-"""A calibration, a fit, or channel name -> model."""
-
-
 @dataclass(frozen=True)
 class ErrorRow:
     """Error of one quantity by one term of one channel's model.
 
-    Attributes
-    ----------
-    channel : str
-    component : str
-        Label of the term in its model.
-    quantity : {"attitude", "velocity", "position"}
-    unit : str
-        "rad", "m/s" or "m".
-    values : tuple of float
-        Standard deviation at each of the budget's ``times``; the absolute value for a rate ramp.
-    curve : tuple of float
-        The same at each time of its ``grid``.
+    component: Label of the term in its model.
+    quantity: {"attitude", "velocity", "position"}.
+    unit: "rad", "m/s" or "m".
+    values: Standard deviation at each of the budget's ``times``; the absolute value for a rate
+        ramp.
+    curve: The same at each time of its ``grid``.
     """
 
     channel: str
@@ -161,11 +147,10 @@ class ErrorBudget:
             raise InputError(
                 f"the error budget has no total {of!r}: it has {', '.join(self.groups)}"
             )
+        flat = of == HORIZONTAL
+        channels = [c for c in self.channels if (axis(c) in ("x", "y") if flat else c == of)]
         return [
-            row
-            for row in self.rows
-            if (row.channel == of or (of == HORIZONTAL and axis(row.channel) in ("x", "y")))
-            and quantity in (None, row.quantity)
+            row for row in self.rows if row.channel in channels and quantity in (None, row.quantity)
         ]
 
     def __str__(self) -> str:
@@ -174,16 +159,14 @@ class ErrorBudget:
             f"exact attitude, velocity and position; {STARTS[self.calibrated]}.",
         ]
         for quantity in QUANTITIES:
-            channels = [c for c in self.channels if quantity in self.quantities(c)]
-            if not channels:
-                continue
-            table: list[tuple[str, str, FloatArray]] = []
-            for channel in channels:
+            table: list[tuple[str, str, Sequence[float] | FloatArray]] = []
+            for channel in self.channels:
                 rows = self._rows(channel, quantity)
-                parts = [(row.component, np.array(row.values)) for row in rows]
+                table += [("" if i else channel, r.component, r.values) for i, r in enumerate(rows)]
                 if len(rows) > 1:
-                    parts.append(("total", self.total(channel)[quantity]))
-                table += [("" if i else channel, *part) for i, part in enumerate(parts)]
+                    table.append(("", "total", self.total(channel)[quantity]))
+            if not table:
+                continue
             if HORIZONTAL in self.groups and quantity in self.quantities():
                 label = "tilt" if quantity == "attitude" else "horizontal, radial"
                 table.append((label, "", self.total()[quantity]))
@@ -224,8 +207,7 @@ class ErrorBudget:
         curves = self.curves(of, quantity)
         if ax is None:
             _, ax = plt.subplots(figsize=(7.0, 4.6), layout="constrained")
-        for i, (label, curve) in enumerate(curves.items()):
-            colour = COMPONENT_COLOURS[i % len(COMPONENT_COLOURS)]
+        for colour, (label, curve) in zip(cycle(COMPONENT_COLOURS), curves.items(), strict=False):
             ax.plot(self.grid, curve, color=colour, linewidth=1.3, linestyle="--", label=label)
         total = per_si(quantity) * root_sum([row.curve for row in self._rows(of, quantity)])
         ax.plot(self.grid, total, color=SUM_COLOUR, linewidth=2.6, label="total")
@@ -249,11 +231,8 @@ class ErrorBudget:
         for row in self._rows(of, quantity):
             label = row.channel if of == HORIZONTAL else row.component
             parts.setdefault(label, []).append(row.curve)
-        return {
-            label: per_si(quantity) * root_sum(part)
-            for label, part in parts.items()
-            if np.any(part)
-        }
+        scale = per_si(quantity)
+        return {label: scale * root_sum(part) for label, part in parts.items() if np.any(part)}
 
     def to_dict(self) -> dict[str, Any]:
         """Everything in JSON types and SI units, with the totals."""
@@ -288,7 +267,7 @@ def per_si(quantity: str) -> float:
 
 
 def error_budget(
-    source: Source,
+    source: One | Several,
     times: Sequence[float] = TIMES,
     *,
     dt: float | None = None,
@@ -312,7 +291,7 @@ def error_budget(
     times : sequence of float, optional
         Coasting times, s.
     dt : float, optional
-        Sampling interval of models that are not fitted, s.
+        Sampling interval of models that are not fitted, s; 0.01 s by default.
     calibrated : bool, optional
         True: the initial value of every state of the models is known, as from a filter before an
         outage; its covariance is zero. False: nothing is known, stationary processes start in their
@@ -341,39 +320,27 @@ def error_budget(
     """
     if isinstance(source, Fit):
         source = {source.wv.name or "channel": source}
-    channels = getattr(source, "fits", source)
-    if not isinstance(channels, Mapping):
-        raise InputError(
-            f"{type(source).__name__} has no channels: give a Calibration, a Fit, or models by "
-            "channel name"
-        )
-    known = {name: item for name, item in channels.items() if _quantity(name, item) is not None}
+    axes = SensorAxes.of(source, dt, 0.0).axes
+    known = [each for each in axes if _quantity(each)]
     if not known:
         raise InputError(
             "the error budget needs a gyro or an accelerometer: give channels of that quantity, or "
             "models by names such as gyro_x and accel_z"
         )
-    steps = {name: _interval(name, item, dt) for name, item in known.items()}
-    longest = max(steps.values())
-    try:
-        rising = np.unique(np.asarray(times, dtype=float))
-    except (TypeError, ValueError):
-        rising = np.zeros(0)
-    if rising.size == 0 or not np.all(np.isfinite(rising)):
-        raise InputError(f"times = {times!r}: give numbers of seconds, e.g. (1, 60)")
-    if rising[0] < longest * (1.0 - 1e-6):
+    longest = max(each.dt for each in known)
+    chosen = given_times("times", times)
+    if chosen[0] < longest * (1.0 - 1e-6):
         raise InputError(
-            f"a coasting time of {rising[0]:g} s is shorter than the sampling interval of "
+            f"a coasting time of {chosen[0]:g} s is shorter than the sampling interval of "
             f"{longest:g} s: give longer times"
         )
-    chosen = tuple(rising.tolist())
     first = chosen[0] if len(chosen) > 1 else max(0.01 * chosen[0], min(longest, chosen[0]))
     grid = tuple(np.geomspace(first, chosen[-1], _CURVE_POINTS).tolist())
     rows: list[ErrorRow] = []
-    for name, item in known.items():
-        rows += _channel_rows(name, item, steps[name], chosen, grid, calibrated)
+    for each in known:
+        rows += _channel_rows(each, chosen, grid, calibrated)
     budget = ErrorBudget(chosen, tuple(rows), calibrated, grid)
-    return replace(budget, notes=tuple(_notes(channels, budget)))
+    return replace(budget, notes=tuple(_notes(axes, budget)))
 
 
 def is_steep(budget: ErrorBudget) -> BoolArray:
@@ -387,34 +354,17 @@ def is_steep(budget: ErrorBudget) -> BoolArray:
     return np.maximum.accumulate(largest) > _SMALL_ANGLE
 
 
-def _quantity(name: str, item: Process | Model | Fit) -> str | None:
-    if isinstance(item, Fit) and item.wv.quantity is not None:
-        return item.wv.quantity
-    return next((sensor for sensor in ("gyro", "accel") if name.startswith(sensor)), None)
-
-
-def _interval(name: str, item: Process | Model | Fit, dt: float | None) -> float:
-    if isinstance(item, Fit):
-        return item.wv.dt
-    if dt is None:
-        raise InputError(f"{name} is a model without data: give its sampling interval, dt=0.01")
-    if not (np.isfinite(dt) and dt > 0.0):
-        raise InputError(f"dt = {dt!r}: give a positive sampling interval in seconds")
-    return float(dt)
+def _quantity(axis: AxisModel) -> str:
+    """The kind of sensor; of models and fits that have none, by the name of the channel."""
+    named = (kind for kind in SI_UNIT if axis.name.startswith(kind))
+    return axis.quantity or next(named, "")
 
 
 def _channel_rows(
-    name: str,
-    item: Process | Model | Fit,
-    dt: float,
-    times: tuple[float, ...],
-    grid: tuple[float, ...],
-    calibrated: bool,
+    known: AxisModel, times: tuple[float, ...], grid: tuple[float, ...], calibrated: bool
 ) -> list[ErrorRow]:
-    model = item.model if isinstance(item, Fit) else as_model(item)
-    if model.is_open:
-        raise InputError(f"{name}: {model!r} has free parameters, give them a value or fit it")
-    if _quantity(name, item) == "accel":
+    name, model, dt = known.name, known.model, known.dt
+    if _quantity(known) == "accel":
         scales = {"velocity": 1.0, "position": 1.0}
     elif axis(name) == "z":
         scales = {"attitude": 1.0}
@@ -436,12 +386,12 @@ def _channel_rows(
     return rows
 
 
-def _notes(channels: Mapping[str, Process | Model | Fit], budget: ErrorBudget) -> list[str]:
+def _notes(axes: Sequence[AxisModel], budget: ErrorBudget) -> list[str]:
     notes = []
-    skipped = [name for name in channels if name not in budget.channels]
+    skipped = [each.name for each in axes if not _quantity(each)]
     if skipped:
         notes.append(f"neither gyro nor accelerometer, left out: {', '.join(skipped)}")
-    fits = {name: item for name, item in channels.items() if isinstance(item, Fit)}
+    fits = {each.name: each.fit for each in axes if each.fit is not None}
     doubtful = [name for name in budget.channels if name in fits and not fits[name].valid]
     if doubtful:
         model, are = ("models", "are") if doubtful[1:] else ("model", "is")
@@ -453,7 +403,7 @@ def _notes(channels: Mapping[str, Process | Model | Fit], budget: ErrorBudget) -
             f"a record of {shortest:.4g} s shows little of what happens over more than "
             f"{_RECORD_SHARE * shortest:.3g} s"
         )
-    present = {f"{_quantity(name, channels[name])}_{axis(name)}" for name in budget.channels}
+    present = {f"{_quantity(each)}_{axis(each.name)}" for each in axes}
     missing = [name for name in _HORIZONTAL_CHANNELS if name not in present]
     if HORIZONTAL in budget.groups and missing:
         notes.append(f"the horizontal total lacks {', '.join(missing)}")

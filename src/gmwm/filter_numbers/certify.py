@@ -12,15 +12,15 @@ from annotated_types import MaxLen, MinLen
 from gmwm._core import checks
 from gmwm._core.documents import Document, NoneIs, NotNegative, Text
 from gmwm._core.tables import cell, frame, plain_table
-from gmwm._core.text import Printed, bullets, wrapped
-from gmwm._core.units import SI_UNIT
+from gmwm._core.text import bullets, wrapped
+from gmwm._core.units import SI_UNIT, factor
 from gmwm.errors import InputError
 from gmwm.filter_numbers import tuning
-from gmwm.filter_numbers.axes import AxisModel, One, Sd, SensorAxes, Several, given_outages
+from gmwm.filter_numbers.axes import AxisModel, One, Sd, SensorAxes, Several, given_times
 from gmwm.filter_numbers.bound import bound_of
 from gmwm.filter_numbers.imperfections import Imperfections, Motion
 from gmwm.filter_numbers.propagation import Chain
-from gmwm.filter_numbers.result import FilterNumbers, SensorNumbers, shown_unit
+from gmwm.filter_numbers.result import FilterNumbers, InUnits, SensorNumbers, shown_unit
 from gmwm.ins import SensorModels, covariance_analysis, loiter_with_outages
 from gmwm.issues import Notice, notice
 from gmwm.process import Model, Process, RandomWalk, WhiteNoise, as_model
@@ -32,10 +32,12 @@ if TYPE_CHECKING:
 Given = FilterNumbers | SensorNumbers | Mapping[str, Any]
 """Numbers of all axes, or by axis or kind (gyro, accel): `FilterNumbers`, a model, or N and K."""
 
-_GRAVITY = 9.80665
-_INTEGRALS = {1: "angle", 2: "position", 3: "position by tilt"}
-_SHOWN = {1: ("deg", float(np.degrees(1.0))), 2: ("m", 1.0), 3: ("m", _GRAVITY)}
-
+_SHOWN = {
+    1: ("angle", "deg", float(np.degrees(1.0))),
+    2: ("position", "m", 1.0),
+    3: ("position by tilt", "m", factor("g", "m/s^2")),
+}
+"""Error, unit and factor of the last integral, by the number of integrals."""
 
 CONSUMERS = {
     "free": f"Without aiding, after {tuning.SETTLING:g} s of fixes every {tuning.FIX_INTERVAL:g} s",
@@ -89,7 +91,7 @@ class Cause:
 
 
 @dataclass(frozen=True, repr=False)
-class Certificate(Document, Printed):
+class Certificate(Document, InUnits):
     """How consistent a filter will be with given numbers, and why.
 
     Attributes
@@ -127,17 +129,7 @@ class Certificate(Document, Printed):
             f"{worst.where} after {worst.time:g} s>"
         )
 
-    def __str__(self) -> str:
-        return self.text()
-
     def text(self, units: str = "field") -> str:
-        """The text of `print`, numbers in data-sheet units or, with ``"si"``, in SI.
-
-        Raises
-        ------
-        InputError
-            If the units are neither.
-        """
         lines = [f"Numbers in use: {self.numbers.source or 'given'}"]
         for consumer, title in CONSUMERS.items():
             rows = []
@@ -165,23 +157,16 @@ class Certificate(Document, Printed):
         """The table of causes of a kind of sensor: the first is in use, the second the model."""
         causes = [cause for cause in self.causes if cause.quantity == quantity]
         (N, n_scale), (K, k_scale) = (shown_unit(letter, quantity, units) for letter in "NK")
-        rows = [
-            [
-                cause.name,
-                cell(cause.N, scale=n_scale),
-                cell(cause.K, scale=k_scale),
-                *(
-                    cell(value / by if by > 0.0 else float("inf"), 3)
-                    for other in causes[:2]
-                    for value, by in ((cause.N, other.N), (cause.K, other.K))
-                ),
-            ]
-            for cause in causes
-        ]
-        over = [f"{letter} over\n{what}" for what in ("in use", "model") for letter in "NK"]
+        rows = []
+        for cause in causes:
+            row = [cause.name, cell(cause.N, scale=n_scale), cell(cause.K, scale=k_scale)]
+            over = [(cause.N, each.N, cause.K, each.K) for each in causes[:2]]
+            row += [cell(_ratio(*pair), 3) for N, n, K, k in over for pair in ((N, n), (K, k))]
+            rows.append(row)
+        heads = [f"{letter} over\n{what}" for what in ("in use", "model") for letter in "NK"]
         return [
             f"{quantity or 'axis'}, all axes: N [{N}] and K [{K}] have to cover",
-            plain_table(["", "N", "K", *over], rows),
+            plain_table(["", "N", "K", *heads], rows),
         ]
 
     def to_frame(self) -> pandas.DataFrame:
@@ -239,7 +224,7 @@ def certify(
     a whole INS/GNSS filter on a loiter, where all six axes are known. It covers neither
     nonlinearity nor errors that are not in the models.
     """
-    times = given_outages(outages)
+    times = given_times("outages", outages)
     keyframe = checks.positive("keyframe", keyframe, "give the interval of keyframes in seconds")
     axes = SensorAxes.of(source, dt, bias_sd)
     axes.check_interval("keyframe", keyframe)
@@ -249,7 +234,7 @@ def certify(
     if known.needs_motion and moved is None:
         raise InputError("these imperfections do nothing at rest: give a motion too")
     horizon = times[-1]
-    safe = axes.sensor(lambda group: bound_of(group, "N+K", horizon, None), shared=False)
+    safe = axes.numbers(lambda group: bound_of(group, "N+K", horizon, None), shared=False)
     in_use = {a.name: _in_use(numbers, a, horizon, safe[a.name].initial_sd) for a in axes.axes}
     own = replace(safe, source="", axes=in_use)
     found = [check for axis in axes.axes for check in _of_axis(axis, own, times, keyframe)]
@@ -264,15 +249,14 @@ def certify(
 
 def _in_use(given: Given, axis: AxisModel, horizon: float, start: float) -> FilterNumbers:
     """The numbers of one axis in use; those without a horizon (s) or start (u) get the given."""
-    item: Any = given
     kind = axis.quantity or axis.name
-    if isinstance(given, Mapping):
-        if axis.name not in given and kind not in given:
-            raise InputError(
-                f"there are no numbers for {axis.name or 'the axis'}: give them by axis, or for "
-                f"{kind or 'gyro and accel'}"
-            )
-        item = given[axis.name] if axis.name in given else given[kind]
+    names = [name for name in (axis.name, kind) if isinstance(given, Mapping) and name in given]
+    if isinstance(given, Mapping) and not names:
+        raise InputError(
+            f"there are no numbers for {axis.name or 'the axis'}: give them by axis, or for "
+            f"{kind or 'gyro and accel'}"
+        )
+    item: Any = given[names[0]] if isinstance(given, Mapping) else given
     if isinstance(item, FilterNumbers):
         return item
     if isinstance(item, Process | Model):
@@ -305,8 +289,7 @@ def _of_axis(
         errors = chain.worse(
             axis.model, believed.model, axis.dt, ends, axis.bias_sd, believed.initial_sd
         )
-        unit, scale = _SHOWN[chain.order] if axis.quantity else ("u s", 1.0)
-        what = _INTEGRALS[chain.order] if axis.quantity else "integral"
+        what, unit, scale = _SHOWN[chain.order] if axis.quantity else ("integral", "u s", 1.0)
         for time, actual, predicted, nees in zip(
             ends, errors.actual, errors.predicted, errors.nees(), strict=True
         ):
@@ -355,9 +338,8 @@ def _causes(
         return bound_of(axes, "N+K", horizon, level)[0]
 
     def row(name: str, found: FilterNumbers, over: tuple[float, float]) -> Cause:
-        pair = (found.N, found.K)
-        factors = (v / o if o > 0.0 else float("inf") for v, o in zip(pair, over, strict=True))
-        return Cause(kind, name, *pair, *factors)
+        factors = _ratio(found.N, over[0]), _ratio(found.K, over[1])
+        return Cause(kind, name, found.N, found.K, *factors)
 
     in_use = [numbers[axis.name] for axis in group]
     N, K = max(each.N for each in in_use), max(each.K for each in in_use)
@@ -399,15 +381,17 @@ def _causes(
 
 def _with(group: Sequence[AxisModel], terms: Sequence[Process]) -> tuple[AxisModel, ...]:
     """Axes with more terms; white noise joins that of the model."""
+    added = [term for term in terms if not isinstance(term, WhiteNoise)]
+    density = sum(float(term.N or 0.0) ** 2 for term in terms if isinstance(term, WhiteNoise))
     result = []
     for axis in group:
-        parts = list(axis.model.terms)
-        for term in terms:
-            if isinstance(term, WhiteNoise):
-                white = axis.model.white_density() + term.N**2
-                parts = [part for part in parts if not part.is_white]
-                parts.append(WhiteNoise(float(np.sqrt(white))))
-            else:
-                parts.append(term)
-        result.append(replace(axis, model=Model(tuple(parts)), fit=None))
+        parts = axis.model.terms
+        if density > 0.0:
+            white = WhiteNoise(float(np.sqrt(axis.model.white_density() + density)))
+            parts = (*(part for part in parts if not part.is_white), white)
+        result.append(replace(axis, model=Model((*parts, *added)), fit=None))
     return tuple(result)
+
+
+def _ratio(value: float, over: float) -> float:
+    return value / over if over > 0.0 else float("inf")

@@ -15,7 +15,7 @@ from scipy.special import gamma
 
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
-from gmwm.filter_numbers.propagation import held, integrated
+from gmwm.filter_numbers.propagation import held, integrated, power
 from gmwm.process import BiasInstability, Process, RateRamp, StateSpace, evaluated, legendre
 
 ORDERS = 3
@@ -77,16 +77,11 @@ def _from_states(form: StateSpace, t: FloatArray, dt: float, *, known: bool) -> 
     covariance = np.zeros((mean.size, mean.size))
     if not known:
         covariance[ORDERS:, ORDERS:] = form.initial_covariance
-    counts, rests = _steps(t, dt)
-    doublings = [integrated(form, dt, ORDERS)]
-    while 2 ** len(doublings) <= max(counts):
-        step, noise = doublings[-1]
-        doublings.append((step @ step, step @ noise @ step.T + noise))
     result = np.empty((ORDERS, t.size))
-    for i, (count, rest) in enumerate(zip(counts, rests, strict=True)):
-        chosen = [each for bit, each in enumerate(doublings) if count >> bit & 1]
+    for i, (count, rest) in enumerate(zip(*_steps(t, dt), strict=True)):
         m, P = mean, covariance
-        for step, noise in [*chosen, *([integrated(form, rest, ORDERS)] if rest > 0.0 else [])]:
+        for h, times in ((dt, count), (rest, int(rest > 0.0))):
+            step, noise = power(*integrated(form, h, ORDERS), times)
             m, P = step @ m, step @ P @ step.T + noise
         result[:, i] = np.sqrt(m[:ORDERS] ** 2 + np.maximum(np.diag(P)[:ORDERS], 0.0))
     return result

@@ -17,11 +17,17 @@ from gmwm.filter_numbers.axes import (
     Sd,
     SensorAxes,
     Several,
-    given_outages,
     given_tau,
+    given_times,
     per_axis,
 )
-from gmwm.filter_numbers.bound import covered_terms_notices, fit_notices, predicted, start_sd
+from gmwm.filter_numbers.bound import (
+    covered_terms_notices,
+    fit_notices,
+    predicted,
+    required,
+    start_sd,
+)
 from gmwm.filter_numbers.propagation import Chain, ChainErrors
 from gmwm.filter_numbers.result import FORMS, FilterNumbers, Predicted, SensorNumbers
 from gmwm.filter_numbers.spectra import Problem, RequiredSpectrum, with_correlation_times
@@ -61,16 +67,8 @@ def reduce(
     keyframe : float, optional
         Interval of keyframes or scans between which poses are related, s, for which they shall be
         good in place of outages.
-    bias_sd : float or mapping, optional
-        Standard deviation of a constant bias, such as the turn-on bias, in u; by axis or kind
-        ("gyro", "accel") if a mapping.
-    shared : bool, optional
-        Whether axes of a kind have the same numbers.
-    tau : float or "shared", optional
-        Correlation time of the Gauss-Markov process, s; "shared": the one for all axes that costs
-        least over them. By default each has its own.
-    dt : float, optional
-        Sampling interval of models that are not fitted, s; 0.01 s by default.
+    bias_sd, shared, tau, dt : optional
+        As in `gmwm.bound`.
     progress : callable, optional
         Called as ``progress(done, total, channel)``.
 
@@ -100,23 +98,21 @@ def reduce(
     tau = given_tau(form, tau)
     if keyframe is not None:
         outages = (checks.positive("keyframe", keyframe, "give the interval of keyframes in s"),)
-    times = given_outages(outages)
+    times = given_times("outages", outages)
     axes = SensorAxes.of(source, dt, bias_sd)
     axes.check_interval("outages" if keyframe is None else "keyframe", times[0])
     search = _Search(form, times, keyframe is not None)
     time = search.correlation_time(axes.sharing(shared)) if isinstance(tau, str) else tau
-    done = 0
+    tell, done, total = progress or (lambda *_: None), 0, len(axes.axes)
 
     def found(group: tuple[AxisModel, ...]) -> list[FilterNumbers]:
         nonlocal done
-        if progress is not None:
-            progress(done, len(axes.axes), group[0].name)
+        tell(done, total, group[0].name)
         done += len(group)
         return search.numbers(group, time)
 
-    result = axes.numbers(found, shared)
-    if progress is not None:
-        progress(done, done, "")
+    result = axes.as_given(axes.numbers(found, shared))
+    tell(total, total, "")
     return result
 
 
@@ -131,15 +127,11 @@ class _Search:
     def chain(self, axis: AxisModel) -> Chain:
         return Chain.of_poses(axis.quantity, self.times[-1]) if self.is_relative else axis.chain
 
-    def required(self, group: Sequence[AxisModel]) -> tuple[RequiredSpectrum, ...]:
-        longest = self.times[-1]
-        return tuple(RequiredSpectrum.of(a.model, a.dt, longest, a.unit) for a in group)
-
     def numbers(self, group: Sequence[AxisModel], tau: float | None) -> list[FilterNumbers]:
         """The numbers of axes that share them."""
         _, model, sd = self.least(group, tau)
         longest, numbers = self.times[-1], []
-        targets = self.required(group)
+        targets = required(group, longest)
         for axis, target in zip(group, targets, strict=True):
             found = predicted(axis, self.chain(axis), model, sd, [*self.times, 10.0 * longest])
             # All else that a bound leaves out is part of the truth here.
@@ -169,7 +161,7 @@ class _Search:
 
     def least(self, group: Sequence[AxisModel], tau: float | None) -> tuple[float, Model, float]:
         """The least score, its numbers, and the standard deviation of the bias at the start."""
-        targets = self.required(group)
+        targets = required(group, self.times[-1])
         start, sd = self._start(group, targets, tau)
         names = [name for name in start.params if tau is None or name != "tau"]
         values = np.array([float(start.params[name] or 0.0) for name in names])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
@@ -38,6 +39,23 @@ _PREDICTION = (
 )
 
 
+class InUnits(Printed, ABC):
+    """A result that prints its numbers in data-sheet units or in SI."""
+
+    @abstractmethod
+    def text(self, units: str = "field") -> str:
+        """The text of `print`, in data-sheet units or, with ``"si"``, in SI.
+
+        Raises
+        ------
+        InputError
+            If the units are neither.
+        """
+
+    def __str__(self) -> str:
+        return self.text()
+
+
 @dataclass(frozen=True)
 class Predicted:
     """How well a filter with these numbers knows its error, after some time without aiding.
@@ -57,7 +75,7 @@ class Predicted:
 
 
 @dataclass(frozen=True, repr=False)
-class FilterNumbers(Document, Printed):
+class FilterNumbers(Document, InUnits):
     """The numbers that a small filter should believe of one axis.
 
     Attributes
@@ -118,16 +136,12 @@ class FilterNumbers(Document, Printed):
     @property
     def sigma(self) -> tuple[float, ...]:
         """Standard deviations of the Gauss-Markov processes by rising correlation time, u."""
-        return self._values("sigma")
+        return tuple(v or 0.0 for key, v in self.model.params.items() if key[:5] == "sigma")
 
     @property
     def tau(self) -> tuple[float, ...]:
         """Correlation times of the Gauss-Markov processes, rising, s."""
-        return self._values("tau")
-
-    def _values(self, name: str) -> tuple[float, ...]:
-        params = self.model.params.items()
-        return tuple(float(value or 0.0) for key, value in params if key.split("_")[0] == name)
+        return tuple(v or 0.0 for key, v in self.model.params.items() if key[:3] == "tau")
 
     @property
     def nees(self) -> Mapping[float, float]:
@@ -142,17 +156,7 @@ class FilterNumbers(Document, Printed):
     def __repr__(self) -> str:
         return f"<FilterNumbers {self.model!r}, {self.method} for {self.horizon:g} s>"
 
-    def __str__(self) -> str:
-        return self.text()
-
     def text(self, units: str = "field") -> str:
-        """The text of `print`, in data-sheet units or, with ``"si"``, in SI.
-
-        Raises
-        ------
-        InputError
-            If the units are neither.
-        """
         lines = [f"{self.form} for {self.horizon:g} s, {self.method}"]
         for key, value in self._shown().items():
             unit, per_si = shown_unit(key, self.quantity, units)
@@ -184,7 +188,7 @@ class FilterNumbers(Document, Printed):
 
 
 @dataclass(frozen=True, repr=False)
-class SensorNumbers(Mapping[str, FilterNumbers], Document, Printed):
+class SensorNumbers(Mapping[str, FilterNumbers], Document, InUnits):
     """The numbers that a small filter should believe of a sensor: channel -> `FilterNumbers`.
 
     Attributes
@@ -255,17 +259,7 @@ class SensorNumbers(Mapping[str, FilterNumbers], Document, Printed):
         where = self.source or "a sensor"
         return f"<SensorNumbers of {where}: {self.form} for {self.horizon:g} s, {', '.join(self)}>"
 
-    def __str__(self) -> str:
-        return self.text()
-
     def text(self, units: str = "field") -> str:
-        """The text of `print`, in data-sheet units or, with ``"si"``, in SI.
-
-        Raises
-        ------
-        InputError
-            If the units are neither.
-        """
         first = next(iter(self.values()))
         head = f"{self.form} for {self.horizon:g} s, {first.method}"
         lines = [f"{self.source}: {head}" if self.source else head]
@@ -322,11 +316,9 @@ def _tables(axes: Mapping[str, FilterNumbers], quantity: str, units: str) -> lis
 
 def _table(heads: Sequence[str], columns: Sequence[Sequence[str]]) -> list[str]:
     """Lines of a table; in two parts beneath each other where it is wider than a page."""
-    widths = [
-        2 + max(map(len, [*head.split("\n"), *column]))
-        for head, column in zip(heads, columns, strict=True)
-    ]
-    if sum(widths) > WIDTH and len(heads) > 2:
+    pairs = zip(heads, columns, strict=True)
+    width = sum(2 + max(map(len, [*head.split("\n"), *column])) for head, column in pairs)
+    if width > WIDTH and len(heads) > 2:
         half = (len(heads) + 2) // 2
         rest = [heads[0], *heads[half:]], [columns[0], *columns[half:]]
         return _table(heads[:half], columns[:half]) + _table(*rest)

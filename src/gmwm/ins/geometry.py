@@ -49,12 +49,6 @@ def radii_at(sin_lat: float) -> tuple[float, float]:
 
 
 @compiled()
-def radii(lat: float) -> tuple[float, float]:
-    """Radii of curvature of the meridian and of the prime vertical, m, at a latitude in rad."""
-    return radii_at(np.sin(lat))
-
-
-@compiled()
 def gravity_at(sin_lat: float, h: float) -> float:
     """Normal gravity, from the latitude's sine.
 
@@ -85,6 +79,12 @@ def radii_along(lat: FloatArray) -> tuple[FloatArray, FloatArray]:
     return formula(np.sin(lat))
 
 
+def gravity_along(lat: FloatArray, h: FloatArray) -> FloatArray:
+    """Normal gravity, m/s^2, at many latitudes (rad) and heights (m); see `gravity_at`."""
+    formula: Any = gravity_at.py_func
+    return formula(np.sin(lat), h)
+
+
 def ned_difference(lla: FloatArray, reference: FloatArray) -> FloatArray:
     """Points minus reference points, (n, 3) or (3,), in metres to the north, east and down.
 
@@ -92,19 +92,12 @@ def ned_difference(lla: FloatArray, reference: FloatArray) -> FloatArray:
     third order in the distance, about 1 mm over 10 km at middle latitudes.
     """
     lla, reference = np.asarray(lla, dtype=float), np.asarray(reference, dtype=float)
-    half_way = 0.5 * (lla + reference)
-    difference = lla - reference
-    east = difference[..., 1] - 2.0 * np.pi * np.round(difference[..., 1] / (2.0 * np.pi))
-    meridian, transverse = radii_along(half_way[..., 0])
-    h = half_way[..., 2]
-    return np.stack(
-        [
-            (meridian + h) * difference[..., 0],
-            (transverse + h) * np.cos(half_way[..., 0]) * east,
-            -difference[..., 2],
-        ],
-        axis=-1,
-    )
+    lat, _, h = np.moveaxis(0.5 * (lla + reference), -1, 0)
+    north, east, up = np.moveaxis(lla - reference, -1, 0)
+    east = east - 2.0 * np.pi * np.round(east / (2.0 * np.pi))
+    meridian, transverse = radii_along(lat)
+    metres = [(meridian + h) * north, (transverse + h) * np.cos(lat) * east, -up]
+    return np.stack(metres, axis=-1)
 
 
 def offset(lla: FloatArray, ned: FloatArray) -> FloatArray:
@@ -132,20 +125,6 @@ _SERIES_BELOW = 0.01  # rad^2: the terms left out of the series are below 1e-17
 # Taylor coefficients of sin(a)/a and (1 - cos(a))/a^2 in a^2.
 _S1, _S2, _S3, _S4, _S5 = ((-1.0) ** k / math.factorial(2 * k + 1) for k in (1, 2, 3, 4, 5))
 _C1, _C2, _C3, _C4 = ((-1.0) ** k / math.factorial(2 * k + 2) for k in (1, 2, 3, 4))
-
-
-@compiled()
-def angles(C: FloatArray) -> tuple[float, float, float]:
-    """Roll, pitch and yaw of C_bn, rad.
-
-    Roll and yaw lie in [-pi, pi]. Where the body points straight up or down, only their difference
-    or sum is defined: roll is then 0.
-    """
-    level = math.hypot(C[2, 1], C[2, 2])
-    pitch = math.atan2(-C[2, 0], level)
-    if level < 1e-12:
-        return 0.0, pitch, math.atan2(-C[0, 1], C[1, 1])
-    return math.atan2(C[2, 1], C[2, 2]), pitch, math.atan2(C[1, 0], C[0, 0])
 
 
 @compiled()
@@ -218,21 +197,6 @@ def orthonormalise(C: FloatArray) -> None:
         C[i, 2] = 0.5 * ((3.0 - zz) * c - xz * a - yz * b)
 
 
-@compiled()
-def _all_angles(matrices: FloatArray, result: FloatArray) -> None:
-    for i in range(matrices.shape[0]):
-        result[i, 0], result[i, 1], result[i, 2] = angles(matrices[i])
-
-
-@compiled()
-def _exponentials(vectors: FloatArray, result: FloatArray) -> None:
-    for i in range(vectors.shape[0]):
-        for j in range(3):
-            for k in range(3):
-                result[i, j, k] = 1.0 if j == k else 0.0
-        turn_body(result[i], vectors[i, 0], vectors[i, 1], vectors[i, 2])
-
-
 def matrix_from_rpy(rpy: FloatArray) -> FloatArray:
     """Matrices C_bn (v_n = C_bn v_b), (..., 3, 3), of roll, pitch and yaw, (..., 3), rad.
 
@@ -249,19 +213,25 @@ def matrix_from_rpy(rpy: FloatArray) -> FloatArray:
 
 
 def rpy_from_matrix(matrices: FloatArray) -> FloatArray:
-    """Roll, pitch and yaw, (..., 3), rad, of matrices C_bn, (..., 3, 3); see `angles`."""
-    flat = np.ascontiguousarray(matrices, dtype=float).reshape(-1, 3, 3)
-    result = np.empty((len(flat), 3))
-    _all_angles(flat, result)
-    return result.reshape(np.shape(matrices)[:-1])
+    """Roll, pitch and yaw, (..., 3), rad, of matrices C_bn, (..., 3, 3).
+
+    Roll and yaw lie in [-pi, pi]. Where the body points straight up or down, only their difference
+    or sum is defined: roll is then 0.
+    """
+    C = np.moveaxis(np.asarray(matrices, dtype=float), (-2, -1), (0, 1))
+    level = np.hypot(C[2, 1], C[2, 2])
+    upright = level < 1e-12
+    roll = np.where(upright, 0.0, np.arctan2(C[2, 1], C[2, 2]))
+    yaw = np.arctan2(np.where(upright, -C[0, 1], C[1, 0]), np.where(upright, C[1, 1], C[0, 0]))
+    return np.stack([roll, np.arctan2(-C[2, 0], level), yaw], axis=-1)
 
 
 def matrix_from_rotation_vector(vectors: FloatArray) -> FloatArray:
     """Rotation matrices exp([v cross]), (..., 3, 3), of rotation vectors, (..., 3), rad."""
-    flat = np.ascontiguousarray(vectors, dtype=float).reshape(-1, 3)
-    result = np.empty((len(flat), 3, 3))
-    _exponentials(flat, result)
-    return result.reshape(*np.shape(vectors), 3)
+    cross = skew(vectors)
+    angle = np.linalg.norm(vectors, axis=-1)[..., None, None] / np.pi
+    half = np.sinc(0.5 * angle)
+    return np.eye(3) + np.sinc(angle) * cross + 0.5 * half * half * (cross @ cross)
 
 
 def skew(vector: FloatArray) -> FloatArray:

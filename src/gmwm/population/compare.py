@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import os
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
+from itertools import chain, count
 from pathlib import PurePath
 from typing import Any
 
@@ -74,7 +77,7 @@ def compare(
     """
     horizon = checks.positive("horizon", horizon, "give the longest outage in seconds")
     single = isinstance(sources, str | os.PathLike | Calibration | Recording) or is_frame(sources)
-    if single or not isinstance(sources, Mapping | Iterable):
+    if single or not isinstance(sources, Iterable):
         raise InputError(
             f"{checks.shown(sources)} is not a list of recordings: give two calibrations or more"
         )
@@ -147,18 +150,14 @@ def labelled(
     """
     names = []
     for place, each in enumerate(calibrations):
-        stem = PurePath(each.source.replace("\\", "/").split(", ")[0]).name
-        for _ in range(2):
-            stem = stem.rsplit(".", 1)[0] if "." in stem[1:] else stem
+        first = PurePath(each.source.replace("\\", "/").split(", ")[0])
+        stem = PurePath(first.stem).stem  # of day1.csv.gz, too
         names.append(printable(stem[:_LONGEST_LABEL]) or f"recording {place + 1}")
     wanted = list(names)
-    for name in set(names):
+    for name in (name for name, number in Counter(names).items() if number > 1):
         same = [place for place, each in enumerate(names) if each == name]
-        if len(same) == 1:
-            continue
-        parts = [
-            list(PurePath(paths[k]).with_suffix("").parts) if str(paths[k]) else [] for k in same
-        ]
+        known = [PurePath(paths[k]) if str(paths[k]) else PurePath() for k in same]
+        parts = [list(path.parent.parts) + [path.stem] * bool(path.name) for path in known]
         for end in (0, -1):
             while all(parts) and len({own[end] for own in parts}) == 1:
                 for own in parts:
@@ -167,10 +166,8 @@ def labelled(
             wanted[place] = printable(part[-_LONGEST_LABEL:]) or name
     found: dict[str, Calibration] = {}
     for name, calibration in zip(wanted, calibrations, strict=True):
-        label, copy = name, 2
-        while label in found:
-            label, copy = f"{name} ({copy})", copy + 1
-        found[label] = calibration
+        labels = chain([name], (f"{name} ({copy})" for copy in count(2)))
+        found[next(each for each in labels if each not in found)] = calibration
     return found
 
 
@@ -186,11 +183,12 @@ def _different(given: Mapping[str, Calibration]) -> tuple[dict[str, Calibration]
     kept: dict[str, Calibration] = {}
     notices = []
     for label, each in given.items():
-        same = next((other for other, known in kept.items() if is_same(each, known)), None)
-        if same is None:
+        same = [other for other, known in kept.items() if is_same(each, known)]
+        if same:
+            copy = notice("same-recording", values={"other": same[0]})
+            notices.append(replace(copy, source=label))
+        else:
             kept[label] = each
-            continue
-        notices.append(replace(notice("same-recording", values={"other": same}), source=label))
     if len(kept) < 2:
         why = "; ".join(f"{n.source} is {n.text}" for n in notices) or f"there is {len(kept)}"
         raise InputError(f"a comparison needs two recordings or more ({why}): give another one")
@@ -234,16 +232,13 @@ def _unlike(fits: Mapping[str, Fit]) -> dict[str, Notice]:
         fits.values(), key=lambda fit: (sum(is_like(fit, f) for f in fits.values()), -fit.wv.dt)
     )
     most = [label for label, fit in fits.items() if is_like(fit, usual)]
-    others = most[0] if len(most) == 1 else "the others"
     found = {}
-    for label, fit in fits.items():
-        if label in most:
-            continue
+    for label, fit in ((label, fit) for label, fit in fits.items() if label not in most):
         code = "rates-differ" if fit.wv.unit == usual.wv.unit else "units-differ"
         values = {"rate": 1.0 / fit.wv.dt, "usual": 1.0 / usual.wv.dt}
-        found[label] = notice(
-            code, values=values, others=others, own=fit.wv.unit, common=usual.wv.unit
-        )
+        words: dict[str, Any] = {"own": fit.wv.unit, "common": usual.wv.unit}
+        words["others"] = most[0] if len(most) == 1 else "the others"
+        found[label] = notice(code, values=values, **words)
     return found
 
 
@@ -360,13 +355,9 @@ def axis_numbers(
         notices.append(notice("no-numbers", name, error=error))
     upper: dict[str, float] = {}
     for letter, level in (("N", noise_density), ("K", random_walk)):
-        if covering is None or getattr(covering, letter) > 0.0:
-            continue
-        for fit in fits.values():
-            try:
+        for fit in fits.values() if covering and getattr(covering, letter) == 0.0 else ():
+            with suppress(InputError):  # this recording gives no limit
                 upper[letter] = max(level(fit).value, upper.get(letter, 0.0))
-            except InputError:
-                continue  # this recording gives no limit
     return AxisNumbers(each, whole, covering, nees, upper), tuple(notices)
 
 

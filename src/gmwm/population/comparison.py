@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import os
+import re
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
@@ -10,16 +12,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
+from pydantic_core import to_json
 
 from gmwm._core.frozen import freeze
 from gmwm._core.pages import make
 from gmwm._core.tables import frame
 from gmwm._core.text import Printed, brief, bullets, per_cent, wrapped
-from gmwm._core.units import field_units, si_parameter_unit
+from gmwm._core.units import customary_unit
 from gmwm.calibration import Calibration
 from gmwm.errors import MissingNameError
 from gmwm.estimate import Estimate, Fit, JointFit
-from gmwm.estimate.result import plain
 from gmwm.filter_numbers import FilterNumbers
 from gmwm.issues import Notice, worst_first
 from gmwm.population import tuning
@@ -45,15 +47,6 @@ _NAMES = {"short": "short times", "R": "drift"}
 def _percent(share: float) -> str:
     """A relative difference; a factor from one on."""
     return per_cent(share) if share < 0.995 else f"a factor of {brief(1.0 + share)}"
-
-
-def _without_nan(value: Any) -> Any:
-    """JSON types without NaN and infinity, which JSON lacks: ``None`` in their place."""
-    if isinstance(value, Mapping):
-        return {key: _without_nan(each) for key, each in value.items()}
-    if isinstance(value, list | tuple):
-        return [_without_nan(each) for each in value]
-    return plain(value) if isinstance(value, float) else value
 
 
 @dataclass(frozen=True)
@@ -194,9 +187,8 @@ class AxisComparison:
 
     def number_text(self, letter: str, value: float) -> tuple[str, str]:
         """An N or a K in the data-sheet unit, and that unit."""
-        known = field_units(_UNITS[letter], self.quantity)
-        unit = known[0].unit if known else si_parameter_unit(_UNITS[letter], self.quantity)
-        text = f"{value * (known[0].per_si if known else 1.0):.3g}"
+        unit, scale = customary_unit(_UNITS[letter], self.quantity, "u")
+        text = f"{value * scale:.3g}"
         return (f"{float(text):,.0f}" if "e+" in text else text), unit
 
     def to_dict(self) -> dict[str, Any]:
@@ -216,14 +208,9 @@ class AxisComparison:
             "joint": None if self.joint is None else self.joint.to_dict(),
             "equality_p": self.joint.equality_p if self.joint else None,
             "parameters": [
-                {
-                    "key": each.key,
-                    "joint": each.joint.to_dict(),
-                    "spread": each.spread,
-                    "p_value": each.p_value,
-                    "each": [None if e is None else e.to_dict() for e in each.each],
-                }
-                for each in self.parameters
+                {"key": p.key, "joint": p.joint.to_dict(), "spread": p.spread, "p_value": p.p_value}
+                | {"each": [None if e is None else e.to_dict() for e in p.each]}
+                for p in self.parameters
             ],
             "numbers": {
                 "each": {label: each.row() for label, each in self.numbers.each.items()},
@@ -235,7 +222,7 @@ class AxisComparison:
             },
             "curve_inflation": self.curve_inflation,
         }
-        return dict(_without_nan(content))
+        return dict(json.loads(to_json(content, inf_nan_mode="null")))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -284,9 +271,8 @@ class SensorComparison(Mapping[str, AxisComparison], Printed):
         counts = Counter(axis.state for axis in self.values())
         parts = []
         for state, word in STATES.items():
-            verb = word.split()[0]
             if counts[state] == 1 and state != "untested":
-                word = word.replace(verb, f"{verb}s", 1)
+                word = re.sub(r"^\w+", r"\g<0>s", word)
             if counts[state]:
                 parts.append(f"{counts[state]} {word}")
         return f"{len(self.labels)} recordings, {len(self)} axes: {', '.join(parts)}"
@@ -314,7 +300,7 @@ class SensorComparison(Mapping[str, AxisComparison], Printed):
         return "\n".join(lines)
 
     def _numbers(self, axis: AxisComparison) -> str:
-        found = []
+        found, own = [], len(axis.numbers.each)
         for letter in _UNITS:
             value, ratio = axis.numbers.value(letter), axis.numbers.inflation(letter)
             if np.isfinite(value):
@@ -322,11 +308,8 @@ class SensorComparison(Mapping[str, AxisComparison], Printed):
                 times = f" ({ratio:.2f} x joint)" if np.isfinite(ratio) else ""
                 shown = " ".join(axis.number_text(letter, value))
                 found.append(f"{letter} {sign}{shown}{times}")
-        own = len(axis.numbers.each)
-        if not found:
-            return "none: no recording can be used"
         few = f" (of {own} only)" if own < len(self.labels) else ""
-        return ", ".join(found) + few
+        return ", ".join(found) + few if found else "none: no recording can be used"
 
     @property
     def promise(self) -> str:
@@ -355,28 +338,19 @@ class SensorComparison(Mapping[str, AxisComparison], Printed):
 
     def to_frame(self) -> pandas.DataFrame:
         """A table with one row a channel, in SI units; needs pandas."""
-        nan = float("nan")
         rows = []
         for name, axis in self.items():
-            worst = axis.main[0] if axis.main else None
-            rows.append(
-                {
-                    "channel": name,
-                    "state": axis.state,
-                    "p_value": axis.p_value,
-                    "part": worst.part if worst else "",
-                    "extent": worst.extent if worst else nan,
-                    "sigma": worst.sigma if worst else nan,
-                    "recordings": len(axis.fits),
-                    "model": axis.joint.model.title() if axis.joint else "",
-                    "N": axis.numbers.value("N"),
-                    "N_inflation": axis.numbers.inflation("N"),
-                    "K": axis.numbers.value("K"),
-                    "K_inflation": axis.numbers.inflation("K"),
-                    "curve_inflation": axis.curve_inflation,
-                }
-            )
-        return frame(rows, tuple(rows[0]) if rows else ("channel",))
+            row: dict[str, Any] = {"channel": name, "state": axis.state, "p_value": axis.p_value}
+            row |= {"part": "", "extent": np.nan, "sigma": np.nan}
+            for worst in axis.main[:1]:
+                row |= {key: getattr(worst, key) for key in ("part", "extent", "sigma")}
+            row["recordings"] = len(axis.fits)
+            row["model"] = axis.joint.model.title() if axis.joint else ""
+            for letter in _UNITS:
+                row[letter] = axis.numbers.value(letter)
+                row[f"{letter}_inflation"] = axis.numbers.inflation(letter)
+            rows.append(row | {"curve_inflation": axis.curve_inflation})
+        return frame(rows, tuple(rows[0]))
 
     def report(
         self,

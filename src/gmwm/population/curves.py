@@ -161,12 +161,9 @@ class Equality:
         tau = next(curve.tau[:levels] for curve in curves if curve.tau.size >= levels)
         variance, share = np.full((2, len(curves), levels), np.nan)
         for row, part, curve in zip(variance, share, curves, strict=True):
-            there = slice(0, min(curve.tau.size, levels))
-            row[there] = curve.variance[there]
-            part[there] = np.diag(curve.relative)[there]
-        known = np.isfinite(variance)
-        weight = np.where(known, 1.0 / np.where(known, share, 1.0), 0.0)
-        common = np.sum(weight * np.where(known, variance, 0.0), axis=0) / np.sum(weight, axis=0)
+            own = min(curve.tau.size, levels)
+            row[:own], part[:own] = curve.variance[:own], np.diag(curve.relative)[:own]
+        common = np.nansum(variance / share, axis=0) / np.nansum(1.0 / share, axis=0)
         ratios = np.sqrt(variance / common)
         chi_square, dof = _chi_square(curves, common)
         differences = _differences(tau, common, np.log(ratios), curves)

@@ -118,10 +118,9 @@ class Fleet(Mapping[str, Calibration | Notice]):
             rows = []
             for each in shown:
                 unit, scale = each.field_unit
-                numbers = (each.n, each.median * scale, each.normal_limit * scale)
-                n, median, limit = map(cell, numbers)
+                median, limit = (cell(x, scale=scale) for x in (each.median, each.normal_limit))
                 sd = per_cent(each.sd, 3) if each.sd >= 0.0 else "-"
-                rows.append((each.channel, each.parameter, n, median, sd, limit, unit))
+                rows.append((each.channel, each.parameter, str(each.n), median, sd, limit, unit))
             lines += ["", *plain_table(heads, rows).splitlines(), ""]
             lines += wrapped(
                 f"filter: for outages up to {self.horizon:g} s; floor: bias instability. Limit: "
@@ -286,8 +285,7 @@ def fleet(
         if store is not None:
             names = {item.name for item in items}
             if others := [each.stem for each in store.calibrations if each.stem not in names]:
-                values = {"units": len(others)}
-                notices.append(notice("left-over", values=values, names=_some(others)))
+                notices.append(_of_some("left-over", others))
         made = Fleet(units, task.horizon, task.options, tuple(notices))
         if not made.done:
             first, *rest = made.failed.values()
@@ -307,39 +305,37 @@ def _notices(units: Collection[Unit]) -> list[Notice]:
     same: dict[str, list[str]] = {}
     for unit in units:
         same.setdefault(unit.digest or unit.path, []).append(unit.name)
-    hint = "each is counted; leave copies out"
     for names in (names for names in same.values() if len(names) > 1):
-        words: dict[str, Any] = {"hint": hint, "names": _some(names)}
-        notices.append(
-            notice("same-recording", values={"units": len(names)}, variant="fleet", **words)
-        )
+        notices.append(_of_some("same-recording", names, "each is counted; leave copies out"))
     done = {unit.name: unit.result for unit in units if isinstance(unit.result, Calibration)}
     return notices + (_differences(done) if done else [])
 
 
+def _of_some(
+    code: str, names: Sequence[str], hint: str | None = None, where: str = "", **values: float
+) -> Notice:
+    """A notice of some units."""
+    have = "1 unit has" if len(names) == 1 else f"{len(names)} units have"
+    more: dict[str, Any] = {} if hint is None else {"hint": hint, "variant": "fleet"}
+    more |= {"have": have, "names": _some(names)}
+    return notice(code, where, {"units": len(names), **values}, **more)
+
+
 def _differences(done: Mapping[str, Calibration]) -> list[Notice]:
     """Rates, channels and lengths that are not the same in all units, and too few units."""
-
-    def about(names: Sequence[str]) -> dict[str, Any]:
-        have = "1 unit has" if len(names) == 1 else f"{len(names)} units have"
-        return {"have": have, "names": _some(names)}
-
     notices = []
-    median = sorted(each.rate for each in done.values())[len(done) // 2]
-    other = [n for n, each in done.items() if abs(each.rate / median - 1.0) > tuning.SAME_RATE]
+    rate = sorted(each.rate for each in done.values())[len(done) // 2]
+    other = [n for n, each in done.items() if abs(each.rate / rate - 1.0) > tuning.SAME_RATE]
     if other:
-        values = {"units": len(other), "rate": median}
         hint = "make sure that they are of one kind"
-        notices.append(
-            notice("rates-differ", values=values, variant="fleet", hint=hint, **about(other))
-        )
+        notices.append(_of_some("rates-differ", other, hint, rate=rate))
     channels = {name: (*each, *each.skipped) for name, each in done.items()}
     lacking: dict[tuple[str, ...], list[str]] = {}
     for channel in dict.fromkeys(channel for own in channels.values() for channel in own):
         names = tuple(name for name, own in channels.items() if channel not in own)
         lacking.setdefault(names, []).append(channel)
     notices += [
-        notice("channels-differ", ", ".join(missing), {"units": len(names)}, **about(names))
+        _of_some("channels-differ", names, where=", ".join(missing))
         for names, missing in lacking.items()
         if names
     ]

@@ -14,8 +14,7 @@ from scipy.stats import binom, chi2, nct, ncx2, norm, shapiro
 
 from gmwm._core.frozen import freeze
 from gmwm._core.typing import BoolArray, FloatArray
-from gmwm._core.units import factor, field_units
-from gmwm.errors import InputError
+from gmwm._core.units import customary_unit, si_parameter_unit
 from gmwm.population import tuning
 from gmwm.population.tuning import CONFIDENCE, CONTENT
 from gmwm.population.unit import DERIVED, Row
@@ -74,11 +73,8 @@ class Spread:
     def field_unit(self) -> tuple[str, float]:
         """The data-sheet unit, and its number in one SI unit."""
         for plain in ("u/sqrt(Hz)", "u", "u s", "u/s/sqrt(Hz)", "u/s"):
-            for usual in field_units(plain, self.quantity)[:1]:
-                try:
-                    return usual.unit, 1.0 / factor(usual.unit, self.unit.replace(" s", "*s"))
-                except InputError:
-                    continue
+            if si_parameter_unit(plain, self.quantity) == self.unit:
+                return customary_unit(plain, self.quantity, "u")
         return self.unit, 1.0
 
     @property
@@ -193,7 +189,9 @@ def spreads_of(rows: Sequence[Row]) -> tuple[Spread, ...]:
     groups: dict[tuple[str, str, int], list[Row]] = {}
     for row in valid:
         of = counts[row["device"], row["channel"], letter(row)]
-        groups.setdefault((row["channel"], row["parameter"], of), []).append(row)
+        # Of the derived numbers an upper limit counts too.
+        if row["kind"] in ("estimated", "derived", *["bound"] * (row["parameter"] in DERIVED)):
+            groups.setdefault((row["channel"], row["parameter"], of), []).append(row)
     units = Counter(channel for channel, _ in {(row["channel"], row["device"]) for row in valid})
     made = [_spread(*key, own, units[key[0]]) for key, own in groups.items()]
     order, channels = list(DERIVED), list(dict.fromkeys(row["channel"] for row in valid))
@@ -202,24 +200,24 @@ def spreads_of(rows: Sequence[Row]) -> tuple[Spread, ...]:
         rank = order.index(each.parameter) if each.parameter in order else len(order)
         return rank, each.parameter, each.of, channels.index(each.channel)
 
-    return tuple(sorted((each for each in made if each.n), key=place))
+    return tuple(sorted(made, key=place))
 
 
-def _spread(channel: str, parameter: str, of: int, rows: Sequence[Row], units: int) -> Spread:
-    kinds = ["estimated", "derived", *(["bound"] if parameter in DERIVED else [])]
-    known = [row for row in rows if row["kind"] in kinds]
-    found = np.array([row["kind"] != "bound" for row in known], dtype=bool)
-    values = [row["upper"] if row["kind"] == "bound" else row["value"] for row in known]
+def _spread(channel: str, parameter: str, of: int, known: Sequence[Row], units: int) -> Spread:
+    found = [row["kind"] != "bound" for row in known]
+    values = [
+        row["value" if is_found else "upper"] for row, is_found in zip(known, found, strict=True)
+    ]
     return Spread(
         channel=channel,
-        quantity=known[0]["quantity"] if known else "",
+        quantity=known[0]["quantity"],
         parameter=parameter,
         of=of,
-        unit=known[0]["unit"] if known else "",
+        unit=known[0]["unit"],
         devices=tuple(row["device"] for row in known),
         values=np.array(values, dtype=float),
         stderr=np.array([row["stderr"] for row in known], dtype=float),  # None becomes NaN
-        found=found,
+        found=np.array([row["kind"] != "bound" for row in known]),
         without=units - len(known),
     )
 
@@ -309,15 +307,17 @@ def rank_of_limit(n: int, content: float = CONTENT, confidence: float = CONFIDEN
     is above the quantile ``content`` unless more than ``n - r`` are below it (Wilks, Ann. Math.
     Stat. 12, 1941).
     """
-    ranks = np.arange(1, n + 1)
-    good = ranks[binom.cdf(n - ranks, n, content) >= confidence]
-    return int(good[-1]) if good.size else None
+    return _rank(n, 1, content, confidence)
 
 
 def rank_of_limits(n: int, content: float = CONTENT, confidence: float = CONFIDENCE) -> int | None:
     """Rank r of the interval from the r-th smallest to the r-th largest: it takes 93 units."""
-    ranks = np.arange(1, (n + 1) // 2 + 1)
-    good = ranks[(n > 1) & (binom.cdf(n - 2 * ranks, n, content) >= confidence)]
+    return _rank(n, 2, content, confidence)
+
+
+def _rank(n: int, sides: int, content: float, confidence: float) -> int | None:
+    ranks = np.arange(1, n // sides + 1)
+    good = ranks[binom.cdf(n - sides * ranks, n, content) >= confidence]
     return int(good[-1]) if good.size else None
 
 

@@ -6,8 +6,10 @@ import glob
 import hashlib
 import json
 import os
+import re
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from inspect import signature
 from itertools import count
@@ -23,7 +25,7 @@ from gmwm.calibration import SCREENING, calibrate, floor, noise_density, random_
 from gmwm.errors import InputError, printable
 from gmwm.estimate import Fit
 from gmwm.issues import failure
-from gmwm.population.unit import DERIVED, Number, Unit
+from gmwm.population.unit import Number, Unit
 from gmwm.process import Model, as_model
 from gmwm.readers import read
 
@@ -126,19 +128,19 @@ class Task:
         return _failed(item, "worker-lost", text)
 
     def _calibrated(self, item: Item) -> Unit:
-        from gmwm._core import __version__
+        from gmwm._core import __version__  # the worker's
 
         if __version__ != self.version:
             raise InputError(
                 f"the worker has gmwm {__version__}, and numbers of {self.version} are asked for: "
                 "install the same version on all machines"
             )
-        before, digest = _state(item.path), digest_of(item.path)
+        digest = digest_of(item.path)
         recording = read(item.path, **self.reading).part(self.start, self.stop)
         calibration = calibrate(
             recording, self.models or None, screening=self.screening, still=self.still, jobs=1
         )
-        if _state(item.path) != before:
+        if digest_of(item.path) != digest:
             raise InputError(
                 f"{item.path}: changed while it was calibrated: calibrate it again with resume",
                 "recording-changed",
@@ -149,15 +151,6 @@ class Task:
 
 def _failed(item: Item, code: str, text: str) -> Unit:
     return Unit(item.path, item.name, failure(code, item.name, text))
-
-
-def _state(path: str) -> list[tuple[int, int]]:
-    """Size and time of change of a file, or of the files of a folder."""
-    try:
-        parts = sorted(Path(path).iterdir()) if os.path.isdir(path) else [Path(path)]
-        return [(each.stat().st_size, each.stat().st_mtime_ns) for each in parts]
-    except (OSError, ValueError):  # the digest reports why
-        return []
 
 
 def digest_of(path: str) -> str:
@@ -177,19 +170,14 @@ def digest_of(path: str) -> str:
 def _numbers(fit: Fit, horizon: float) -> dict[str, Number]:
     """The numbers of `DERIVED` that a fit gives."""
     found: dict[str, Number] = {}
-    try:
+    with suppress(InputError):  # no white noise and random walk bound this model
         bound = filter_numbers.bound(fit, horizon=horizon)
         for letter, value, level in (("N", bound.N, noise_density), ("K", bound.K, random_walk)):
-            found[f"filter_{letter}"] = (
-                Number(value, bound.stderr.get(letter), True)
-                if value > 0.0
-                else Number(level(fit).value, None, False)
-            )
-    except InputError:
-        pass  # no white noise and random walk bound this model
+            known = value > 0.0
+            value = value if known else level(fit).value
+            found[f"filter_{letter}"] = Number(value, bound.stderr.get(letter), known)
     low = floor(fit)
-    found["floor_B"] = Number(low.bias_instability, None, not low.falls)
-    return {name: found[name] for name in DERIVED if name in found}
+    return found | {"floor_B": Number(low.bias_instability, None, not low.falls)}
 
 
 # -- recordings ------------------------------------------------------------------------------------
@@ -203,10 +191,9 @@ def recordings(paths: Paths, folder: Path | None) -> list[Item]:
     folder: Folder of the outputs, which are no recordings.
     Raises InputError if there are none, or a pattern matches nothing.
     """
-    try:
-        given: list[Any] = [paths] if isinstance(paths, str | os.PathLike) else list(paths)
-    except TypeError:
-        raise InputError(f"{checks.shown(paths)} is no path: give paths of recordings") from None
+    given: Iterable[Any] = [paths]
+    if isinstance(paths, Iterable) and not isinstance(paths, str | os.PathLike):
+        given = paths
     found: dict[str, str] = {}
     for each in given:
         text = os.fspath(each) if isinstance(each, str | os.PathLike) else None
@@ -223,24 +210,15 @@ def recordings(paths: Paths, folder: Path | None) -> list[Item]:
 def _matching(text: str, folder: Path | None) -> list[str]:
     if not glob.has_magic(text) or os.path.lexists(text):
         return [text]
-    found = sorted(glob.glob(text, recursive=True))
-    if folder is not None:  # the folder of the outputs and the outputs are no recordings
-        own = Path(os.path.realpath(folder))
-        outputs = {own / name for name in OUTPUTS}
-        places = [Path(os.path.realpath(path)) for path in found]
-        found = [
-            path
-            for path, place in zip(found, places, strict=True)
-            if place != own and outputs.isdisjoint((place, *place.parents))
-        ]
-    # ``**`` names the folders on the way too; the folder of a bag is a recording.
-    on_the_way = {str(above) for path in found for above in Path(path).parents}
-    found = [
-        path
-        for path in found
-        if path.rstrip(os.sep) not in on_the_way
-        or os.path.isfile(os.path.join(path, "metadata.yaml"))
-    ]
+    outputs = () if folder is None else (folder / name for name in OUTPUTS)
+    out = {Path(os.path.realpath(path)) for path in outputs}
+    found = []
+    for path in sorted(glob.glob(text, recursive=True)):
+        place = Path(os.path.realpath(path))
+        # A folder on the way is no recording, that of a bag is one.
+        is_recording = os.path.isfile(path) or os.path.isfile(os.path.join(path, "metadata.yaml"))
+        if is_recording and out.isdisjoint((place, *place.parents)):
+            found.append(path)
     if not found:
         raise InputError(f"no file matches {printable(text)[:200]!r}: check the pattern")
     return found
@@ -265,9 +243,9 @@ def _names(paths: Sequence[str]) -> list[str]:
             for name, parts, is_repeated in zip(names, whole, repeated(names), strict=True)
         ]
     # Every file system takes them, and they fit into a line.
-    for i, name in enumerate(names):
-        plain = [c if c.isprintable() and c not in '/\\:*?"<>|' else "_" for c in name]
-        names[i] = "".join(plain).strip(" .")[-_LONGEST_NAME:] or "unit"
+    odd = re.compile(r'[/\\:*?"<>|]')
+    plain = ("".join(c if c.isprintable() else "_" for c in odd.sub("_", name)) for name in names)
+    names = [name.strip(" .")[-_LONGEST_NAME:] or "unit" for name in plain]
     taken = {name.lower() for name in names}
     for i, is_repeated in enumerate(repeated(names)):
         if is_repeated:

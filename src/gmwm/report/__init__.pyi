@@ -8,4 +8,4 @@ from .navigation import (
     write_navigated_report as write_navigated_report,
     write_validation_report as write_validation_report,
 )
-from .text import duration_text as duration_text
+from .page import duration_text as duration_text

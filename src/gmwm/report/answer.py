@@ -9,15 +9,14 @@ import numpy as np
 
 from gmwm._core.pages import page_of
 from gmwm._core.text import brief, per_cent
-from gmwm._core.units import field_units, si_parameter_unit
 from gmwm.calibration import AMBIGUITY, Calibration, floor
 from gmwm.diagnosis import gathered
 from gmwm.estimate import Fit
 from gmwm.export import Axis, Triad
 from gmwm.issues import Notice
-from gmwm.report.health import counted, findings
-from gmwm.report.length import length_sentence, parameters_sentence
+from gmwm.report.health import counted, findings, length_sentence, parameters_sentence
 from gmwm.report.numbers import SHOWN, Certified, certified
+from gmwm.report.page import units_of
 
 _COVERS = ("more-than-white-noise", "more-than-random-walk")
 
@@ -107,12 +106,8 @@ def trust(name: str, fit: Fit, calibration: Calibration) -> tuple[bool, str]:
 
 def quantity_text(value: float, unit: str, fit: Fit) -> dict[str, str]:
     """A value in the field's first unit and in SI."""
-    si = si_parameter_unit(unit, fit.wv.quantity)
-    if fit.wv.quantity is None and fit.wv.unit:
-        si = unit.replace("u", fit.wv.unit, 1)
-    found = field_units(unit, fit.wv.quantity)
-    own = (found[0].per_si, found[0].unit) if found else (1.0, si)
-    return {"field": f"{brief(value * own[0], 3)} {own[1]}", "si": f"{value:.3g} {si}"}
+    field, scale, si = units_of(unit, fit.wv)
+    return {"field": f"{brief(value * scale, 3)} {field}", "si": f"{value:.3g} {si}"}
 
 
 def bias_instability(fit: Fit) -> dict[str, str]:

@@ -51,13 +51,12 @@ def navigation(calibration: Calibration) -> dict[str, Any] | None:
         "times": [f"{t:g} s" for t in times],
         "sentence": _sentence(known, unknown),
         "starts": [
-            (
-                "Slow errors known at the start, as after aiding",
-                _rows(known, invalid),
-            ),
+            ("Slow errors known at the start, as after aiding", _rows(known, invalid)),
             ("Slow errors unknown at the start", _rows(unknown, invalid)),
         ],
-        "parts": _parts(known, invalid),
+        "parts": [row for row in known.rows if any(row.values)],
+        "units": {quantity: (FIELD_UNITS[quantity], per_si(quantity)) for quantity in QUANTITIES},
+        "invalid": invalid,
         "notes": known.notes,
         "rough": any(is_steep(each)[-1] for each in (known, unknown)),
         "figure": figure,
@@ -76,7 +75,7 @@ def _rows(budget: ErrorBudget, invalid: Set[str]) -> list[dict[str, Any]]:
             mostly = f"{row.channel} {row.component}, {100.0 * share:.0f} %"
             rows.append(
                 {
-                    "name": _name(of, quantity),
+                    "name": _NAMES.get((axis(of) or of, quantity), f"{of} {quantity}"),
                     "quantity": quantity,
                     "unit": FIELD_UNITS[quantity],
                     "values": [
@@ -89,25 +88,6 @@ def _rows(budget: ErrorBudget, invalid: Set[str]) -> list[dict[str, Any]]:
             )
     # By quantity, the horizontal before the others; the sort keeps that order within each.
     return sorted(rows, key=lambda row: list(QUANTITIES).index(row["quantity"]))
-
-
-def _name(of: str, quantity: str) -> str:
-    return _NAMES.get((axis(of) or of, quantity), f"{of} {quantity}")
-
-
-def _parts(budget: ErrorBudget, invalid: Set[str]) -> list[dict[str, Any]]:
-    return [
-        {
-            "channel": row.channel,
-            "component": row.component,
-            "quantity": row.quantity,
-            "unit": FIELD_UNITS[row.quantity],
-            "values": [brief(value * per_si(row.quantity), 3) for value in row.values],
-            "invalid": row.channel in invalid,
-        }
-        for row in budget.rows
-        if any(row.values)
-    ]
 
 
 def _sentence(known: ErrorBudget, unknown: ErrorBudget) -> str:

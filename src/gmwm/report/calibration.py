@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from functools import partial
-from html import escape
 from operator import call
 from pathlib import Path
 from typing import Any
@@ -15,7 +14,7 @@ from gmwm._core.jobs import shared
 from gmwm._core.pages import page_of
 from gmwm._core.text import brief, per_cent
 from gmwm.calibration import Calibration, floor, sentence, white_density
-from gmwm.estimate import Estimate, Fit
+from gmwm.estimate import Fit
 from gmwm.issues import worst_first
 from gmwm.readers import Channel, Recording
 from gmwm.report.answer import (
@@ -30,19 +29,16 @@ from gmwm.report.answer import (
 from gmwm.report.budget import navigation
 from gmwm.report.datasheet import Datasheet, read_datasheet
 from gmwm.report.figure import (
+    Spans,
     density_figure,
     deviation_figure,
     overview_figure,
-    per_si,
     residual_figure,
     series_figure,
 )
-from gmwm.report.health import ambiguity, health
-from gmwm.report.length import length_sentence, parameters_sentence
+from gmwm.report.health import ambiguity, health, length_sentence, parameters_sentence
 from gmwm.report.numbers import SHOWN, Certified, certified
-from gmwm.report.page import origin, rendered, resource
-from gmwm.report.samples import Spans
-from gmwm.report.text import duration_text, needed
+from gmwm.report.page import duration_text, origin, rendered, resource, units_of
 
 _AIM = 0.1  # relative standard error
 
@@ -118,28 +114,26 @@ def fragment(calibration: Calibration) -> str:
     """The answer for a notebook: health, a filter's numbers, length, and the axes as a table."""
     found = verdict(calibration)
     believed = filter_sentence(calibration)
-    heads = ("channel", "model", "N", "B", "slow terms", "")
-    head = f"<tr>{''.join(f'<th>{each}</th>' for each in heads)}</tr>"
     rows = []
     for name, fit in calibration.items():
         is_valid, why = trust(name, fit, calibration)
-        cells = [
-            name,
-            fit.model.title(),
-            quantity_text(white_density(fit), "u/sqrt(Hz)", fit)["field"],
-            bias_instability(fit)["field"],
-            "; ".join(term["field"] for term in slow_terms(fit)) or "none found",
-            f"{'valid' if is_valid else 'not valid'}: {why}",
-        ]
-        rows.append("<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in cells) + "</tr>")
+        rows.append(
+            [
+                name,
+                fit.model.title(),
+                quantity_text(white_density(fit), "u/sqrt(Hz)", fit)["field"],
+                bias_instability(fit)["field"],
+                "; ".join(term["field"] for term in slow_terms(fit)) or "none found",
+                f"{'valid' if is_valid else 'not valid'}: {why}",
+            ]
+        )
     title = (
         f"{calibration.source or 'a recording'}: {duration_text(calibration.duration)} at "
         f"{calibration.rate:g} Hz. {found['word']}: {found['text']}."
     )
     lengths = [length_sentence(calibration, SHOWN), parameters_sentence(calibration)]
     lines = [title, believed, "Length: " + ". ".join(filter(None, lengths)) + "."]
-    shown = "".join(f"<p>{escape(line)}</p>" for line in lines if line)
-    return f"{shown}<table>{head}{''.join(rows)}</table>"
+    return rendered("fragment.html", lines=list(filter(None, lines)), rows=rows)
 
 
 def _side_by_side(
@@ -161,10 +155,10 @@ def _side_by_side(
 
 
 def _of_samples(fit: Fit, channel: Channel | None, spans: Spans) -> dict[str, Any]:
-    if channel is None:
-        return {"density": None, "series": None}
-    drawn = {"density": density_figure, "series": series_figure}
-    return {name: draw(fit, channel, spans) for name, draw in drawn.items()}
+    draw = {"density": density_figure, "series": series_figure}
+    return {
+        name: None if channel is None else make(fit, channel, spans) for name, make in draw.items()
+    }
 
 
 def _channel(
@@ -188,7 +182,7 @@ def _channel(
         "noise": "" if own is None else _noise(fit, own.N),
         "ambiguity": ambiguity(calibration, name),
         "stated": _stated(name, fit, sheet),
-        "rows": [_row(each, lengths.get(each.key), duration) for each in fit.estimates],
+        "rows": [(e, _needed(lengths.get(e.key), duration)) for e in fit.estimates],
         "figure": deviation_figure(fit, filter_numbers=believed, rivals=rivals, sheet=sheet),
         "sliders": _sliders(fit, believed),
         "residuals": residual_figure(fit),
@@ -215,15 +209,9 @@ def _sliders(fit: Fit, numbers: tuple[float, float] | None) -> list[dict[str, st
         return []
     shown = []
     for letter, value, unit in zip("NK", numbers, ("u/sqrt(Hz)", "u/s/sqrt(Hz)"), strict=True):
-        text = quantity_text(1.0, unit, fit)
-        shown.append(
-            {
-                "letter": letter,
-                "value": f"{value:.6e}",
-                **{key: each.split(" ", 1)[1] for key, each in text.items()},
-                "per_si": f"{per_si(unit, fit):.9e}",
-            }
-        )
+        field, scale, si = units_of(unit, fit.wv)
+        own = {"letter": letter, "value": f"{value:.6e}", "per_si": f"{scale:.9e}"}
+        shown.append(own | {"field": field, "si": si})
     return shown
 
 
@@ -256,26 +244,13 @@ def _fitness(fit: Fit) -> str:
     return "; ".join(part for part in (text, fit.goodness.sentence) if part)
 
 
-def _row(estimate: Estimate, length: float | None, duration: float) -> dict[str, Any]:
-    """A parameter for the table: SI, then each of the field's units."""
-
-    def cell(value: float, low: float, high: float, unit: str) -> dict[str, str]:
-        if estimate.kind == "bound":
-            return {"value": f"< {brief(high, 4)}", "interval": "95 % upper limit", "unit": unit}
-        if estimate.kind == "estimated":
-            interval = f"{brief(low, 4)} to {brief(high, 4)}"
-            return {"value": brief(value, 4), "interval": interval, "unit": unit}
-        return {"value": brief(value, 4), "interval": estimate.kind, "unit": unit}
-
-    si = (estimate.value, estimate.lower, estimate.upper, estimate.unit)
-    cells = [*(cell(f.value, f.lower, f.upper, f.unit) for f in estimate.field), cell(*si)]
-    error = ""
-    if estimate.kind == "estimated" and estimate.value and estimate.stderr is not None:
-        error = per_cent(estimate.stderr / abs(estimate.value))
-    return {
-        "key": estimate.key,
-        "meaning": estimate.meaning,
-        "cells": cells,
-        "error": error,
-        "needed": needed(length, duration),
-    }
+def _needed(seconds: float | None, duration: float) -> str:
+    """Length of record that a parameter needs, in words; empty if it was not estimated."""
+    if seconds is None:
+        return ""
+    if seconds <= duration:
+        return "long enough"
+    if seconds == float("inf"):
+        return "not identified"
+    text = duration_text(seconds)
+    return text if text == "centuries" else f"needs {text}"

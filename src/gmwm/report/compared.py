@@ -16,9 +16,8 @@ from gmwm.estimate import Estimate, Fit
 from gmwm.issues import worst_first
 from gmwm.population import STATES, AxisComparison, ParameterSpread, SensorComparison
 from gmwm.report.datasheet import Datasheet, read_datasheet
-from gmwm.report.multiples import COLOURS, multiple
 from gmwm.report.page import origin, write_page
-from gmwm.report.text import duration_text
+from gmwm.report.pictures import multiple
 
 _SIDE_BY_SIDE = 6
 """Recordings whose values stand in columns of their own; of more the range is shown."""
@@ -28,6 +27,9 @@ _NARROW, _WIDE = 1.02, 1.5
 
 _ASIDE = ("not-noise", "channel-missing", "channel-skipped")
 """Codes of notices that the verdicts have in a word."""
+
+_REPEATED = ("curves-differ", "curves-close")
+"""Codes of those that the verdicts repeat."""
 
 _MARKS = {"agree": "good", "close": "good", "differ": "care", "untested": "bad"}
 _LETTERS = {"N": "u/sqrt(Hz)", "K": "u/s/sqrt(Hz)"}
@@ -62,17 +64,10 @@ def write_sensor_comparison_report(
         path,
         "compared.html",
         comparison=comparison,
-        recordings=[
-            {
-                "label": label,
-                "colour": place % COLOURS,
-                "size": f"{duration_text(each.duration)} at {each.rate:.6g} Hz",
-            }
-            for place, (label, each) in enumerate(comparison.calibrations.items())
-        ],
-        state=_overall(comparison),
+        state="care" if {"differ", "untested"} & {a.state for a in comparison.values()} else "good",
         axes=[_axis(axis, comparison, sheet) for axis in comparison.values()],
-        notices=_notices(comparison),
+        notices=[n for n in worst_first(list(comparison.notices)) if n.code not in _REPEATED],
+        aside=_ASIDE,
         columns=comparison.labels if len(comparison.labels) <= _SIDE_BY_SIDE else ("range",),
         sheet=sheet,
         stated={
@@ -82,24 +77,6 @@ def write_sensor_comparison_report(
         },
         provenance=origin(sources | dict(provenance or {}), "comparison of", sheet),
     )
-
-
-def _overall(comparison: SensorComparison) -> str:
-    states = {axis.state for axis in comparison.values()}
-    return "care" if states & {"differ", "untested"} else "good"
-
-
-def _notices(comparison: SensorComparison) -> list[dict[str, Any]]:
-    """Without those that the verdicts repeat."""
-    return [
-        {
-            "is_aside": notice.code in _ASIDE,
-            "is_remark": notice.severity in ("warning", "bad"),
-            "text": notice.sentence,
-        }
-        for notice in worst_first(list(comparison.notices))
-        if notice.code not in ("curves-differ", "curves-close")
-    ]
 
 
 def _axis(
@@ -112,22 +89,15 @@ def _axis(
         if axis.name in comparison.calibrations[label]
     ]
     return {
-        "name": axis.name,
+        "of": axis,
         "state": _MARKS[axis.state],
         "word": STATES[axis.state],
-        "sentence": axis.sentence,
-        "figure": multiple(axis, labels, others, sheet) if axis.fits or others else "",
-        "model": axis.joint.model.title() if axis.joint else "none",
-        "joint_valid": axis.joint is not None and axis.joint.valid,
-        "joint_codes": _codes(axis.joint),
+        "figure": multiple(axis, labels, others, sheet) if axis.fits or others else None,
+        "codes": _codes(axis.joint),
         "equality": _p(axis.joint.equality_p, "= ") if axis.joint else "",
-        "rows": [
-            _row(each, axis, labels) for each in axis.parameters if each.joint.kind != "fixed"
-        ],
+        "rows": [_row(p, axis, labels) for p in axis.parameters if p.joint.kind != "fixed"],
         "numbers": [_numbers(axis, letter, sheet) for letter in _LETTERS],
         "nees": _nees(axis),
-        "inflation": f"{axis.curve_inflation:.2f}" if np.isfinite(axis.curve_inflation) else "",
-        "own": len(axis.numbers.each),
     }
 
 
@@ -180,29 +150,22 @@ def _p(value: float, sign: str = "") -> str:
 
 
 def _numbers(axis: AxisComparison, letter: str, sheet: Datasheet | None) -> dict[str, str]:
-    values = [getattr(each, letter) for each in axis.numbers.each.values()]
-    found = [value for value in values if value > 0.0]
-    covering, ratio = axis.numbers.value(letter), axis.numbers.inflation(letter)
-    sign = "≤ " if letter in axis.numbers.upper else ""
-    stated = sheet.of(axis.name, axis.quantity).get(letter) if sheet is not None else None
-    times = f"{brief(covering / stated, 3)} times" if stated and np.isfinite(covering) else ""
+    found = [n for each in axis.numbers.each.values() if (n := getattr(each, letter)) > 0.0]
     ends = [axis.number_text(letter, end)[0] for end in found and (min(found), max(found))]
-    text, unit = axis.number_text(letter, covering)
-    details = [f"{covering:.3e} SI"] if np.isfinite(covering) else []
-    details += [f"{ratio:.2f} x joint"] if np.isfinite(ratio) else []
-    return {
-        "range": " to ".join(dict.fromkeys(ends)) or "none found",
-        "covering": sign + text if np.isfinite(covering) else "none",
-        "unit": unit if np.isfinite(covering) else "",
-        "details": ", ".join(details),
-        "stated": times,
-    }
+    row = {"range": " to ".join(dict.fromkeys(ends)) or "none found"}
+    covering, ratio = axis.numbers.value(letter), axis.numbers.inflation(letter)
+    if not np.isfinite(covering):
+        return row | {"covering": "none", "unit": "", "details": "", "stated": ""}
+    text, row["unit"] = axis.number_text(letter, covering)
+    row["covering"] = f"{'≤ ' if letter in axis.numbers.upper else ''}{text}"
+    times = f", {ratio:.2f} x joint" if np.isfinite(ratio) else ""
+    stated = sheet.of(axis.name, axis.quantity).get(letter) if sheet is not None else None
+    row["stated"] = f"{brief(covering / stated, 3)} times" if stated else ""
+    return row | {"details": f"{covering:.3e} SI{times}"}
 
 
 def _nees(axis: AxisComparison) -> str:
     """Of the covering numbers, in the recordings."""
     known = [value for value in axis.numbers.nees.values() if np.isfinite(value)]
-    if not known:
-        return ""
-    low, high = f"{min(known):.2g}", f"{max(known):.2g}"
-    return low if low == high else f"{low} to {high}"
+    ends = [f"{each:.2g}" for each in known and (min(known), max(known))]
+    return " to ".join(dict.fromkeys(ends))

@@ -7,14 +7,14 @@ hide; and ``whatif``: N and K of the curve that sliders move, with the sampling 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
 
 from gmwm._core.typing import FloatArray
-from gmwm._core.units import field_units, si_parameter_unit
 from gmwm.calibration import Calibration, floor
+from gmwm.diagnosis import spectrum
 from gmwm.estimate import Fit
 from gmwm.estimate.result import dense_curves
 from gmwm.filter_numbers import FIELD_UNITS, ErrorBudget, root_sum
@@ -22,9 +22,10 @@ from gmwm.plotting import COMPONENT_COLOURS, DATA_COLOUR, SUM_COLOUR, deviation_
 from gmwm.process import Model
 from gmwm.readers import Channel
 from gmwm.report.datasheet import Datasheet
-from gmwm.report.samples import Spans, density, series
+from gmwm.report.page import units_of
 
 Figure = dict[str, Any]
+Spans = Sequence[tuple[int, int]]
 
 WHATIF = "filter: N and K"
 """Name of the curve that sliders move."""
@@ -36,6 +37,9 @@ _BELOW = 8.0  # how far below the curves a mark may lie that the axis is stretch
 _SHARE = 100.0  # per cent: residuals beyond are drawn at the edge, with their size
 _FILTER = "#c2185b"
 _TICK = 0.93  # of the height: what was left out is marked above, and no sample is painted over
+_BINS = 400  # of the time series: as many as a figure has columns of pixels to show
+_PER_OCTAVE = 12
+_FIRST_BIN = 4  # of the spectrum: the window reaches over the bins below
 _LAYOUT: Figure = {
     "margin": {"l": 62, "r": 12, "t": 12, "b": 44},
     "height": 360,
@@ -54,7 +58,7 @@ def overview_figure(calibration: Calibration, quantity: str | None) -> Figure:
     traces: list[Figure] = []
     first = next(iter(fits.values()))
     units = _units("Allan deviation", "u", first)
-    factor = per_si("u", first)
+    factor = units_of("u", first.wv)[1]
     seen: list[FloatArray] = []
     for (name, fit), colour in zip(fits.items(), _colours(len(fits)), strict=True):
         tau, components = dense_curves(fit)
@@ -83,7 +87,7 @@ def deviation_figure(
     filter_numbers: (float, float), n and K of the curve that the sliders move, SI.
     rivals: That describe the data as well: drawn faintly.
     """
-    wv, factor = fitted.wv, per_si("u", fitted)
+    wv, factor = fitted.wv, units_of("u", fitted.wv)[1]
     tau, components = dense_curves(fitted)
     total = root_sum(list(components.values()))
     traces = []
@@ -92,29 +96,24 @@ def deviation_figure(
         curve, name = factor * root_sum(list(parts.values())), "models that fit equally well"
         faint = _line(at, curve, name, "#777777", "solid", 1.0)
         traces.append({**faint, "opacity": 0.85, "legendgroup": "ties"})
-    toggles = [0] if traces else []
     for (label, curve), colour in zip(components.items(), _colours(len(components)), strict=True):
         if np.any(curve > 0.0):
-            toggles.append(len(traces))
             traces.append(_line(tau, factor * curve, label, colour, "dash", 1.5))
     stated = sheet.deviation(wv.name, wv.quantity, tau, wv.dt) if sheet else None
     if stated is not None:
-        toggles.append(len(traces))
         traces.append(_line(tau, factor * stated, "data sheet", _SHEET, "longdashdot", 2.0))
-    toggles.append(len(traces))
     traces.append(_line(tau, factor * total, "model", SUM_COLOUR, "solid", 2.2))
     value = factor * wv.allan_deviation
-    toggles.append(len(traces))
     low, high = factor * np.sqrt(2.0 * wv.lower), factor * np.sqrt(2.0 * wv.upper)
     points = _points(wv.tau, value, f"data, {100.0 * wv.confidence:g} % interval", DATA_COLOUR, 6)
     traces.append({**points, "error_y": _bars(value, low, high, DATA_COLOUR)})
     more: Figure = {}
     if filter_numbers is not None:
         more["whatif"] = {"curve": WHATIF, "factor": factor}
-        toggles.append(len(traces))
         N, K = filter_numbers
         believed = factor * np.sqrt(N**2 / tau + K**2 * tau / 3.0)
         traces.append(_line(tau, believed, WHATIF, _FILTER, "dot", 2.4))
+    toggles = [0, *range(max(len(rivals), 1), len(traces))]  # one for all rivals
     traces.append(_marks(fitted, filter_numbers, factor))
     bottom, top = deviation_range(np.concatenate([factor * total, value]))
     marks = [0.7 * y for y in traces[-1]["y"] if y > bottom / _BELOW]
@@ -130,23 +129,21 @@ def _marks(fitted: Fit, numbers: tuple[float, float] | None, factor: float) -> F
     places = [("0.664 B", low.tau, low.deviation)]
     if numbers is not None:
         places += [("N at 1 s", 1.0, numbers[0]), ("K at 3 s", 3.0, numbers[1])]
-    shown = [(label, tau, y * factor) for label, tau, y in places if y > 0.0]
-    return {
-        "type": "scatter",
-        "mode": "markers+text",
-        "name": "N at 1 s, 0.664 B at the lowest point, K at 3 s",
-        "x": [each[1] for each in shown],
-        "y": [float(f"{each[2]:.5g}") for each in shown],
-        "text": [each[0] for each in shown],
-        "textposition": [
-            "top left" if label[0] == "K" or tau > 0.1 * fitted.wv.tau[-1] else "top right"
-            for label, tau, _ in shown
-        ],
-        "textfont": {"size": 14, "color": SUM_COLOUR},
+    shown = [each for each in places if each[2] > 0.0]
+    late = 0.1 * fitted.wv.tau[-1]
+    left = [label[0] == "K" or tau > late for label, tau, _ in shown]
+    return _scatter(
+        np.array([tau for _, tau, _ in shown]),
+        factor * np.array([y for *_, y in shown]),
+        "N at 1 s, 0.664 B at the lowest point, K at 3 s",
+        mode="markers+text",
+        text=[label for label, *_ in shown],
+        textposition=["top left" if is_left else "top right" for is_left in left],
+        textfont={"size": 14, "color": SUM_COLOUR},
         # Open, so that a point of the data beneath is seen.
-        "marker": {"symbol": "diamond-open", "size": 12, "color": _FILTER, "line": {"width": 2}},
-        "hovertemplate": "%{text}: %{y:.4g} at %{x:.4g} s<extra></extra>",
-    }
+        marker={"symbol": "diamond-open", "size": 12, "color": _FILTER, "line": {"width": 2}},
+        hovertemplate="%{text}: %{y:.4g} at %{x:.4g} s<extra></extra>",
+    )
 
 
 def residual_figure(fitted: Fit) -> Figure:
@@ -177,66 +174,58 @@ def residual_figure(fitted: Fit) -> Figure:
         "circle" if ok else "triangle-up" if value > 0.0 else "triangle-down"
         for ok, value in zip(inside, misfit, strict=True)
     ]
-    zero = {"range": [-reach, reach], "zeroline": True, "zerolinecolor": SUM_COLOUR}
-    shares = {**_linear("data - model [%]"), **zero}
+    shares = _linear("data - model [%]") | {"range": [-reach, reach], "zeroline": True}
+    shares |= {"zerolinecolor": SUM_COLOUR}
     layout = {"height": 190, "xaxis": _times(at.tau), "yaxis": shares}
     return _figure([points], layout)
 
 
 def density_figure(fitted: Fit, channel: Channel, spans: Spans) -> Figure:
     """Square root of the spectral density: samples, model and its terms."""
-    factor = per_si("u/sqrt(Hz)", fitted)
-    frequency, root = density(channel, spans)
+    factor = units_of("u/sqrt(Hz)", fitted.wv)[1]
+    frequency, root = _density(channel, spans)
     traces = [_line(frequency, factor * root, "data", "#7f8c99", "solid", 1.2)]
-    toggles = [0]
     grid = np.geomspace(frequency[0], frequency[-1], 160)
-    terms = zip(fitted.model.term_labels(), fitted.model.terms, strict=True)
-    found: dict[str, FloatArray] = {
-        label: np.sqrt(np.maximum(np.asarray(term.psd(grid, channel.dt), dtype=float), 0.0))
-        for label, term in terms
-        if term.has_spectrum() and not term.is_line and not term.is_drift
-    }
-    colours = dict(zip(fitted.model.term_labels(), _colours(len(fitted.model.terms)), strict=True))
-    for label, curve in found.items():
-        if np.any(curve > 0.0):
-            toggles.append(len(traces))
-            traces.append(_line(grid, factor * curve, label, colours[label], "dash", 1.3))
-    if found:
-        toggles.append(len(traces))
-        total = root_sum(list(found.values()))
-        traces.append(_line(grid, factor * total, "model", SUM_COLOUR, "solid", 2.0))
+    terms, curves = fitted.model.terms, []
+    for label, term, colour in zip(
+        fitted.model.term_labels(), terms, _colours(len(terms)), strict=True
+    ):
+        if term.has_spectrum() and not term.is_line and not term.is_drift:
+            curves.append(np.sqrt(np.maximum(term.psd(grid, channel.dt), 0.0)))
+            if np.any(curves[-1] > 0.0):
+                traces.append(_line(grid, factor * curves[-1], label, colour, "dash", 1.3))
+    if curves:
+        traces.append(_line(grid, factor * root_sum(curves), "model", SUM_COLOUR, "solid", 2.0))
     units = _units("density", "u/sqrt(Hz)", fitted)
     known = root[root > 0.0]
     densities = _axis(units[0][0], 0.4 * factor * known.min(), 2.5 * factor * known.max())
     layout = {"height": 300, "xaxis": _axis("frequency [Hz]"), "yaxis": densities}
-    return _figure(traces, layout, units=units, toggles=toggles)
+    return _figure(traces, layout, units=units, toggles=range(len(traces)))
 
 
 def series_figure(fitted: Fit, channel: Channel, spans: Spans) -> Figure:
     """The time series in bins, less its mean, with what was left out of it."""
-    found, factor = series(channel, spans), per_si("u", fitted)
-    end = channel.n * channel.dt
+    factor, end = units_of("u", fitted.wv)[1], channel.n * channel.dt
     unit, scale = ("h", 3600.0) if end > 7200.0 else ("min", 60.0) if end > 600.0 else ("s", 1.0)
-    time = found.time / scale
-    edge: Figure = {"type": "scatter", "mode": "lines", "x": _plain(time), "hoverinfo": "skip"}
-    edge |= {"line": {"width": 0}}
-    low, high = _plain(factor * found.low), _plain(factor * found.high)
+    time, *values = _bins(channel, spans)
+    time, (mean, low, high) = time / scale, (factor * each for each in values)
+    edge = {**_line(time, low, "smallest", SUM_COLOUR, "solid", 0), "hoverinfo": "skip"}
     filled = {"fill": "tonexty", "fillcolor": "rgba(0,114,178,0.35)"}
-    mean = _line(time, factor * found.mean, "mean of the bin", SUM_COLOUR, "solid", 1.2)
+    line = _line(time, mean, "mean of the bin", SUM_COLOUR, "solid", 1.2)
     traces: list[Figure] = [
-        {**edge, "name": "smallest", "y": low},
-        {**edge, "name": "largest", "y": high, **filled},
-        {**mean, "hovertemplate": f"%{{y:.4g}} at %{{x:.4g}} {unit}<extra></extra>"},
+        edge,
+        {**edge, "name": "largest", "y": _plain(high), **filled},
+        {**line, "hovertemplate": f"%{{y:.4g}} at %{{x:.4g}} {unit}<extra></extra>"},
     ]
     units = _units("signal - mean", "u", fitted)
-    mark = {"type": "rect", "yref": "paper", "y0": _TICK, "y1": 1, "line": {"width": 0}}
-    mark |= {"fillcolor": "#d55e00"}
-    spans_out = [(first / scale, last / scale) for first, last in found.left_out[:500]]
+    mark = {"type": "rect", "yref": "paper", "y0": _TICK, "y1": 1, "fillcolor": "#d55e00"}
+    mark |= {"line": {"width": 0}}
+    out = [{"x0": first / scale, "x1": last / scale} for first, last in _gone(channel, spans)[:500]]
     layout = {
         "height": 220,
         "xaxis": _linear(f"time [{unit}]"),
         "yaxis": _linear(units[0][0]),
-        "shapes": [{**mark, "x0": first, "x1": last} for first, last in spans_out],
+        "shapes": [mark | ends for ends in out],
     }
     return _figure(traces, layout, units=units)
 
@@ -266,74 +255,44 @@ def growth_figure(known: ErrorBudget, unknown: ErrorBudget, of: str, quantity: s
 
 
 def _figure(
-    traces: Sequence[Figure],
-    layout: Mapping[str, Any],
+    traces: list[Figure],
+    layout: Figure,
     *,
     units: Sequence[tuple[str, float]] = (),
     toggles: Iterable[int] = (),
     **more: Any,
 ) -> Figure:
-    return {
-        "data": list(traces),
-        "layout": {**_LAYOUT, **layout},
-        "config": _CONFIG,
-        "units": list(units),
-        "toggles": list(toggles),
-        **more,
-    }
+    more |= {"units": list(units), "toggles": list(toggles), "config": _CONFIG}
+    return {"data": traces, "layout": _LAYOUT | layout, **more}
 
 
 def _units(title: str, unit: str, fitted: Fit) -> list[tuple[str, float]]:
     """Title of the axis and factor from the unit drawn first, for the field's unit and SI."""
-    quantity = fitted.wv.quantity
-    si = si_parameter_unit(unit, quantity)
-    if quantity is None:
-        si = unit.replace("u", fitted.wv.unit or "u", 1)
-    found = field_units(unit, quantity)
-    field = [(f"{title} [{found[0].unit}]", 1.0)] if found else []
-    return [*field, (f"{title} [{si}]", 1.0 / found[0].per_si if found else 1.0)]
-
-
-def per_si(unit: str, fitted: Fit) -> float:
-    """How many of the field's unit one SI unit is."""
-    found = field_units(unit, fitted.wv.quantity)
-    return found[0].per_si if found else 1.0
+    field, scale, si = units_of(unit, fitted.wv)
+    own = [(f"{title} [{field}]", 1.0)] if field != si else []
+    return [*own, (f"{title} [{si}]", 1.0 / scale)]
 
 
 def _points(x: FloatArray, y: FloatArray, label: str, colour: str, size: int) -> Figure:
-    return {
-        "type": "scatter",
-        "mode": "markers",
-        "name": label,
-        "x": _plain(x),
-        "y": _plain(y),
-        "marker": {"color": colour, "size": size},
-        "hovertemplate": "%{y:.4g} at %{x:.4g} s",
-    }
-
-
-def _bars(value: FloatArray, low: FloatArray, high: FloatArray, colour: str) -> Figure:
-    return {
-        "type": "data",
-        "symmetric": False,
-        "array": _plain(np.maximum(high - value, 0.0)),
-        "arrayminus": _plain(np.maximum(value - low, 0.0)),
-        "color": colour,
-        "thickness": 1.2,
-        "width": 3,
-    }
+    marker = {"color": colour, "size": size}
+    hover = "%{y:.4g} at %{x:.4g} s"
+    return _scatter(x, y, label, mode="markers", marker=marker, hovertemplate=hover)
 
 
 def _line(x: FloatArray, y: FloatArray, label: str, colour: str, dash: str, width: float) -> Figure:
-    return {
-        "type": "scatter",
-        "mode": "lines",
-        "name": label,
-        "x": _plain(x),
-        "y": _plain(y),
-        "line": {"color": colour, "dash": dash, "width": width},
-        "hovertemplate": "%{y:.4g} at %{x:.4g}",
-    }
+    line = {"color": colour, "dash": dash, "width": width}
+    hover = "%{y:.4g} at %{x:.4g}"
+    return _scatter(x, y, label, mode="lines", line=line, hovertemplate=hover)
+
+
+def _scatter(x: FloatArray, y: FloatArray, label: str, **style: Any) -> Figure:
+    return {"type": "scatter", "name": label, "x": _plain(x), "y": _plain(y), **style}
+
+
+def _bars(value: FloatArray, low: FloatArray, high: FloatArray, colour: str) -> Figure:
+    above, below = (_plain(np.maximum(each, 0.0)) for each in (high - value, value - low))
+    style = {"type": "data", "symmetric": False, "color": colour, "thickness": 1.2, "width": 3}
+    return {**style, "array": above, "arrayminus": below}
 
 
 def _plain(values: FloatArray) -> list[float | None]:
@@ -356,14 +315,62 @@ def _axis(title: str, low: float | None = None, high: float = 1.0) -> Figure:
 
 
 def _linear(title: str) -> Figure:
-    return {
-        "title": {"text": title, "standoff": 6},
-        "gridcolor": _GRID,
-        "linecolor": "#888888",
-        "mirror": True,
-        "zeroline": False,
-    }
+    frame = {"gridcolor": _GRID, "linecolor": "#888888", "mirror": True, "zeroline": False}
+    return {"title": {"text": title, "standoff": 6}, **frame}
 
 
 def _colours(count: int) -> list[str]:
     return [COMPONENT_COLOURS[i % len(COMPONENT_COLOURS)] for i in range(count)]
+
+
+# -- samples ---------------------------------------------------------------------------------------
+
+
+def _used(channel: Channel, spans: Spans) -> FloatArray:
+    """The samples of a channel, NaN where they were left out."""
+    values = np.array(channel.values, dtype=float)
+    for start, stop in spans:
+        values[start:stop] = np.nan
+    return values
+
+
+def _bins(channel: Channel, spans: Spans) -> FloatArray:
+    """Middle (s), mean, smallest and largest of the used samples in bins, less their mean, (4, b).
+
+    NaN where there are none.
+    """
+    values = _used(channel, spans)
+    values -= np.nanmean(values)
+    edges = np.unique(np.linspace(0, values.size, min(_BINS, values.size) + 1).astype(int))
+    first, known = edges[:-1], ~np.isnan(values)
+    with np.errstate(invalid="ignore"):
+        counts = np.add.reduceat(known, first, dtype=float)
+        mean = np.add.reduceat(np.where(known, values, 0.0), first) / counts
+        low, high = np.fmin.reduceat(values, first), np.fmax.reduceat(values, first)
+    return np.array([0.5 * (first + edges[1:]) * channel.dt, mean, low, high])
+
+
+def _gone(channel: Channel, spans: Spans) -> list[tuple[float, float]]:
+    """First and last time (s) of what was left out, joined where a gap could not be seen."""
+    width = 0.5 * channel.dt * channel.n / _BINS
+    gone: list[tuple[float, float]] = []
+    for start, stop in spans:
+        first, last = start * channel.dt - width, stop * channel.dt + width
+        if gone and first <= gone[-1][1]:
+            first = gone.pop()[0]
+        gone.append((first, last))
+    return gone
+
+
+def _density(channel: Channel, spans: Spans) -> tuple[FloatArray, FloatArray]:
+    """Frequency (Hz) and root of the two-sided density (u/sqrt(Hz)) of a channel.
+
+    Means of the periodogram over a twelfth of an octave. White noise of N lies at N.
+    """
+    found = spectrum(_used(channel, spans), channel.dt)
+    octaves = np.log2(found.density.size / _FIRST_BIN)
+    grid = np.linspace(0.0, octaves, int(_PER_OCTAVE * octaves) + 1)
+    edges = np.unique(np.rint(_FIRST_BIN * 2.0**grid)).astype(int)
+    mean = np.add.reduceat(found.density[: edges[-1]], edges[:-1]) / np.diff(edges)
+    middle = 0.5 * (edges[:-1] + edges[1:] - 1) * found.resolution
+    return middle, np.sqrt(0.5 * mean)

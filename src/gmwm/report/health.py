@@ -1,4 +1,4 @@
-"""Findings of the recording, worst first."""
+"""Findings of the recording, worst first, and whether it is long enough for a filter."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from gmwm.estimate import Fit
 from gmwm.filter_numbers import bound
 from gmwm.issues import Notice, worst_first
 from gmwm.process import Model
-from gmwm.report.length import part_sentence
 from gmwm.report.numbers import SHOWN
+from gmwm.report.page import begun, duration_text
 
+_AIM = 0.1  # relative standard error of a deviation or a parameter that is well enough known
 _COUNTED = {"bad": "severe issue", "warning": "warning", "note": "note"}
 _LEAST_CHANGE = 1e-3
-_LABELS = {"bad": "severe"}
 
 
 def health(calibration: Calibration) -> dict[str, Any]:
@@ -31,16 +31,17 @@ def health(calibration: Calibration) -> dict[str, Any]:
     return {
         "examined": examined,
         "advice": [
-            f"{_begun(n.text)}: {n.hint}. "
-            + part_sentence(calibration, n.values["stop"] - n.values["start"], SHOWN)
+            f"{begun(n.text)}: {n.hint}. "
+            + _part_sentence(calibration, n.values["stop"] - n.values["start"], SHOWN)
             for n in calibration.notices
             if n.code == LONGEST_PART
         ],
         "unexamined": () if examined else list(map(str, notices)),
         "summary": _summary(found),
         "severe": any(notice.severity == "bad" for notice in found),
-        "rows": _rows(found),
-        "good": _rows([notice for notice in notices if notice.severity == "good"]),
+        # Of equal ones, those of the whole recording before those of a channel.
+        "rows": worst_first(sorted(found, key=lambda notice: bool(notice.where))),
+        "good": [notice for notice in notices if notice.severity == "good"],
     }
 
 
@@ -105,21 +106,6 @@ def _effect(fit: Fit, rivals: Sequence[Model]) -> str:
     return f". {text}" if np.isfinite(change) else ""
 
 
-def _rows(notices: list[Notice]) -> list[dict[str, Any]]:
-    """Worst first; of equal ones, those of the whole recording before those of a channel."""
-    return [
-        {
-            "severity": notice.severity,
-            "label": _LABELS.get(notice.severity, notice.severity),
-            "where": ", ".join(part for part in (notice.where, notice.source) if part),
-            "text": _begun(notice.text),
-            "hint": _begun(notice.hint),
-            "done": notice.hint,
-        }
-        for notice in worst_first(sorted(notices, key=lambda notice: bool(notice.where)))
-    ]
-
-
 def _summary(notices: list[Notice]) -> str:
     if all(notice.severity not in ("bad", "warning") for notice in notices):
         return "No defect found."
@@ -127,6 +113,78 @@ def _summary(notices: list[Notice]) -> str:
     return f"{' and '.join([', '.join(parts[:-1]), parts[-1]] if parts[1:] else parts)}."
 
 
-def _begun(text: str) -> str:
-    """With a capital at the beginning; units and names keep theirs."""
-    return text[:1].upper() + text[1:]
+# -- length ----------------------------------------------------------------------------------------
+
+
+def known_at(fit: Fit, tau: float, rivals: Sequence[Model] = ()) -> float:
+    """Relative standard error of the model's Allan deviation at an averaging time.
+
+    rivals: Models that describe the data as well: as far as the farthest of them.
+    """
+    if not fit.keys or fit.wv.dt > tau:
+        return float("nan")
+    with np.errstate(all="ignore"):
+        value, lower, upper = fit.deviation_interval(np.array([tau]), 0.6827, rivals)
+        farthest = max(upper[0] / value[0], value[0] / lower[0]) - 1.0
+    return float(farthest) if value[0] > 0.0 else float("nan")
+
+
+def _worst(calibration: Calibration, horizon: float) -> tuple[str, float, float] | None:
+    """Channel whose curve is known worst at a horizon, its error, and the length (s) for `_AIM`."""
+    errors = {
+        name: known_at(fit, horizon, calibration.rivals.get(name, ()))
+        for name, fit in calibration.items()
+    }
+    known = {name: each for name, each in errors.items() if np.isfinite(each)}
+    if not known:
+        return None
+    worst = max(known, key=known.__getitem__)
+    least = max(calibration.duration * (known[worst] / _AIM) ** 2, 4.0 * horizon)
+    return worst, known[worst], least
+
+
+def length_sentence(calibration: Calibration, horizon: float) -> str:
+    """Whether the recording is long enough for a horizon, and how long would do."""
+    found = _worst(calibration, horizon)
+    if found is None:
+        return ""
+    worst, error, least = found
+    # A curve that ends before the horizon is known there by the model alone.
+    covered = min(float(fit.wv.tau[-1]) for fit in calibration.values()) >= horizon
+    share, text = per_cent(error), duration_text(least)
+    if least <= calibration.duration and covered:
+        return (
+            f"long enough for {horizon:g} s outages: {worst} is known to +-{share} there; {text} "
+            f"would give +-{100.0 * _AIM:g} %"
+        )
+    return (
+        f"too short for {horizon:g} s outages: record {text} for +-{100.0 * _AIM:g} % "
+        f"(now +-{share}, {worst})"
+    )
+
+
+def parameters_sentence(calibration: Calibration) -> str:
+    """The length at which every parameter is well known; a filter's numbers need less."""
+    lengths = [
+        (seconds, f"{key} of {name}")
+        for name, fit in calibration.items()
+        for key, seconds in fit.needed_length(_AIM).items()
+    ]
+    finite = [each for each in lengths if np.isfinite(each[0])]
+    if not finite:
+        return ""
+    longest, what = max(finite)
+    if longest <= calibration.duration:
+        return f"Every parameter has an error of at most {100.0 * _AIM:g} %"
+    found = _worst(calibration, SHOWN)
+    aside = "; a filter needs less" if found is not None and longest > found[2] else ""
+    return (
+        f"For {100.0 * _AIM:g} % in every parameter record {duration_text(longest)} ({what}){aside}"
+    )
+
+
+def _part_sentence(calibration: Calibration, length: float, horizon: float) -> str:
+    """Whether a part (s) of the recording is long enough too."""
+    found = _worst(calibration, horizon)
+    word = "long enough" if found is not None and found[2] <= length else "too short"
+    return f"That part is {word} for {horizon:g} s outages." if found is not None else ""

@@ -13,12 +13,11 @@ import numpy as np
 from gmwm._core.files import writable_file
 from gmwm._core.pages import page_of
 from gmwm._core.text import readable
-from gmwm._core.units import SI_UNIT
+from gmwm._core.units import SI_UNIT, customary_unit
 from gmwm.ins.logs import Comparison, Navigated
-from gmwm.ins.simulation import QUANTITIES, Consistency, Ratio, Validation
+from gmwm.ins.simulation import QUANTITIES, Ratio, Validation
 from gmwm.process import Model
 from gmwm.report.page import write_page
-from gmwm.report.text import duration_text, model_text
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -52,14 +51,24 @@ def write_validation_report(validation: Validation, path: str | os.PathLike[str]
         growth=svg(validation.plot_growth()) if outages else "",
         outages=outages,
         groups=_GROUPS,
-        gnss_on=[(name, _cells(validation.with_gnss(name))) for name in validation.names],
+        gnss_on=[(name, validation.with_gnss(name)) for name in validation.names],
         innovations=[(name, validation.innovations(name)) for name in validation.names],
         models=[(name, _models(each.models)) for name, each in experiment.filters.items()],
     )
 
 
 def _models(models: Mapping[str, Model]) -> list[tuple[str, str]]:
-    return [(axis, model_text(each, axis.partition("_")[0])) for axis, each in models.items()]
+    """Axis, and its terms with their parameters in the first unit of the field."""
+    found = []
+    for axis, model in models.items():
+        terms: dict[int, list[str]] = {}
+        for item in model.parameters:
+            unit, scale = customary_unit(item.parameter.unit, axis.partition("_")[0], "u")
+            text = f"{item.parameter.name} {float(item.value or 0.0) * scale:.4g} {unit}".rstrip()
+            terms.setdefault(item.term, []).append(text)
+        labels = model.term_labels()
+        found.append((axis, "; ".join(f"{labels[i]} {', '.join(t)}" for i, t in terms.items())))
+    return found
 
 
 def svg(figure: Figure) -> str:
@@ -77,32 +86,21 @@ def svg(figure: Figure) -> str:
 
 def _outage(validation: Validation, index: int) -> dict[str, Any]:
     outage = validation.study.outages[index]
-    rows = []
-    for quantity, unit in QUANTITIES.items():
-        for name in validation.reached:
-            rows.append((f"{quantity} [{unit}]", name, validation.spreads(name)[index][quantity]))
+    rows = [
+        (f"{quantity} [{unit}]", name, validation.spreads(name)[index][quantity])
+        for quantity, unit in QUANTITIES.items()
+        for name in validation.reached
+    ]
     found = {name: validation.at_ends(name)[index] for name in validation.names}
     return {
         "title": f"Outage of {outage.duration:g} s at {outage.start:g} s",
         "errors": svg(validation.plot_errors(index)),
         "rows": rows,
-        "nees": [(name, _cells(each)) for name, each in found.items()],
+        "nees": list(found.items()),
         "coverage": [
             (part, name, each.coverage[part]) for part in _COVERED for name, each in found.items()
         ],
     }
-
-
-def _cells(consistency: Consistency) -> list[tuple[str, bool]]:
-    """NEES of each group as text, and whether it lies in its band."""
-    cells = []
-    for group in _GROUPS:
-        ratio = consistency.nees.get(group)
-        if ratio is None or np.isnan(ratio.value):
-            cells.append(("-", True))
-        else:
-            cells.append((f"{ratio.value:.3g}", ratio.within or bool(np.isnan(ratio.lower))))
-    return cells
 
 
 def _sentences(validation: Validation) -> list[str]:
@@ -127,16 +125,12 @@ def _sentences(validation: Validation) -> list[str]:
 
 def _compared(validation: Validation, name: str, first: str) -> str:
     d = validation.against_first(name, "horizontal")
-    interval = f"95 % interval {d.ratio_lower:.3g} to {d.ratio_upper:.3g}"
+    word, unit = ("larger than" if d.value > 0.0 else "smaller than"), " in RMS"
     if not d.significant:
-        return (
-            f"Without GNSS, the horizontal error with {name} is the same as with {first}: "
-            f"{d.ratio:.3g} times ({interval})."
-        )
-    word = "larger" if d.value > 0.0 else "smaller"
+        word, unit = "the same as", ""
     return (
-        f"Without GNSS, the horizontal error with {name} is {word} than with {first}: "
-        f"{d.ratio:.3g} times in RMS ({interval})."
+        f"Without GNSS, the horizontal error with {name} is {word} with {first}: {d.ratio:.3g} "
+        f"times{unit} (95 % interval {d.ratio_lower:.3g} to {d.ratio_upper:.3g})."
     )
 
 
@@ -166,7 +160,7 @@ def write_navigated_report(navigated: Navigated, path: str | os.PathLike[str]) -
         path,
         "navigated.html",
         n=navigated,
-        length=duration_text((imu.n - alignment.epoch) * imu.dt),
+        length=(imu.n - alignment.epoch) * imu.dt,
         track=svg(navigated.plot_track()),
         outages=[(title, svg(figure)) for title, figure in navigated.plot_outages()],
         innovations=svg(navigated.plot_innovations()),
@@ -189,6 +183,5 @@ def write_comparison_report(comparison: Comparison, path: str | os.PathLike[str]
         path,
         "comparison.html",
         c=comparison,
-        length=duration_text(comparison.duration),
         errors=svg(comparison.plot()),
     )

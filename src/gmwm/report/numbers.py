@@ -62,7 +62,7 @@ def _at(
 ) -> tuple[Certified, ImuNumbers | None]:
     """The numbers for a horizon, and the IMU that they make; ``before`` is that of another."""
     axes: dict[str, Axis] = {}
-    problem, notes = "", []
+    problem = ""
     imu, why = _imu(calibration, tuple(calibration), horizon, before)
     if imu is not None:
         axes = {axis.name: axis for triad in imu.triads for axis in triad.axes}
@@ -78,11 +78,12 @@ def _at(
     invalid = {name for name in shown if not calibration[name].valid}
     texts = _by_axis(shown, invalid, horizon)
     if imu is None:
-        notes.append(why)
-    else:
-        texts |= _files(imu)
-    triads = () if imu is None else imu.triads
-    return Certified(horizon, axes, triads, problem, texts, tuple(notes)), imu
+        return Certified(horizon, axes, (), problem, texts, (why,)), None
+    for name, title in _TITLES.items():
+        target = TARGETS[name]
+        if isinstance(target, ImuFile):
+            texts[title] = target.text(imu if target.shared else imu.by_axis())
+    return Certified(horizon, axes, imu.triads, problem, texts, ()), imu
 
 
 def _imu(
@@ -96,15 +97,6 @@ def _imu(
         return imu_of(given, "N+K", horizon, horizon, shared=True, outlook=outlook), ""
     except InputError as error:
         return None, str(error)
-
-
-def _files(imu: ImuNumbers) -> dict[str, str]:
-    texts = {}
-    for name, title in _TITLES.items():
-        target = TARGETS[name]
-        if isinstance(target, ImuFile):
-            texts[title] = target.text(imu if target.shared else imu.by_axis())
-    return texts
 
 
 def _by_axis(axes: Mapping[str, Axis], invalid: Set[str], horizon: float) -> dict[str, str]:

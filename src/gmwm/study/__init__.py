@@ -12,9 +12,8 @@ from gmwm.study.emulated_logs import (
     emulated_log as emulated_log,
     sensors as sensors,
 )
-from gmwm.study.figures import boxplots as boxplots
 from gmwm.study.navigation import reproduce_figure as reproduce_figure
+from gmwm.study.rotation import reproduce_rotation as reproduce_rotation
 from gmwm.study.runs import run_study as run_study
 from gmwm.study.studies import FIGURES as FIGURES, STUDIES as STUDIES, Study as Study
-from gmwm.study.summary import summarise as summarise
-from gmwm.study.turns import reproduce_rotation as reproduce_rotation
+from gmwm.study.summary import boxplots as boxplots, summarise as summarise

@@ -35,14 +35,13 @@ _FIRST = 4
 class Convergence:
     """Means over the runs at one length.
 
-    expected: (2,), of the Allan estimates of sigma2_WN and sigma2_RW, computed.
-    allan, allan_error: (2,), their mean over the runs, and its standard error.
+    allan, allan_error: (2,), of the Allan estimates of sigma2_WN and sigma2_RW: their mean over
+        the runs, and its standard error.
     gmwm, gmwm_error: (2,), the same of GMWM.
     """
 
     n: int
     runs: int
-    expected: FloatArray
     allan: FloatArray
     allan_error: FloatArray
     gmwm: FloatArray
@@ -56,18 +55,10 @@ def allan_least_squares(tau: FloatArray, allan_variance: FloatArray, k: int = _F
     allan_variance: (J,).
     k: From 1 to 7.
     """
-    white, walk = _SCALES[:k], _SCALES[k:]
+    lines = (_SCALES[:k], 1.0 / _SCALES[:k]), (_SCALES[k:], _SCALES[k:] / 3.0)
     return np.array(
-        [
-            _line(tau, allan_variance, white, 1.0 / white),
-            _line(tau, allan_variance, walk, walk / 3.0),
-        ]
+        [shape @ allan_variance[np.isin(tau, own)] / (shape @ shape) for own, shape in lines]
     )
-
-
-def _line(tau: FloatArray, values: FloatArray, scales: FloatArray, shape: FloatArray) -> float:
-    chosen = np.isin(tau, scales)
-    return float(shape @ values[chosen] / (shape @ shape))
 
 
 def expectation(k: int = _FIRST) -> FloatArray:
@@ -79,11 +70,9 @@ def converge(runs: int, seed: int, jobs: int = 1) -> list[Convergence]:
     """Monte Carlo for growing length, Allan lines and GMWM on the same series."""
     result = []
     for n in LENGTHS:
-        work = partial(_one_run, n, seed)
-        estimates = do_runs(work, runs, {}, jobs=jobs)["estimates"]
-        mean = estimates.mean(axis=0)
-        error = estimates.std(axis=0, ddof=1) / np.sqrt(runs)
-        result.append(Convergence(n, runs, expectation(), mean[0], error[0], mean[1], error[1]))
+        found = do_runs(partial(_one_run, n, seed), runs, {}, jobs=jobs)["estimates"]
+        means, errors = found.mean(axis=0), found.std(axis=0, ddof=1) / np.sqrt(runs)
+        result.append(Convergence(n, runs, means[0], errors[0], means[1], errors[1]))
     return result
 
 
@@ -103,15 +92,11 @@ def convergence_table(rows: list[Convergence]) -> str:
         f"lines over 1-8 s and 16-128 s; means of {rows[0].runs} runs with standard errors",
     ]
     for k, name in enumerate(NAMES):
-        cells = [
-            [
-                f"{row.n:,}",
-                f"{row.expected[k]:.5g}",
-                f"{row.allan[k]:.5g} +- {row.allan_error[k]:.2g}",
-                f"{row.gmwm[k]:.5g} +- {row.gmwm_error[k]:.2g}",
-            ]
-            for row in rows
-        ]
+        cells = []
+        for row in rows:
+            both = (row.allan, row.allan_error), (row.gmwm, row.gmwm_error)
+            means = [f"{mean[k]:.5g} +- {error[k]:.2g}" for mean, error in both]
+            cells.append([f"{row.n:,}", f"{expectation()[k]:.5g}", *means])
         table = plain_table(("n", "Allan, expected", "Allan, mean", "GMWM, mean"), cells)
         parts.append(f"{name}, truth {_TRUE[k]:g}\n{table}")
     ratios = [(k, *(expectation(k) / _TRUE)) for k in range(1, _SCALES.size)]

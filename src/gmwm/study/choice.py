@@ -61,18 +61,6 @@ class Choice:
     surplus: Counter[int]
 
 
-def choose(index: int, n: int, seed: int) -> tuple[bool, int]:
-    """Whether the true model is chosen for a simulated series, and the terms it has too many."""
-    truth = TRUTHS[index]
-    series = truth.simulate(n, 1.0, np.random.default_rng([seed, index, n]))
-    lines = tuple(
-        Sinusoid(frequency=term.frequency) for term in truth.terms if isinstance(term, Sinusoid)
-    )
-    chosen = select(series, dt=1.0, extra=lines).model
-    kinds = [Counter(type(term).__name__ for term in m.terms) for m in (truth, chosen)]
-    return kinds[0] == kinds[1], len(chosen.terms) - len(truth.terms)
-
-
 def choice_study(runs: int, seed: int, jobs: int, lengths: Sequence[int] = LENGTHS) -> list[Choice]:
     """Choose models for ``runs`` series of every truth and length, in parallel processes."""
     cases = [(index, n) for n in lengths for index in range(len(TRUTHS))]
@@ -87,10 +75,15 @@ def choice_study(runs: int, seed: int, jobs: int, lengths: Sequence[int] = LENGT
 def _choose(
     cases: Sequence[tuple[int, int]], runs: int, seed: int, number: int
 ) -> dict[str, bool | int]:
-    """A run among those of all cases."""
+    """Whether the true model is chosen for one series of all cases, and its surplus terms."""
     case, run = divmod(number, runs)
-    right, surplus = choose(*cases[case], seed + run)
-    return {"right": right, "surplus": surplus}
+    index, n = cases[case]
+    truth = TRUTHS[index]
+    series = truth.simulate(n, 1.0, np.random.default_rng([seed + run, index, n]))
+    lines = tuple(Sinusoid(frequency=t.frequency) for t in truth.terms if isinstance(t, Sinusoid))
+    chosen = select(series, dt=1.0, extra=lines).model
+    kinds = [Counter(type(term).__name__ for term in m.terms) for m in (truth, chosen)]
+    return {"right": kinds[0] == kinds[1], "surplus": len(chosen.terms) - len(truth.terms)}
 
 
 def choice_table(choices: Sequence[Choice]) -> str:

@@ -10,12 +10,13 @@ import pyarrow as pa
 from pyarrow import csv
 
 from gmwm._core.typing import FloatArray
-from gmwm._core.units import SI_UNIT, field_units
+from gmwm._core.units import SI_UNIT, customary_unit
 from gmwm.estimate.result import Fit
 from gmwm.ins import SensorModels
+from gmwm.ins.imu import AXES
 from gmwm.ins.spec import sensor_models
 from gmwm.process import Model
-from gmwm.readers import Channel, Recording
+from gmwm.readers import Recording
 from gmwm.study.emulated_logs import LEVER_ARM, emulated_log, sensors
 
 RATE = 100.0
@@ -40,27 +41,17 @@ def simulated_imu(
     seconds: Length.
     Returns: dict, channel name -> Model that made it.
     """
-    rng = np.random.default_rng(seed)
-    n = int(seconds * RATE)
-    truth = sensors.models
-    channels = []
-    for name, model in truth.items():
-        quantity = name.split("_")[0]
-        values = model.simulate(n, 1.0 / RATE, rng)
-        channels.append(Channel(name, values, 1.0 / RATE, quantity, SI_UNIT[quantity]))
+    rng, n, truth = np.random.default_rng(seed), int(seconds * RATE), sensors.models
+    columns = {name: model.simulate(n, 1.0 / RATE, rng) for name, model in truth.items()}
     source = f"simulated IMU, seed {seed}"
-    return Recording(tuple(channels), source), truth
+    return Recording.from_arrays(columns, RATE, SI_UNIT, source=source), truth
 
 
 @dataclass(frozen=True)
 class Comparison:
     """A true value beside its estimate, in the units of the field.
 
-    Attributes
-    ----------
-    channel, what, unit : str
-    truth, estimate, lower, upper : float
-        With the 95 % interval.
+    lower, upper: Of the 95 % interval.
     """
 
     channel: str
@@ -87,21 +78,11 @@ def compare(fitted: Fit, truth: Model) -> list[Comparison]:
     intervals = fitted.interval()
     rows = []
     for item in truth.parameters:
-        key, value = item.key, item.value or 0.0
-        units = field_units(item.parameter.unit, fitted.wv.quantity)
-        unit, scale = (units[0].unit, units[0].per_si) if units else (item.parameter.unit, 1.0)
-        low, high = intervals.get(key, (0.0, np.inf))
-        rows.append(
-            Comparison(
-                channel=fitted.wv.name,
-                what=key,
-                truth=value * scale,
-                estimate=fitted.params[key] * scale,
-                lower=low * scale,
-                upper=high * scale,
-                unit=unit,
-            )
-        )
+        key = item.key
+        unit, scale = customary_unit(item.parameter.unit, fitted.wv.quantity, fitted.wv.unit)
+        values = (item.value or 0.0, fitted.params[key], *intervals.get(key, (0.0, np.inf)))
+        true, estimate, low, high = (scale * each for each in values)
+        rows.append(Comparison(fitted.wv.name, key, true, estimate, low, high, unit))
     return rows
 
 
@@ -109,7 +90,6 @@ FILES_RATE, DRIVE = 25.0, 600.0
 """Hz; s. Small files, and a drive long enough to compare sensor models on."""
 
 _GRAVITY = 9.80665
-_AXES = tuple(f"{sensor}_{axis}" for sensor in ("gyro", "accel") for axis in "xyz")
 
 
 def write_demo_files(folder: Path, seconds: float, seed: int) -> tuple[float, float, float]:
@@ -118,32 +98,25 @@ def write_demo_files(folder: Path, seconds: float, seed: int) -> tuple[float, fl
     seconds: Length of the recording at rest.
     Returns: from the IMU to the antenna: forward, right, down; m.
     """
-    still = (
-        sensors()
-        .simulate(round(seconds * FILES_RATE), 1.0 / FILES_RATE, np.random.default_rng(seed))
-        .total
-    )
-    _write(folder / "static.csv", _inertial(still + np.array([0, 0, 0, 0, 0, -_GRAVITY])))
+    rng = np.random.default_rng(seed)
+    still = sensors().simulate(round(seconds * FILES_RATE), 1.0 / FILES_RATE, rng).total
+    _write(folder / "static.csv", still + np.array([0, 0, 0, 0, 0, -_GRAVITY]))
     log, _ = emulated_log(seed, duration=DRIVE, rate=FILES_RATE)
-    moving = np.hstack([log.imu.rotation, log.imu.velocity]) * FILES_RATE
-    _write(folder / "imu.csv", _inertial(moving))
+    _write(folder / "imu.csv", np.hstack([log.imu.rotation, log.imu.velocity]) * FILES_RATE)
     position, velocity = log.aiding.fixes
-    columns = {"time_s": position.time}
-    columns |= {"latitude_deg": np.degrees(position.value[:, 0])}
-    columns |= {"longitude_deg": np.degrees(position.value[:, 1]), "height_m": position.value[:, 2]}
+    latitude, longitude, height = position.value.T
+    columns = {"time_s": position.time, "latitude_deg": np.degrees(latitude)}
+    columns |= {"longitude_deg": np.degrees(longitude), "height_m": height}
     for i, name in enumerate(("north", "east", "down")):
         columns |= {f"velocity_{name}": velocity.value[:, i], f"sd_{name}": position.sd[:, i]}
         columns |= {f"sd_velocity_{name}": velocity.sd[:, i]}
-    _write(folder / "fixes.csv", columns)
+    csv.write_csv(pa.table(columns), folder / "fixes.csv")
     return LEVER_ARM
 
 
-def _inertial(values: FloatArray) -> dict[str, FloatArray]:
+def _write(path: Path, values: FloatArray) -> None:
     values = np.round(values, 8)  # far below the noise
-    columns = {f"{a} [{SI_UNIT[a.split('_')[0]]}]": values[:, i] for i, a in enumerate(_AXES)}
     # A sample is the mean over the interval that ends at its stamp.
-    return {"time [s]": np.round((np.arange(len(values)) + 1) / FILES_RATE, 6)} | columns
-
-
-def _write(path: Path, columns: dict[str, FloatArray]) -> None:
+    columns = {"time [s]": np.round((np.arange(len(values)) + 1) / FILES_RATE, 6)}
+    columns |= {f"{a} [{SI_UNIT[a.split('_')[0]]}]": values[:, i] for i, a in enumerate(AXES)}
     csv.write_csv(pa.table(columns), path)

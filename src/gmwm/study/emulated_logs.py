@@ -10,7 +10,6 @@ import numpy as np
 
 from gmwm.errors import InputError
 from gmwm.ins import (
-    Aiding,
     Fixes,
     Imu,
     Measured,
@@ -30,24 +29,20 @@ VEHICLES: dict[str, Callable[..., Trajectory]] = {
     "loiter": fixed_wing_loiter,
 }
 
-FAULTS = (
-    "coloured",
-    "stamps",
-    "leap seconds",
-    "clock step",
-    "lever arm",
-    "off-grid",
-    "one far",
-    "outliers",
-    "mounting",
-    "clock drift",
-    "gyro scale",
-    "accel scale",
-)
-"""Coloured GNSS; stamps 0.2 s late; stamps in GPS time, 18 s late; stamps a second late from the
-middle on; lever arm left out; fixes between samples; one fix 500 m off; 3 % outliers of 50 m; IMU
-turned by 90 deg about its vertical axis; the fixes' clock 500 ppm fast; 3 % too much of all gyros,
-or accelerometers."""
+FAULTS = {
+    "coloured": "coloured GNSS",
+    "stamps": "stamps of fixes 0.2 s late",
+    "leap seconds": "stamps of fixes in GPS time, 18 s late",
+    "clock step": "stamps of fixes a second late from the middle on",
+    "lever arm": "lever arm left out",
+    "off-grid": "fixes between samples",
+    "one far": "one fix 500 m off",
+    "outliers": "3 % outliers of 50 m",
+    "mounting": "IMU turned by 90 deg about its vertical axis",
+    "clock drift": "the fixes' clock 500 ppm fast",
+    "gyro scale": "3 % too much of all gyros",
+    "accel scale": "3 % too much of all accelerometers",
+}
 
 LEVER_ARM = (1.0, 0.3, -1.0)
 _DEGREE_HOUR, _MICRO_G = np.radians(1.0 / 3600.0), 9.80665e-6
@@ -113,15 +108,20 @@ def emulated_log(
         lever_arm=LEVER_ARM,
         coloured_sd=(2.0, 2.0, 3.0) if "coloured" in faults else (0, 0, 0),
         coloured_tau=60.0,
-        imu=_part(ideal, round(late / fine.dt)),
+        imu=Imu(fine.dt, ideal.rotation[finer > 1 :], ideal.velocity[finer > 1 :]),
     ).noisy(rng)
     aiding = replace(aiding, coloured_sd=(0.0, 0.0, 0.0))
     by = late + (0.2 if "stamps" in faults else 0.0) + (18.0 if "leap seconds" in faults else 0.0)
     step = 1.0 if "clock step" in faults else 0.0
     drift = 5e-4 if "clock drift" in faults else 0.0
-    fixes = tuple(_later(each, by, drift, step, duration) for each in aiding.fixes)
-    aiding = replace(aiding, fixes=fixes)
-    aiding = _with_outliers(aiding, faults, rng)
+
+    def stamped(fixes: Fixes) -> Fixes:
+        time = fixes.time
+        later = by + (1.0 + drift) * time + step * (time > 0.5 * duration)
+        return replace(fixes, time=later).part(later <= duration)
+
+    position, *others = map(stamped, aiding.fixes)
+    aiding = replace(aiding, fixes=(_with_outliers(position, faults, rng), *others))
     if "lever arm" in faults:
         aiding = replace(aiding, lever_arm=(0.0, 0.0, 0.0))
     if "mounting" in faults:
@@ -139,25 +139,12 @@ def _world(vehicle: str, duration: float, rate: float) -> tuple[Trajectory, Imu]
     return truth, emulate(truth)
 
 
-def _part(imu: Imu, first: int) -> Imu:
-    return Imu(imu.dt, imu.rotation[first:], imu.velocity[first:])
-
-
-def _later(fixes: Fixes, by: float, drift: float, step: float, duration: float) -> Fixes:
-    """With stamps as much later, more and more by ``drift``, and once more from the middle on."""
-    time = fixes.time
-    later = replace(fixes, time=by + (1.0 + drift) * time + step * (time > 0.5 * duration))
-    return later.part(later.time <= duration)
-
-
-def _with_outliers(aiding: Aiding, faults: tuple[str, ...], rng: np.random.Generator) -> Aiding:
-    position, *others = aiding.fixes
-    by = np.zeros((position.time.size, 3))
+def _with_outliers(fixes: Fixes, faults: tuple[str, ...], rng: np.random.Generator) -> Fixes:
+    by = np.zeros((fixes.time.size, 3))
     if "one far" in faults:
-        by[position.time.size // 2, 0] = 500.0
+        by[fixes.time.size // 2, 0] = 500.0
     if "outliers" in faults:
-        far = rng.random(position.time.size) < 0.03
-        angle = rng.uniform(0.0, 2.0 * np.pi, position.time.size)
+        far = rng.random(fixes.time.size) < 0.03
+        angle = rng.uniform(0.0, 2.0 * np.pi, fixes.time.size)
         by[far, 0], by[far, 1] = 50.0 * np.cos(angle[far]), 50.0 * np.sin(angle[far])
-    moved = replace(position, value=position.moved(by))
-    return replace(aiding, fixes=(moved, *others))
+    return replace(fixes, value=fixes.moved(by))

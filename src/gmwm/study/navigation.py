@@ -28,8 +28,8 @@ from gmwm.ins.simulation import Experiment, Scenario, Simulated, Validation
 from gmwm.ins.trajectory import car_drive, helicopter_mapping
 from gmwm.process import BiasInstability, GaussMarkov, Model, Process, RandomWalk, WhiteNoise
 from gmwm.readers import Recording
-from gmwm.study.figures import saved
 from gmwm.study.sensor_tables import TABLE_5, TABLE_6
+from gmwm.study.summary import saved
 from gmwm.variance import WaveletVariance
 
 if TYPE_CHECKING:
@@ -57,13 +57,9 @@ class Calibrated:
     gmwm: Calibration
 
     @classmethod
-    def of(cls, recording: Recording, progress: Progress | None = None) -> Calibrated:
-        """Calibrate a recording both ways."""
-        return cls.by_lines_too(calibrate(recording, progress=progress))
-
-    @classmethod
-    def by_lines_too(cls, calibration: Calibration) -> Calibrated:
-        """A calibration by GMWM, and lines in its Allan plots."""
+    def of(cls, given: Recording | Calibration) -> Calibrated:
+        """A recording calibrated both ways, or lines in the Allan plots of a calibration."""
+        calibration = given if isinstance(given, Calibration) else calibrate(given)
         kind = WhiteNoise() + BiasInstability() + RandomWalk()
         lines = {
             axis: estimate(kind, calibration[axis].wv, method=AllanLines())
@@ -155,6 +151,11 @@ def experiment(
     return Experiment(scenario, Simulated(TABLE_6), filters, TABLE_6, runs, seed, title)
 
 
+def vehicle_of(figure: str) -> str:
+    """The vehicle of the paper's Figures 7 to 9."""
+    return "car" if figure == "fig9" else "helicopter"
+
+
 def scenario_of(vehicle: str) -> Scenario:
     """The mission of a vehicle, with its outages."""
     trajectory = helicopter_mapping() if vehicle == "helicopter" else car_drive()
@@ -171,33 +172,36 @@ def aligned(models: SensorModels, start: Mapping[str, float]) -> SensorModels:
     """
     bias = {}
     for axis, model in models.models.items():
-        markov = [term for term in model.terms if isinstance(term, GaussMarkov)]
-        own = model.white_density() / tuning.BIAS_WINDOW + sum(map(_of_means, markov))
+        own = model.white_density() / tuning.BIAS_WINDOW
+        for term in model.terms:
+            if isinstance(term, GaussMarkov):  # its variance, and that of its means over a minute
+                share = float(term.tau or 0.0) / tuning.BIAS_WINDOW
+                within = 2.0 * share * (1.0 - share * -np.expm1(-1.0 / share))
+                own += float(term.sigma or 0.0) ** 2 * float(within)
         bias[axis] = float(np.sqrt(max(start[axis] ** 2 - own, 0.0)))
     return SensorModels(models.models, bias)
 
 
-def _of_means(term: GaussMarkov) -> float:
-    """Variance of means over a minute."""
-    share = float(term.tau or 0.0) / tuning.BIAS_WINDOW
-    within = 2.0 * share * (1.0 - share * -np.expm1(-1.0 / share))
-    return float(term.sigma or 0.0) ** 2 * float(within)
-
-
 def times(models: SensorModels, factor: float) -> SensorModels:
     """All amplitudes times a factor."""
-    return SensorModels(
-        {
-            axis: model.with_params(
-                {
-                    item.key: float(item.value or 0.0) * factor
-                    for item in model.parameters
-                    if item.parameter.name in ("N", "K", "sigma")
-                }
+    larger = {}
+    for axis, model in models.models.items():
+        amplitudes = (p for p in model.parameters if p.parameter.name in ("N", "K", "sigma"))
+        larger[axis] = model.with_params(
+            {p.key: float(p.value or 0.0) * factor for p in amplitudes}
+        )
+    return SensorModels(larger)
+
+
+def check_channels(figure: str, recordings: Sequence[Recording], needed: Sequence[str]) -> None:
+    """Raise `InputError` if a recording lacks a channel that a figure needs."""
+    for recording in recordings:
+        missing = [axis for axis in needed if axis not in recording.names]
+        if missing:
+            raise InputError(
+                f"{recording.source}: channel {missing[0]} is missing: {figure} needs "
+                f"{', '.join(needed)}"
             )
-            for axis, model in models.models.items()
-        }
-    )
 
 
 def reproduce_figure(
@@ -221,12 +225,7 @@ def reproduce_figure(
     if figure not in _OF_ONE_GYRO and len(recordings) == 1:
         raise InputError("give two recordings or more: one to calibrate, others to navigate with")
     first = recordings[0] if recordings else static_recording(seed)
-    needed = (_SHOWN,) if figure in _OF_ONE_GYRO else AXES
-    missing = [axis for axis in needed if axis not in first.names]
-    if missing:
-        raise InputError(
-            f"{first.source}: channel {missing[0]} is missing: {figure} needs {', '.join(needed)}"
-        )
+    check_channels(figure, [first], (_SHOWN,) if figure in _OF_ONE_GYRO else AXES)
     calibrated = Calibrated.of(first)
     if figure in _OF_ONE_GYRO:
         import matplotlib.pyplot as plt
@@ -235,12 +234,8 @@ def reproduce_figure(
         drawn, axes = plt.subplots(figsize=(7.0, 4.6), layout="constrained")
         shown.plot(axes)
         return str(shown), saved(drawn, folder / figure)
-    vehicle = "car" if figure == "fig9" else "helicopter"
-    validation = Validation.of(
-        experiment(vehicle, calibrated, runs or _RUNS, seed, recordings),
-        jobs=jobs,
-        progress=progress,
-    )
+    planned = experiment(vehicle_of(figure), calibrated, runs or _RUNS, seed, recordings)
+    validation = Validation.of(planned, jobs=jobs, progress=progress)
     draw: dict[str, Callable[[], Figure]] = {
         "fig7": validation.plot_track,
         "fig8": validation.plot_errors,

@@ -6,27 +6,49 @@ compared comes from the recording that is calibrated alone; intervals allow for 
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import TYPE_CHECKING
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
+from gmwm import filter_numbers
+from gmwm._core import __version__
 from gmwm._core.distributions import norm
+from gmwm._core.documents import Document
+from gmwm._core.files import folder_to_fill, written
+from gmwm._core.runs import Earlier
 from gmwm._core.tables import plain_table
 from gmwm._core.text import bullets, wrapped
-from gmwm._core.typing import FloatArray
+from gmwm._core.typing import FloatArray, Progress
+from gmwm.calibration import Calibration, calibrate
+from gmwm.errors import InputError
+from gmwm.filter_numbers import SensorNumbers
 from gmwm.ins import tuning
-from gmwm.ins.simulation import GROUPS, FilterErrors, Validation
-from gmwm.issues import Notice
-from gmwm.study.summary import markdown_table
+from gmwm.ins.imu import AXES, Recorded, SensorModels
+from gmwm.ins.simulation import GROUPS, Experiment, FilterErrors, Validation
+from gmwm.issues import Notice, notice
+from gmwm.readers import Recording
+from gmwm.study.navigation import (
+    TEN,
+    Calibrated,
+    aligned,
+    check_channels,
+    scenario_of,
+    times,
+    vehicle_of,
+)
+from gmwm.study.summary import markdown_table, saved
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 FIRST = "GMWM"  # the others are compared with it
 _BOUND = float(norm.ppf(0.975))  # of the interval whose coverage is counted
+_D = TypeVar("_D", bound=Document)
 
 
 @dataclass(frozen=True)
@@ -37,8 +59,9 @@ class Interval:
     lower: float
     upper: float
 
-    def __str__(self) -> str:
-        return f"{_short(self.value)} ({_short(self.lower)}-{_short(self.upper)})"
+    def text(self, dash: str) -> str:
+        """Value and ends in three digits, without an exponent."""
+        return f"{_short(self.value)} ({_short(self.lower)}{dash}{_short(self.upper)})"
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,13 +83,12 @@ class Rotation:
         """Of the filters; the others are compared with the first."""
         return self.turns[0].names
 
-    # -- numbers ----------------------------------------------------------------------------------
+    # -- numbers; with one recording calibrated (``turn``) or, by default, over all turns ----------
 
     def ratio(self, name: str, quantity: str, turn: int | None = None) -> Interval:
         """Root mean square of an error at the ends of outages against the first filter's.
 
         quantity: {"horizontal", "vertical"}.
-        turn: With this recording calibrated; by default all of them.
         """
         part = slice(0, 2) if quantity == "horizontal" else slice(2, 3)
 
@@ -75,18 +97,15 @@ class Rotation:
 
         other, first = (self._table(each, squares) for each in (name, FIRST))
         both = np.isfinite(other) & np.isfinite(first)
-        tables = [np.where(both, each, np.nan) for each in (other, first)]
-        return self._interval(tables, turn, np.sqrt)
+        above, below = (np.where(both, each, np.nan) for each in (other, first))
+        return self._interval(above, below, turn, np.sqrt)
 
     def nees(self, name: str, group: str, turn: int | None = None) -> Interval:
         """NEES per degree of freedom at the ends of outages, of a group of errors."""
         index, part = list(GROUPS).index(group), GROUPS[group]
-
-        def judged(runs: FilterErrors, end: int) -> FloatArray:
-            return np.asarray(runs.nees[:, end, index] / (part.stop - part.start))
-
-        table = self._table(name, judged)
-        return self._interval([table, np.where(np.isfinite(table), 1.0, np.nan)], turn)
+        size = part.stop - part.start
+        table = self._table(name, lambda runs, end: runs.nees[:, end, index] / size)
+        return self._interval(table, np.isfinite(table).astype(float), turn)
 
     def coverage(self, name: str, group: str, turn: int | None = None) -> Interval:
         """Fraction of errors within the predicted interval of 95 % at the ends of outages."""
@@ -98,7 +117,7 @@ class Rotation:
             return np.where(np.isfinite(standard[:, 0]), hits, np.nan)
 
         table = self._table(name, inside)
-        return self._interval([table, np.where(np.isfinite(table), 1.0, np.nan)], turn)
+        return self._interval(table, np.isfinite(table).astype(float), turn)
 
     def _table(self, name: str, measure: Callable[[FilterErrors, int], FloatArray]) -> FloatArray:
         """Mean over the outages, by recording calibrated, recording navigated with and stretch."""
@@ -108,38 +127,35 @@ class Rotation:
             runs = turn.study[name]
             ends = [runs.index(outage.end) for outage in turn.study.outages]
             values = np.mean([measure(runs, end) for end in ends], axis=0)
-            first = 0
-            for j, size in enumerate(self.stretches):
-                if j != i:
-                    table[i, j, :size] = values[first : first + size]
-                    first += size
+            others = [j for j in range(n) if j != i]
+            cuts = np.cumsum([self.stretches[j] for j in others])[:-1]
+            for j, own in zip(others, np.split(values, cuts), strict=True):
+                table[i, j, : own.size] = own
         return table
 
     def _interval(
         self,
-        tables: Sequence[FloatArray],
+        above: FloatArray,
+        below: FloatArray,
         turn: int | None,
         root: Callable[[FloatArray], FloatArray] = np.asarray,
     ) -> Interval:
         """Ratio of the sums of two tables."""
-        n = len(self.sources)
-        weights = _weights(self.stretches, turn, self.turns[0].experiment.seed)
-        above, below = (np.nan_to_num(each) for each in tables)
-        whole = np.ones((n, n)) if turn is None else np.outer(np.eye(n)[turn], np.ones(n))
+        seed = self.turns[0].experiment.seed
+        weights = crossed_weights(self.stretches, turn, tuning.BOOTSTRAP_DRAWS, seed)
+        rows = slice(None) if turn is None else turn
         with np.errstate(invalid="ignore", divide="ignore"):
-            sums = [np.sum(whole[..., None] * each) for each in (above, below)]
-            value = root(np.array(sums[0] / sums[1]))
-            drawn = root(
-                np.einsum("dcts,cts->d", weights, above) / np.einsum("dcts,cts->d", weights, below)
-            )
+            value = float(root(np.asarray(np.nansum(above[rows]) / np.nansum(below[rows]))))
+            sums = (np.einsum("dcts,cts->d", weights, np.nan_to_num(e)) for e in (above, below))
+            drawn = root(np.divide(*sums))
         drawn = drawn[np.isfinite(drawn)]
         if not drawn.size:
-            return Interval(float(value), float("nan"), float("nan"))
+            return Interval(value, float("nan"), float("nan"))
         tail = 0.5 - 0.5 * tuning.CONFIDENCE
         lower, upper = np.quantile(drawn, [tail, 1.0 - tail])
-        return Interval(float(value), float(lower), float(upper))
+        return Interval(value, float(lower), float(upper))
 
-    # -- words ------------------------------------------------------------------------------------
+    # -- words and figures ------------------------------------------------------------------------
 
     def __str__(self) -> str:
         turns, both = range(len(self.sources)), ("horizontal", "vertical")
@@ -155,32 +171,27 @@ class Rotation:
             return [*shares, self.nees(name, "position")]
 
         blocks = [self._head()]
-        for title, head, row in (
-            (
-                f"All turns, at the ends of outages before the first fix: errors over those of "
-                f"{FIRST}; NEES per degree of freedom",
-                [*(f"{each} RMS" for each in both), *(f"NEES {each}" for each in both)],
-                ratios_and_nees,
-            ),
-            (
-                "Share within predicted 95 % intervals, %; NEES of the position, which includes "
-                "the correlation of horizontal and vertical",
-                [*both, "NEES position"],
-                covered,
-            ),
-            (
-                f"Horizontal RMS over that of {FIRST}, turn by turn",
-                by_turn,
-                lambda name: [self.ratio(name, "horizontal", i) for i in turns],
-            ),
-            (
-                "NEES of the position, turn by turn",
-                by_turn,
-                lambda name: [self.nees(name, "position", i) for i in turns],
-            ),
-        ):
-            rows = [[name, *map(str, row(name))] for name in self.names]
-            blocks.append([*wrapped(title), plain_table(("filter", *head), rows)])
+
+        def add(title: str, heads: list[str], row: Callable[[str], list[Interval]]) -> None:
+            rows = [[name, *(each.text("-") for each in row(name))] for name in self.names]
+            blocks.append([*wrapped(title), plain_table(("filter", *heads), rows)])
+
+        add(
+            "All turns, at the ends of outages before the first fix: errors over those of "
+            f"{FIRST}; NEES per degree of freedom",
+            [*(f"{each} RMS" for each in both), *(f"NEES {each}" for each in both)],
+            ratios_and_nees,
+        )
+        add(
+            "Share within predicted 95 % intervals, %; NEES of the position, which includes the "
+            "correlation of horizontal and vertical",
+            [*both, "NEES position"],
+            covered,
+        )
+        title = f"Horizontal RMS over that of {FIRST}, turn by turn"
+        add(title, by_turn, lambda name: [self.ratio(name, "horizontal", i) for i in turns])
+        title = "NEES of the position, turn by turn"
+        add(title, by_turn, lambda name: [self.nees(name, "position", i) for i in turns])
         return "\n\n".join(map("\n".join, blocks))
 
     def _head(self) -> list[str]:
@@ -195,8 +206,7 @@ class Rotation:
         lines = wrapped(text, indent=2)
         for i, (source, size) in enumerate(zip(self.sources, self.stretches, strict=True)):
             lines += wrapped(f"{source}, {size} stretches", f"{i + 1} ", 2)
-        lines += bullets(self.notices)
-        return lines
+        return lines + bullets(self.notices)
 
     def markdown(self) -> str:
         """All turns together, as a table for a page."""
@@ -204,13 +214,11 @@ class Rotation:
         head = ["filter", "horizontal error against GMWM", *(f"NEES {each}" for each in groups)]
         rows = []
         for name in self.names:
-            ratio = "1" if name == FIRST else _of(self.ratio(name, "horizontal"))
-            judged = [_of(self.nees(name, each)) for each in groups]
+            ratio = "1" if name == FIRST else self.ratio(name, "horizontal").text(" to ")
+            judged = [self.nees(name, each).text(" to ") for each in groups]
             shares = [self.coverage(name, each).value for each in groups[:2]]
             rows.append([name, ratio, *judged, *(f"{100.0 * each:.0f} %" for each in shares)])
         return markdown_table([*head, "within 95 %: horizontal", "vertical"], rows)
-
-    # -- figures ----------------------------------------------------------------------------------
 
     def plot(self) -> Figure:
         """Ratio of horizontal errors and NEES of each filter: every turn, and all together."""
@@ -230,15 +238,8 @@ class Rotation:
 
 
 @lru_cache(maxsize=16)
-def _weights(stretches: tuple[int, ...], turn: int | None, seed: int) -> FloatArray:
-    """Of all intervals of a study, or of one turn of it; see `crossed_weights`."""
-    calibrated = None if turn is None else np.eye(len(stretches))[turn]
-    rng = np.random.default_rng(seed)
-    return crossed_weights(stretches, calibrated, tuning.BOOTSTRAP_DRAWS, rng)
-
-
 def crossed_weights(
-    stretches: Sequence[int], calibrated: FloatArray | None, draws: int, rng: np.random.Generator
+    stretches: tuple[int, ...], calibrated: int | None, draws: int, seed: int
 ) -> FloatArray:
     """How often a bootstrap draws each run, (draws, n, n, S).
 
@@ -250,19 +251,18 @@ def crossed_weights(
     much as stretches, and in 84 % where they differ twice as much.
 
     stretches: Of each of the n recordings, S at most.
-    calibrated: (n,) or None, weights of those that are calibrated, if they are not drawn.
+    calibrated: The one that is calibrated, if it is not drawn; the others are then drawn among
+        themselves to be navigated with.
     """
-    n = len(stretches)
+    n, rng = len(stretches), np.random.default_rng(seed)
     even = np.full(n, 1.0 / n)
-    first = np.tile(calibrated, (draws, 1)) if calibrated is not None else None
-    by = rng.multinomial(n, even, draws) if first is None else first
-    of = np.zeros((draws, n, max(stretches)))
     if calibrated is None:
+        by = rng.multinomial(n, even, draws)
         times_drawn = rng.multinomial(n, even, draws)
     else:
-        # The calibrated one is not navigated with: the others are drawn among themselves.
-        others = np.where(calibrated > 0.0, 0.0, 1.0)
-        times_drawn = rng.multinomial(n - 1, others / np.sum(others), draws)
+        by = np.tile(np.eye(n)[calibrated], (draws, 1))
+        times_drawn = rng.multinomial(n - 1, (1.0 - np.eye(n)[calibrated]) / (n - 1.0), draws)
+    of = np.zeros((draws, n, max(stretches)))
     for i, size in enumerate(stretches):
         of[:, i, :size] = rng.multinomial(size, np.full(size, 1.0 / size), draws)
     weights = by[:, :, None, None] * (times_drawn[:, :, None] * of)[:, None]
@@ -271,12 +271,133 @@ def crossed_weights(
 
 
 def _short(value: float) -> str:
-    """Three digits, without an exponent."""
     if not np.isfinite(value):
         return "-"
     digits = 0 if abs(value) >= 99.95 else 1 if abs(value) >= 9.995 else 2
     return f"{value:.{digits}f}"
 
 
-def _of(found: Interval) -> str:
-    return f"{_short(found.value)} ({_short(found.lower)} to {_short(found.upper)})"
+# -- the study ------------------------------------------------------------------------------------
+
+
+def rotate(
+    vehicle: str,
+    recordings: Sequence[Recording],
+    folder: Path,
+    *,
+    runs: int | None = None,
+    seed: int = 0,
+    jobs: int = 1,
+    earlier: Earlier = "refuse",
+    progress: Progress | None = None,
+) -> Rotation:
+    """Calibrate every recording in turn, and navigate with the others.
+
+    vehicle: {"helicopter", "car"}.
+    recordings: Two at least.
+    folder: Where calibrations and finished runs are kept, so that work that was interrupted goes
+        on.
+    runs: Most stretches of each recording; by default all that do not overlap.
+    earlier: {"resume", "replace", "refuse"}, what to do with what the folder holds.
+    progress: Called as ``progress(done, total, what)``.
+    Raises InputError if there are fewer than two recordings, an axis is missing, one is too short,
+        or the folder holds runs that are not to be resumed.
+    """
+    if len(recordings) < 2:
+        raise InputError("give two recordings or more: each is calibrated in turn")
+    scenario, tell = scenario_of(vehicle), progress or (lambda *_: None)
+    horizon = max(outage.duration for outage in scenario.outages)
+    parts = [Recorded.of(each, scenario.trajectory.duration) for each in recordings]
+    parts = [replace(part, stretches=part.stretches[:runs]) for part in parts]
+    kept = folder / "calibrations"
+    if earlier == "refuse" and kept.exists():
+        raise InputError(
+            f"{folder} holds calibrations of an earlier study: resume it, or give another folder",
+            "earlier-runs",
+        )
+    turns: list[Validation] = []
+    notices: list[Notice] = []
+    with folder_to_fill(kept):
+        for i, recording in enumerate(recordings):
+            tell(i, len(recordings), recording.source)
+            filters, found = _filters(recording, parts[i].bias_sd, horizon, kept)
+            others = [part for j, part in enumerate(parts) if j != i]
+            source = replace(
+                others[0],
+                stretches=tuple(each for part in others for each in part.stretches),
+                source=", ".join(part.source for part in others),
+            )
+            total, title = len(source.stretches), f"{vehicle}, real errors"
+            planned = Experiment(scenario, source, filters, None, total, seed, title)
+            kept_runs = folder / f"{vehicle}-{i + 1}"
+            turns.append(Validation.of(planned, jobs=jobs, folder=kept_runs, earlier="resume"))
+            found += turns[-1].notices
+            notices += [replace(each, source=recording.source) for each in found]
+    tell(len(recordings), len(recordings), "")
+    sources = tuple(recording.source for recording in recordings)
+    stretches = tuple(len(part.stretches) for part in parts)
+    return Rotation(sources, stretches, tuple(turns), tuple(notices))
+
+
+def reproduce_rotation(
+    figure: str,
+    folder: Path,
+    *,
+    recordings: Sequence[Recording],
+    resume: bool,
+    **options: Any,
+) -> tuple[str, list[Path]]:
+    """Figure 8 (helicopter) or 9 (car) with every recording calibrated in turn.
+
+    options: ``runs``, ``seed``, ``jobs`` and ``progress`` of `rotate`.
+    Returns: what to print, and the files that were written.
+    """
+    check_channels(figure, recordings, AXES)
+    earlier: Earlier = "resume" if resume else "refuse"
+    rotation = rotate(vehicle_of(figure), recordings, folder, earlier=earlier, **options)
+    text, paths = str(rotation), []
+    for suffix, content in (("txt", text), ("md", rotation.markdown())):
+        paths.append(folder / f"{figure}-rotated.{suffix}")
+        with written(paths[-1]) as stream:
+            stream.write(content + "\n")
+    return text, [*paths, *saved(rotation.plot(), folder / f"{figure}-rotated")]
+
+
+def _filters(
+    recording: Recording, start: dict[str, float], horizon: float, folder: Path
+) -> tuple[dict[str, SensorModels], list[Notice]]:
+    """Sensor models of the filters, from the one recording that is calibrated."""
+    # A calibration depends on the samples, and on the version of the program.
+    digest = hashlib.sha256(f"{__version__} {recording.source} {recording.dt!r}".encode())
+    for axis in AXES:
+        digest.update(np.ascontiguousarray(recording[axis].values).tobytes())
+    stem = digest.hexdigest()[:16]
+
+    def kept(kind: type[_D], what: str, make: Callable[[], _D]) -> _D:
+        path = folder / f"{stem}-{what}.json"
+        if path.exists():
+            return kind.load(path)
+        made = make()
+        made.save(path)
+        return made
+
+    calibration = kept(Calibration, "calibration", lambda: calibrate(recording))
+    found = Calibrated.of(calibration)
+    lines = found.line_models()
+    filters = {
+        FIRST: aligned(SensorModels.of(calibration), start),
+        "lines": aligned(lines, start),
+        "lines x 10": aligned(times(lines, TEN), start),
+        "N+K read off": aligned(found.curve_models(horizon), start),
+    }
+    bound, reduce = filter_numbers.bound, filter_numbers.reduce
+    for name, what, make in (
+        ("N+K bound", "bound-N+K", lambda: bound(calibration, "N+K", horizon)),
+        ("N+K+GM bound", "bound-N+K+GM", lambda: bound(calibration, "N+K+GM", horizon)),
+        ("N+K reduced", "reduce-N+K", lambda: reduce(calibration, "N+K", [horizon])),
+    ):
+        numbers = kept(SensorNumbers, f"{what}-{horizon:g}", make)
+        models = {axis: numbers[axis].model for axis in AXES}
+        filters[name] = SensorModels(models, {axis: numbers[axis].initial_sd for axis in AXES})
+    axes = found.lineless()
+    return filters, [notice("no-line", "", {"axes": ", ".join(axes)})] if axes else []

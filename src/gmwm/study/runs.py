@@ -38,50 +38,36 @@ def one_run(name: str, methods: Sequence[str], seed: int, run: int) -> dict[str,
 def _row(study: Study, method: str, series: FloatArray) -> dict[str, Any]:
     start = perf_counter()
     result: Fit | None = None
-    message, valid = "", False
     try:
         result = _estimate(study, series, study.methods[method])
         message, valid = result.message, result.valid
     except InputError as error:
-        message = str(error)
-    row: dict[str, Any] = {
-        "method": method,
-        "seconds": perf_counter() - start,
-        "valid": valid,
-        "message": message,
-    }
+        message, valid = str(error), False
+    row = {"method": method, "seconds": perf_counter() - start, "valid": valid, "message": message}
     for quantity in study.quantities:
         row |= _values(quantity, result)
     return row
 
 
 def _estimate(study: Study, series: FloatArray, by: Estimation) -> Fit:
-    model = study.truth.opened()
+    model, dt = study.truth.opened(), study.dt
     if by.wavelet == "haar" and not by.robust:
-        return estimate(model, series, study.dt, by.method)
+        return estimate(model, series, dt, by.method)
     of_data = isinstance(by.method, GMWM) and by.method.weights == "data"
-    wv = wavelet_variance(
-        series,
-        study.dt,
-        wavelet=by.wavelet,
-        robust=by.robust,
-        data_covariance="octave" if of_data else None,
-    )
+    kind = "octave" if of_data else None
+    wv = wavelet_variance(series, dt, wavelet=by.wavelet, robust=by.robust, data_covariance=kind)
     return estimate(model, wv, method=by.method)
 
 
 def _values(quantity: Quantity, result: Fit | None) -> dict[str, float]:
     """Estimate and 95 % interval of a quantity; not a number where the fit has none."""
-    names = (quantity.name, f"{quantity.name}_lower", f"{quantity.name}_upper")
-    if result is None or quantity.key not in result.params:
-        return dict.fromkeys(names, float("nan"))
-    value = result.params[quantity.key]
-    low, high = result.interval().get(quantity.key, (float("nan"), float("nan")))
+    value, ends = float("nan"), (float("nan"), float("nan"))
+    if result is not None and quantity.key in result.params:
+        value, ends = result.params[quantity.key], result.interval().get(quantity.key, ends)
     with np.errstate(divide="ignore"):
-        powers = [float(np.float64(v) ** quantity.power) for v in (value, low, high)]
-    if quantity.power < 0:
-        powers[1:] = powers[:0:-1]
-    return dict(zip(names, powers, strict=True))
+        value, *powers = (float(each) for each in np.array([value, *ends]) ** quantity.power)
+    lower, upper = powers if quantity.power > 0 else powers[::-1]
+    return {quantity.name: value, f"{quantity.name}_lower": lower, f"{quantity.name}_upper": upper}
 
 
 def run_study(

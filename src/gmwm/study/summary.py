@@ -1,18 +1,24 @@
-"""The summary of a study's runs: errors against the truth, the bound and the paper."""
+"""The summary of a study's runs: errors against the truth, the bound and the paper; boxplots."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pyarrow as pa
 
+from gmwm import plotting
+from gmwm._core.files import moved_into_place
 from gmwm._core.tables import plain_table
 from gmwm._core.text import bullets
-from gmwm._core.typing import FloatArray
 from gmwm.estimate import cramer_rao
-from gmwm.study.studies import Quantity, Study
+from gmwm.study.studies import Study
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 @dataclass(frozen=True)
@@ -101,22 +107,37 @@ class Summary:
 
 
 def summarise(study: Study, table: pa.Table, seed: int) -> Summary:
-    """Scores of all methods in ``table``, as `gmwm.study.runs.run_study` gives it."""
+    """Scores of all methods in ``table``, as `run_study` gives it."""
     bound = cramer_rao(study.truth, study.n, study.dt)
     names = np.array(table["method"].to_pylist())
     methods = [m for m in study.methods if m in set(names)]
     scores, bounds, moment_bounds = {}, {}, {}
     for quantity in study.quantities:
-        true = study.truth.params[quantity.key] or 1.0
-        factor = abs(quantity.power / true)
-        best = bound.stderr[quantity.key] * factor
-        moments = bound.wavelet_stderr[quantity.key] * factor
-        bounds[quantity.name], moment_bounds[quantity.name] = best, moments
-        value = study.true_value(quantity)
-        columns = [table[quantity.name + end].to_numpy() for end in ("", "_lower", "_upper")]
+        name, value = quantity.name, study.true_value(quantity)
+        factor = abs(quantity.power / (study.truth.params[quantity.key] or 1.0))
+        bounds[name] = bound.stderr[quantity.key] * factor
+        moment_bounds[name] = bound.wavelet_stderr[quantity.key] * factor
+        estimate, low, high = (table[name + end].to_numpy() for end in ("", "_lower", "_upper"))
         for method in methods:
-            chosen = [column[names == method] for column in columns]
-            scores[quantity.name, method] = _score(quantity, method, value, chosen, best, moments)
+            own = names == method
+            there = own & np.isfinite(estimate)
+            error = estimate[there] / value - 1.0
+            inside = (low[there] <= value) & (value <= high[there])
+            with np.errstate(invalid="ignore"):  # no run has an estimate
+                relative, bias, coverage = (
+                    float(np.sum(each) / error.size) for each in (error**2, error, inside)
+                )
+            relative **= 0.5
+            scores[name, method] = Score(
+                rmse=relative * abs(value),
+                relative=relative,
+                bias=bias,
+                ratio=relative / bounds[name],
+                moment_ratio=relative / moment_bounds[name],
+                coverage=coverage,
+                missing=int(np.sum(own) - np.sum(there)),
+                published=quantity.published.get(method, float("nan")),
+            )
     valid = np.array(table["valid"].to_pylist())
     seconds = table["seconds"].to_numpy()
     return Summary(
@@ -128,31 +149,6 @@ def summarise(study: Study, table: pa.Table, seed: int) -> Summary:
         moment_bounds=moment_bounds,
         invalid={m: int(np.sum(~valid[names == m])) for m in methods},
         seconds={m: float(np.median(seconds[names == m])) for m in methods},
-    )
-
-
-def _score(
-    quantity: Quantity,
-    method: str,
-    value: float,
-    columns: Sequence[FloatArray],
-    bound: float,
-    moments: float,
-) -> Score:
-    estimate, lower, upper = columns
-    there = np.isfinite(estimate)
-    error = estimate[there] / value - 1.0
-    relative = float(np.sqrt(np.mean(error**2))) if error.size else float("nan")
-    inside = (lower[there] <= value) & (value <= upper[there])
-    return Score(
-        rmse=relative * abs(value),
-        relative=relative,
-        bias=float(np.mean(error)) if error.size else float("nan"),
-        ratio=relative / bound,
-        moment_ratio=relative / moments,
-        coverage=float(np.mean(inside)) if error.size else float("nan"),
-        missing=int(np.sum(~there)),
-        published=quantity.published.get(method, float("nan")),
     )
 
 
@@ -172,3 +168,33 @@ def markdown_table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     """A table for a page in Markdown."""
     lines = [head, ["---"] * len(head), *rows]
     return "\n".join("| " + " | ".join(line) + " |" for line in lines)
+
+
+def boxplots(study: Study, table: pa.Table, stem: Path) -> list[Path]:
+    """Draw one panel a quantity, one box a method; returns the PNG and the SVG.
+
+    table: As `run_study` gives it.
+    stem: Where to, without suffix.
+    """
+    names = np.array(table["method"].to_pylist())
+    methods = [m for m in study.methods if m in set(names)]
+    panels = {}
+    for quantity in study.quantities:
+        values = table[quantity.name].to_numpy()
+        known = np.isfinite(values)
+        panels[quantity.name] = {each: values[known & (names == each)] for each in methods}
+    truths = {quantity.name: study.true_value(quantity) for quantity in study.quantities}
+    figure = plotting.boxes(panels, truths, title=f"{study.title} (dashed: truth)")
+    return saved(figure, stem)
+
+
+def saved(figure: Figure, stem: Path) -> list[Path]:
+    """Write a figure as PNG and SVG; it is closed."""
+    import matplotlib.pyplot as plt
+
+    paths = [stem.with_suffix(suffix) for suffix in (".png", ".svg")]
+    for path in paths:
+        with moved_into_place(path) as temporary:
+            figure.savefig(temporary, format=path.suffix[1:], dpi=150)
+    plt.close(figure)
+    return paths

@@ -33,23 +33,24 @@ def fitted(model, quantity="gyro", dt=0.01, n=20_000, scale=1.0):
 # -- density --------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("dt", [0.001, 0.01, 1.0, 10.0])
-def test_density_of_white_noise_is_N(dt):
-    assert white_density(fitted(WhiteNoise(3e-4), dt=dt)) == pytest.approx(3e-4, rel=1e-12)
+WHITE = WhiteNoise(3e-4)
+SLOW = (RandomWalk(1.0), RateRamp(1.0), GaussMarkov(1.0, 1e4))
+# Their integrals stay bounded: the line and the resonance raised the density by up to 60 %.
+BOUNDED = QuantizationNoise(2e-5) + Sinusoid(amplitude=1e-3, frequency=7.3)
 
 
-@pytest.mark.parametrize("slow", [RandomWalk(1.0), RateRamp(1.0), GaussMarkov(1.0, 1e4)], ids=repr)
-def test_slow_terms_do_not_count(slow):
-    assert white_density(fitted(WhiteNoise(3e-4) + slow)) == pytest.approx(3e-4, rel=1e-12)
-    assert white_density(fitted(slow)) == 0.0
-
-
-def test_quantization_noise_and_lines_leave_no_white_noise():
-    # Their integrals stay bounded: the line and the resonance raised the density by up to 60 %.
-    assert white_density(fitted(QuantizationNoise(2e-4))) == 0.0
-    line = Sinusoid(amplitude=1e-3, frequency=7.3)
-    quiet = WhiteNoise(3e-4) + QuantizationNoise(2e-5) + line
-    assert white_density(fitted(quiet)) == pytest.approx(3e-4)
+@pytest.mark.parametrize(
+    ("model", "dt", "expected"),
+    [
+        *[(WHITE, dt, 3e-4) for dt in (0.001, 0.01, 1.0, 10.0)],
+        *[(WHITE + slow, 0.01, 3e-4) for slow in SLOW],
+        *[(slow, 0.01, 0.0) for slow in SLOW],
+        (QuantizationNoise(2e-4), 0.01, 0.0),
+        (WHITE + BOUNDED, 0.01, 3e-4),
+    ],
+)
+def test_density_is_that_of_the_white_noise(model, dt, expected):
+    assert white_density(fitted(model, dt=dt)) == pytest.approx(expected, rel=1e-9)
 
 
 def test_a_fast_resonance_counts_with_the_foot_of_its_spectrum():

@@ -255,22 +255,18 @@ def test_terms_of_imperfections():
     ("options", "message"),
     [
         ({"outages": ()}, "outages: give one length at least"),
-        ({"outages": (0.0,)}, "outage = 0.0"),
+        ({"outages": (0.0,)}, "outages = 0.0"),
         ({"keyframe": 0.01}, "two sampling intervals"),
         ({"motion": "boat"}, "motion 'boat' is not known: write handheld, drone, car, fixed-wing"),
         ({"imperfections": Imperfections(scale_error=0.01)}, "do nothing at rest"),
+        ({"source": QuantizationNoise(1e-3)}, "nothing that white noise"),
     ],
 )
 def test_what_cannot_be_used(options, message):
     with pytest.raises(InputError, match=message):
-        gmwm.certify(ONE, (1e-4, 1e-6), **options)
-
-
-def test_sizes_that_cannot_be_used():
+        gmwm.certify(**({"source": ONE, "numbers": (1e-4, 1e-6)} | options))
     with pytest.raises(InputError, match=r"scale_error = -0\.1"):
         Imperfections(scale_error=-0.1)
-    with pytest.raises(InputError, match="nothing that white noise"):
-        gmwm.certify(QuantizationNoise(1e-3), (1e-4, 1e-6))
 
 
 # ---- Numbers in use ----

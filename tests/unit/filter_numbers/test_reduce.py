@@ -193,7 +193,7 @@ def test_a_turn_on_bias_is_part_of_the_start():
     [
         ({"form": "N"}, r"form = 'N': known are N\+K, N\+GM, N\+K\+GM, N\+2GM"),
         ({"outages": ()}, "outages: give one length at least"),
-        ({"outages": (10.0, -1.0)}, r"outage = -1\.0"),
+        ({"outages": (10.0, -1.0)}, r"outages = -1\.0"),
         ({"outages": (10.0, 0.001)}, "outages = 0.001 s: give two sampling intervals or more"),
         ({"tau": 60.0}, r"tau is that of one Gauss-Markov process, the form is N\+K"),
         ({"form": "N+GM", "tau": "one"}, "tau = 'one'.*give a time in seconds, or 'shared'"),

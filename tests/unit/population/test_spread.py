@@ -95,16 +95,13 @@ def test_a_single_unit_and_equal_ones_promise_nothing_more():
     assert alone.free_limits is None
 
 
-def test_a_limit_without_a_distribution_is_a_value():
+def test_limits_without_a_distribution_are_values_and_what_is_not_normal_is_reported():
     values = np.random.default_rng(3).permutation(np.arange(1.0, 101.0))
     assert spread(values).free_limit == 99.0
     assert spread(values).free_limits == (1.0, 100.0)
-
-
-def test_what_is_not_normal_is_reported():
-    rng = np.random.default_rng(4)
-    assert spread(np.exp(rng.standard_normal(50))).is_normal
-    assert not spread(np.exp(rng.standard_normal(50) ** 3)).is_normal
+    normal = np.random.default_rng(4).standard_normal(50)
+    assert spread(np.exp(normal)).is_normal
+    assert not spread(np.exp(normal**3)).is_normal
 
 
 def test_errors_of_estimation_are_a_fraction_of_the_variance():

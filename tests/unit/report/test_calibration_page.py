@@ -20,7 +20,7 @@ from gmwm.plotting import COMPONENT_COLOURS
 from gmwm.report import figure as figures, write_report
 from gmwm.report.answer import answer, trust
 from gmwm.report.budget import navigation
-from gmwm.report.calibration import page
+from gmwm.report.calibration import _needed as needed, page
 from gmwm.report.datasheet import read_datasheet
 from gmwm.report.figure import (
     density_figure,
@@ -30,8 +30,7 @@ from gmwm.report.figure import (
 )
 from gmwm.report.health import health
 from gmwm.report.numbers import certified
-from gmwm.report.page import resource
-from gmwm.report.text import duration_text, needed
+from gmwm.report.page import duration_text, resource
 
 VOID = {"meta", "wbr", "link", "br", "img", "input", "hr"}
 NAVIGATION = "plot-navigation"
@@ -147,11 +146,7 @@ def test_nothing_is_fetched(parsed):
         assert "url(" not in style
     for script in parsed.scripts:
         assert "http" not in script or script is parsed.plotly
-
-
-def test_plotly_is_inside(parsed):
-    assert len(parsed.plotly) > 1_000_000
-    assert "plotly.js v" in parsed.plotly[:200]
+    assert len(parsed.plotly) > 1_000_000 and "plotly.js v" in parsed.plotly[:200]
 
 
 def test_nothing_runs_but_the_two_scripts_of_the_page(parsed):
@@ -187,22 +182,25 @@ def test_every_channel_is_there(parsed, calibration):
     assert drawn == plots
 
 
-def test_head_line(parsed):
-    assert "bench.csv: stochastic error models" in parsed.text
-    assert "80 s static at 100 Hz, 8,000 samples a channel" in parsed.text
-    assert f"gmwm {gmwm.__version__}, numpy" in parsed.text
-
-
-def test_notes_and_skipped_channels(parsed):
-    assert "Column not used: 'temp'" in parsed.text
-    assert ["gyro_y", "skipped: constant at 0 rad/s", "skipped"] in parsed.cells
-
-
-def test_notices_are_sentences(parsed, calibration):
+def test_the_page_says_what_was_found(parsed, calibration):
+    fit = calibration["gyro_x"]
     notices = [notice for fit in calibration.fits.values() for notice in fit.notices]
-    assert notices, "the fixture must have some"
-    for notice in notices:
-        assert notice.sentence in parsed.text
+    notes = gmwm.error_budget(calibration).notes
+    assert notices and notes, "the fixture must have some"
+    for words in (
+        "bench.csv: stochastic error models",
+        "80 s static at 100 Hz, 8,000 samples a channel",
+        f"gmwm {gmwm.__version__}, numpy",
+        "Column not used: 'temp'",
+        f"objective {fit.objective:.4g} on {fit.dof} degrees of freedom",
+        *(notice.sentence for notice in notices),
+        *(f"{note[0].upper()}{note[1:]}." for note in notes),
+    ):
+        assert words in parsed.text
+    assert ["gyro_y", "skipped: constant at 0 rad/s", "skipped"] in parsed.cells
+    # What is not valid is said before the headline.
+    warned = parsed.text.index("The model of accel_x is not valid: read the notices first.")
+    assert warned < parsed.text.index("After a 60 s outage")
 
 
 def test_valid_and_not_valid(calibration):
@@ -286,13 +284,16 @@ def test_parameters_in_si_and_in_the_units_of_the_field(parsed, calibration):
         ), unit
 
 
-def test_interval_of_a_parameter(parsed, calibration):
-    low, high = calibration["gyro_x"].interval()["N"]
+def test_interval_error_and_length_of_a_parameter(parsed, calibration):
+    fit = calibration["gyro_x"]
     (row,) = [row for row in parsed.cells if row[4:5] == ["rad/s/sqrt(Hz)"]]
     found = [float(text) for text in row[3].split(" to ")]
-    assert found == pytest.approx([low, high], rel=1e-3)
+    assert found == pytest.approx(fit.interval()["N"], rel=1e-3)
     first = next(row for row in parsed.cells if row[4:5] == ["deg/sqrt(h)"])
     assert first[:2] == ["N", "white noise"]
+    assert first[5:] == [f"{100 * fit.stderr['N'] / fit.params['N']:.2g} %", "long enough"]
+    bounded = next(row for row in parsed.cells if row[0] == "K" and row[2].startswith("<"))
+    assert bounded[5:] == ["", "not identified"]
 
 
 def test_upper_bounds_are_shown_as_such(parsed, calibration):
@@ -305,11 +306,6 @@ def test_upper_bounds_are_shown_as_such(parsed, calibration):
         assert float(row[2][2:].replace(",", "")) == pytest.approx(
             calibration["accel_x"][key].usual.upper, rel=1e-3
         )
-
-
-def test_fitness_is_told(parsed, calibration):
-    fit = calibration["gyro_x"]
-    assert f"objective {fit.objective:.4g} on {fit.dof} degrees of freedom" in parsed.text
 
 
 # -- what it means for navigation -----------------------------------------------------------------
@@ -343,18 +339,6 @@ def test_every_term_of_the_error_budget_is_listed(parsed, calibration):
         for r in budget.rows
         if any(r.values)
     ]
-
-
-def test_the_notes_of_the_error_budget(parsed, calibration):
-    notes = gmwm.error_budget(calibration).notes
-    assert notes, "the fixture must have some"
-    for note in notes:
-        assert f"{note[0].upper()}{note[1:]}." in parsed.text
-
-
-def test_what_is_not_valid_is_said_before_the_headline(parsed):
-    warned = parsed.text.index("The model of accel_x is not valid: read the notices first.")
-    assert warned < parsed.text.index("After a 60 s outage")
 
 
 def test_the_headline_of_a_minute(parsed, calibration):
@@ -491,6 +475,7 @@ def test_models_that_tie_and_the_data_sheet_are_drawn(calibration, tmp_path):
     sheet.write_text("gyro: {N: 1.2 deg/sqrt(h), K: 60 deg/h/sqrt(h)}\n")
     rivals = {"gyro_x": (WhiteNoise(4e-4) + gmwm.GaussMarkov(1e-3, 30.0),)}
     shown = Page(page(replace(calibration, rivals=rivals), datasheet=sheet))
+    assert set(read_datasheet(sheet).entries) == {"gyro"}  # before there are channels, too
     traces = {trace["name"]: trace for trace in shown.figures()[0]["data"]}
     tau, stated = (np.array(traces["data sheet"][key]) for key in "xy")
     expected = np.sqrt(72.0**2 / tau[-1] + 1.0**2 * tau[-1] / 3.0)
@@ -519,12 +504,6 @@ def test_data_sheets_that_cannot_be_used(calibration, tmp_path, text, what):
         read_datasheet(path, {name: fit.wv.quantity or "" for name, fit in calibration.items()})
     with pytest.raises(InputError, match=what):
         read_datasheet(path)
-
-
-def test_a_data_sheet_is_read_before_there_are_channels(tmp_path):
-    path = tmp_path / "sheet.yaml"
-    path.write_text("gyro_z: {N: 1 deg/sqrt(h)}\naccel: {B: 1 g}\n")
-    assert set(read_datasheet(path).entries) == {"gyro_z", "accel"}
 
 
 def test_series_and_spectrum_leave_out_what_was_masked(calibration, recording):
@@ -591,24 +570,18 @@ def test_residuals_are_in_per_cent_of_the_deviation(parsed, calibration):
         assert low == -high
 
 
-def test_a_residual_beyond_the_axis_is_a_triangle_at_its_edge(calibration):
+@pytest.mark.parametrize("last", [400.0, 0.09])
+def test_residuals_are_within_the_axis_or_triangles_at_its_edge(calibration, last):
     fit = calibration["gyro_x"]
-    wv = replace(fit.wv, variance=fit.wv.variance * np.r_[np.ones(fit.wv.tau.size - 1), 400.0])
-    (points,) = residual_figure(replace(fit, wv=wv))["data"]
-    assert points["marker"]["symbol"][-1] == "triangle-up"
-    assert points["marker"]["symbol"][0] == "circle"
-    assert points["text"][0] == ""
-    assert points["text"][-1] == f"{points['customdata'][-1][0]:+.0f} %"
-
-
-def test_the_axis_of_residuals_reaches_what_is_missed(calibration):
-    fit = calibration["gyro_x"]
-    wv = replace(fit.wv, variance=fit.wv.variance * np.r_[np.ones(fit.wv.tau.size - 1), 0.09])
+    wv = replace(fit.wv, variance=fit.wv.variance * np.r_[np.ones(fit.wv.tau.size - 1), last])
     figure = residual_figure(replace(fit, wv=wv))
-    misfit = figure["data"][0]["customdata"][-1][0]
-    assert misfit < -60.0
-    assert figure["layout"]["yaxis"]["range"][0] < misfit
-    assert set(figure["data"][0]["marker"]["symbol"]) == {"circle"}
+    (points,) = figure["data"]
+    misfit, (low, high) = points["customdata"][-1][0], figure["layout"]["yaxis"]["range"]
+    beyond = not low < misfit < high
+    assert beyond == (last > 1.0) and (beyond or misfit < -60.0)
+    assert points["marker"]["symbol"][-1] == ("triangle-up" if beyond else "circle")
+    assert points["text"][-1] == (f"{misfit:+.0f} %" if beyond else "")
+    assert (points["marker"]["symbol"][0], points["text"][0]) == ("circle", "")
 
 
 def test_lines_are_seen_on_white_and_on_dark_screens():
@@ -645,10 +618,10 @@ def test_a_step_that_spoils_a_fit_is_the_first_finding(calibration):
     crosstalk = issue("warning", "correlated noise", "")
     spoilt = in_options(replace(calibration, fits=fits, notices=(LENGTH, crosstalk)))
     first, second = health(spoilt)["rows"]
-    assert (first["severity"], first["where"]) == ("bad", "accel_x")
-    assert first["text"] == "A step of +2.7 mg at 293 s"
-    assert first["hint"].endswith("--stop 283.6 or --start 303.2, or --remove-departures")
-    assert second["severity"] == "warning"
+    assert (first.severity, first.where) == ("bad", "accel_x")
+    assert first.text == "a step of +2.7 mg at 293 s"
+    assert first.hint.endswith("--stop 283.6 or --start 303.2, or --remove-departures")
+    assert second.severity == "warning"
 
 
 def test_every_reason_why_a_channel_is_not_valid_is_a_finding(calibration):
@@ -657,8 +630,8 @@ def test_every_reason_why_a_channel_is_not_valid_is_a_finding(calibration):
     fits = {**calibration.fits, "gyro_x": replace(calibration["gyro_x"], notices=(missed, moved))}
     for notices in ((LENGTH, moved), ()):
         spoilt = replace(calibration, fits=fits, notices=notices)
-        rows = [(row["where"], row["text"]) for row in health(spoilt)["rows"]]
-        assert ("gyro_x", "The model misses the data by 40 %") in rows
+        rows = [(row.where, row.text) for row in health(spoilt)["rows"]]
+        assert ("gyro_x", "the model misses the data by 40 %") in rows
         # What is a finding of the recording is not said twice.
         assert sum("moved" in text for _, text in rows) == 1
         shown = page(spoilt)
@@ -719,15 +692,6 @@ def test_an_ambiguous_choice_is_reported_with_the_channel(calibration):
     shown = Page(page(replace(calibration, notices=(tie,))))
     assert shown.text.index("gyro_x: white noise") < shown.text.index("2 models describe")
     assert shown.text.index("2 models describe") < shown.text.index("accel_x: white noise")
-
-
-def test_errors_and_lengths_are_in_the_table(parsed, calibration):
-    fit = calibration["gyro_x"]
-    row = next(row for row in parsed.cells if row[4:5] == ["deg/sqrt(h)"])
-    assert row[5] == f"{100 * fit.stderr['N'] / fit.params['N']:.2g} %"
-    assert row[6] == "long enough"
-    bounded = next(row for row in parsed.cells if row[0] == "K" and row[2].startswith("<"))
-    assert bounded[5:] == ["", "not identified"]
 
 
 @pytest.mark.parametrize(

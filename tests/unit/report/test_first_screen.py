@@ -11,8 +11,13 @@ import gmwm
 from gmwm import GaussMarkov, QuantizationNoise, RandomWalk, WhiteNoise
 from gmwm.issues import Notice
 from gmwm.report.answer import filter_sentence
-from gmwm.report.health import ambiguity, health
-from gmwm.report.length import known_at, length_sentence, parameters_sentence
+from gmwm.report.health import (
+    ambiguity,
+    health,
+    known_at,
+    length_sentence,
+    parameters_sentence,
+)
 
 TIE = Notice("ambiguity", "note", "gyro_x", "2 models fit", hint="the first is used")
 
@@ -59,7 +64,7 @@ def test_parameters_need_more_length_than_a_filter(gyro, monkeypatch):
     text = parameters_sentence(gyro)
     assert text.startswith("For 10 % in every parameter record ")
     assert text.endswith(f"({key} of gyro_x)")
-    monkeypatch.setattr("gmwm.report.length.known_at", lambda *_: 0.01)
+    monkeypatch.setattr("gmwm.report.health.known_at", lambda *_: 0.01)
     assert parameters_sentence(gyro).endswith("; a filter needs less")
 
 

@@ -93,10 +93,12 @@ BROKEN = """(function () {
   return found; })()"""
 
 
-@pytest.mark.parametrize("width", [1300, 420])
-def test_nothing_is_cut_off(tab, width):
+@pytest.mark.parametrize(("width", "is_opened"), [(1300, False), (420, False), (420, True)])
+def test_nothing_is_cut_off(tab, path, width, is_opened):
     try:
         tab.size(width)
+        if is_opened:  # narrow from the start
+            tab.open(path)
         tab.run("new Promise(function (done) { setTimeout(done, 400); })")  # figures follow
         assert tab.run("document.documentElement.scrollWidth") <= width
         plots = tab.run("Array.from(document.querySelectorAll('.plot svg.main-svg')).map("
@@ -270,19 +272,7 @@ def test_text_can_be_read(tab, scheme):
         tab.scheme("light")
 
 
-def test_a_narrow_screen_from_the_start(tab, path):
-    try:
-        tab.size(420)
-        tab.open(path)
-        assert tab.run("document.documentElement.scrollWidth") <= 420
-        plots = tab.run("Array.from(document.querySelectorAll('.plot svg.main-svg')).map("
-                        "function (p) { return p.getBoundingClientRect().right; })")  # fmt: skip
-        assert max(plots) <= 420
-    finally:
-        tab.size(1300)
-
-
-def test_words_of_figures_are_whole_on_paper(tab):
+def test_words_of_figures_are_whole_on_paper_and_notes_are_there(tab):
     cut = """Array.from(document.querySelectorAll('.plot')).filter(function (p) {
       var box = p.querySelector('svg.main-svg').getBoundingClientRect();
       return Array.from(p.querySelectorAll('svg text')).some(function (t) {
@@ -290,23 +280,16 @@ def test_words_of_figures_are_whole_on_paper(tab):
         return t.textContent && (r.top < box.top - 1 || r.bottom > box.bottom + 1 ||
           r.left < box.left - 1 || r.right > box.right + 1); });
     }).map(function (p) { return p.id; })"""
-    try:
-        tab.run("dispatchEvent(new Event('beforeprint'))")
-        assert tab.run(cut) == []
-        closed = "Array.from(document.querySelectorAll('details.printed:not([open])')).length"
-        assert tab.run(closed) == 0
-    finally:
-        tab.run("dispatchEvent(new Event('afterprint'))")
-
-
-def test_notes_are_on_paper(tab):
     notes = (
         "Array.from(document.querySelectorAll('.run > *')).filter(function (s) {"
         " return s.getClientRects().length; }).map(function (s) { return s.innerText; })"
     )
     try:
-        tab.call("Emulation.setEmulatedMedia", media="print")
         tab.run("dispatchEvent(new Event('beforeprint'))")
+        assert tab.run(cut) == []
+        closed = "Array.from(document.querySelectorAll('details.printed:not([open])')).length"
+        assert tab.run(closed) == 0
+        tab.call("Emulation.setEmulatedMedia", media="print")
         assert "Column not used: 'temp'." in tab.run(notes)
     finally:
         tab.run("dispatchEvent(new Event('afterprint'))")

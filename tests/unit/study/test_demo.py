@@ -10,7 +10,7 @@ import gmwm
 from gmwm import GaussMarkov, RandomWalk, RateRamp, WhiteNoise, ins
 from gmwm.study.demo import DRIVE, RATE, compare, simulated_imu, write_demo_files
 from gmwm.study.emulated_logs import emulated_log
-from gmwm.study.sensor_tables import TABLE_6
+from gmwm.study.sensor_tables import TABLE_5, TABLE_6
 
 DEG_PER_HOUR = pi / 180.0 / 3600.0
 MICRO_G = 9.80665e-6
@@ -28,12 +28,8 @@ def test_table_six_in_si():
         accel |= {f"sigma_{i}": sigma * MICRO_G, f"tau_{i}": 1.0 / beta}
     assert models["gyro"].params == pytest.approx(gyro, rel=1e-12, abs=0.0)
     assert models["accel"].params == pytest.approx(accel, rel=1e-12, abs=0.0)
-
-
-def test_gyro_white_noise_in_numbers():
-    # 140 deg/h/sqrt(Hz) = 2.333 deg/sqrt(h) = 6.787e-4 rad/s/sqrt(Hz)
-    assert TABLE_6.models["gyro_x"].params["N"] == pytest.approx(6.787e-4, rel=1e-3)
-    assert TABLE_6.models["accel_x"].params["N"] == pytest.approx(1.373e-3, rel=1e-3)
+    tuned = {"N": 1e5 * MICRO_G, "sigma": 4e4 * MICRO_G, "tau": 100.0}
+    assert TABLE_5.models["accel_z"].params == pytest.approx(tuned, rel=1e-12)
 
 
 def test_simulated_recording():
@@ -118,19 +114,13 @@ def test_a_truth_outside_its_interval_is_not_covered(fit):
     assert not compare(fit, TRUTH.with_params({"K": 1e-6}))[1].covered
 
 
-def test_accelerometers_have_their_own_units():
+def test_accelerometers_have_their_own_units_and_a_signed_truth_its_sign():
     truth = WhiteNoise(140.0 * MICRO_G) + GaussMarkov(500.0 * MICRO_G, 2.0)
     channel = gmwm.Channel("accel_z", truth.simulate(20_000, 0.01, 5), 0.01, "accel", "m/s^2")
     rows = compare(gmwm.fit(truth.opened(), channel), truth)
-    assert [(row.what, row.unit) for row in rows] == [
-        ("N", "ug/sqrt(Hz)"),
-        ("sigma", "ug"),
-        ("tau", "s"),
-    ]
+    shown = [("N", "ug/sqrt(Hz)"), ("sigma", "ug"), ("tau", "s")]
+    assert [(row.what, row.unit) for row in rows] == shown
     assert [row.truth for row in rows] == pytest.approx([140.0, 500.0, 2.0])
-
-
-def test_a_signed_truth_keeps_its_sign():
     truth = WhiteNoise(1e-4) + RateRamp(-1e-5)
     channel = gmwm.Channel("gyro_x", truth.simulate(5000, 0.01, 5), 0.01, "gyro", "rad/s")
     ramp = compare(gmwm.fit(truth.opened(), channel), truth)[1]

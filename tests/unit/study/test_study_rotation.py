@@ -12,9 +12,8 @@ from gmwm.ins import car_drive, gnss
 from gmwm.ins.filter.aiding import Outage
 from gmwm.ins.imu import AXES
 from gmwm.ins.simulation import Scenario
-from gmwm.study import turns
-from gmwm.study.rotation import Rotation, crossed_weights
-from gmwm.study.turns import reproduce_rotation, rotate
+from gmwm.study import rotation
+from gmwm.study.rotation import Rotation, crossed_weights, reproduce_rotation, rotate
 
 FACTORS = {"GMWM": 1.0, "lines": 2.0}
 STRETCHES = (6, 8, 7)
@@ -78,7 +77,7 @@ def test_a_filter_that_diverged_everywhere_has_no_numbers(made_up):
 
 
 def test_a_draw_takes_each_recording_and_stretch_once_for_all_its_runs():
-    weights = crossed_weights((3, 5, 4), None, 4000, np.random.default_rng(1))
+    weights = crossed_weights((3, 5, 4), None, 4000, 1)
     assert not np.any(weights[:, np.arange(3), np.arange(3)])
     assert not np.any(weights[:, :, 0, 3:])
     mean = weights.mean(axis=0)
@@ -89,7 +88,7 @@ def test_a_draw_takes_each_recording_and_stretch_once_for_all_its_runs():
     rows = np.nonzero(both)[0]
     for row in rows[:50]:
         assert np.ptp(shares[rows == row]) == pytest.approx(0.0)
-    alone = crossed_weights((3, 5, 4), np.eye(3)[2], 100, np.random.default_rng(1))
+    alone = crossed_weights((3, 5, 4), 2, 100, 1)
     assert not np.any(alone[:, :2])
     assert np.all(np.sum(alone[:, 2], axis=(1, 2)) > 0.0)
 
@@ -98,8 +97,8 @@ def test_intervals_allow_for_few_recordings():
     """Four recordings whose effects are as large as those of stretches: crossed, 300 studies."""
     rng = np.random.default_rng(5)
     n, size = 4, 8
-    weights = crossed_weights((size,) * n, None, 1000, rng)
-    weights /= np.sum(weights, axis=(1, 2, 3), keepdims=True)
+    weights = crossed_weights((size,) * n, None, 1000, 5)
+    weights = weights / np.sum(weights, axis=(1, 2, 3), keepdims=True)
     studies = 300
     off = 1.0 - np.eye(n)[..., None]
     values = (
@@ -128,7 +127,7 @@ def short(monkeypatch):
     """A drive of 40 s, and a calibration that counts how often it is done."""
     truth = car_drive(duration=40.0, dt=1 / RATE)
     scenario = Scenario(truth, gnss(truth), (Outage(20.0, 10.0),), interval=10.0)
-    monkeypatch.setattr(turns, "scenario_of", lambda vehicle: scenario)
+    monkeypatch.setattr(rotation, "scenario_of", lambda vehicle: scenario)
     done = []
 
     def calibrate(given):
@@ -137,13 +136,13 @@ def short(monkeypatch):
         fits = {axis: fit(model, wavelet_variance(given[axis])) for axis in AXES}
         return Calibration(fits, {}, given.source, RATE, 3000)
 
-    bound = turns.filter_numbers.bound
+    bound = rotation.filter_numbers.bound
     quick = SimpleNamespace(  # the others take seconds
         bound=lambda given, form, horizon: bound(given, "N+K", horizon),
         reduce=lambda given, form, outages: bound(given, form, outages[0]),
     )
-    monkeypatch.setattr(turns, "calibrate", calibrate)
-    monkeypatch.setattr(turns, "filter_numbers", quick)
+    monkeypatch.setattr(rotation, "calibrate", calibrate)
+    monkeypatch.setattr(rotation, "filter_numbers", quick)
     return done
 
 

@@ -5,9 +5,8 @@ import pyarrow as pa
 import pytest
 
 from gmwm import Model, WhiteNoise, cramer_rao
-from gmwm.study.figures import boxplots
 from gmwm.study.studies import FIGURES, STUDIES, Estimation, Quantity, Study
-from gmwm.study.summary import summarise
+from gmwm.study.summary import boxplots, summarise
 
 WHITE = Study(
     name="white",

@@ -9,11 +9,9 @@ from gmwm.filter_numbers.spectra.dominance import (
     with_correlation_times as with_correlation_times,
 )
 from gmwm.filter_numbers.spectra.region import (
+    Estimated as Estimated,
     ParameterRegion as ParameterRegion,
     region_spectra as region_spectra,
 )
 from gmwm.filter_numbers.spectra.required import RequiredSpectrum as RequiredSpectrum
-from gmwm.filter_numbers.spectra.standard_errors import (
-    Estimated as Estimated,
-    standard_errors as standard_errors,
-)
+from gmwm.filter_numbers.spectra.standard_errors import standard_errors as standard_errors

@@ -10,7 +10,8 @@ linear program, for each correlation time.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.optimize import linprog, minimize_scalar
@@ -46,22 +47,23 @@ class Problem:
     horizon: float
     region: tuple[RequiredSpectrum, ...] = ()
     lowest: float = 0.0
-    f: FloatArray = field(init=False)
-    need: FloatArray = field(init=False)
-    _averaging: FloatArray = field(init=False)
-    _allan: FloatArray = field(init=False)
 
-    def __post_init__(self) -> None:
+    @cached_property
+    def f(self) -> FloatArray:
+        """Frequencies of the linear program, Hz."""
+        return self.frequencies(tuning.POINTS)
+
+    @cached_property
+    def need(self) -> FloatArray:
+        """The required density at these, u^2/Hz."""
+        return self.largest(self.f)
+
+    @cached_property
+    def _allan(self) -> tuple[FloatArray, FloatArray]:
+        """Averaging times of the cost, s, and the Allan variances of the targets there, u^2."""
         times = np.geomspace(0.1 * self.horizon, self.horizon, tuning.AVERAGING_TIMES)
-        averaging = np.unique(np.maximum(np.rint(times / self.dt), 1.0)) * self.dt
-        f = self.frequencies(tuning.POINTS)
-        for name, values in (
-            ("f", f),
-            ("need", self.largest(f)),
-            ("_averaging", averaging),
-            ("_allan", np.array([each.allan_variance(averaging) for each in self.targets])),
-        ):
-            object.__setattr__(self, name, values)
+        tau = np.unique(np.maximum(np.rint(times / self.dt), 1.0)) * self.dt
+        return tau, np.array([each.allan_variance(tau) for each in self.targets])
 
     @property
     def dt(self) -> float:
@@ -85,8 +87,8 @@ class Problem:
 
     def cost(self, process: Process) -> float:
         """Mean over averaging times and axes: its Allan variance over the true one."""
-        variance = 2.0 * process.haar_variance(self._averaging, self.dt)
-        return float(np.mean(variance / self._allan))
+        tau, allan = self._allan
+        return float(np.mean(2.0 * process.haar_variance(tau, self.dt) / allan))
 
 
 def dominating(problem: Problem, form: str, tau: float | None = None) -> Model:
@@ -97,14 +99,13 @@ def dominating(problem: Problem, form: str, tau: float | None = None) -> Model:
     Raises InputError if the form cannot dominate: "N+GM" where a spectrum has no limit at zero
         frequency.
     """
-    kinds = KINDS[form]
-    if "K" not in kinds and not all(target.is_stationary for target in problem.dominated):
+    if "K" not in KINDS[form] and not all(target.is_stationary for target in problem.dominated):
         raise InputError(
             f"{form} cannot dominate a model with a random walk: its spectrum rises without "
             "limit towards zero frequency; use N+K or N+K+GM"
         )
     plain = _plain(form)
-    if "G" not in kinds:
+    if "G" not in KINDS[form]:
         return _scaled(problem, plain, solved(problem, columns_of(problem, plain))[0])
     tau = correlation_time([problem], form) if tau is None else tau
     shares = _with_slow(problem, columns_of(problem, plain), [GaussMarkov(1.0, tau)])
@@ -137,7 +138,7 @@ def correlation_time(problems: Sequence[Problem], form: str) -> float:
 
 def _plain(form: str) -> list[Process]:
     """The processes of a form beside a Gauss-Markov process, of unit amplitude."""
-    return [WhiteNoise(1.0)] + [RandomWalk(1.0)] * ("K" in KINDS[form])
+    return [WhiteNoise(1.0), *([RandomWalk(1.0)] if "+K" in form else [])]
 
 
 def _with_slow(problem: Problem, fast: FloatArray, gauss: Sequence[Process]) -> FloatArray:
@@ -152,12 +153,8 @@ def with_correlation_times(problem: Problem, form: str, taus: Sequence[float]) -
 
     A spectrum without a limit at zero frequency is dominated from the lowest frequency on.
     """
-    processes: list[Process] = [WhiteNoise(1.0)]
-    if "K" in form.split("+"):
-        processes.append(RandomWalk(1.0))
-    processes += [GaussMarkov(1.0, tau) for tau in taus]
-    walking = any(process.is_walk for process in processes)
-    shares = solved(problem, columns_of(problem, processes), walking)[0]
+    processes = [*_plain(form), *(GaussMarkov(1.0, tau) for tau in taus)]
+    shares = solved(problem, columns_of(problem, processes), "+K" in form)[0]
     least = tuning.LEAST_SHARE * float(np.sum(shares))
     return _scaled(problem, processes, np.maximum(shares, least))
 

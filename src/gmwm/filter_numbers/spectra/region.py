@@ -17,6 +17,27 @@ from gmwm.process import Model, Process
 
 
 @dataclass(frozen=True, eq=False)
+class Estimated:
+    """A model, and the errors of some of its parameters.
+
+    covariance: (p, p), of these parameters, in products of their units.
+    """
+
+    model: Model
+    keys: tuple[str, ...]
+    covariance: FloatArray
+
+    @classmethod
+    def of(cls, fit: Fit) -> Estimated:
+        """Of a fit: amplitudes at upper limits and rate ramps count as known."""
+        drifts = {p.key for p in fit.model.parameters if fit.model.terms[p.term].is_drift}
+        known = drifts | set(fit.upper_bounds)
+        free = [i for i, key in enumerate(fit.keys) if key not in known]
+        keys = tuple(fit.keys[i] for i in free)
+        return cls(fit.model, keys, fit.covariance[np.ix_(free, free)])
+
+
+@dataclass(frozen=True, eq=False)
 class ParameterRegion:
     """A joint confidence region: the image of a ball of p dimensions.
 
@@ -43,11 +64,8 @@ class ParameterRegion:
 
         Raises InputError if the data do not bound a parameter.
         """
-        drifts = {p.key for p in fit.model.parameters if fit.model.terms[p.term].is_drift}
-        place = [
-            i for i, key in enumerate(fit.keys) if key not in drifts and key not in fit.upper_bounds
-        ]
-        keys = tuple(fit.keys[i] for i in place)
+        free = Estimated.of(fit)
+        keys = free.keys
         single = 2.0 * norm.cdf(np.sqrt(chi2.ppf(level, max(len(keys), 1)))) - 1.0
         ends = fit.interval(float(single))
         bounds = dict(fit.upper_bounds)
@@ -57,12 +75,11 @@ class ParameterRegion:
                     f"channel {fit.wv.name!r}: the record does not bound {key}, so no numbers "
                     "dominate its confidence region: record longer, or leave out the level"
                 )
-        covariance = fit.covariance[np.ix_(place, place)]
-        errors = np.sqrt(np.diag(covariance))
-        correlation = covariance / np.outer(errors, errors)
+        errors = np.sqrt(np.diag(free.covariance))
+        correlation = free.covariance / np.outer(errors, errors)
         values, vectors = np.linalg.eigh(correlation) if keys else (np.zeros(0), np.zeros((0, 0)))
         return cls(
-            model=fit.model.with_params({key: bounds[key] for key in bounds}),
+            model=fit.model.with_params(bounds),
             keys=keys,
             lower=np.array([ends[key][0] for key in keys]),
             upper=np.array([ends[key][1] for key in keys]),

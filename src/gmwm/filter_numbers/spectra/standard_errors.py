@@ -9,39 +9,18 @@ first order.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from gmwm._core.typing import BoolArray, FloatArray
-from gmwm.estimate import Fit
 from gmwm.filter_numbers import tuning
 from gmwm.filter_numbers.spectra.dominance import Problem, columns_of, limits, solved
+from gmwm.filter_numbers.spectra.region import Estimated
 from gmwm.filter_numbers.spectra.required import RequiredSpectrum
 from gmwm.process import Model
 
 _STEP = 1e-3  # standard errors
-
-
-@dataclass(frozen=True, eq=False)
-class Estimated:
-    """A model, and the errors of some of its parameters.
-
-    covariance: (p, p), of these parameters, in products of their units.
-    """
-
-    model: Model
-    keys: tuple[str, ...]
-    covariance: FloatArray
-
-    @classmethod
-    def of(cls, fit: Fit) -> Estimated:
-        """Of a fit: amplitudes at upper limits and rate ramps count as known."""
-        drifts = {p.key for p in fit.model.parameters if fit.model.terms[p.term].is_drift}
-        known = drifts | set(fit.upper_bounds)
-        free = [i for i, key in enumerate(fit.keys) if key not in known]
-        keys = tuple(fit.keys[i] for i in free)
-        return cls(fit.model, keys, fit.covariance[np.ix_(free, free)])
 
 
 def standard_errors(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
@@ -10,21 +11,20 @@ import numpy as np
 from scipy.linalg import block_diag, eigh
 
 from gmwm._core.typing import BoolArray, FloatArray, IntArray
-from gmwm.errors import InputError
 from gmwm.ins import tuning
 from gmwm.ins.covariance.joint_kernels import JointFilter, KeptCovariances, Track, run_jointly
 from gmwm.ins.filter import (
     NAVIGATION,
+    Events,
     Filter,
     Kinematics,
     Outputs,
     SensorStates,
-    modified,
     unmodified,
 )
 from gmwm.ins.geometry import matrix_from_rpy
 from gmwm.ins.imu import Imu, SensorModels, emulate
-from gmwm.ins.simulation import Scenario
+from gmwm.ins.simulation import Scenario, place_of
 from gmwm.issues import Notice, notice
 
 _ALL, _POSITION = slice(None), slice(0, 3)
@@ -102,17 +102,8 @@ class Analysis(CovarianceErrors):
         return np.sqrt(np.diagonal(self.predicted, axis1=1, axis2=2))
 
     def index(self, time: float, *, before: bool = True) -> int:
-        """Place of an epoch.
-
-        Raises
-        ------
-        InputError
-            If it was not kept.
-        """
-        found = np.flatnonzero((np.abs(self.time - time) < 1e-6) & (self.before == before))
-        if found.size == 0:
-            raise InputError(f"nothing was kept at {time:g} s: give the end of an outage")
-        return int(found[0])
+        """Place of an epoch; InputError if it was not kept."""
+        return place_of(time, self.time, self.before == before)
 
     def nees(self, part: slice = _POSITION) -> FloatArray:
         """Expected NEES per degree of freedom, (K,), of the position or another part."""
@@ -129,6 +120,7 @@ class Course:
 
     scenario: Scenario
     outputs: Outputs
+    events: Events
     track: Track
 
     @classmethod
@@ -138,9 +130,9 @@ class Course:
         imu = emulate(trajectory) if imu is None else imu
         stride = max(round(scenario.step / trajectory.dt), 1)
         outputs = scenario.outputs()
-        asked = scenario.aiding.without(scenario.outages).events(trajectory.dt, trajectory.n).epoch
+        events = scenario.aiding.without(scenario.outages).events(trajectory.dt, trajectory.n)
         # Every epoch that is asked for, and none more than a stride apart.
-        marks = np.union1d(asked, np.append(outputs.epoch, [0, trajectory.n]))
+        marks = np.union1d(events.epoch, np.append(outputs.epoch, [0, trajectory.n]))
         between = [np.append(np.arange(a, b, stride), b)[1:] for a, b in pairwise(marks)]
         epoch: IntArray = np.concatenate([np.zeros(1, dtype=np.int64), *between])
         samples = np.diff(epoch, prepend=0)
@@ -152,38 +144,42 @@ class Course:
         end = (np.ascontiguousarray(each[epoch]) for each in motion)
         rate = imu.rotation[np.maximum(epoch - 1, 0)] / trajectory.dt
         track = Track(epoch, samples, trajectory.dt, Kinematics(*middle), Kinematics(*end), rate)
-        return cls(scenario, outputs, track)
+        return cls(scenario, outputs, events, track)
 
     def analyse(self, truth: SensorModels, believed: SensorModels) -> Analysis:
         """True and predicted covariance of a filter; see `covariance_analysis`."""
-        scenario, dt = self.scenario, self.track.dt
-        aiding = scenario.aiding.without(scenario.outages)
-        ready = Filter.of(believed, aiding, dt, scenario.step, scenario.second_order)
-        real = Filter.of(truth, aiding, dt, scenario.step, drift_known=True)
-        events = aiding.events(dt, scenario.trajectory.n)
-        initial = scenario.trajectory.state(0)
-        table, joint = ready.states, _joint(ready.states, real.states)
+        scenario, dt, kept = self.scenario, self.track.dt, self.outputs
+        ready = Filter.of(believed, scenario.aiding, dt, scenario.step, scenario.second_order)
+        real = Filter.of(truth, scenario.aiding, dt, scenario.step, drift_known=True)
+        initial, table = scenario.trajectory.state(0), ready.states
+        joint, n, m = _joint(table, real.states), NAVIGATION, NAVIGATION + table.m
         P = ready.covariance(initial, scenario.initial_sd)
-        start = modified(np.diag(scenario.initial_sd.deviations**2), initial.velocity)
-        J = block_diag(start, joint.covariance + np.outer(joint.mean, joint.mean))
-        size = self.outputs.epoch.size
-        out_P, out_J = np.empty((size, *P.shape)), np.empty((size, *J.shape))
-        kept = KeptCovariances(self.outputs.epoch, self.outputs.before, out_P, out_J)
-        firsts = ((ready.noise_states, NAVIGATION), (real.noise_states, NAVIGATION + table.m))
-        estimate, true = (np.where(own >= 0, own + first, -1) for own, first in firsts)
-        noises = (estimate, true, ready.lever_arm, ready.second_order)
-        run_jointly(self.track, events, JointFilter(table.table, joint.table, *noises), P, J, kept)
-        index, nine = self.outputs.epoch, slice(0, NAVIGATION)
-        velocity = scenario.trajectory.velocity[index]
+        J = block_diag(P[:n, :n], joint.covariance + np.outer(joint.mean, joint.mean))
+        out = KeptCovariances(
+            kept.epoch,
+            kept.before,
+            np.empty((kept.epoch.size, *P.shape)),
+            np.empty((kept.epoch.size, *J.shape)),
+        )
+        about = JointFilter(
+            table.table,
+            joint.table,
+            np.where(ready.noise_states >= 0, ready.noise_states + n, -1),
+            np.where(real.noise_states >= 0, real.noise_states + m, -1),
+            ready.lever_arm,
+            ready.second_order,
+        )
+        run_jointly(self.track, self.events, about, P, J, out)
+        velocity = scenario.trajectory.velocity[kept.epoch]
         # The filter's error in a sensor is the true sum less the estimated one, and either way
         # round it has the same second moments.
         found = Analysis(
-            time=self.outputs.time(dt),
-            before=self.outputs.before == 1,
-            predicted=unmodified(out_P[:, nine, nine], velocity),
-            actual=unmodified(out_J[:, nine, nine], velocity),
-            sensor_predicted=table.sums @ out_P[:, NAVIGATION:, NAVIGATION:] @ table.sums.T,
-            sensor_actual=joint.sums @ out_J[:, NAVIGATION:, NAVIGATION:] @ joint.sums.T,
+            time=kept.time(dt),
+            before=kept.before == 1,
+            predicted=unmodified(out.P[:, :n, :n], velocity),
+            actual=unmodified(out.J[:, :n, :n], velocity),
+            sensor_predicted=table.sums @ out.P[:, n:, n:] @ table.sums.T,
+            sensor_actual=joint.sums @ out.J[:, n:, n:] @ joint.sums.T,
         )
         notices = []
         for end in (outage.end for outage in scenario.outages):
@@ -191,8 +187,10 @@ class Course:
             tilt = max(tilts)
             if tilt > tuning.LINEAR_TILT or heading > tuning.LINEAR_HEADING:
                 values = {"time": end, "tilt": tilt, "heading": heading}
-                tilt_deg, heading_deg = map(float, np.degrees([tilt, heading]))
-                words: dict[str, Any] = {"tilt_deg": tilt_deg, "heading_deg": heading_deg}
+                words: dict[str, Any] = {
+                    "tilt_deg": math.degrees(tilt),
+                    "heading_deg": math.degrees(heading),
+                }
                 notices.append(notice("outside-linearity", "", values, **words))
         return replace(found, notices=tuple(notices))
 

@@ -24,7 +24,6 @@ from gmwm.ins.filter import (
     SensorTable,
     excess,
     measurement_update,
-    new_scratch,
     new_transition,
     observe,
     propagate,
@@ -102,21 +101,18 @@ def update_jointly(
     variance: Of the measurement's white noise.
     gain: (n + q,), the filter's.
     """
-    size, n = J.shape[0], h.size
+    n, size = h.size, J.shape[0]
     a, k = np.zeros(size), np.zeros(size)
     for i in range(n):
         if h[i] != 0.0:
             for j in range(size):
                 a[j] += h[i] * J[i, j]
+    # Feedback: the integrals are corrected, and the estimates take what their errors lose.
+    k[:n], k[n : gain.size] = gain[:n], -gain[n:]
     if estimate >= 0:
         for j in range(size):
             a[j] += J[estimate, j] - J[truth, j]
-    # Feedback: the integrals are corrected, and the estimates take what their errors lose.
-    for i in range(gain.size):
-        k[i] = gain[i] if i < n else -gain[i]
-    s = variance
-    for i in range(n):
-        s += h[i] * a[i]
+    s = variance + np.sum(h * a[:n])
     if estimate >= 0:
         s += a[estimate] - a[truth]
     for i in range(size):
@@ -165,8 +161,7 @@ def aid_jointly(
         P = _propagated(P, step.A, step.Q)
         J = _propagated(J, step.B, step.R)
         total = P[last, last] + variance
-        for i in range(gain.size):
-            gain[i] = P[i, last] / total
+        gain[:] = P[:, last] / total
         for i in range(gain.size):
             for j in range(i, gain.size):
                 P[i, j] -= gain[i] * gain[j] * total
@@ -186,8 +181,8 @@ def run_jointly(
     kept: KeptCovariances,
 ) -> None:  # fmt: skip
     """Propagate P and J of a navigation filter along a trajectory."""
-    change, scratch, j_scratch = new_transition(), new_scratch(P.shape[0]), new_scratch(J.shape[0])
-    h, gain, x = np.zeros(9), np.zeros(P.shape[0]), np.zeros(P.shape[0])
+    change, h = new_transition(), np.zeros(9)
+    gain, x = np.zeros(P.shape[0]), np.zeros(P.shape[0])
     event = out = 0
     gathered = j_gathered = 0.0
     for s in range(track.epoch.size):
@@ -196,8 +191,8 @@ def run_jointly(
             middle = Kinematics(track.middle.C[s], track.middle.v[s], track.middle.lla[s])
             step = count * track.dt
             transition(middle, step, change)
-            propagate(P, change, about.table, count, scratch)
-            propagate(J, change, about.joint, count, j_scratch)
+            propagate(P, change, about.table, count)
+            propagate(J, change, about.joint, count)
             if about.second_order:
                 g = gravity(middle.lla[0], middle.lla[2])
                 gathered = tilt_squared(P, g, step, gathered)

@@ -25,7 +25,6 @@ from gmwm.ins.filter.records import (
     Kinematics as Kinematics,
     SensorTable as SensorTable,
     Transition as Transition,
-    new_scratch as new_scratch,
     new_transition as new_transition,
 )
 from gmwm.ins.filter.states import SensorStates as SensorStates

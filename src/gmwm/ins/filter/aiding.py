@@ -13,7 +13,7 @@ from gmwm._core.distributions import chi2
 from gmwm._core.typing import BoolArray, FloatArray
 from gmwm.errors import InputError
 from gmwm.ins import tuning
-from gmwm.ins.filter.measurements import IS_INFERRED, KINDS, MEASUREMENTS, Measurement
+from gmwm.ins.filter.measurements import IS_INFERRED, KINDS, MEASUREMENTS, Instrument, Measurement
 from gmwm.ins.filter.records import Events
 from gmwm.ins.imu import Imu
 from gmwm.ins.trajectory import Trajectory
@@ -36,7 +36,7 @@ class Outage:
     duration: float
 
     def __post_init__(self) -> None:
-        if not (checks.is_number(self.start) and np.isfinite(self.start) and self.start >= 0.0):
+        if not (checks.is_number(self.start) and self.start >= 0.0):
             raise InputError(
                 f"outage start {checks.shown(self.start)}: give seconds since the first epoch"
             )
@@ -79,11 +79,12 @@ class Fixes:
                 f"{name}: give E times and E x 3 values and standard deviations, not "
                 f"{time.shape}, {value.shape}, {sd.shape}"
             )
-        bad = ~np.isfinite(time) | ~np.all(np.isfinite(value) & np.isfinite(sd), axis=1)
+        bad = ~np.all(np.isfinite(np.column_stack([time, value, sd])), axis=1)
         if np.any(bad):
             raise InputError(f"{name}: number {int(np.argmax(bad))} is not finite: leave it out")
-        if np.any(np.diff(time) < 0.0):
-            late = int(np.argmax(np.diff(time) < 0.0)) + 1
+        back = np.diff(time) < 0.0
+        if np.any(back):
+            late = int(np.argmax(back)) + 1
             raise InputError(
                 f"{name}: number {late} at {time[late]:g} s comes before the one ahead of it: sort "
                 "them by time"
@@ -140,30 +141,24 @@ class Aiding:
     gate: float | None = None
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "lever_arm", _three("lever_arm", self.lever_arm))
-        object.__setattr__(self, "coloured_sd", _three("coloured_sd", self.coloured_sd))
+        for name in ("lever_arm", "coloured_sd"):
+            object.__setattr__(self, name, _three(name, getattr(self, name)))
         if np.any(np.asarray(self.coloured_sd) < 0.0):
             raise InputError("coloured_sd: give 0 or more metres to the north, east and down")
         checks.positive("coloured_tau", self.coloured_tau, "give seconds above zero")
         checks.positive("barometer_tau", self.barometer_tau, "give seconds above zero")
-        if not (checks.is_number(self.barometer_sd) and 0.0 <= self.barometer_sd < np.inf):
+        if not (checks.is_number(self.barometer_sd) and self.barometer_sd >= 0.0):
             raise InputError(
                 f"barometer_sd = {checks.shown(self.barometer_sd)}: give 0 or more metres"
             )
-        if self.gate is not None and not (checks.is_number(self.gate) and 0.0 < self.gate < 1.0):
-            raise InputError(
-                f"gate = {checks.shown(self.gate)}: give a probability between 0 and 1, e.g. 1e-5"
-            )
+        if self.gate is not None:
+            checks.share("gate", self.gate, tuning.GATE)
 
     def __add__(self, other: Aiding) -> Aiding:
         """Both together; the antenna and the noise of the first, or the other's barometer."""
         own = self if self.barometer_sd else other
-        return replace(
-            self,
-            fixes=(*self.fixes, *other.fixes),
-            barometer_sd=own.barometer_sd,
-            barometer_tau=own.barometer_tau,
-        )
+        sd, tau, fixes = own.barometer_sd, own.barometer_tau, (*self.fixes, *other.fixes)
+        return replace(self, fixes=fixes, barometer_sd=sd, barometer_tau=tau)
 
     def of(self, kind: str) -> Fixes | None:
         """The first fixes of a kind, ``None`` if there are none."""
@@ -208,18 +203,20 @@ class Aiding:
                     f"{each.kind} fix at {each.time[np.argmax(outside)]:g} s: the IMU record goes "
                     f"from 0 to {n * dt:g} s; cut the fixes or shift their clock"
                 )
-        none = np.zeros((0, 3))
-        time = np.concatenate([none[:, 0], *(each.time for each in self.fixes)])
-        codes = [np.full(each.time.size, KINDS[each.kind]) for each in self.fixes]
-        kind = np.concatenate([np.zeros(0, dtype=np.int64), *codes])
+        empty = Fixes("position", np.zeros(0), np.zeros((0, 3)), np.zeros((0, 3)))
+        fixes = (*self.fixes, empty)
+        time = np.concatenate([each.time for each in fixes])
+        kind = np.repeat([KINDS[each.kind] for each in fixes], [each.time.size for each in fixes])
         epoch = np.clip(np.rint(time / dt), 0, n).astype(np.int64)
         offset = time - epoch * dt
         offset[np.abs(offset) <= _SAME_TIME] = 0.0
         order = np.lexsort((kind, offset, epoch))
-        value = np.concatenate([none, *(each.value for each in self.fixes)])[order]
-        kind, sd = kind[order], np.concatenate([none, *(each.sd for each in self.fixes)])[order]
-        gates = np.full(kind.size, np.inf)
-        gated = (self.gate is not None) | IS_INFERRED[kind]
+        kind = kind[order]
+        value, sd = (
+            np.concatenate([getattr(each, name) for each in fixes])[order]
+            for name in ("value", "sd")
+        )
+        gates, gated = np.full(kind.size, np.inf), (self.gate is not None) | IS_INFERRED[kind]
         freedom = np.maximum(np.count_nonzero(sd, axis=1), 1)
         gates[gated] = chi2.isf(self.gate or tuning.GATE, freedom[gated])
         return Events(epoch[order], kind, offset[order], value, sd, gates)
@@ -255,14 +252,13 @@ def gnss(
     imu : Imu, optional
         Error-free, for the antenna's velocity about the IMU; needed with a lever arm and velocity.
     """
-    arm = _three("lever_arm", lever_arm)
-    given = {"position": position_sd, "velocity": velocity_sd}
-    fixes = [
+    arm, given = _three("lever_arm", lever_arm), {"position": position_sd, "velocity": velocity_sd}
+    fixes = tuple(
         _along(kind, trajectory, interval, sd, arm, imu)
         for kind, sd in given.items()
         if sd is not None
-    ]
-    return Aiding(tuple(fixes), arm, coloured_sd, coloured_tau)
+    )
+    return Aiding(fixes, arm, coloured_sd, coloured_tau)
 
 
 def barometer(trajectory: Trajectory, interval: float = 1.0, sd: float = 1.0) -> Aiding:
@@ -283,7 +279,7 @@ def _along(
     trajectory: Trajectory,
     interval: float,
     sd: float | Sequence[float],
-    arm: FloatArray | None = None,
+    arm: Sequence[float] | FloatArray = (0.0, 0.0, 0.0),
     imu: Imu | None = None,
 ) -> Fixes:
     """Error-free fixes of a kind, every ``interval`` (s) after the first epoch."""
@@ -298,8 +294,8 @@ def _along(
     if np.any(each <= 0.0):
         raise InputError(f"standard deviation = {checks.shown(sd)}: give positive numbers")
     index = np.arange(round(stride), trajectory.n + 1, round(stride))
-    measurement = MEASUREMENTS[KINDS[kind]]
-    value = measurement.along(trajectory, index, np.zeros(3) if arm is None else arm, imu)
+    where = Instrument(trajectory, index, np.asarray(arm), imu)
+    value = MEASUREMENTS[KINDS[kind]].along(where)
     return Fixes(kind, trajectory.time[index], value, np.tile(each, (index.size, 1)))
 
 

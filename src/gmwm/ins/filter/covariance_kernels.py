@@ -13,9 +13,11 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from gmwm._core.compiled import compiled
 from gmwm._core.typing import FloatArray
-from gmwm.ins.filter.records import Kinematics, Scratch, SensorTable, Transition
+from gmwm.ins.filter.records import Kinematics, SensorTable, Transition
 from gmwm.ins.geometry import RATE, gravity_at, radii_at
 
 POSITION, VELOCITY, ATTITUDE, NAVIGATION = 0, 3, 6, 9
@@ -35,9 +37,7 @@ def error_rates(v: FloatArray, lla: FloatArray, F: FloatArray) -> None:
     wn, wd = RATE * cosine, -RATE * sine
     rn, re, rd = ve * east, -vn * north, -ve * tangent * east
     g = gravity_at(sine, lla[2])
-    for i in range(9):
-        for j in range(9):
-            F[i, j] = 0.0
+    F[:] = 0.0
     # Position.
     F[0, 0], F[0, 2] = -vd * north, vn * north
     F[1, 0], F[1, 1], F[1, 2] = ve * tangent * north, -vd * east - vn * tangent * north, ve * east
@@ -111,26 +111,20 @@ def transition(at: Kinematics, step: float, into: Transition) -> None:
 
 
 @compiled(fastmath=_FAST)
-def propagate(
-    P: FloatArray, change: Transition, table: SensorTable, samples: int, scratch: Scratch
-) -> None:
+def propagate(P: FloatArray, change: Transition, table: SensorTable, samples: int) -> None:
     """Propagate a covariance (9 + m, 9 + m) over a step of some samples, in place.
 
     change: From `transition`.
     table: Of the m sensor states.
-    scratch: Work space for 9 + m states.
     """
     A, B = change.A, change.B
-    S, T, U, row = scratch
     axis, partner, paired = table.axis, table.partner, table.paired
     phi, phi_off, gain = table.phi[samples], table.phi_off[samples], table.gain[samples]
     noise, noise_off = table.noise[samples], table.noise_off[samples]
     cross, integral = table.cross[samples], table.integral[samples]
     n = P.shape[0]
     m = n - 9
-    for a in range(6):
-        for j in range(n):
-            S[a, j] = 0.0
+    S, T, U, row = np.zeros((6, n)), np.empty((9, n)), np.empty((9, 6)), np.empty(m)
     for i in range(m):
         a = axis[i]
         if a >= 0:
@@ -271,8 +265,7 @@ def measurement_update(
     Returns: innovation, variance.
     """
     n = P.shape[0]
-    for j in range(n):
-        K[j] = 0.0
+    K[:] = 0.0
     for i in range(9):
         factor = h[i]
         if factor != 0.0:

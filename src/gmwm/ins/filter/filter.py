@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, TypedDict, Unpack
 
 import numpy as np
@@ -167,10 +168,10 @@ class InitialSd:
         rad.
     """
 
-    position: float = field(default=1.0, metadata={"unit": "m"})
-    velocity: float = field(default=0.1, metadata={"unit": "m/s"})
-    tilt: float = field(default=np.radians(0.1), metadata={"unit": "rad"})
-    heading: float = field(default=np.radians(0.5), metadata={"unit": "rad"})
+    position: float = 1.0
+    velocity: float = 0.1
+    tilt: float = math.radians(0.1)
+    heading: float = math.radians(0.5)
 
     def __post_init__(self) -> None:
         for name in ("position", "velocity", "tilt", "heading"):
@@ -221,20 +222,16 @@ class Filter:
     ) -> Filter:
         """A filter for an IMU of interval ``dt`` (s), covariance steps of ``step`` (s)."""
         stride = max(round(checks.positive("step", step) / dt), 1)
-        states = SensorStates.of(sensors, dt, stride, drift_known)
-        noise_states = np.full((len(MEASUREMENTS), 3), -1, dtype=np.int64)
-        names: list[str] = []
-        sigmas: list[float] = []
-        taus: list[float] = []
-        for code, measurement in enumerate(MEASUREMENTS):
-            sd, tau = measurement.slow_noise(aiding)
+        places, slow = [], []
+        for code, kind in enumerate(MEASUREMENTS):
+            sd, tau = kind.slow_noise(aiding)
             for component in np.flatnonzero(sd > 0.0):
-                noise_states[code, component] = states.m + len(names)
-                names.append(measurement.slow_names[component])
-                sigmas.append(float(sd[component]))
-                taus.append(tau)
-        if names:
-            states = states.with_markov(names, np.array(sigmas), np.array(taus), dt)
+                places.append((code, component))
+                slow.append((kind.slow_names[component], float(sd[component]), tau))
+        states = SensorStates.of(sensors, dt, stride, drift_known, tuple(slow))
+        noise_states = np.full((len(MEASUREMENTS), 3), -1, dtype=np.int64)
+        for state, place in enumerate(places, states.m - len(places)):
+            noise_states[place] = state
         return cls(states, dt, stride, noise_states, np.asarray(aiding.lever_arm), second_order)
 
     @property
@@ -257,17 +254,15 @@ class Filter:
         C, v, lla = matrix_from_rpy(initial.rpy), initial.velocity.copy(), initial.lla.copy()
         P, x = self.covariance(initial, initial_sd), self.states.mean.copy()
         estimate = FilterState(Kinematics(C, v, lla), P, x)
-        shape, count = events.value.shape, outputs.epoch.size
-        found = Innovated(
-            np.full(shape, np.nan), np.full(shape, np.nan), np.ones(shape[0], dtype=np.bool_)
-        )
+        nothing, count = np.full(events.value.shape, np.nan), outputs.epoch.size
+        found = Innovated(nothing, nothing.copy(), np.ones(events.epoch.size, dtype=np.bool_))
         sizes = ((6,), (3, 3), (9, 9), (6,), (6, 6))
         kept = Kept(outputs.epoch, outputs.before, *(np.zeros((count, *each)) for each in sizes))
         samples = Samples(imu.rotation, imu.velocity, imu.dt)
         place, rejected = np.zeros(4, dtype=np.int64), np.zeros(len(KINDS), dtype=np.int64)
-        where = RunPlace(place, rejected, np.zeros(7))
-        table, lever, stopped = self.states.table, self.lever_arm, PAUSED
-        settings = Settings(table, self.noise_states, lever, self.second_order, self.stride)
+        where, stopped = RunPlace(place, rejected, np.zeros(7)), PAUSED
+        options = (self.noise_states, self.lever_arm, self.second_order, self.stride)
+        settings = Settings(self.states.table, *options)
         for part in (*windows(imu.n), slice(imu.n, imu.n)):
             if stopped == PAUSED:
                 stopped = run(samples, settings, estimate, events, found, kept, where, part.stop)

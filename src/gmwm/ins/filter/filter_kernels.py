@@ -29,8 +29,8 @@ from gmwm.ins.filter.records import (
     Samples,
     SensorTable,
     Settings,
-    Workspace,
-    new_workspace,
+    Transition,
+    new_transition,
 )
 from gmwm.ins.geometry import gravity, orthonormalise, radii_at, turn_navigation
 
@@ -60,26 +60,7 @@ def correct(at: Kinematics, x: FloatArray) -> None:
     v[2] = c + r + 0.5 * (x[6] * q - x[7] * p)
     turn_navigation(C, -x[6], -x[7], -x[8])
     orthonormalise(C)
-    for i in range(9):
-        x[i] = 0.0
-
-
-@compiled()
-def axis_sums(
-    P: FloatArray, table: SensorTable, x: FloatArray, mean: FloatArray, covariance: FloatArray
-) -> None:
-    """Estimated error of each sensor (6,) and its covariance (6, 6) from those of its states."""
-    first, output = table.first, table.output
-    for a in range(6):
-        mean[a] = 0.0
-        for i in range(first[a], first[a + 1]):
-            mean[a] += output[i] * x[i]
-        for b in range(6):
-            total = 0.0
-            for i in range(first[a], first[a + 1]):
-                for j in range(first[b], first[b + 1]):
-                    total += output[i] * output[j] * P[9 + i, 9 + j]
-            covariance[a, b] = total
+    x[:9] = 0.0
 
 
 @compiled()
@@ -100,32 +81,19 @@ def run(
     last: Epoch from which on the filter pauses, to go on with the next call.
     """
     at, P, x = estimate
-    lla = at.lla
+    lla, table, carry = at.lla, settings.table, where.carry
     n, dt = samples.rotation.shape[0], samples.dt
-    work = new_workspace(P.shape[0])
-    place, carry = where.place, where.carry
-    epoch, event, out, steps = place[0], place[1], place[2], place[3]
+    change, middle = new_transition(), Kinematics(np.zeros((3, 3)), np.zeros(3), np.zeros(3))
+    epoch, event, out, steps = where.place[0], where.place[1], where.place[2], where.place[3]
     while True:
         # What is asked for at this epoch: results before, measurements, results after.
         while out < kept.epoch.size and kept.epoch[out] == epoch and kept.before[out] == 1:
-            _keep(out, estimate, settings.table, kept)
+            _keep(out, estimate, table, kept)
             out += 1
         if event < events.epoch.size and events.epoch[event] == epoch:
-            attitude = P[6, 6] + P[7, 7] + P[8, 8] if settings.second_order else 0.0
-            for i in range(3):
-                turned = carry[i] if epoch > 0 or n == 0 else samples.rotation[0, i]
-                work.rate[i] = turned / dt
-            while event < events.epoch.size and events.epoch[event] == epoch:
-                _measure(
-                    event, samples, settings, estimate, events, innovated, where, attitude, work
-                )
-                event += 1
-            for i in range(x.size):
-                x[i] += work.estimated[9 + i]
-                work.estimated[9 + i] = 0.0
-            correct(at, work.estimated)
+            event = _aid(event, samples, settings, estimate, events, innovated, where)
         while out < kept.epoch.size and kept.epoch[out] == epoch:
-            _keep(out, estimate, settings.table, kept)
+            _keep(out, estimate, table, kept)
             out += 1
         if epoch >= n:
             return -1
@@ -135,9 +103,9 @@ def run(
             stop = min(stop, events.epoch[event])
         if out < kept.epoch.size:
             stop = min(stop, kept.epoch[out])
-        _advance(epoch, stop, samples, settings.table, at, x, carry, work)
-        transition(work.middle, (stop - epoch) * dt, work.change)
-        propagate(P, work.change, settings.table, stop - epoch, work.scratch)
+        _advance(epoch, stop, samples, table, at, x, carry, middle)
+        transition(middle, (stop - epoch) * dt, change)
+        propagate(P, change, table, stop - epoch)
         if settings.second_order:
             g = gravity(lla[0], lla[2])
             carry[6] = tilt_squared(P, g, (stop - epoch) * dt, carry[6])
@@ -152,12 +120,12 @@ def run(
         ):
             return epoch
         if last <= epoch < n:
-            place[0], place[1], place[2], place[3] = epoch, event, out, steps
+            where.place[:] = epoch, event, out, steps
             return PAUSED
 
 
 @compiled()
-def _measure(
+def _aid(
     event: int,
     samples: Samples,
     settings: Settings,
@@ -165,52 +133,53 @@ def _measure(
     events: Events,
     innovated: Innovated,
     where: RunPlace,
-    attitude: float,
-    work: Workspace,
-) -> None:
-    """Update the covariance and the estimated errors by a measurement, unless it is far off.
+) -> int:
+    """Correct the estimate by all measurements of an epoch; returns the event after them.
 
-    attitude: Variance of the attitude, rad^2; 0 where products of errors are not allowed for.
-    work: ``rate`` is the angular rate at the epoch, ``estimated`` holds the errors so far.
+    A measurement that is far off leaves covariance and estimate as they were.
     """
     at, P, x = estimate
-    rate, h = work.rate, work.h
-    kind, gate = events.kind[event], events.gate[event]
-    moved = events.offset[event] != 0.0 and samples.rotation.shape[0] > 0
-    if moved:
-        _look(samples, settings.table, estimate, events.epoch[event], events.offset[event], work)
-        at, rate = work.there, work.rate_there
-    rejected = where.rejected
-    gated = gate < np.inf and (IS_INFERRED[kind] or rejected[kind] < _PATIENCE)
-    if gated:
-        _copy(P, work.estimated, work.P_held, work.estimated_held)
-    squares = 0.0
-    for component in range(3):
-        sd = events.sd[event, component]
-        if not sd > 0.0:
-            continue
-        z = observe(kind, component, events.value[event], at, rate, settings.lever, h)
+    epoch, n, rejected = events.epoch[event], samples.rotation.shape[0], where.rejected
+    attitude = P[6, 6] + P[7, 7] + P[8, 8] if settings.second_order else 0.0
+    errors, gain = np.zeros(P.shape[0]), np.zeros(P.shape[0])
+    h, rate, change = np.zeros(9), np.empty(3), new_transition()
+    for i in range(3):
+        turned = where.carry[i] if epoch > 0 or n == 0 else samples.rotation[0, i]
+        rate[i] = turned / samples.dt
+    while event < events.epoch.size and events.epoch[event] == epoch:
+        kind, gate, offset = events.kind[event], events.gate[event], events.offset[event]
+        seen, seen_rate, moved = at, rate, offset != 0.0 and n > 0
         if moved:
-            for j in range(9):
-                work.h_there[j] = h[j]
-            for j in range(9):
-                h[j] = 0.0
-                for k in range(9):
-                    h[j] += work.h_there[k] * work.change.A[k, j]
-        own = settings.noise_states[kind, component]
-        if own >= 0:
-            z += x[own]
-            own += 9
-        variance = sd * sd + excess(P, h, attitude)
-        found, variance = measurement_update(P, h, own, variance, z, work.estimated, work.gain)
-        innovated.value[event, component] = found
-        innovated.sd[event, component] = math.sqrt(variance)
-        squares += found * found / variance
-    if not _is_accepted(squares, gate, gated, kind, rejected):
-        innovated.used[event] = False
-        _copy(work.P_held, work.estimated_held, P, work.estimated)
-    elif IS_GNSS[kind]:
-        where.carry[6] = 0.0
+            seen, seen_rate = _look(samples, settings.table, estimate, epoch, offset, change)
+        gated = gate < np.inf and (IS_INFERRED[kind] or rejected[kind] < _PATIENCE)
+        P_before, errors_before = P.copy(), errors.copy()
+        squares = 0.0
+        for component in range(3):
+            sd = events.sd[event, component]
+            if not sd > 0.0:
+                continue
+            value = events.value[event]
+            z = observe(kind, component, value, seen, seen_rate, settings.lever, h)
+            if moved:
+                h[:] = np.sum(change.A * h[:, None], axis=0)
+            own = settings.noise_states[kind, component]
+            if own >= 0:
+                z += x[own]
+                own += 9
+            variance = sd * sd + excess(P, h, attitude)
+            found, variance = measurement_update(P, h, own, variance, z, errors, gain)
+            innovated.value[event, component] = found
+            innovated.sd[event, component] = math.sqrt(variance)
+            squares += found * found / variance
+        if not _is_accepted(squares, gate, gated, kind, rejected):
+            innovated.used[event] = False
+            P[:], errors[:] = P_before, errors_before
+        elif IS_GNSS[kind]:
+            where.carry[6] = 0.0
+        event += 1
+    x += errors[9:]
+    correct(at, errors)
+    return event
 
 
 @compiled()
@@ -220,41 +189,27 @@ def _look(
     estimate: FilterState,
     epoch: int,
     offset: float,
-    work: Workspace,
-) -> None:
-    """Solution ``offset`` s from an epoch, and the transition of the errors to there.
+    change: Transition,
+) -> tuple[Kinematics, FloatArray]:
+    """Solution ``offset`` s from an epoch, and angular rate; fills the errors' transition to there.
 
     Noise and sensor errors over a part of a sampling interval are left out: they are far below the
     noise of any fix.
     """
-    at, x = estimate.at, estimate.x
-    there, rate, force, dt = work.there, work.rate_there, work.force_there, samples.dt
+    at, _, x = estimate
     i = min(max(epoch if offset > 0.0 else epoch - 1, 0), samples.rotation.shape[0] - 1)
-    for a in range(3):
-        rate[a], force[a] = samples.rotation[i, a] / dt, samples.velocity[i, a] / dt
+    sensed = np.empty(6)
+    sensed[:3] = samples.rotation[i] / samples.dt
+    sensed[3:] = samples.velocity[i] / samples.dt
     for k in range(x.size):
-        a = table.axis[k]
-        if 0 <= a < 3:
-            rate[a] -= table.output[k] * x[k]
-        elif a >= 3:
-            force[a - 3] -= table.output[k] * x[k]
-    for i in range(3):
-        there.v[i], there.lla[i] = at.v[i], at.lla[i]
-        for j in range(3):
-            there.C[i, j] = at.C[i, j]
-    ax, ay, az = rate[0] * offset, rate[1] * offset, rate[2] * offset
-    fx, fy, fz = force[0] * offset, force[1] * offset, force[2] * offset
-    now = Increments(ax, ay, az, fx, fy, fz)
+        if table.axis[k] >= 0:
+            sensed[table.axis[k]] -= table.output[k] * x[k]
+    there = Kinematics(at.C.copy(), at.v.copy(), at.lla.copy())
+    s = sensed * offset
+    now = Increments(s[0], s[1], s[2], s[3], s[4], s[5])
     step(there, now, now, offset)
-    transition(at, offset, work.change)
-
-
-@compiled()
-def _copy(P: FloatArray, x: FloatArray, P_to: FloatArray, x_to: FloatArray) -> None:
-    for j in range(x.size):
-        x_to[j] = x[j]
-        for k in range(x.size):
-            P_to[j, k] = P[j, k]
+    transition(at, offset, change)
+    return there, sensed[:3]
 
 
 @compiled()
@@ -282,7 +237,7 @@ def _advance(
     at: Kinematics,
     x: FloatArray,
     carry: FloatArray,
-    work: Workspace,
+    middle: Kinematics,
 ) -> None:
     """Mechanize the samples of a step of the covariance; fills the solution in its middle.
 
@@ -292,23 +247,17 @@ def _advance(
     carry: Corrected increments of the sample before; then those of the last one.
     """
     rotation, velocity, dt = samples
-    C_mid, v_mid, lla_mid = work.middle
-    error, held, count = work.error, work.x_held, stop - epoch
-    first, output, partner, paired = table.first, table.output, table.partner, table.paired
+    axis, output, partner, paired = table.axis, table.output, table.partner, table.paired
     decay, decay_off = table.phi[1], table.phi_off[1]
-    C, v, lla = at
+    error, held, count = np.empty(6), np.empty(x.size), stop - epoch
     now = Increments(carry[0], carry[1], carry[2], carry[3], carry[4], carry[5])
     for i in range(epoch, stop):
         if i - epoch == count // 2:
-            for a in range(3):
-                v_mid[a], lla_mid[a] = v[a], lla[a]
-                for b in range(3):
-                    C_mid[a, b] = C[a, b]
-        for a in range(6):
-            error[a] = 0.0
-            for k in range(first[a], first[a + 1]):
-                error[a] += output[k] * x[k]
+            middle.C[:], middle.v[:], middle.lla[:] = at.C, at.v, at.lla
+        error[:] = 0.0
         for k in range(x.size):
+            if axis[k] >= 0:
+                error[axis[k]] += output[k] * x[k]
             held[k] = x[k]
             x[k] *= decay[k]
         if paired:
@@ -323,11 +272,9 @@ def _advance(
         step(at, now, now if i == 0 else before, dt)
         if 2 * (i - epoch) + 1 == count:
             # The middle of the step lies within this sample.
-            for a in range(3):
-                v_mid[a] = 0.5 * (v_mid[a] + v[a])
-                lla_mid[a] = 0.5 * (lla_mid[a] + lla[a])
-                for b in range(3):
-                    C_mid[a, b] = 0.5 * (C_mid[a, b] + C[a, b])
+            middle.C[:] = 0.5 * (middle.C + at.C)
+            middle.v[:] = 0.5 * (middle.v + at.v)
+            middle.lla[:] = 0.5 * (middle.lla + at.lla)
     for a in range(6):
         carry[a] = now[a]
 
@@ -335,11 +282,13 @@ def _advance(
 @compiled()
 def _keep(k: int, estimate: FilterState, table: SensorTable, kept: Kept) -> None:
     at, P, x = estimate
-    for i in range(3):
-        kept.nav[k, i], kept.nav[k, 3 + i] = at.lla[i], at.v[i]
-        for j in range(3):
-            kept.C[k, i, j] = at.C[i, j]
-    for i in range(9):
-        for j in range(9):
-            kept.P[k, i, j] = P[i, j]
-    axis_sums(P, table, x, kept.sensor[k], kept.sensor_covariance[k])
+    kept.nav[k, :3], kept.nav[k, 3:] = at.lla, at.v
+    kept.C[k], kept.P[k] = at.C, P[:9, :9]
+    for i in range(x.size):
+        for j in range(x.size):
+            a, b = table.axis[i], table.axis[j]
+            if a >= 0 and b >= 0:
+                product = table.output[i] * table.output[j]
+                kept.sensor_covariance[k, a, b] += product * P[9 + i, 9 + j]
+                if i == j:
+                    kept.sensor[k, a] += table.output[i] * x[i]

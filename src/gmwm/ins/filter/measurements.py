@@ -7,7 +7,7 @@ paragraph in docs/navigation.md.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -21,6 +21,18 @@ from gmwm.ins.trajectory import Trajectory
 
 if TYPE_CHECKING:
     from gmwm.ins.filter.aiding import Aiding
+
+
+class Instrument(NamedTuple):
+    """What measures on a simulated vehicle: at some epochs, on an arm (3,) from the IMU, m.
+
+    imu: Error-free, for the antenna's velocity about the IMU.
+    """
+
+    trajectory: Trajectory
+    epochs: IntArray
+    arm: FloatArray
+    imu: Imu | None
 
 
 class Measurement:
@@ -53,11 +65,9 @@ class Measurement:
         return value + by
 
     @staticmethod
-    def along(
-        trajectory: Trajectory, index: IntArray, arm: FloatArray, imu: Imu | None
-    ) -> FloatArray:
-        """Error-free values (E, 3) at some epochs of a trajectory, with an antenna on an arm."""
-        raise NotImplementedError
+    def along(where: Instrument) -> FloatArray:
+        """Error-free values, (E, 3)."""
+        return np.zeros((where.epochs.size, 3))
 
 
 @compiled()
@@ -65,11 +75,9 @@ def observe_position(
     component: int, value: FloatArray, at: Kinematics, lever: FloatArray, h: FloatArray
 ) -> float:
     """Latitude, longitude and height of the antenna, as metres to the north, east and down."""
-    C, lla = at.C, at.lla
+    lla = at.lla
+    a, b, c = _to_navigation(at.C, lever[0], lever[1], lever[2])
     h[component] = 1.0
-    a = C[0, 0] * lever[0] + C[0, 1] * lever[1] + C[0, 2] * lever[2]
-    b = C[1, 0] * lever[0] + C[1, 1] * lever[1] + C[1, 2] * lever[2]
-    c = C[2, 0] * lever[0] + C[2, 1] * lever[1] + C[2, 2] * lever[2]
     _add_turned(component, a, b, c, h)
     if component == 2:
         return c - (lla[2] - value[2])
@@ -97,10 +105,9 @@ class Position(Measurement):
         return offset(value, by)
 
     @staticmethod
-    def along(
-        trajectory: Trajectory, index: IntArray, arm: FloatArray, imu: Imu | None
-    ) -> FloatArray:
-        return offset(trajectory.lla[index], matrix_from_rpy(trajectory.rpy[index]) @ arm)
+    def along(where: Instrument) -> FloatArray:
+        truth, index = where.trajectory, where.epochs
+        return offset(truth.lla[index], matrix_from_rpy(truth.rpy[index]) @ where.arm)
 
 
 @compiled()
@@ -112,18 +119,15 @@ def observe_velocity(
     lever: FloatArray,
     h: FloatArray,
 ) -> float:
-    """Velocity of the antenna, which turns about the IMU."""
-    C, v = at.C, at.v
+    """Velocity of a point on the lever, which turns about the IMU."""
     x = rate[1] * lever[2] - rate[2] * lever[1]
     y = rate[2] * lever[0] - rate[0] * lever[2]
     z = rate[0] * lever[1] - rate[1] * lever[0]
-    a = C[0, 0] * x + C[0, 1] * y + C[0, 2] * z
-    b = C[1, 0] * x + C[1, 1] * y + C[1, 2] * z
-    c = C[2, 0] * x + C[2, 1] * y + C[2, 2] * z
+    a, b, c = _to_navigation(at.C, x, y, z)
+    a, b, c = at.v[0] + a, at.v[1] + b, at.v[2] + c
     h[3 + component] = 1.0
-    _add_turned(component, v[0] + a, v[1] + b, v[2] + c, h)
-    moved = a if component == 0 else b if component == 1 else c
-    return v[component] + moved - value[component]
+    _add_turned(component, a, b, c, h)
+    return (a if component == 0 else b if component == 1 else c) - value[component]
 
 
 class Velocity(Measurement):
@@ -133,23 +137,15 @@ class Velocity(Measurement):
     is_gnss = True
 
     @staticmethod
-    def along(
-        trajectory: Trajectory, index: IntArray, arm: FloatArray, imu: Imu | None
-    ) -> FloatArray:
-        velocity = trajectory.velocity[index]
+    def along(where: Instrument) -> FloatArray:
+        truth, index, arm, imu = where
+        velocity = truth.velocity[index]
         if not np.any(arm):
             return velocity
         if imu is None:
             raise InputError("velocity fixes with a lever arm: give the error-free imu too")
-        matrix, rate = matrix_from_rpy(trajectory.rpy[index]), imu.rotation[index - 1] / imu.dt
+        matrix, rate = matrix_from_rpy(truth.rpy[index]), imu.rotation[index - 1] / imu.dt
         return np.asarray(velocity + np.einsum("kij,kj->ki", matrix, np.cross(rate, arm)))
-
-
-@compiled()
-def observe_height(value: FloatArray, at: Kinematics, h: FloatArray) -> float:
-    """Height of the IMU; errors are counted downwards."""
-    h[2] = -1.0
-    return at.lla[2] - value[0]
 
 
 class Height(Measurement):
@@ -168,18 +164,8 @@ class Height(Measurement):
         return value + np.where(np.arange(3) == 0, by, 0.0)
 
     @staticmethod
-    def along(
-        trajectory: Trajectory, index: IntArray, arm: FloatArray, imu: Imu | None
-    ) -> FloatArray:
-        return np.where(np.arange(3) == 0, trajectory.lla[index, 2:], 0.0)
-
-
-@compiled()
-def observe_standstill(component: int, value: FloatArray, at: Kinematics, h: FloatArray) -> float:
-    """Velocity of the IMU."""
-    h[3 + component] = 1.0
-    _add_turned(component, at.v[0], at.v[1], at.v[2], h)
-    return at.v[component] - value[component]
+    def along(where: Instrument) -> FloatArray:
+        return np.where(np.arange(3) == 0, where.trajectory.lla[where.epochs, 2:], 0.0)
 
 
 class Standstill(Measurement):
@@ -188,11 +174,13 @@ class Standstill(Measurement):
     name = "standstill"
     is_inferred = True
 
-    @staticmethod
-    def along(
-        trajectory: Trajectory, index: IntArray, arm: FloatArray, imu: Imu | None
-    ) -> FloatArray:
-        return np.zeros((index.size, 3))
+
+@compiled()
+def _to_navigation(C: FloatArray, x: float, y: float, z: float) -> tuple[float, float, float]:
+    """Components of a vector of the body to the north, east and down."""
+    a = C[0, 0] * x + C[0, 1] * y + C[0, 2] * z
+    b = C[1, 0] * x + C[1, 1] * y + C[1, 2] * z
+    return a, b, C[2, 0] * x + C[2, 1] * y + C[2, 2] * z
 
 
 @compiled()
@@ -234,12 +222,12 @@ def observe(
     kind: Code of `KINDS`.
     rate, lever: (3,), angular rate, rad/s, and antenna from the IMU, m, body axes.
     """
-    for i in range(9):
-        h[i] = 0.0
+    h[:] = 0.0
     if kind == 0:
         return observe_position(component, value, at, lever, h)
     if kind == 1:
         return observe_velocity(component, value, at, rate, lever, h)
     if kind == 2:
-        return observe_height(value, at, h)
-    return observe_standstill(component, value, at, h)
+        h[2] = -1.0  # errors are counted downwards
+        return at.lla[2] - value[0]
+    return observe_velocity(component, value, at, np.zeros(3), lever, h)

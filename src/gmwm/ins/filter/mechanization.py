@@ -12,13 +12,13 @@ from gmwm.ins.filter.records import Increments, Kinematics, Samples
 from gmwm.ins.geometry import (
     RATE,
     SEMI_MAJOR_AXIS,
-    angles,
     gravity_at,
     matrix_from_rpy,
     orthonormalise,
     radii_at,
     rotate,
     rotation_coefficients,
+    rpy_from_matrix,
     turn_navigation,
 )
 from gmwm.ins.imu import Imu
@@ -106,7 +106,7 @@ def step(
 
 @compiled()
 def _run(
-    samples: Samples, at: Kinematics, lla: FloatArray, velocity: FloatArray, rpy: FloatArray
+    samples: Samples, at: Kinematics, lla: FloatArray, velocity: FloatArray, C: FloatArray
 ) -> None:
     """Fill the epochs after the first one, where the solution is ``at``."""
     a, f = samples.rotation, samples.velocity
@@ -117,10 +117,7 @@ def _run(
         step(at, now, now if i == 0 else before, samples.dt)
         if (i + 1) % _CLEAN_EVERY == 0:
             orthonormalise(at.C)
-        for j in range(3):
-            lla[i + 1, j] = at.lla[j]
-            velocity[i + 1, j] = at.v[j]
-        rpy[i + 1, 0], rpy[i + 1, 1], rpy[i + 1, 2] = angles(at.C)
+        lla[i + 1], velocity[i + 1], C[i + 1] = at.lla, at.v, at.C
 
 
 def integrate(imu: Imu, initial: NavState) -> Trajectory:
@@ -143,8 +140,11 @@ def integrate(imu: Imu, initial: NavState) -> Trajectory:
         n + 1 epochs; roll and yaw within [-pi, pi], the longitude runs on past 180 deg.
     """
     check_latitudes(initial.lla[None, :], "initial")
-    lla, velocity, rpy = (np.empty((imu.n + 1, 3)) for _ in range(3))
-    lla[0], velocity[0], rpy[0] = initial.lla, initial.velocity, initial.rpy
-    at = Kinematics(matrix_from_rpy(initial.rpy), initial.velocity.copy(), initial.lla.copy())
-    _run(Samples(imu.rotation, imu.velocity, imu.dt), at, lla, velocity, rpy)
+    lla, velocity = np.empty((imu.n + 1, 3)), np.empty((imu.n + 1, 3))
+    matrix = np.empty((imu.n + 1, 3, 3))
+    lla[0], velocity[0], matrix[0] = initial.lla, initial.velocity, matrix_from_rpy(initial.rpy)
+    at = Kinematics(matrix[0].copy(), initial.velocity.copy(), initial.lla.copy())
+    _run(Samples(imu.rotation, imu.velocity, imu.dt), at, lla, velocity, matrix)
+    rpy = rpy_from_matrix(matrix)
+    rpy[0] = initial.rpy
     return Trajectory(imu.dt, lla, velocity, rpy)

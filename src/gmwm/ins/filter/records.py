@@ -40,7 +40,6 @@ class Samples(NamedTuple):
 class SensorTable(NamedTuple):
     """m sensor states, and what k samples do to them, for k = 0..k_max.
 
-    first: (7,), first state of each sensor, and how many states add to a sensor.
     paired: Whether there are blocks of two states.
     axis: (m,), sensor that each state adds to; -1 for none.
     output: (m,), fraction of the state in the error of its sensor.
@@ -54,7 +53,6 @@ class SensorTable(NamedTuple):
         noise included.
     """
 
-    first: IntArray
     paired: bool
     axis: IntArray
     output: FloatArray
@@ -81,13 +79,10 @@ class Transition(NamedTuple):
     B: FloatArray
 
 
-class Scratch(NamedTuple):
-    """Work space of `propagate` for n states: (6, n), (9, n), (9, 6), (n,)."""
-
-    S: FloatArray
-    T: FloatArray
-    U: FloatArray
-    row: FloatArray
+@compiled()
+def new_transition() -> Transition:
+    """Room for a transition."""
+    return Transition(np.zeros((9, 9)), np.zeros((9, 9)), np.zeros((9, 6)))
 
 
 class FilterState(NamedTuple):
@@ -99,14 +94,7 @@ class FilterState(NamedTuple):
 
 
 class Settings(NamedTuple):
-    """How a filter is set up.
-
-    table: Of its sensor states.
-    noise_states: (kinds, 3), sensor state of the slow noise of each component; -1 for none.
-    lever: (3,), from the IMU to the antenna, body axes, m.
-    second_order: Whether products of errors are allowed for; see `tilt_squared` and `excess`.
-    stride: Samples per step of the covariance.
-    """
+    """How a filter is set up; see `Filter`."""
 
     table: SensorTable
     noise_states: IntArray
@@ -146,10 +134,8 @@ class Innovated(NamedTuple):
 
 
 class Kept(NamedTuple):
-    """Epochs that are kept, in order of time, and the estimates there, overwritten.
+    """Epochs that are kept, see `Outputs`, and the estimates there; zeros at first.
 
-    before: (K,), 1 for the estimate before the measurements of the epoch, 0 for that after them; at
-        one epoch those before come first.
     nav: (K, 6), position and velocity.
     C, P: (K, 3, 3), (K, 9, 9).
     sensor, sensor_covariance: (K, 6), (K, 6, 6), sums of sensor states and their covariance.
@@ -175,57 +161,3 @@ class RunPlace(NamedTuple):
     place: IntArray
     rejected: IntArray
     carry: FloatArray
-
-
-class Workspace(NamedTuple):
-    """Work space of the filter's loop.
-
-    middle: Solution in the middle of a step.
-    there, rate_there, force_there: Solution at a measurement between two epochs, and angular rate
-        and specific force about it, rad/s and m/s^2.
-    rate: (3,), angular rate at the epoch, rad/s.
-    h, h_there: (9,), rows of a measurement.
-    gain, estimated: (9 + m,), gain of a measurement, errors estimated at the epoch so far.
-    P_held, estimated_held: What a rejected measurement must not change.
-    error, x_held: (6,), (m,).
-    """
-
-    change: Transition
-    scratch: Scratch
-    middle: Kinematics
-    there: Kinematics
-    rate_there: FloatArray
-    force_there: FloatArray
-    rate: FloatArray
-    h: FloatArray
-    h_there: FloatArray
-    gain: FloatArray
-    estimated: FloatArray
-    P_held: FloatArray
-    estimated_held: FloatArray
-    error: FloatArray
-    x_held: FloatArray
-
-
-@compiled()
-def new_transition() -> Transition:
-    """Room for a transition."""
-    return Transition(np.zeros((9, 9)), np.zeros((9, 9)), np.zeros((9, 6)))
-
-
-@compiled()
-def new_scratch(n: int) -> Scratch:
-    """Work space of `propagate` for n states, the nine of navigation included."""
-    return Scratch(np.zeros((6, n)), np.zeros((9, n)), np.zeros((9, 6)), np.zeros(n))
-
-
-@compiled()
-def new_workspace(n: int) -> Workspace:
-    """Work space for n states, the nine of navigation included."""
-    change, scratch = new_transition(), new_scratch(n)
-    middle = Kinematics(np.zeros((3, 3)), np.zeros(3), np.zeros(3))
-    there = Kinematics(np.zeros((3, 3)), np.zeros(3), np.zeros(3))
-    three = (np.zeros(3), np.zeros(3), np.zeros(3))
-    rows = (np.zeros(9), np.zeros(9), np.zeros(n), np.zeros(n))
-    held = (np.zeros((n, n)), np.zeros(n), np.zeros(6), np.zeros(n - 9))
-    return Workspace(change, scratch, middle, there, *three, *rows, *held)

@@ -6,18 +6,16 @@ correlation time may be shorter than the step of the covariance.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
-from scipy.linalg import block_diag
 
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.ins.filter.records import SensorTable
 from gmwm.ins.imu import AXES, SensorModels
-from gmwm.process import Model, StateSpace
+from gmwm.process import GaussMarkov, Model, StateSpace
 
 _LARGEST_BLOCK = 2
 _NO_AXIS = -1  # of a state that adds to no inertial sensor
@@ -50,7 +48,12 @@ class SensorStates:
 
     @classmethod
     def of(
-        cls, sensors: SensorModels, dt: float, k_max: int, drift_known: bool = False
+        cls,
+        sensors: SensorModels,
+        dt: float,
+        k_max: int,
+        drift_known: bool = False,
+        slow: tuple[tuple[str, float, float], ...] = (),
     ) -> SensorStates:
         """States of six models at a sampling interval of ``dt`` (s).
 
@@ -59,43 +62,21 @@ class SensorStates:
 
         drift_known: Whether drifts start at zero and have their slopes exactly, as simulated ones
             do.
+        slow: First-order Gauss-Markov states that add to no inertial sensor, after the others:
+            name, standard deviation and correlation time (s).
         Raises InputError if a term has no state-space form, or one of more than two states.
         """
         given = tuple((sensors.models[axis], sensors.bias_sd[axis]) for axis in AXES)
-        return _states(given, dt, k_max, drift_known)
-
-    def with_markov(
-        self, names: Sequence[str], sigma: FloatArray, tau: FloatArray, dt: float
-    ) -> SensorStates:
-        """These states and first-order Gauss-Markov states that add to no inertial sensor.
-
-        sigma, tau: Standard deviation and correlation time (s) of each.
-        dt: Sampling interval, s.
-        """
-        table, k = self.table, np.arange(len(self.table.phi))[:, None]
-        zero = np.zeros(len(names))
-        zeros, decay = np.zeros((k.size, len(names))), np.exp(-k * dt / tau)
-        return SensorStates(
-            names=(*self.names, *names),
-            mean=np.append(self.mean, zero),
-            covariance=block_diag(self.covariance, np.diag(sigma**2)),
-            table=table._replace(
-                axis=np.append(table.axis, np.full(len(names), _NO_AXIS)),
-                output=np.append(table.output, zero),
-                partner=np.append(table.partner, self.m + np.arange(len(names))),
-                phi=np.hstack([table.phi, decay]),
-                phi_off=np.hstack([table.phi_off, zeros]),
-                gain=np.hstack([table.gain, zeros]),
-                noise=np.hstack([table.noise, sigma**2 * (1.0 - decay**2)]),
-                noise_off=np.hstack([table.noise_off, zeros]),
-                cross=np.hstack([table.cross, zeros]),
-            ),
-        )
+        return _states(given, dt, k_max, drift_known, slow)
 
 
 @lru_cache(maxsize=8)
 def _states(
-    given: tuple[tuple[Model, float], ...], dt: float, k_max: int, drift_known: bool
+    given: tuple[tuple[Model, float], ...],
+    dt: float,
+    k_max: int,
+    drift_known: bool,
+    slow: tuple[tuple[str, float, float], ...],
 ) -> SensorStates:
     """States of models and standard deviations of biases; kept, since logs are filtered often."""
     blocks: list[tuple[int, StateSpace]] = []
@@ -103,6 +84,7 @@ def _states(
     for i, (model, bias_sd) in enumerate(given):
         forms, white[i] = _blocks(AXES[i], model, bias_sd**2, dt, drift_known)
         blocks += [(i, form) for form in forms]
+    blocks += [(_NO_AXIS, GaussMarkov(sigma, tau).state_space(dt)) for _, sigma, tau in slow]
     m = sum(form.n_states for _, form in blocks)
     phi, phi_off, gain, noise, noise_off, cross = (np.zeros((k_max + 1, m)) for _ in range(6))
     axis, partner = np.zeros(m, dtype=np.int64), np.arange(m)
@@ -114,23 +96,25 @@ def _states(
         part = slice(first, first + size)
         axis[part] = sensor
         partner[part] = first + np.arange(size)[::-1]
-        output[part], mean[part] = form.output, form.initial_mean
-        covariance[part, part] = form.initial_covariance
+        mean[part], covariance[part, part] = form.initial_mean, form.initial_covariance
         transition, added = _after_samples(form, dt, k_max)
         phi[:, part] = np.diagonal(transition, axis1=1, axis2=2)[:, :size]
-        gain[:, part] = transition[:, size, :size]
         noise[:, part] = np.diagonal(added, axis1=1, axis2=2)[:, :size]
-        cross[:, part] = added[:, size, :size]
-        integral[:, sensor] += added[:, size, size]
         if size == _LARGEST_BLOCK:
             phi_off[:, part] = np.stack([transition[:, 0, 1], transition[:, 1, 0]], axis=1)
             noise_off[:, part] = added[:, :1, 1]
+        if sensor != _NO_AXIS:
+            output[part], gain[:, part] = form.output, transition[:, size, :size]
+            cross[:, part] = added[:, size, :size]
+            integral[:, sensor] += added[:, size, size]
         first += size
-    starts, paired = np.searchsorted(axis, np.arange(7)), bool(np.any(partner != np.arange(m)))
+    paired = bool(np.any(partner != np.arange(m)))
     steps = (phi, phi_off, gain, noise, noise_off, cross, integral)
-    table = SensorTable(starts.astype(np.int64), paired, axis, output, partner, *steps)
-    names = tuple(f"{AXES[sensor]}: {name}" for sensor, form in blocks for name in form.names)
-    return SensorStates(names, mean, covariance, table)
+    names = [f"{AXES[i]}: {name}" for i, form in blocks if i >= 0 for name in form.names]
+    names += [name for name, _, _ in slow]
+    return SensorStates(
+        tuple(names), mean, covariance, SensorTable(paired, axis, output, partner, *steps)
+    )
 
 
 def _blocks(

@@ -8,15 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from gmwm._core.checks import sampling_interval
-from gmwm._core.compiled import compiled
 from gmwm._core.typing import FloatArray
-from gmwm.errors import InputError
-from gmwm.ins.geometry import ECCENTRICITY_SQUARED, RATE, gravity_at, radii_at
+from gmwm.ins.geometry import ECCENTRICITY_SQUARED, RATE, gravity_along, radii_along
 from gmwm.ins.trajectory import (
     Trajectory,
     check_latitudes,
     coefficients,
     finite_numbers,
+    finite_rows,
     unwrapped_angles,
     unwrapped_longitudes,
 )
@@ -24,6 +23,7 @@ from gmwm.ins.trajectory import (
 # Gauss-Legendre rule of three points on [0, 1]: exact for polynomials of degree 5.
 _NODES = (0.5 - math.sqrt(0.15), 0.5, 0.5 + math.sqrt(0.15))
 _WEIGHTS = (5.0 / 18.0, 8.0 / 18.0, 5.0 / 18.0)
+_ROWS = 4096  # at a time: all that is computed of them stays in the processor's cache
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,14 +46,11 @@ class Imu:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "dt", sampling_interval(self.dt))
-        for name in ("rotation", "velocity"):
-            values = finite_numbers(getattr(self, name), name)
-            if values.ndim != 2 or values.shape[1] != 3 or len(values) != len(self.rotation):
-                raise InputError(
-                    f"{name} has shape {values.shape}: give rotation and velocity one row of 3 "
-                    "numbers for each interval"
-                )
-            object.__setattr__(self, name, values)
+        hint = "rotation and velocity one row of 3 numbers for each interval"
+        rotation = finite_rows(self.rotation, "rotation", hint)
+        object.__setattr__(self, "rotation", rotation)
+        velocity = finite_rows(self.velocity, "velocity", hint, n=len(rotation))
+        object.__setattr__(self, "velocity", velocity)
 
     @property
     def n(self) -> int:
@@ -77,14 +74,9 @@ class Imu:
         accel_errors : (n, 3) ndarray
             m/s^2.
         """
-        gyro = finite_numbers(gyro_errors, "gyro_errors")
-        accel = finite_numbers(accel_errors, "accel_errors")
-        for name, values in (("gyro_errors", gyro), ("accel_errors", accel)):
-            if values.shape != self.rotation.shape:
-                raise InputError(
-                    f"{name} has shape {values.shape}: give one row of 3 numbers for each of the "
-                    f"{self.n:,} intervals"
-                )
+        hint = f"one row of 3 numbers for each of the {self.n:,} intervals"
+        gyro = finite_rows(gyro_errors, "gyro_errors", hint, n=self.n)
+        accel = finite_rows(accel_errors, "accel_errors", hint, n=self.n)
         return Imu(self.dt, self.rotation + self.dt * gyro, self.velocity + self.dt * accel)
 
 
@@ -106,53 +98,31 @@ def emulate(trajectory: Trajectory) -> Imu:
     lla = unwrapped_longitudes(finite_numbers(trajectory.lla, "lla"))
     check_latitudes(lla, "lla")
     rpy = unwrapped_angles(finite_numbers(trajectory.rpy, "rpy"))
-    rotation, velocity = np.empty((trajectory.n, 3)), np.empty((trajectory.n, 3))
-    dt = trajectory.dt
     # Relative to the first epoch fewer digits are lost in the second differences.
-    _fill(coefficients(lla - lla[0], dt), lla[0], coefficients(rpy, dt), dt, rotation, velocity)
+    dt, n = trajectory.dt, trajectory.n
+    track, attitude = coefficients(lla - lla[0], dt), coefficients(rpy, dt)
+    rotation, velocity = np.zeros((n, 3)), np.zeros((n, 3))
+    for first in range(0, n, _ROWS):
+        part = slice(first, first + _ROWS)
+        for node, weight in zip(_NODES, _WEIGHTS, strict=True):
+            rate, force = _sensed(track[..., part], lla[0], attitude[..., part], node * dt)
+            rotation[part] += weight * dt * rate
+            velocity[part] += weight * dt * force
     return Imu(dt, rotation, velocity)
 
 
-@compiled()
-def _fill(
-    track: FloatArray,
-    start: FloatArray,
-    attitude: FloatArray,
-    dt: float,
-    rotation: FloatArray,
-    velocity: FloatArray,
-) -> None:
-    """Integrate over each interval; polynomials as of `splines.coefficients`."""
-    for i in range(track.shape[0]):
-        for j in range(3):
-            rotation[i, j] = velocity[i, j] = 0.0
-        for k in range(3):
-            t, weight = _NODES[k] * dt, _WEIGHTS[k] * dt
-            wx, wy, wz, fx, fy, fz = _sensed(track[i], start, attitude[i], t)
-            rotation[i, 0] += weight * wx
-            rotation[i, 1] += weight * wy
-            rotation[i, 2] += weight * wz
-            velocity[i, 0] += weight * fx
-            velocity[i, 1] += weight * fy
-            velocity[i, 2] += weight * fz
-
-
-@compiled()
 def _sensed(
     track: FloatArray, start: FloatArray, attitude: FloatArray, t: float
-) -> tuple[float, float, float, float, float, float]:
-    """Angular rate, rad/s, and specific force, m/s^2, in body axes at one time."""
-    lat, lat_rate, lat_turn = _polynomial(track[0], t)
-    _, lon_rate, lon_turn = _polynomial(track[1], t)
-    h, h_rate, h_turn = _polynomial(track[2], t)
-    s, c = math.sin(start[0] + lat), math.cos(start[0] + lat)
-    h += start[2]
-    meridian, transverse = radii_at(s)
+) -> tuple[FloatArray, FloatArray]:
+    """Angular rate, rad/s, and specific force, m/s^2, (n, 3), some time into each interval."""
+    (lat, _, h), (lat_rate, lon_rate, h_rate), (lat_turn, lon_turn, h_turn) = _cubic(track, t)
+    lat, h = start[0] + lat, start[2] + h
+    s, c = np.sin(lat), np.cos(lat)
+    meridian, transverse = radii_along(lat)
     shrink = ECCENTRICITY_SQUARED * s * c / (1.0 - ECCENTRICITY_SQUARED * s * s) * lat_rate
     meridian_rate = 3.0 * meridian * shrink + h_rate
     transverse_rate = transverse * shrink + h_rate
-    meridian += h
-    transverse += h
+    meridian, transverse = meridian + h, transverse + h
 
     vn, ve, vd = meridian * lat_rate, transverse * c * lon_rate, -h_rate
     an = meridian_rate * lat_rate + meridian * lat_turn
@@ -162,35 +132,29 @@ def _sensed(
     cn, cd = wn + RATE * c, wd - RATE * s
     fn = an + we * vd - cd * ve
     fe = ae + cd * vn - cn * vd
-    fd = -h_turn + cn * ve - we * vn - gravity_at(s, h)
+    fd = -h_turn + cn * ve - we * vn - gravity_along(lat, h)
 
-    roll, roll_rate, _ = _polynomial(attitude[0], t)
-    pitch, pitch_rate, _ = _polynomial(attitude[1], t)
-    yaw, yaw_rate, _ = _polynomial(attitude[2], t)
-    sr, cr = math.sin(roll), math.cos(roll)
-    sp, cp = math.sin(pitch), math.cos(pitch)
-    sy, cy = math.sin(yaw), math.cos(yaw)
-    wx, wy, wz = _to_body(wn, we, wd, sr, cr, sp, cp, sy, cy)
-    fx, fy, fz = _to_body(fn, fe, fd, sr, cr, sp, cp, sy, cy)
-    wx += roll_rate - yaw_rate * sp
-    wy += pitch_rate * cr + yaw_rate * cp * sr
-    wz += -pitch_rate * sr + yaw_rate * cp * cr
-    return wx, wy, wz, fx, fy, fz
+    angles, (roll_rate, pitch_rate, yaw_rate), _ = _cubic(attitude, t)
+    (sr, sp, sy), (cr, cp, cy) = np.sin(angles), np.cos(angles)
 
+    def to_body(n: FloatArray, e: FloatArray, d: FloatArray) -> FloatArray:
+        """Resolve a vector in body axes: yaw, then pitch, then roll."""
+        x, y = cy * n + sy * e, cy * e - sy * n
+        below = sp * x + cp * d
+        return np.stack([cp * x - sp * d, cr * y + sr * below, cr * below - sr * y], axis=-1)
 
-@compiled()
-def _polynomial(c: FloatArray, t: float) -> tuple[float, float, float]:
-    """Value, first and second derivative of a cubic."""
-    value = c[0] + t * (c[1] + t * (c[2] + t * c[3]))
-    return value, c[1] + t * (2.0 * c[2] + t * 3.0 * c[3]), 2.0 * c[2] + t * 6.0 * c[3]
+    rate = to_body(wn, we, wd)
+    rate[:, 0] += roll_rate - yaw_rate * sp
+    rate[:, 1] += pitch_rate * cr + yaw_rate * cp * sr
+    rate[:, 2] += -pitch_rate * sr + yaw_rate * cp * cr
+    return rate, to_body(fn, fe, fd)
 
 
-@compiled()
-def _to_body(
-    n: float, e: float, d: float, sr: float, cr: float, sp: float, cp: float, sy: float, cy: float
-) -> tuple[float, float, float]:
-    """Resolve a vector of the navigation frame in body axes, given sines and cosines."""
-    # Yaw, then pitch, then roll.
-    x, y = cy * n + sy * e, cy * e - sy * n
-    forward, below = cp * x - sp * d, sp * x + cp * d
-    return forward, cr * y + sr * below, cr * below - sr * y
+def _cubic(c: FloatArray, t: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Values, first and second derivatives, (3, n), of cubics (4, 3, n)."""
+    a, b, c2, c3 = c
+    return (
+        a + t * (b + t * (c2 + t * c3)),
+        b + t * (2.0 * c2 + t * 3.0 * c3),
+        2.0 * c2 + t * 6.0 * c3,
+    )

@@ -21,7 +21,6 @@ from gmwm.ins.filter import (
     Solution,
     Transition,
     measurement_update,
-    new_scratch,
     new_transition,
     observe,
     propagate,
@@ -107,11 +106,10 @@ class _Forward:
     def run(self, wanted: set[int]) -> dict[int, FloatArray]:
         """Run forwards; the covariance after the measurements of the wanted epochs."""
         epochs = np.union1d(self._nodes, self._events.epoch)
-        table, scratch = self._ready.states.table, new_scratch(self._P.shape[0])
-        kept, event, before = {}, 0, int(epochs[0])
+        table, kept, event, before = self._ready.states.table, {}, 0, int(epochs[0])
         for epoch in epochs.tolist():
             for first, count in self.strides(before, epoch):
-                propagate(self._P, self.transition(first, count)[1], table, count, scratch)
+                propagate(self._P, self.transition(first, count)[1], table, count)
             updates = []
             while event < self._events.epoch.size and self._events.epoch[event] == epoch:
                 updates += self._updates(event, epoch)

@@ -94,14 +94,7 @@ class Consistency:
 
 
 def at_epoch(runs: FilterErrors, index: int) -> Consistency:
-    """Consistency at one epoch, over independent runs: chi-square bands.
-
-    Parameters
-    ----------
-    runs : FilterErrors
-    index : int
-        Of the epoch; see `FilterErrors.index`.
-    """
+    """Consistency at one epoch (`FilterErrors.index`) over independent runs: chi-square bands."""
     alive = np.isfinite(runs.error[:, index, 0])
     return _consistency(runs, alive, np.array([index]), single=True)
 
@@ -113,11 +106,7 @@ def over_time(runs: FilterErrors, start: float = 0.0, end: float = np.inf) -> Co
 
     Raises InputError if no errors were kept in that time.
 
-    Parameters
-    ----------
-    runs : FilterErrors
-    start, end : float, optional
-        s.
+    start, end: s.
     """
     epochs = np.flatnonzero((runs.time >= start) & (runs.time <= end) & ~runs.before)
     if not epochs.size:
@@ -226,15 +215,10 @@ def coverage_of(standard: FloatArray, single: bool) -> tuple[Coverage, ...]:
         if error > 0.0:
             few, many = t.ppf(_UPPER, [max(runs - 1, 1), standard.size - 1])
             draws = min(mean * (1.0 - mean) / error, float(standard.size)) * (many / few) ** 2
-        result.append(_binomial(level, mean, draws))
+        lower = upper = float("nan")
+        if draws > 0.0:
+            hits, tail = mean * draws, 1.0 - _UPPER
+            lower = float(betaincinv(hits, draws - hits + 1.0, tail)) if hits > 0.0 else 0.0
+            upper = float(betaincinv(hits + 1.0, draws - hits, 1.0 - tail)) if hits < draws else 1.0
+        result.append(Coverage(level, mean, lower, upper))
     return tuple(result)
-
-
-def _binomial(level: float, fraction: float, draws: float) -> Coverage:
-    """Coverage with its binomial interval."""
-    if not draws > 0.0:
-        return Coverage(level, float("nan"), float("nan"), float("nan"))
-    hits, tail = fraction * draws, 1.0 - _UPPER
-    lower = float(betaincinv(hits, draws - hits + 1.0, tail)) if hits > 0.0 else 0.0
-    upper = float(betaincinv(hits + 1.0, draws - hits, 1.0 - tail)) if hits < draws else 1.0
-    return Coverage(level, fraction, lower, upper)

@@ -82,10 +82,15 @@ class FilterErrors:
 
     def index(self, time: float, *, before: bool = True) -> int:
         """Place of an epoch; InputError if it was not kept."""
-        found = np.flatnonzero((np.abs(self.time - time) < _SAME_TIME) & (self.before == before))
-        if found.size == 0:
-            raise InputError(f"no errors were kept at {time:g} s: give the end of an outage")
-        return int(found[0])
+        return place_of(time, self.time, self.before == before)
+
+
+def place_of(time: float, kept: FloatArray, of_kind: BoolArray) -> int:
+    """Place of a time among those that were kept and are of a kind."""
+    found = np.flatnonzero((np.abs(kept - time) < _SAME_TIME) & of_kind)
+    if found.size == 0:
+        raise InputError(f"no errors were kept at {time:g} s: give the end of an outage")
+    return int(found[0])
 
 
 PER_RUN = tuple(name for name in FilterErrors.__annotations__ if name not in ("time", "before"))
@@ -98,9 +103,8 @@ def errors_of_run(
     """Figures of a run, by the names of `PER_RUN`; NaN where the solution does not reach."""
     done = solution.time.size
     error = solution.errors(truth)
-    nees, log_det = np.empty((2, done, len(GROUPS)))
-    for i, part in enumerate(GROUPS.values()):
-        nees[:, i], log_det[:, i] = _normalised(error[:, part], solution.covariance[:, part, part])
+    groups = [_normalised(error[:, p], solution.covariance[:, p, p]) for p in GROUPS.values()]
+    nees, log_det = np.moveaxis(np.reshape(groups, (len(GROUPS), 2, done)), 0, -1)
     sensor_error, sensor_nees = np.full((done, 6), np.nan), np.full(done, np.nan)
     if errors.slow is not None:
         # The states of an epoch are those of the sample that follows it; the last one has none.
@@ -108,16 +112,10 @@ def errors_of_run(
         known = at < len(errors.slow)
         sensor_error[known] = solution.sensor_errors[known] - errors.slow[at[known]]
         sensor_nees = _normalised(sensor_error, solution.sensor_covariance)[0]
-    result = {
-        "error": error,
-        "sd": solution.sd,
-        "nees": nees,
-        "log_det": log_det,
-        "sensor_error": sensor_error,
-        "sensor_sd": np.sqrt(np.diagonal(solution.sensor_covariance, axis1=1, axis2=2)),
-        "sensor_nees": sensor_nees,
-    }
-    for key, values in result.items():
+    sensor_sd = np.sqrt(np.diagonal(solution.sensor_covariance, axis1=1, axis2=2))
+    reached = (error, solution.sd, nees, log_det, sensor_error, sensor_sd, sensor_nees)
+    result = {}
+    for key, values in zip(PER_RUN, reached, strict=False):
         result[key] = np.full((outputs.epoch.size, *values.shape[1:]), np.nan)
         result[key][:done] = values
     standard, kinds = solution.innovations.standard, solution.innovations.kind
@@ -218,20 +216,15 @@ def spread(runs: FilterErrors, time: float) -> dict[str, ErrorSizes]:
     time : float
         End of the outage, s.
     """
-    predicted = _sizes(runs.sd[:, runs.index(time)])
-    result = {}
+    predicted, result = _sizes(runs.sd[:, runs.index(time)]), {}
     for name, values in sizes(runs, time).items():
         alive = np.isfinite(values)
         if not np.any(alive):
             raise InputError("the filter diverged in every run: check its sensor models")
-        values = values[alive]
-        result[name] = ErrorSizes(
-            mean=float(np.mean(values)),
-            rms=float(np.sqrt(np.mean(values**2))),
-            median=float(np.median(values)),
-            p95=float(np.quantile(values, 0.95)),
-            predicted=float(np.sqrt(np.mean(predicted[name][alive] ** 2))),
-        )
+        size, expected = values[alive], predicted[name][alive]
+        rms, believed = np.sqrt(np.mean(size**2)), np.sqrt(np.mean(expected**2))
+        found = (np.mean(size), rms, np.median(size), np.quantile(size, 0.95), believed)
+        result[name] = ErrorSizes(*map(float, found))
     return result
 
 
@@ -259,10 +252,11 @@ def difference(
         raise InputError("one or the other filter diverged in every run: check their sensor models")
     a, b = a[alive], b[alive]
     index = np.random.default_rng(seed).integers(a.size, size=(tuning.BOOTSTRAP_DRAWS, a.size))
-    drawn = np.mean(a[index] - b[index], axis=1)
-    ratios = np.sqrt(np.mean(a[index] ** 2, axis=1) / np.mean(b[index] ** 2, axis=1))
+
+    def ratio(first: FloatArray, second: FloatArray) -> FloatArray:
+        return np.sqrt(np.mean(first**2, axis=-1) / np.mean(second**2, axis=-1))
+
     ends = [0.5 - 0.5 * tuning.CONFIDENCE, 0.5 + 0.5 * tuning.CONFIDENCE]
-    ratio = float(np.sqrt(np.mean(a**2) / np.mean(b**2)))
-    lower, upper = map(float, np.quantile(drawn, ends))
-    ratio_lower, ratio_upper = map(float, np.quantile(ratios, ends))
-    return ErrorDifference(float(np.mean(a - b)), lower, upper, ratio, ratio_lower, ratio_upper)
+    means, ratios = np.mean(a[index] - b[index], axis=1), ratio(a[index], b[index])
+    found = [np.mean(a - b), *np.quantile(means, ends), ratio(a, b), *np.quantile(ratios, ends)]
+    return ErrorDifference(*map(float, found))

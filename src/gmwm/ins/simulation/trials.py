@@ -183,19 +183,7 @@ def pooled_sizes(study: MonteCarlo, name: str) -> dict[str, FloatArray]:
 
 
 class RunOptions(TypedDict, total=False):
-    """How runs are done, and where they are kept.
-
-    jobs : int
-        Processes; -1 for one a core.
-    cluster : str
-        Address of a Dask scheduler that does the work instead.
-    folder : Path
-        Where finished runs are kept every few seconds, also when the work is interrupted.
-    earlier : {"resume", "replace", "refuse"}
-        What to do with runs that the folder holds already.
-    progress : callable
-        Called as ``progress(done, runs, "")``.
-    """
+    """How runs are done, and where they are kept; see `gmwm.ins.monte_carlo`."""
 
     jobs: int
     cluster: str | None
@@ -229,7 +217,10 @@ def monte_carlo(
         Name -> models of a filter.
     runs, seed : int, optional
     **options
-        jobs, cluster, folder, earlier, progress: see `gmwm.ins.simulation.trials.RunOptions`.
+        jobs (processes; -1 for one a core) or cluster (address of a Dask scheduler that does the
+        work instead); folder (Path, where finished runs are kept every few seconds); earlier
+        ("resume", "replace" or "refuse", for runs that it holds already); progress (called as
+        ``progress(done, runs, "")``).
     """
     if not filters:
         raise InputError("there is no filter: give one at least")

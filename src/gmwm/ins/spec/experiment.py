@@ -21,7 +21,6 @@ from gmwm.ins.simulation import ErrorSource, Experiment, Scenario, Simulated
 from gmwm.ins.spec.fields import (
     RECORDINGS,
     REDUCED,
-    Declared,
     FileName,
     Meters,
     Models,
@@ -29,6 +28,7 @@ from gmwm.ins.spec.fields import (
     OfTerms,
     PositiveHertz,
     PositiveMeters,
+    PositiveRadians,
     PositiveSeconds,
     PositiveSpeed,
     Seconds,
@@ -100,6 +100,15 @@ class GnssSpec(Spec):
     coloured_tau: PositiveSeconds | None = None
 
 
+class InitialSpec(Spec):
+    """What is left out is as usual in `InitialSd`."""
+
+    position: PositiveMeters | None = None
+    velocity: PositiveSpeed | None = None
+    tilt: PositiveRadians | None = None
+    heading: PositiveRadians | None = None
+
+
 def _named(given: Any) -> dict[str, Any]:
     """Filters by names that tables and figures can show."""
     if not isinstance(given, Mapping):
@@ -148,7 +157,7 @@ class ExperimentSpec(Spec):
     filters: Annotated[dict[str, _Filter], BeforeValidator(_named)]
     outages: Annotated[tuple[_Span, ...], written("[[start, length], ...] in seconds")] = ()
     gnss: GnssSpec = GnssSpec()
-    initial_sd: Annotated[InitialSd, Declared()] = InitialSd()
+    initial_sd: InitialSpec = InitialSpec()
     runs: Annotated[StrictInt, Field(ge=1)] = 100
     seed: Annotated[StrictInt, Field(ge=0)] = 0
 
@@ -212,7 +221,7 @@ def _scenario(spec: ExperimentSpec, trajectory: Trajectory) -> Scenario:
                 f"ends at {first.end:g} s: write them as one, or apart"
             )
     aiding = _aiding(spec.gnss, trajectory)
-    scenario = Scenario(trajectory, aiding, tuple(outages), spec.initial_sd)
+    scenario = Scenario(trajectory, aiding, tuple(outages), InitialSd(**spec.initial_sd.given))
     total = sum(each.time.size for each in aiding.fixes)
     if not total:
         raise InputError(
@@ -262,26 +271,24 @@ def _models(
     where: str, given: _Filter, source: ErrorSource, scenario: Scenario, folder: Path
 ) -> SensorModels:
     """Models of a filter, written at ``where``; the scenario is that of reduced models."""
-    models = source.models if isinstance(source, Simulated) else None
-    dt = scenario.trajectory.dt
-    if given == "truth" and models is None:
+    reduced, dt = isinstance(given, ReducedSpec), scenario.trajectory.dt
+    origin = given.of if isinstance(given, ReducedSpec) else given
+    if origin != "truth":
+        models = read_models(where, origin, folder)
+    elif isinstance(source, Simulated):
+        models = source.models
+    elif reduced:
+        raise InputError(f"{where}: name what is reduced, as in of: calibration.json")
+    else:
         raise InputError(f"{where}: real errors have no true model: give a calibration")
-    if isinstance(given, ReducedSpec):
-        if given.of != "truth":
-            models = read_models(where, given.of, folder)
-        if models is None:
-            raise InputError(f"{where}: name what is reduced, as in of: calibration.json")
-    elif given != "truth":
-        models = read_models(where, given, folder)
-        if isinstance(source, Recorded):
-            # A random walk does not start at zero in the middle of a recording.
-            walks = {
-                axis: source.bias_sd[axis]
-                for axis, model in models.models.items()
-                if models.bias_sd[axis] == 0.0 and any(term.is_walk for term in model.terms)
-            }
-            models = replace(models, bias_sd={**models.bias_sd, **walks})
-    assert models is not None
+    if isinstance(source, Recorded) and not reduced:
+        # A random walk does not start at zero in the middle of a recording.
+        walks = {
+            axis: source.bias_sd[axis]
+            for axis, model in models.models.items()
+            if models.bias_sd[axis] == 0.0 and any(term.is_walk for term in model.terms)
+        }
+        models = replace(models, bias_sd={**models.bias_sd, **walks})
     try:
         if isinstance(given, ReducedSpec):
             about = scenario if scenario.outages else None

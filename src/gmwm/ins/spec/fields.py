@@ -5,19 +5,18 @@ A value such as ``"140 deg/h"`` becomes a number in SI units; pydantic says wher
 
 from __future__ import annotations
 
-import dataclasses
 import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Self, TypeVar
 
+import yaml
 from pydantic import (
     BaseModel,
     BeforeValidator,
     ConfigDict,
     Discriminator,
     Field,
-    GetCoreSchemaHandler,
     StringConstraints,
     Tag,
     TypeAdapter,
@@ -25,11 +24,9 @@ from pydantic import (
     ValidationInfo,
     ValidatorFunctionWrapHandler,
     WrapValidator,
-    create_model,
     field_validator,
     model_validator,
 )
-from pydantic_core import CoreSchema, core_schema
 
 from gmwm._core import checks
 from gmwm._core.files import opened
@@ -92,44 +89,24 @@ class Spec(BaseModel):
         return {name: getattr(self, name) for name in self.model_fields_set}
 
 
-class Declared:
-    """Marks a key that makes a dataclass at once, whose fields have their ``unit`` as metadata."""
-
-    def __get_pydantic_core_schema__(
-        self, source: Any, handler: GetCoreSchemaHandler
-    ) -> CoreSchema:
-        """Schema of the keys with their units, and then of the dataclass."""
-        fields: dict[str, Any] = {
-            each.name: (Annotated[float, number(each.metadata["unit"])], each.default)
-            for each in dataclasses.fields(source)
-        }
-        form = create_model(source.__name__, __base__=Spec, **fields)
-        return core_schema.no_info_after_validator_function(
-            lambda found: source(**found.given), handler.generate_schema(form)
-        )
-
-
 def _sentence(error: ValidationError, where: str, needs: str) -> tuple[str, str]:
     """Text and code."""
     errors = error.errors(include_url=False)
-    first, *path = errors[0], *errors[0]["loc"]
-    missing = first["type"] == "missing"
-    if missing:
-        path = path[:-1]
-    place = where
-    for part in path:
+    first, path, place = errors[0], errors[0]["loc"], where
+    missing = [str(each["loc"][-1]) for each in errors if each["type"] == "missing"]
+    code = "missing-key" if first["type"] == "missing" else ""
+    for part in path[:-1] if code else path:
         if isinstance(part, int):
             place += f"[{part}]"
         elif part not in TAGS:
             place += f", {part}" if place else part
-    if missing:
-        names = [str(e["loc"][-1]) for e in errors if e["type"] == "missing"]
-        text = f"there is no {', no '.join(names)}: {needs}"
+    if code:
+        text = f"there is no {', no '.join(missing)}: {needs}"
     elif first["type"] == "value_error":
         text = str(first["ctx"]["error"])
     else:
         text = f"{checks.shown(first['input'])}: {first['msg'][0].lower()}{first['msg'][1:]}"
-    return (f"{place}: {text}" if place else text), "missing-key" if missing else ""
+    return (f"{place}: {text}" if place else text), code
 
 
 def value(given: Any, si_unit: str) -> float:
@@ -196,7 +173,7 @@ def read_document(path: Path) -> dict[str, Any]:
             text = stream.read(_LARGEST_FILE + 1)
         if len(text) > _LARGEST_FILE:
             raise InputError(f"{path}: has more than {_LARGEST_FILE:,} bytes: check the path")
-        content = _load(text.decode("utf-8-sig"))
+        content = yaml.load(text.decode("utf-8-sig"), Loader=_UniqueKeys)
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror}): check the path") from None
     except InputError:
@@ -212,48 +189,28 @@ def read_document(path: Path) -> dict[str, Any]:
     return {name: each for name, each in content.items() if each is not None}
 
 
-def _load(text: str) -> Any:
-    import yaml
+class _UniqueKeys(yaml.SafeLoader):  # type: ignore[misc]
+    """Rejects a key given twice, which YAML would replace."""
 
-    loader = yaml.SafeLoader(text)
-    try:
-        node = loader.get_single_node()
-        _check_keys(node, set())
-        return None if node is None else loader.construct_document(node)
-    finally:
-        loader.dispose()
-
-
-def _check_keys(node: Any, checked: set[int]) -> None:
-    """Reject a key given twice, which YAML would replace; an alias is a node checked before."""
-    if node is None or isinstance(node.value, str) or id(node) in checked:
-        return
-    checked.add(id(node))
-    seen: set[str] = set()
-    for item in node.value:
-        if not isinstance(item, tuple):
-            _check_keys(item, checked)
-            continue
-        key, value = item
-        name = str(key.value)
-        if key.tag != "tag:yaml.org,2002:merge" and name in seen:
-            raise ValueError(f"line {key.start_mark.line + 1}: {name!r} is there twice")
-        seen.add(name)
-        _check_keys(key, checked)
-        _check_keys(value, checked)
+    def compose_mapping_node(self, anchor: Any) -> Any:
+        node = super().compose_mapping_node(anchor)
+        seen: set[str] = set()
+        for key, _ in node.value:
+            name = str(key.value)
+            if key.tag != "tag:yaml.org,2002:merge" and name in seen:
+                raise ValueError(f"line {key.start_mark.line + 1}: {name!r} is there twice")
+            seen.add(name)
+        return node
 
 
 def _reason(error: Exception) -> str:
     """The error and its line, without the parser's own picture of it."""
-    import yaml
-
-    mark = getattr(error, "problem_mark", None)
-    problem = getattr(error, "problem", None)
-    if mark is None or problem is None:
-        text = checks.shown(" ".join(str(error).split())).strip("'\"")
-        fits = isinstance(error, ValueError | RecursionError | yaml.YAMLError)
-        return text if fits else f"a value does not fit its tag, {text}"
-    return f"line {mark.line + 1}, column {mark.column + 1}: {problem}"
+    mark, problem = getattr(error, "problem_mark", None), getattr(error, "problem", None)
+    if mark is not None and problem is not None:
+        return f"line {mark.line + 1}, column {mark.column + 1}: {problem}"
+    text = checks.shown(" ".join(str(error).split())).strip("'\"")
+    fits = isinstance(error, ValueError | RecursionError | yaml.YAMLError)
+    return text if fits else f"a value does not fit its tag, {text}"
 
 
 _KINDS: dict[str, type[Process]] = {
@@ -263,6 +220,7 @@ _KINDS: dict[str, type[Process]] = {
     "B": BiasInstability,
     "R": RateRamp,
 }
+
 
 _PAIRS = TypeAdapter(Annotated[tuple[tuple[Any, Any], ...], written("[[sigma, tau], ...]")])
 
@@ -280,23 +238,18 @@ class Terms(Spec):
     GM: tuple[GaussMarkov, ...] = ()
     bias: float = 0.0
 
-    @field_validator(*_KINDS, mode="before")
+    @field_validator("*", mode="before")
     @classmethod
-    def _term(cls, given: Any, info: ValidationInfo) -> Process:
-        kind = _KINDS[info.field_name or ""]
-        unit = si_parameter_unit(kind.parameters[0].unit, cls.QUANTITY).replace(" s", "*s")
-        return kind(value(given, unit))
-
-    @field_validator("GM", mode="before")
-    @classmethod
-    def _markov(cls, given: Any) -> tuple[GaussMarkov, ...]:
-        unit, pairs = SI_UNIT[cls.QUANTITY], _PAIRS.validate_python(given)
-        return tuple(GaussMarkov(value(sigma, unit), value(tau, "s")) for sigma, tau in pairs)
-
-    @field_validator("bias", mode="before")
-    @classmethod
-    def _bias(cls, given: Any) -> float:
-        return value(given, SI_UNIT[cls.QUANTITY])
+    def _in_si(cls, given: Any, info: ValidationInfo) -> Any:
+        name, unit = info.field_name or "", SI_UNIT[cls.QUANTITY]
+        if name == "bias":
+            return value(given, unit)
+        if name == "GM":
+            pairs = _PAIRS.validate_python(given)
+            return tuple(GaussMarkov(value(sigma, unit), value(tau, "s")) for sigma, tau in pairs)
+        kind = _KINDS[name]
+        unit = si_parameter_unit(kind.parameters[0].unit, cls.QUANTITY)
+        return kind(value(given, unit.replace(" s", "*s")))
 
     @model_validator(mode="after")
     def _has_noise(self) -> Self:
@@ -308,7 +261,7 @@ class Terms(Spec):
     @property
     def terms(self) -> tuple[Process, ...]:
         """In the order of the keys above."""
-        single = (self.N, self.K, self.Q, self.B, self.R)
+        single = (getattr(self, name) for name in _KINDS)
         return (*(term for term in single if term is not None), *self.GM)
 
 
@@ -376,11 +329,10 @@ def read_models(where: str, given: str | ModelsSpec, folder: Path) -> SensorMode
     """Sensor models from what was written, or from a calibration.json relative to a folder."""
     if isinstance(given, ModelsSpec):
         return given.models()
+    place = f"{where}: "
     try:
         calibration = load(folder / given)
-    except InputError as error:
-        raise InputError(f"{where}: {error}") from None
-    try:
+        place = f"{where}, {given}: "
         return SensorModels.of(calibration)
     except InputError as error:
-        raise InputError(f"{where}, {given}: {error}") from None
+        raise InputError(f"{place}{error}") from None

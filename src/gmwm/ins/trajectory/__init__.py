@@ -11,6 +11,7 @@ from gmwm.ins.trajectory.trajectory import (
     check_latitudes as check_latitudes,
     coefficients as coefficients,
     finite_numbers as finite_numbers,
+    finite_rows as finite_rows,
     unwrapped_angles as unwrapped_angles,
     unwrapped_longitudes as unwrapped_longitudes,
 )

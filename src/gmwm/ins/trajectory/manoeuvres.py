@@ -9,17 +9,18 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol, TypedDict, Unpack
+from typing import NamedTuple, Protocol, TypedDict, Unpack
 
 import numpy as np
+from numpy.polynomial import Polynomial
 from scipy.integrate import simpson
 
 from gmwm._core.checks import is_number, positive, sampling_interval, shown
 from gmwm._core.compiled import compiled
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
-from gmwm.ins.geometry import RATE, gravity_at, ned_difference, radii
-from gmwm.ins.trajectory.trajectory import Trajectory, check_latitudes, finite_numbers
+from gmwm.ins.geometry import RATE, gravity_along, ned_difference, radii_at
+from gmwm.ins.trajectory.trajectory import Trajectory, check_latitudes, finite_numbers, finite_rows
 
 Lla = Sequence[float] | FloatArray
 """Latitude, longitude, rad, and height, m."""
@@ -30,14 +31,18 @@ _HALF_TURN = math.radians(179.0)  # the corner of a U-turn lies at infinity
 _TURN_POINTS = 1001
 
 
+_STEP = Polynomial([0.0, 0.0, 0.0, 10.0, -15.0, 6.0])
+"""From 0 to 1; two derivatives vanish at both ends."""
+_AREA, _BELL = _STEP.integ(), _STEP.deriv()
+
+
 @dataclass(frozen=True)
 class Pulse:
     """A change of a quantity.
 
     change: By how much, signed.
     limit: Largest rate, unit of the quantity per second; a change too small for it has a lower one.
-    ramp: Time in which the rate comes up, and goes down, s. It follows 10 x^3 - 15 x^4 + 6 x^5, of
-        which two derivatives vanish at both ends.
+    ramp: Time in which the rate comes up smoothly, and goes down, s.
     """
 
     change: float
@@ -61,39 +66,30 @@ class Pulse:
 
     def value(self, time: FloatArray) -> FloatArray:
         """What has changed some time after the begin, s."""
-        up, down = self._ramps(time)
-        area = up**4 * (2.5 + up * (-3.0 + up)) - down**4 * (2.5 + down * (-3.0 + down))
+        area = self.ramp * self._ramps(_AREA, time)
         # After a ramp its step goes on at 1.
         past_up = np.maximum(time - self.ramp, 0.0)
         past_down = np.maximum(time - 2.0 * self.ramp - self.hold, 0.0)
-        found = self.rate * self.ramp * area + self.rate * (past_up - past_down)
+        found = self.rate * (area + past_up - past_down)
         return np.where(time >= self.duration, self.change, found)
 
     def slope(self, time: FloatArray) -> FloatArray:
         """Its rate some time after the begin, s."""
-        up, down = self._ramps(time)
-        step_up = up**3 * (10.0 + up * (-15.0 + 6.0 * up))
-        return self.rate * (step_up - down**3 * (10.0 + down * (-15.0 + 6.0 * down)))
+        return self.rate * self._ramps(_STEP, time)
 
     def curvature(self, time: FloatArray) -> FloatArray:
         """Derivative of the rate some time after the begin, s."""
-        up, down = self._ramps(time)
-        bell = 30.0 * up**2 * (1.0 - up) ** 2
-        return self.rate / self.ramp * (bell - 30.0 * down**2 * (1.0 - down) ** 2)
+        return self.rate / self.ramp * self._ramps(_BELL, time)
 
-    def _ramps(self, time: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """How far the two ramps are, 0 to 1."""
+    def _ramps(self, of: Polynomial, time: FloatArray) -> FloatArray:
+        """A polynomial on the ramp up less that on the ramp down."""
         up = np.clip(time / self.ramp, 0.0, 1.0)
-        return up, np.clip((time - self.ramp - self.hold) / self.ramp, 0.0, 1.0)
+        down = np.clip((time - self.ramp - self.hold) / self.ramp, 0.0, 1.0)
+        return np.asarray(of(up) - of(down))
 
 
-@dataclass(frozen=True)
-class Plan:
-    """What a manoeuvre does; ``None`` where nothing changes.
-
-    duration: s.
-    speed, heading, height: Changes that begin with the manoeuvre: m/s, rad, m.
-    """
+class Plan(NamedTuple):
+    """What a manoeuvre does in ``duration`` (s): changes that begin with it, in m/s, rad and m."""
 
     duration: float
     speed: Pulse | None = None
@@ -273,8 +269,7 @@ def perform(
     return Trajectory.from_arrays(dt, lla, _attitude(course, lla, **body))
 
 
-@dataclass(frozen=True, eq=False)
-class _Course:
+class _Course(NamedTuple):
     """Speed, heading and rate of climb, and their derivatives, at epochs and half-way."""
 
     speed: FloatArray
@@ -286,9 +281,8 @@ class _Course:
 
 
 def _course(plans: Sequence[Plan], time: FloatArray, speed: float, heading: float) -> _Course:
-    course = _Course(*(np.zeros(time.size) for _ in range(6)))
-    course.speed[:] = speed
-    course.heading[:] = heading
+    course = _Course(*np.zeros((6, time.size)))
+    course.speed[:], course.heading[:] = speed, heading
     begin = 0.0
     for plan in plans:
         first = int(np.searchsorted(time, begin))
@@ -329,10 +323,10 @@ def _attitude(
         # The Earth's axis, and the specific force, in a level frame with the body's heading.
         ahead, across = np.cos(lla[:, 0]) * np.cos(heading), -np.cos(lla[:, 0]) * np.sin(heading)
         below = -np.sin(lla[:, 0])
-        gravity: Any = gravity_at.py_func
         forward = course.acceleration[::2] - 2.0 * RATE * across * climb
         right = speed * course.turn_rate[::2] + 2.0 * RATE * (below * speed + ahead * climb)
-        down = -course.climb_rate[::2] - 2.0 * RATE * across * speed - gravity(-below, lla[:, 2])
+        down = -course.climb_rate[::2] - 2.0 * RATE * across * speed
+        down -= gravity_along(lla[:, 0], lla[:, 2])
         roll = np.arctan2(right, -(forward * np.sin(pitch) + down * np.cos(pitch)))
     return np.stack([roll, pitch, heading], axis=-1)
 
@@ -366,7 +360,7 @@ def _walk(
 @compiled()
 def _angular_speed(lat: float, h: float, speed: float, heading: float) -> tuple[float, float]:
     """Rates of latitude and longitude, rad/s."""
-    meridian, transverse = radii(lat)
+    meridian, transverse = radii_at(math.sin(lat))
     north, east = speed * math.cos(heading), speed * math.sin(heading)
     return north / (meridian + h), east / ((transverse + h) * math.cos(lat))
 
@@ -400,12 +394,8 @@ def through(
     dt, ramp, flat, level : optional
         See `perform`.
     """
-    points = finite_numbers(waypoints, "waypoints")
-    if points.ndim != 2 or points.shape[1] != 3 or len(points) < 2:
-        raise InputError(
-            f"waypoints has shape {points.shape}: give two or more, each of latitude, longitude "
-            "and height"
-        )
+    hint = "two or more, each of latitude, longitude and height"
+    points = finite_rows(waypoints, "waypoints", hint, 2)
     speed, ramp = positive("speed", speed), positive("ramp", ramp)
     turn_rate = positive("turn_rate", turn_rate)
     legs = ned_difference(points[1:], points[:-1])
@@ -415,8 +405,14 @@ def through(
         raise InputError(f"waypoints {i} and {i + 1} lie over each other: leave one out")
     headings = np.arctan2(legs[:, 1], legs[:, 0])
     turns = (np.diff(headings) + np.pi) % (2.0 * np.pi) - np.pi
-    corners = [Pulse(float(turn), turn_rate, ramp) for turn in turns]
-    cuts = [0.0, *(_cut(corner, speed, i) for i, corner in enumerate(corners, start=1)), 0.0]
+    if np.any(np.abs(turns) > _HALF_TURN):
+        i = int(np.argmax(np.abs(turns) > _HALF_TURN)) + 1
+        raise InputError(f"waypoint {i} asks to turn back: put two waypoints there, side by side")
+    cuts = [0.0]  # how far before a waypoint a turn begins, and behind it ends, m
+    for turn in map(float, turns):
+        base = displacement(Pulse(turn, turn_rate, ramp), -0.5 * turn, speed)[0] if turn else 0.0
+        cuts.append(base / (2.0 * math.cos(0.5 * turn)))
+    cuts.append(0.0)
     manoeuvres: list[Manoeuvre] = []
     for i, length in enumerate(lengths):
         time, rise = (float(length) - cuts[i] - cuts[i + 1]) / speed, -float(legs[i, 2])
@@ -434,23 +430,11 @@ def through(
             manoeuvres.append(Climb(rise, abs(rise) / (time - ramp)))
         elif time > 0.0:
             manoeuvres.append(Straight(time))
-        if i < len(corners) and corners[i].change:
-            manoeuvres.append(Turn(corners[i].change, turn_rate))
+        if i < turns.size and turns[i]:
+            manoeuvres.append(Turn(float(turns[i]), turn_rate))
     body: Body = {"flat": flat, "level": level}
     motion = {"heading": float(headings[0]), "speed": speed}
     return perform(manoeuvres, start=points[0], dt=dt, ramp=ramp, **motion, **body)
-
-
-def _cut(corner: Pulse, speed: float, waypoint: int) -> float:
-    """How far before a waypoint a turn, which is symmetric, begins, and behind it ends, m."""
-    if abs(corner.change) > _HALF_TURN:
-        raise InputError(
-            f"waypoint {waypoint} asks to turn back: put two waypoints there, side by side"
-        )
-    if not corner.change:
-        return 0.0
-    base, _ = displacement(corner, -0.5 * corner.change, speed)
-    return base / (2.0 * math.cos(0.5 * corner.change))
 
 
 def displacement(turn: Pulse, heading: float, speed: float) -> tuple[float, float]:

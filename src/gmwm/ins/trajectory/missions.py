@@ -102,12 +102,8 @@ def car_drive(
 
     Parameters
     ----------
-    duration, dt : float, optional
-        s.
-    start : (3,) sequence, optional
-        Latitude, longitude, rad, and height, m.
-    heading : float, optional
-        rad.
+    duration, dt, start, heading : optional
+        See `helicopter_mapping`.
     """
 
     def manoeuvres() -> Iterator[Manoeuvre]:
@@ -143,12 +139,8 @@ def fixed_wing_loiter(
 
     Parameters
     ----------
-    duration, dt : float, optional
-        s.
-    start : (3,) sequence, optional
-        Latitude, longitude, rad, and height, m.
-    heading : float, optional
-        At the start, rad.
+    duration, dt, start, heading : optional
+        See `helicopter_mapping`.
     speed, radius : float, optional
         Speed, m/s, and radius of the circles, m.
     """

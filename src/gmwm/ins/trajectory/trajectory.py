@@ -49,9 +49,9 @@ def unwrapped_angles(rpy: FloatArray) -> FloatArray:
 
 
 def coefficients(values: FloatArray, dt: float) -> FloatArray:
-    """Spline through values (n + 1, 3): coefficients (n, 3, 4) of 1, t, t^2, t^3 by interval."""
+    """Spline through values (n + 1, 3): coefficients (4, 3, n) of 1, t, t^2, t^3 by interval."""
     spline = CubicSpline(np.arange(len(values)) * dt, values, axis=0)
-    return np.ascontiguousarray(np.transpose(spline.c[::-1], (1, 2, 0)))
+    return np.ascontiguousarray(np.transpose(spline.c[::-1], (0, 2, 1)))
 
 
 def track_velocity(lla: FloatArray, dt: float) -> FloatArray:
@@ -161,12 +161,10 @@ class Trajectory:
             Roll, pitch and yaw, rad; jumps by a full turn do no harm.
         """
         dt = sampling_interval(dt)
-        position, attitude = finite_numbers(lla, "lla"), finite_numbers(rpy, "rpy")
-        for name, values in (("lla", position), ("rpy", attitude)):
-            if values.ndim != 2 or values.shape[1] != 3 or len(values) < 2:
-                raise InputError(
-                    f"{name} has shape {values.shape}: give two or more epochs, 3 numbers each"
-                )
+        hint = "two or more epochs, 3 numbers each"
+        position, attitude = (
+            finite_rows(each, name, hint, 2) for each, name in ((lla, "lla"), (rpy, "rpy"))
+        )
         check_latitudes(position, "lla")
         position = unwrapped_longitudes(position)
         return cls(dt, position, track_velocity(position, dt), attitude)
@@ -260,4 +258,14 @@ def finite_numbers(values: object, name: str) -> FloatArray:
             row = part.start + int(np.argwhere(~np.isfinite(array[part]))[0][0])
             raise InputError(f"{name} is not finite at index {row}: give a number for every epoch")
         release(array)
+    return array
+
+
+def finite_rows(
+    values: object, name: str, hint: str, least: int = 0, n: int | None = None
+) -> FloatArray:
+    """Rows of three finite numbers: ``least`` or more, or exactly ``n``."""
+    array = finite_numbers(values, name)
+    if array.ndim != 2 or array.shape[1] != 3 or len(array) < least or n not in (None, len(array)):
+        raise InputError(f"{name} has shape {array.shape}: give {hint}")
     return array

@@ -154,12 +154,12 @@ class LogColumns:
         common = self.unit("latitude") or ("deg" if beyond else None)
         found = {}
         for quantity, limit in limits.items():
-            unit = self.unit(quantity) or common
-            hint = f"name it {quantity}_rad or {quantity}_deg"
-            if unit is None:
-                raise InputError(f"{self.place(quantity)}: are its angles in rad or deg? {hint}")
+            unit, hint = self.unit(quantity) or common, f"name it {quantity}_rad or {quantity}_deg"
             if unit not in ("rad", "deg"):
-                raise InputError(f"{self.place(quantity)}: {unit} is not a unit of angle: {hint}")
+                what = (
+                    f"{unit} is not a unit of angle:" if unit else "are its angles in rad or deg?"
+                )
+                raise InputError(f"{self.place(quantity)}: {what} {hint}")
             angle = FACTORS[unit] * values[quantity]
             bad = np.flatnonzero(np.abs(angle) > limit * (1.0 + 1e-9))
             if bad.size:

@@ -8,12 +8,7 @@ from gmwm import GaussMarkov, RandomWalk, WhiteNoise
 from gmwm.errors import InputError
 from gmwm.ins.covariance import reduction
 from gmwm.ins.covariance.analysis import Course, covariance_analysis
-from gmwm.ins.covariance.reduction import (
-    FORMS,
-    loiter_with_outages,
-    read_off,
-    reduce,
-)
+from gmwm.ins.covariance.reduction import FORMS, loiter_with_outages, read_off, reduce
 from gmwm.ins.filter.aiding import Outage, gnss
 from gmwm.ins.imu.sensors import AXES, SensorModels
 from gmwm.ins.simulation.trials import Scenario, Simulated, monte_carlo

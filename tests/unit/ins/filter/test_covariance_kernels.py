@@ -20,7 +20,6 @@ from gmwm.ins.filter import (
     Kinematics,
     SensorStates,
     measurement_update,
-    new_scratch,
     new_transition,
     propagate,
     tilt_squared,
@@ -55,9 +54,7 @@ LEFT_OUT[5, 0], LEFT_OUT[5, 2] = 8.2e-9, 4e-8
 def nav_state(case):
     lat, lon, height, velocity, rpy = case
     return NavState(
-        np.array([np.radians(lat), np.radians(lon), height]),
-        np.array(velocity),
-        np.radians(rpy),
+        np.array([np.radians(lat), np.radians(lon), height]), np.array(velocity), np.radians(rpy)
     )
 
 
@@ -229,7 +226,7 @@ def propagated(P, change, states, k):
     """P after `propagate`, in a copy."""
     assert states.m + 9 == len(P)
     P = P.copy()
-    propagate(P, change, states.table, k, new_scratch(len(P)))
+    propagate(P, change, states.table, k)
     return P
 
 
@@ -238,10 +235,10 @@ def propagated(P, change, states, k):
 @pytest.mark.parametrize("seed", [1, 2])
 def test_carry_is_dense_propagation_sample_by_sample(k, seed, extra):
     rng = np.random.default_rng(seed)
-    states = SensorStates.of(SENSORS, DT, 10)
+    slow = (("a", 1.0, 0.3), ("b", 2.0, 0.3), ("c", 0.5, 0.3))[:extra]
+    states = SensorStates.of(SENSORS, DT, 10, slow=slow)
     Phi, Q, H, white = dense(SENSORS, DT)
     if extra:
-        states = states.with_markov(["a", "b", "c"], np.array([1.0, 2.0, 0.5]), np.full(3, 0.3), DT)
         decay = np.exp(-DT / 0.3)
         Phi = block_diag(Phi, decay * np.eye(3))
         Q = block_diag(Q, np.diag([1.0, 4.0, 0.25]) * (1.0 - decay**2))

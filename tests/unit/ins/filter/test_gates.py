@@ -96,17 +96,6 @@ def test_an_outlier_is_rejected_and_leaves_the_solution_as_without_it(drive, fix
     assert np.abs(ungated.errors(truth)[61, :2]).max() > 20.0
 
 
-def test_outliers_among_all_fixes_hardly_matter(drive, fixes):
-    truth, imu = drive
-    rng = np.random.default_rng(8)
-    rows = np.flatnonzero(rng.random(fixes.fixes[0].time.size) < 0.05)
-    assert rows.size >= 5
-    found = navigate(imu, truth.state(0), SENSORS, replace(outlying(fixes, rows, 50.0), gate=1e-5))
-    np.testing.assert_array_equal(np.flatnonzero(~found.innovations.used), rows)
-    standard = found.errors(truth)[5:, :3] / found.sd[5:, :3]
-    assert np.mean(standard**2) < 2.0
-
-
 def test_a_filter_that_is_wrong_does_not_refuse_fixes_for_ever(drive, fixes):
     """It starts 300 m off, sure of 1 m: after some rejections it uses the fixes."""
     truth, imu = drive

@@ -36,10 +36,10 @@ TERMS = [
 IDS = [repr(term) for term in TERMS]
 
 
-def states_of(term, k_max=12, bias=0.0, white=None, drift_known=False):
+def states_of(term, k_max=12, bias=0.0, white=None, **options):
     model = term if white is None else term + WhiteNoise(white)
     models = {"gyro": WhiteNoise(1.0), "accel": WhiteNoise(1.0), "accel_y": model}
-    return SensorStates.of(SensorModels.of(models, {"accel_y": bias}), DT, k_max, drift_known)
+    return SensorStates.of(SensorModels.of(models, {"accel_y": bias}), DT, k_max, **options)
 
 
 def matrices(states, k):
@@ -131,9 +131,7 @@ def test_states_are_in_the_order_of_the_axes():
 
 def test_extra_markov_states_touch_no_sensor():
     before = states_of(Resonance(0.5, 4.0, 0.05))
-    after = before.with_markov(
-        ["GNSS north", "GNSS down"], np.array([2.0, 3.0]), np.full(2, 7.0), DT
-    )
+    after = states_of(Resonance(0.5, 4.0, 0.05), slow=(("north", 2.0, 7.0), ("down", 3.0, 7.0)))
     assert after.m == before.m + 2
     assert after.table.axis[-2:].tolist() == [-1, -1]
     assert after.table.partner.tolist() == [1, 0, 2, 3]

@@ -21,10 +21,7 @@ def noise(n, seed=0):
     return np.random.default_rng(seed).standard_normal((n, 6)) + 10.0 * np.arange(6)
 
 
-@given(
-    st.lists(st.integers(1, 400), min_size=1, max_size=4),
-    st.floats(0.1, 30.0),
-)
+@given(st.lists(st.integers(1, 400), min_size=1, max_size=4), st.floats(0.1, 30.0))
 @settings(max_examples=60, deadline=None)
 def test_stretches_cover_what_they_can_and_never_overlap(lengths, duration):
     # Every sample has a value of its own, known again without its mean.
