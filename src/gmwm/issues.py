@@ -12,7 +12,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
+from functools import partial
 from string import Formatter
 from typing import Any, Literal
 
@@ -47,6 +48,8 @@ class Issue:
         it makes that of its own channel invalid.
     masks: Whether samples are left out for it.
     user_only: Whether only the user can follow the hint.
+    repeats: "reader": notices of the reader, or reasons to skip a channel, say the same;
+        "diagnosis": findings of the examination have the same numbers.
     """
 
     code: str
@@ -59,6 +62,7 @@ class Issue:
     spoils: tuple[str, ...] = ()
     masks: bool = False
     user_only: bool = False
+    repeats: Literal["", "reader", "diagnosis"] = ""
 
 
 @dataclass(frozen=True)
@@ -113,15 +117,8 @@ class Notice:
 
     def to_dict(self) -> dict[str, Any]:
         """Everything in JSON types; numbers that are not finite are ``None``."""
-        return {
-            "code": self.code,
-            "severity": self.severity,
-            "where": self.where,
-            "text": self.text,
-            "values": {name: _plain(value) for name, value in self.values.items()},
-            "hint": self.hint,
-            "source": self.source,
-        }
+        values = {name: _plain(value) for name, value in self.values.items()}
+        return {**vars(self), "values": values}
 
     @classmethod
     def from_dict(cls, content: Mapping[str, Any]) -> Notice:
@@ -129,17 +126,17 @@ class Notice:
 
         Raises ValueError if the content is not a notice.
         """
-        names = ("code", "where", "text", "hint", "source")
-        if not isinstance(content, Mapping) or {*names, "severity", "values"} - {*content}:
+        own = {each.name for each in fields(cls)}
+        if not isinstance(content, Mapping) or own - {*content}:
             raise ValueError("not a notice")
         if content["severity"] not in SEVERITIES:
             raise ValueError(f"severity = {str(content['severity'])[:20]!r}")
-        texts = {name: str(content[name])[:10_000] for name in names}
-        values = {
+        found: dict[str, Any] = {name: str(content[name])[:10_000] for name in own}
+        found["values"] = {
             str(name): float("nan") if value is None else value
             for name, value in content["values"].items()
         }
-        return cls(**texts, severity=content["severity"], values=values)
+        return cls(**found)
 
 
 def notice(
@@ -176,6 +173,11 @@ def notice(
         values or {},
         _TEXT.format(issue.hint if hint is None else hint, **known),
     )
+
+
+def failure(code: str, where: str, text: str) -> Notice:
+    """A bad notice of what could not be done, by the code and the sentence of an `InputError`."""
+    return Notice(code, "bad", where, text)
 
 
 class _Text(Formatter):
@@ -220,565 +222,518 @@ def _catalogue(*rooms: Sequence[Issue]) -> dict[str, Issue]:
     return result
 
 
+_reading = partial(Issue, topic="reading")
+_fit = partial(Issue, topic="fit", severity="bad")
+_filter = partial(Issue, topic="filter")
+_navigation = partial(Issue, topic="navigation")
+_population = partial(Issue, topic="population", severity="warning")
+
 _READERS = (
-    Issue("clock-jumps", {
-          "": "the clock jumps by {longest:.12g} s, {time:.12g} s after the start: "
-              "{missing:,.0f} sample{missing:s?} missing",
-          "many": "the clock jumps {count:,} times, farthest by {longest:.12g} s, {time:.12g} s "
-                  "after the start: in all {missing:,.0f} samples missing"}, topic="clock"),
-    Issue("clock-off-grid", "{which} not near a whole number of sampling intervals: the samples "
-          "after it were placed at the nearest", topic="clock"),
-    Issue("clock-wraps", "the counter of the time stamps overflowed: they were continued",
-          topic="reading"),
-    Issue("column-numbers", "line {line} was read as column numbers and left out", topic="reading"),
-    Issue("columns-auxiliary", "auxiliary channels: {listed}", topic="reading"),
-    Issue("columns-not-used", "column{count:s?} not used: {listed}", topic="reading"),
-    Issue("columns-unreadable", "{what} left out", topic="reading"),
-    Issue("counts", "{listed}: every sample is a whole number, with a noise of {noise:.3g}: counts "
-          "of the converter, not {unit}",
-          "multiply them by the size of a count from the data sheet", severity="bad",
-          topic="recording", lacks="units_agree", reason="counts, not in the unit given",
-          spoils=("gyro", "accel")),
-    Issue("damaged", "the file {what}; the rest is used", severity="warning", topic="recording"),
-    Issue("dates", {
-          "": "column {column!r} holds dates: they count as seconds since 1970-01-01",
-          "fixes": "dates ({scale}) are counted in seconds since 1970-01-01, without leap seconds",
-          }, topic="recording"),
-    Issue("gravity", {
-          "unit": "the mean of the accelerometer is {in_file:.4g} {unit} long, which is gravity in "
-                  "{likely}",
-          "increments": "the accelerometer reads {usual:.4g} m/s^2, gravity over one sampling "
-                        "interval: increments of velocity, not accelerations",
-          "scale": "the accelerometer reads {usual:.4g} m/s^2, {ratio:.3g} times gravity: neither "
-                   "gravity nor an accelerometer without it"},
-          "check its scale and range, and that the numbers are not counts", severity="bad",
-          topic="recording", lacks="units_agree", reason="gravity contradicts the unit",
-          spoils=("gyro", "accel")),
-    Issue("gravity-absent", "Sensor Logger has subtracted gravity from these accelerations, by "
-          "what other sensors say", "use TotalAcceleration or AccelerometerUncalibrated",
-          severity="warning", topic="reading"),
-    Issue("gyro-unit", {
-          "noise": "white noise of {size:.3g} deg/s/sqrt(Hz) is more than gyros at rest have",
-          "mean": "a mean rate of {size:.3g} deg/s is more than gyros at rest have"},
-          "check the unit and the sampling rate{explained}", severity="warning",
-          topic="recording"),
-    Issue("log-dropouts", "the logger dropped {count} stretches, {duration:.3g} s in all",
-          topic="recording"),
-    Issue("mean-rate", "a mean rate of {size:.3g} deg/s is more than the bias of most gyros: the "
-          "sensor turned all the time, or is a cheap gyro that was not calibrated",
-          "make sure that it was at rest", severity="warning", topic="recording"),
-    Issue("missing-samples", {
-          "all": "{each}all {n:,} samples missing",
-          "one": "{each}{missing:,} of {n:,} samples missing, in one gap",
-          "many": "{each}{missing:,} of {n:,} samples missing, in {gaps:,} gaps, the longest "
-                  "{longest:,} sample{longest:s?}"}, topic="reading"),
-    Issue("part", "the part from {start:.6g} to {stop:.6g} s is used; times count from its start",
-          topic="reading"),
-    Issue("partial-record", "the last record is cut off, {bytes} of its {size} bytes are there: "
-          "left out", severity="warning", topic="reading"),
-    Issue("preamble", "the lines before the header (line {line}) were left out", topic="reading"),
-    Issue("rate-changes", "the sampling rate goes from {before:.4g} to {after:.4g} Hz at about "
-          "{time:.4g} s, and {rate:.6g} Hz is taken for all of it",
-          "use the part before or after ({row})", severity="bad", topic="clock",
-          lacks="rate_constant", reason="the sampling rate changed", spoils=("gyro", "accel")),
-    Issue("rate-stated", "the rate stated, {rate:g} Hz, is used", topic="reading"),
-    Issue("rate-unlikely", "inertial sensors hardly have a rate of {rate:.6g} Hz",
-          "check the unit of the time column", severity="warning", topic="reading"),
-    Issue("rows-repeated", {"": "{count:,} row repeats a row before",
-                            "many": "{count:,} rows repeat rows before"}, "left out",
-          topic="clock"),
-    Issue("sentinel", "{samples} {value:.10g}{alike}, {meaning}, first at {place}: taken as "
-          "missing", "look at the recorder", severity="warning", topic="reading", masks=True),
-    Issue("stamps-astray", "{stamps} far from the clock, at most by {largest:.3g} s ({place}): the "
-          "samples were taken as evenly spaced", topic="clock"),
-    Issue("stamps-in-bursts", "{rows} rows come with one stamp, usually: it is taken as that of "
-          "the last of them, and the others are one sampling interval apart",
-          "if the rows are of several sensors, keep those of one", topic="reading"),
-    Issue("swapped", "{contradiction}", "check which column is which channel", severity="bad",
-          topic="recording", lacks="units_agree", reason="gyro and accelerometer swapped",
-          spoils=("gyro", "accel")),
-    Issue("temperature-interpolated", "{listed}: {count:,} values, interpolated to the samples of "
-          "{first}", topic="reading"),
-    Issue("time-column", "time is column {used}; time= selects {others}", topic="reading"),
-    Issue("time-of-day", "times of day (hhmmss) count as seconds since midnight",
-          topic="recording"),
-    Issue("time-stamps", "time stamps ({column}, {units}) give {rate:.6g} Hz{steps}",
-          topic="reading"),
-    Issue("topic", {"": "{sensors} of topic {topic}",
-                    "others": "read from {topic}; there are also {listed}"}, topic="reading"),
-    Issue("topics-joined", "{count} topics at {listed}: the {duration:.6g} s that they share are "
-          "used", topic="reading"),
-    Issue("units-contradicted", "the units given contradict {origin}: {listed}",
-          severity="warning", topic="reading"),
-    Issue("units-from-names", "units from {origin}: {listed}", topic="reading"),
+    _reading("clock-jumps", {
+        "": "the clock jumps by {longest:.12g} s, {time:.12g} s after the start: {missing:,.0f} "
+        "sample{missing:s?} missing",
+        "many": "the clock jumps {count:,} times, farthest by {longest:.12g} s, {time:.12g} s "
+        "after the start: in all {missing:,.0f} samples missing"}, topic="clock"),
+    _reading("clock-off-grid", "{which} not near a whole number of sampling intervals: the samples "
+        "after it were placed at the nearest", topic="clock"),
+    _reading("clock-wraps", "the counter of the time stamps overflowed: they were continued"),
+    _reading("column-numbers", "line {line} was read as column numbers and left out"),
+    _reading("columns-auxiliary", "auxiliary channels: {listed}"),
+    _reading("columns-not-used", "column{count:s?} not used: {listed}"),
+    _reading("columns-unreadable", "{what} left out"),
+    _reading("counts", "{listed}: every sample is a whole number, with a noise of {noise:.3g}: "
+        "counts of the converter, not {unit}",
+        "multiply them by the size of a count from the data sheet", severity="bad",
+        topic="recording", lacks="units_agree", reason="counts, not in the unit given",
+        spoils=("gyro", "accel")),
+    _reading("damaged", "the file {what}; the rest is used", severity="warning", topic="recording"),
+    _reading("dates", {
+        "": "column {column!r} holds dates: they count as seconds since 1970-01-01",
+        "fixes": "dates ({scale}) are counted in seconds since 1970-01-01, without leap seconds"},
+        topic="recording"),
+    _reading("gravity", {
+        "unit": "the mean of the accelerometer is {in_file:.4g} {unit} long, which is gravity in "
+        "{likely}",
+        "increments": "the accelerometer reads {usual:.4g} m/s^2, gravity over one sampling "
+        "interval: increments of velocity, not accelerations",
+        "scale": "the accelerometer reads {usual:.4g} m/s^2, {ratio:.3g} times gravity: neither "
+        "gravity nor an accelerometer without it"},
+        "check its scale and range, and that the numbers are not counts", severity="bad",
+        topic="recording", lacks="units_agree", reason="gravity contradicts the unit",
+        spoils=("gyro", "accel")),
+    _reading("gravity-absent", "Sensor Logger has subtracted gravity from these accelerations, by "
+        "what other sensors say", "use TotalAcceleration or AccelerometerUncalibrated",
+        severity="warning"),
+    _reading("gyro-unit", {
+        "noise": "white noise of {size:.3g} deg/s/sqrt(Hz) is more than gyros at rest have",
+        "mean": "a mean rate of {size:.3g} deg/s is more than gyros at rest have"},
+        "check the unit and the sampling rate{explained}", severity="warning", topic="recording"),
+    _reading("log-dropouts", "the logger dropped {count} stretches, {duration:.3g} s in all",
+        topic="recording"),
+    _reading("mean-rate", "a mean rate of {size:.3g} deg/s is more than the bias of most gyros: "
+        "the sensor turned all the time, or is a cheap gyro that was not calibrated",
+        "make sure that it was at rest", severity="warning", topic="recording"),
+    _reading("missing-samples", {
+        "all": "{each}all {n:,} samples missing",
+        "one": "{each}{missing:,} of {n:,} samples missing, in one gap",
+        "many": "{each}{missing:,} of {n:,} samples missing, in {gaps:,} gaps, the longest "
+        "{longest:,} sample{longest:s?}"}, repeats="diagnosis"),
+    _reading("part", "the part from {start:.6g} to {stop:.6g} s is used; times count from its "
+        "start"),
+    _reading("partial-record", "the last record is cut off, {bytes} of its {size} bytes are there: "
+        "left out", severity="warning"),
+    _reading("preamble", "the lines before the header (line {line}) were left out"),
+    _reading("rate-changes", "the sampling rate goes from {before:.4g} to {after:.4g} Hz at about "
+        "{time:.4g} s, and {rate:.6g} Hz is taken for all of it",
+        "use the part before or after ({row})", severity="bad", topic="clock",
+        lacks="rate_constant", reason="the sampling rate changed", spoils=("gyro", "accel")),
+    _reading("rate-stated", "the rate stated, {rate:g} Hz, is used"),
+    _reading("rate-unlikely", "inertial sensors hardly have a rate of {rate:.6g} Hz",
+        "check the unit of the time column", severity="warning"),
+    _reading("rows-repeated", {
+        "": "{count:,} row repeats a row before",
+        "many": "{count:,} rows repeat rows before"}, "left out", topic="clock"),
+    _reading("sentinel", "{samples} {value:.10g}{alike}, {meaning}, first at {place}: taken as "
+        "missing", "look at the recorder", severity="warning", masks=True),
+    _reading("stamps-astray", "{stamps} far from the clock, at most by {largest:.3g} s ({place}): "
+        "the samples were taken as evenly spaced", topic="clock"),
+    _reading("stamps-in-bursts", "{rows} rows come with one stamp, usually: it is taken as that of "
+        "the last of them, and the others are one sampling interval apart",
+        "if the rows are of several sensors, keep those of one"),
+    _reading("swapped", "{contradiction}", "check which column is which channel", severity="bad",
+        topic="recording", lacks="units_agree", reason="gyro and accelerometer swapped",
+        spoils=("gyro", "accel")),
+    _reading("temperature-interpolated", "{listed}: {count:,} values, interpolated to the samples "
+        "of {first}"),
+    _reading("time-column", "time is column {used}; time= selects {others}"),
+    _reading("time-of-day", "times of day (hhmmss) count as seconds since midnight",
+        topic="recording"),
+    _reading("time-stamps", "time stamps ({column}, {units}) give {rate:.6g} Hz{steps}"),
+    _reading("topic", {
+        "": "{sensors} of topic {topic}",
+        "others": "read from {topic}; there are also {listed}"}),
+    _reading("topics-joined", "{count} topics at {listed}: the {duration:.6g} s that they share "
+        "are used"),
+    _reading("units-contradicted", "the units given contradict {origin}: {listed}",
+        severity="warning"),
+    _reading("units-from-names", "units from {origin}: {listed}"),
 )  # fmt: skip
 
 _VARIANCE = (
     Issue("curve-shortened", "missing samples shorten the curve: it ends at tau = {tau:.3g} s, a "
-          "complete record at {complete:.3g} s", severity="warning", topic="samples"),
+        "complete record at {complete:.3g} s", severity="warning", topic="samples"),
 )  # fmt: skip
 
 _DIAGNOSIS = (
-    Issue("abrupt-end",
-          "samples end abruptly at {ends}, where noise would thin out: rectified, wrapped round or "
-          "sorted out",
-          "look for what wraps, cuts or takes absolute values between the sensor and the file",
-          severity="warning", topic="samples", lacks="within_range",
-          reason="samples that end abruptly", spoils=("channel",), user_only=True),
+    Issue("abrupt-end", "samples end abruptly at {ends}, where noise would thin out: rectified, "
+        "wrapped round or sorted out",
+        "look for what wraps, cuts or takes absolute values between the sensor and the file",
+        severity="warning", topic="samples", lacks="within_range",
+        reason="samples that end abruptly", spoils=("channel",), user_only=True),
     Issue("clean", "nothing found that spoils the estimates", severity="good"),
     Issue("clock", "the steps of the time stamps vary by {jitter:.2g%} rms",
-          "harmless if only the stamps are late; else let the sensor's own clock trigger it",
-          severity="warning"),
+        "harmless if only the stamps are late; else let the sensor's own clock trigger it",
+        severity="warning"),
     Issue("crosstalk", "fast noise of {both} is correlated by {correlation:.2g}",
-          "each channel is modelled by itself; a filter may need their covariance",
-          severity="warning", topic="samples"),
+        "each channel is modelled by itself; a filter may need their covariance",
+        severity="warning", topic="samples"),
     Issue("dead", "every sample is {shown}: the channel is dead",
-          "check sensor and columns; the calibration skips it",
-          severity="bad", topic="samples", lacks="samples_change", spoils=("channel",)),
-    Issue("drift",
-          {"": "means of {length:.3g} s wander by {shown} rms, {times} times what the fast noise "
-               "leaves",
-           "ramp": "drifts by {shown[0]} over the record and wanders about that by {shown[1]} rms"},
-          "estimated as a random walk or a slow Gauss-Markov process", topic="samples"),
-    Issue("event",
-          {"": "a spike or shock {shown} at {time:.6g} s, {duration:.2g} s long",
-           "many": "{count:,.0f} spikes or shocks, the largest {shown} at {time:.6g} s, "
-                   "{duration:.2g} s long{others}",
-           "most": "{part:.2g%} of the samples differ from what is before them as spikes do: "
-                   "values that are held, switched or made otherwise, not noise of a sensor"},
-          "gmwm calibrate leaves it out; in Python: Health.masked, or robust=True",
-          severity="warning", topic="samples", masks=True),
-    Issue("events-left-out",
-          "{samples:,} samples of {copies}spikes, shocks or lost packets left out",
-          topic="samples"),
-    Issue("filled",
-          "{share:.2g%} of the samples lie on straight lines between others: put there for samples "
-          "that were lost or sorted out",
-          "make such samples missing (NaN)", severity="warning", topic="samples",
-          lacks="samples_measured", reason="samples put between others", spoils=("channel",),
-          user_only=True),
-    Issue("gap",
-          {"": "{missing:,.0f} of {n:,} samples missing ({share:.2g%}) in {gaps:,.0f} "
-               "gap{gaps:s?}, the longest {longest:.3g} s",
-           "all": "all samples missing"},
-          severity="bad", topic="samples"),
-    Issue("heavy-tails",
-          {"student": "the noise has heavy tails, like Student's t with {shape:.2g} degrees of "
-                      "freedom: large samples belong to it",
-           "power": "the noise has heavy tails, like exp(-|x|^{shape:.2g}): large samples belong "
-                    "to it"},
-          "nothing is left out; the standard error of the white noise allows for it",
-          topic="samples"),
-    Issue("held",
-          "{share:.2g%} of the samples repeat the one before, where chance explains "
-          "{chance:.2g%}: lost packets, for which the last sample was written again",
-          "make such samples missing (NaN)", severity="warning", topic="samples",
-          lacks="samples_measured", reason="samples that repeat the one before",
-          spoils=("channel",), masks=True, user_only=True),
+        "check sensor and columns; the calibration skips it", severity="bad", topic="samples",
+        lacks="samples_change", spoils=("channel",), repeats="reader"),
+    Issue("drift", {
+        "": "means of {length:.3g} s wander by {shown} rms, {times} times what the fast noise "
+        "leaves",
+        "ramp": "drifts by {shown[0]} over the record and wanders about that by {shown[1]} rms"},
+        "estimated as a random walk or a slow Gauss-Markov process", topic="samples"),
+    Issue("event", {
+        "": "a spike or shock {shown} at {time:.6g} s, {duration:.2g} s long",
+        "many": "{count:,.0f} spikes or shocks, the largest {shown} at {time:.6g} s, "
+        "{duration:.2g} s long{others}",
+        "most": "{part:.2g%} of the samples differ from what is before them as spikes do: values "
+        "that are held, switched or made otherwise, not noise of a sensor"},
+        "gmwm calibrate leaves it out; in Python: Health.masked, or robust=True",
+        severity="warning", topic="samples", masks=True),
+    Issue("events-left-out", "{samples:,} samples of {copies}spikes, shocks or lost packets left "
+        "out", topic="samples", repeats="diagnosis"),
+    Issue("filled", "{share:.2g%} of the samples lie on straight lines between others: put there "
+        "for samples that were lost or sorted out", "make such samples missing (NaN)",
+        severity="warning", topic="samples", lacks="samples_measured",
+        reason="samples put between others", spoils=("channel",), user_only=True),
+    Issue("gap", {
+        "": "{missing:,.0f} of {n:,} samples missing ({share:.2g%}) in {gaps:,.0f} gap{gaps:s?}, "
+        "the longest {longest:.3g} s",
+        "all": "all samples missing"}, severity="bad", topic="samples", repeats="reader"),
+    Issue("heavy-tails", {
+        "student": "the noise has heavy tails, like Student's t with {shape:.2g} degrees of "
+        "freedom: large samples belong to it",
+        "power": "the noise has heavy tails, like exp(-|x|^{shape:.2g}): large samples belong to "
+        "it"}, "nothing is left out; the standard error of the white noise allows for it",
+        topic="samples"),
+    Issue("held", "{share:.2g%} of the samples repeat the one before, where chance explains "
+        "{chance:.2g%}: lost packets, for which the last sample was written again",
+        "make such samples missing (NaN)", severity="warning", topic="samples",
+        lacks="samples_measured", reason="samples that repeat the one before", spoils=("channel",),
+        masks=True, user_only=True),
     Issue("infinite", "{count:,} infinite samples", "repair them, or set them to NaN for missing",
-          severity="bad", topic="samples"),
-    Issue("interpolated",
-          "{share:.2g%} of the samples lie on straight lines between others: interpolated from "
-          "about {rate:.3g} Hz, so the noise is not the sensor's",
-          "record what the sensor gives, in a topic of its own or without the driver's "
-          "interpolation (RealSense: unite_imu_method 0); the calibration skips the channel",
-          severity="bad", topic="samples"),
-    Issue("length",
-          {"": "{n:,} samples at {rate:g} Hz, {duration:.6g} s",
-           "short": "{n:,} samples at {rate:g} Hz, {duration:.6g} s, too short for slow errors of "
-                    "minutes and more",
-           "few": "fewer than {fewest} samples in a row, too few for any other check"},
-          "an hour or more shows them", severity="good"),
-    Issue("line",
-          {"": "a periodic line at {frequency:.4g} Hz, amplitude {shown}, {times} times its "
-               "surroundings{also}",
-           "weak": "{count:.0f} weaker periodic line{count:s?}, the strongest at "
-                   "{frequency:.4g} Hz, amplitude {shown}"},
-          "gmwm calibrate adds a Sinusoid to the model; or find what turns or hums",
-          topic="samples"),
-    Issue("not-static", "not static: {verb} {times}", severity="warning",
-          lacks="recording_static", reason="the sensor moved", spoils=("gyro", "accel")),
-    Issue("outliers",
-          {"": "{share:.2g%} of the samples are outliers spread over the record, beyond four "
-               "standard deviations, where noise has {usual:.2g%}",
-           "fixes": "{fixes} ({share})",
-           "innovations": "The filter's model does not fit: innovations are {sizes} as it expects; "
-                          "most are not, so that some fixes are outliers, or errors without fixes "
-                          "grow faster than the sensor models predict."},
-          "gmwm calibrate leaves them out; in Python: Health.masked, or robust=True",
-          severity="warning", topic="samples", masks=True),
-    Issue("repeated-samples",
-          "each sample is written {times:.0f} times: the channel's own rate is {rate:.6g} Hz",
-          "one of each is used, at that rate", topic="samples"),
-    Issue("resonance",
-          "a resonance at {frequency:.3g} Hz, damping {damping:.2g}, {times} times its "
-          "surroundings, {shown} rms",
-          "gmwm calibrate adds a Resonance to the model where it is needed", topic="samples"),
-    Issue("rounding",
-          {"": "samples come in steps of {step}, {times} times the white noise of {shown}",
-           "coarse": "samples come in steps of {step}, more than three times the noise below them"},
-          severity="bad", topic="samples", lacks="resolution_fine",
-          reason="steps coarser than the noise", spoils=("channel",)),
-    Issue("rows-copied",
-          {"": "{samples:,.0f} rows repeat earlier ones in every channel, all from {start:.6g} s "
-               "on, as from {first:.6g} s on: noise does not repeat",
-           "several": "{samples:,.0f} rows repeat earlier ones in every channel, in {count:,.0f} "
-                      "stretches, the longest {longest:.6g} s from {start:.6g} s on, as from "
-                      "{first:.6g} s on: noise does not repeat"},
-          "look for files joined with an overlap and for buffers that are sent again",
-          severity="warning", topic="samples", masks=True),
-    Issue("saturation",
-          "cut off at {ends}: {samples:,.0f} samples ({share:.2g%}) at the end of the scale",
-          "use a wider range; make such samples missing (NaN) if they are few",
-          severity="warning", topic="samples", lacks="within_range",
-          reason="samples cut off at range", spoils=("channel",), user_only=True),
+        severity="bad", topic="samples", repeats="reader"),
+    Issue("interpolated", "{share:.2g%} of the samples lie on straight lines between others: "
+        "interpolated from about {rate:.3g} Hz, so the noise is not the sensor's",
+        "record what the sensor gives, in a topic of its own or without the driver's interpolation "
+        "(RealSense: unite_imu_method 0); the calibration skips the channel", severity="bad",
+        topic="samples"),
+    Issue("length", {
+        "": "{n:,} samples at {rate:g} Hz, {duration:.6g} s",
+        "short": "{n:,} samples at {rate:g} Hz, {duration:.6g} s, too short for slow errors of "
+        "minutes and more",
+        "few": "fewer than {fewest} samples in a row, too few for any other check"},
+        "an hour or more shows them", severity="good"),
+    Issue("line", {
+        "": "a periodic line at {frequency:.4g} Hz, amplitude {shown}, {times} times its "
+        "surroundings{also}",
+        "weak": "{count:.0f} weaker periodic line{count:s?}, the strongest at {frequency:.4g} Hz, "
+        "amplitude {shown}"},
+        "gmwm calibrate adds a Sinusoid to the model; or find what turns or hums", topic="samples"),
+    Issue("not-static", "not static: {verb} {times}", severity="warning", lacks="recording_static",
+        reason="the sensor moved", spoils=("gyro", "accel")),
+    Issue("outliers", {
+        "": "{share:.2g%} of the samples are outliers spread over the record, beyond four standard "
+        "deviations, where noise has {usual:.2g%}",
+        "fixes": "{fixes} ({share})",
+        "innovations": "The filter's model does not fit: innovations are {sizes} as it expects; "
+        "most are not, so that some fixes are outliers, or errors without fixes grow faster than "
+        "the sensor models predict."},
+        "gmwm calibrate leaves them out; in Python: Health.masked, or robust=True",
+        severity="warning", topic="samples", masks=True),
+    Issue("repeated-samples", "each sample is written {times:.0f} times: the channel's own rate is "
+        "{rate:.6g} Hz", "one of each is used, at that rate", topic="samples"),
+    Issue("resonance", "a resonance at {frequency:.3g} Hz, damping {damping:.2g}, {times} times "
+        "its surroundings, {shown} rms",
+        "gmwm calibrate adds a Resonance to the model where it is needed", topic="samples"),
+    Issue("rounding", {
+        "": "samples come in steps of {step}, {times} times the white noise of {shown}",
+        "coarse": "samples come in steps of {step}, more than three times the noise below them"},
+        severity="bad", topic="samples", lacks="resolution_fine",
+        reason="steps coarser than the noise", spoils=("channel",)),
+    Issue("rows-copied", {
+        "": "{samples:,.0f} rows repeat earlier ones in every channel, all from {start:.6g} s on, "
+        "as from {first:.6g} s on: noise does not repeat",
+        "several": "{samples:,.0f} rows repeat earlier ones in every channel, in {count:,.0f} "
+        "stretches, the longest {longest:.6g} s from {start:.6g} s on, as from {first:.6g} s on: "
+        "noise does not repeat"},
+        "look for files joined with an overlap and for buffers that are sent again",
+        severity="warning", topic="samples", masks=True),
+    Issue("saturation", "cut off at {ends}: {samples:,.0f} samples ({share:.2g%}) at the end of "
+        "the scale", "use a wider range; make such samples missing (NaN) if they are few",
+        severity="warning", topic="samples", lacks="within_range",
+        reason="samples cut off at range", spoils=("channel",), user_only=True),
     Issue("size", "varies by {spread:.1g} {unit}, which no sensor gives", "check the unit",
-          severity="bad"),
-    Issue("still-stretches",
-          "in motion or vibrating for a part of its {duration:.4g} s; at rest from {listed} "
-          "|{timeline}|: these {total:.4g} s are used, and no averaging time is longer than the "
-          "longest of them, {longest:.4g} s",
-          "slower errors are not seen", severity="warning"),
-    Issue("stuck",
-          {"": "stuck at {shown} for {longest:,.0f} samples from {time:.6g} s on, where rounding "
-               "explains {chance:,}",
-           "often": "stuck {count:,.0f} times, the longest at {shown} for {longest:,.0f} samples "
-                    "from {time:.6g} s on, where rounding explains {chance:,}",
-           "log": "one value for {length:.4g} s from {start:.10g} s on: the sensor is stuck"},
-          "make such samples missing (NaN) before the fit", severity="warning", topic="samples",
-          lacks="samples_change", reason="values that stick", spoils=("channel",),
-          user_only=True),
+        severity="bad"),
+    Issue("still-stretches", "in motion or vibrating for a part of its {duration:.4g} s; at rest "
+        "from {listed} |{timeline}|: these {total:.4g} s are used, and no averaging time is longer "
+        "than the longest of them, {longest:.4g} s", "slower errors are not seen",
+        severity="warning"),
+    Issue("stuck", {
+        "": "stuck at {shown} for {longest:,.0f} samples from {time:.6g} s on, where rounding "
+        "explains {chance:,}",
+        "often": "stuck {count:,.0f} times, the longest at {shown} for {longest:,.0f} samples from "
+        "{time:.6g} s on, where rounding explains {chance:,}",
+        "log": "one value for {length:.4g} s from {start:.10g} s on: the sensor is stuck"},
+        "make such samples missing (NaN) before the fit", severity="warning", topic="samples",
+        lacks="samples_change", reason="values that stick", spoils=("channel",), user_only=True),
     Issue("temperature", "follows {name} by {per} (correlation {correlation:.2g})",
-          "compensate for it first, or slow terms of the model will stand for it",
-          severity="warning", user_only=True),
-    Issue("tilt",
-          "tilted by {degrees:.2g} deg at {time:.4g} s{others}: gravity moves between the axes",
-          severity="warning", lacks="attitude_kept", reason="the sensor tilted",
-          spoils=("accel",)),
-    Issue("value-repeated",
-          {"": "{samples:,.0f} samples ({share:.2g%}) are {shown}, which comes {times} times as "
-               "often as the values next to it",
-           "cut": "zero comes twice as often ({share:.2g%}) as the values around it explain: "
-                  "samples were cut towards zero, not rounded"},
-          "if it stands for no answer or a dead band, make such samples missing (NaN)",
-          severity="warning", topic="samples", lacks="samples_measured",
-          reason="one value stands for many", spoils=("channel",)),
-    Issue("variance",
-          {"": "{before}the noise is not steady: {low} in the quiet and {high} in the loud tenth "
-               "of parts of {part:.3g} s, so that its mean is {excess:.2g%} above that of the "
-               "quiet quarter",
-           "half": "the noise is {growth:.2g%} {word} in the second half than in the first",
-           "tenth": "the noise is {growth:.2g%} larger than usual in the tenth of the record that "
-                    "begins at {start:.4g} s"},
-          "use a recording, or a part, without what vibrates",
-          severity="bad", topic="samples", lacks="noise_steady",
-          reason="the noise comes and goes", spoils=("channel",), user_only=True),
-    Issue("vibration",
-          "it vibrates for {total:.4g} s: samples scatter up to {times} times more than at rest "
-          "from {listed}",
-          "use what is at rest: gmwm.find_still has the stretches", severity="warning"),
+        "compensate for it first, or slow terms of the model will stand for it", severity="warning",
+        user_only=True),
+    Issue("tilt", "tilted by {degrees:.2g} deg at {time:.4g} s{others}: gravity moves between the "
+        "axes", severity="warning", lacks="attitude_kept", reason="the sensor tilted",
+        spoils=("accel",)),
+    Issue("value-repeated", {
+        "": "{samples:,.0f} samples ({share:.2g%}) are {shown}, which comes {times} times as often "
+        "as the values next to it",
+        "cut": "zero comes twice as often ({share:.2g%}) as the values around it explain: samples "
+        "were cut towards zero, not rounded"},
+        "if it stands for no answer or a dead band, make such samples missing (NaN)",
+        severity="warning", topic="samples", lacks="samples_measured",
+        reason="one value stands for many", spoils=("channel",)),
+    Issue("variance", {
+        "": "{before}the noise is not steady: {low} in the quiet and {high} in the loud tenth of "
+        "parts of {part:.3g} s, so that its mean is {excess:.2g%} above that of the quiet quarter",
+        "half": "the noise is {growth:.2g%} {word} in the second half than in the first",
+        "tenth": "the noise is {growth:.2g%} larger than usual in the tenth of the record that "
+        "begins at {start:.4g} s"}, "use a recording, or a part, without what vibrates",
+        severity="bad", topic="samples", lacks="noise_steady", reason="the noise comes and goes",
+        spoils=("channel",), user_only=True),
+    Issue("vibration", "it vibrates for {total:.4g} s: samples scatter up to {times} times more "
+        "than at rest from {listed}", "use what is at rest: gmwm.find_still has the stretches",
+        severity="warning"),
 )  # fmt: skip
 
 _CALIBRATION = (
     Issue("all-missing", "all samples missing{why}", severity="bad"),
     Issue("ambiguity", "{models} models fit equally well: {titles}{also}", "the first is used",
-          topic="selection"),
+        topic="selection"),
     Issue("constant", "constant at {value:.6g} {unit}", severity="bad"),
-    Issue("departures-many",
-          "{removed} departures were subtracted: a level that changes so often is noise of the "
-          "sensor",
-          "fit a slow term in place of it, such as a Gauss-Markov process",
-          severity="bad", lacks="stationary", reason="the bias steps to and fro"),
-    Issue("departures-removed",
-          "what was subtracted makes the deviation {times} times as large at tau = {tau:.3g} s: "
-          "the model holds where nothing like it comes again",
-          "find its cause, or let a slow term of the model describe it", severity="warning"),
+    Issue("departures-many", "{removed} departures were subtracted: a level that changes so often "
+        "is noise of the sensor",
+        "fit a slow term in place of it, such as a Gauss-Markov process", severity="bad",
+        lacks="stationary", reason="the bias steps to and fro"),
+    Issue("departures-removed", "what was subtracted makes the deviation {times} times as large at "
+        "tau = {tau:.3g} s: the model holds where nothing like it comes again",
+        "find its cause, or let a slow term of the model describe it", severity="warning"),
     Issue("drift-at-start", "a drift by {height} from the start that ends at {when}{also}",
-          "leave it out{back}", severity="bad", topic="departure", lacks="stationary",
-          reason="drift after switching on"),
+        "leave it out{back}", severity="bad", topic="departure", lacks="stationary",
+        reason="drift after switching on"),
     Issue("fit-not-valid", {
-        "": "{text}",
-        "compared": "its own fit is not valid ({reasons})",
-    }, topic="recording"),
-    Issue("longest-part",
-          "the longest part without the {count} steps and drifts is {kept:,.0f} s of {of:,.0f} s, "
-          "from {start:.6g} s to {stop:.6g} s",
-          "calibrate that part{also}"),
+        "": "the fit failed; do not use these numbers",
+        "filter": "the fit{count:s?} {are} not valid: do not use these numbers in a filter",
+        "compared": "its own fit is not valid ({reasons})"}, "read its notices first",
+        severity="warning"),
+    Issue("longest-part", "the longest part without the {count} steps and drifts is {kept:,.0f} s "
+        "of {of:,.0f} s, from {start:.6g} s to {stop:.6g} s", "calibrate that part{also}"),
     Issue("mostly-missing", "{missing:,} of {n:,} samples missing, more than half{why}",
-          severity="bad"),
+        severity="bad"),
     Issue("not-estimable", "{text}", severity="bad"),
     Issue("slow-period", "a period of {when} with an amplitude of {height}{also}",
-          "find what varies so, such as the temperature{back}", severity="bad",
-          topic="departure", lacks="stationary", reason="a slow period stands out"),
+        "find what varies so, such as the temperature{back}", severity="bad", topic="departure",
+        lacks="stationary", reason="a slow period stands out"),
     Issue("step", "a step of {height} at {when}{also}",
-          "calibrate the part before it or after it{back}", severity="bad", topic="departure",
-          lacks="stationary", reason="the bias stepped"),
-    Issue("transient",
-          "a transient of {height} at the start with a time constant of {when}{also}",
-          "leave out the first three time constants{back}", severity="bad", topic="departure",
-          lacks="stationary", reason="a transient at the start"),
-    Issue("unresolved-walk",
-          "the record leaves open a random walk of up to K = {shown} (95 %): with it the deviation "
-          "at {tau:.4g} s is {times} times that of the model",
-          "only a longer record can tell"),
-    Issue("unsteady",
-          "the slow noise changes during the recording: {quiet_part} it has {less} times the "
-          "deviation of the whole record, {loud_part} {more} times; the model is an average",
-          "calibrate the part that is like the use", severity="bad", lacks="noise_steady",
-          reason="slow noise changes its size"),
+        "calibrate the part before it or after it{back}", severity="bad", topic="departure",
+        lacks="stationary", reason="the bias stepped"),
+    Issue("transient", "a transient of {height} at the start with a time constant of {when}{also}",
+        "leave out the first three time constants{back}", severity="bad", topic="departure",
+        lacks="stationary", reason="a transient at the start"),
+    Issue("unresolved-walk", "the record leaves open a random walk of up to K = {shown} (95 %): "
+        "with it the deviation at {tau:.4g} s is {times} times that of the model",
+        "only a longer record can tell"),
+    Issue("unsteady", "the slow noise changes during the recording: {quiet_part} it has {less} "
+        "times the deviation of the whole record, {loud_part} {more} times; the model is an "
+        "average", "calibrate the part that is like the use", severity="bad", lacks="noise_steady",
+        reason="slow noise changes its size"),
 )  # fmt: skip
 
 _ESTIMATE = (
-    Issue("amplitude-bound", "not significantly above zero: only an upper limit is known",
-          severity="bad", topic="fit", lacks="amplitudes_above_zero",
-          reason="a term was not found"),
-    Issue("confounded", "cannot be distinguished from {other} (their estimates have a correlation "
-          "of {correlation:.5f})", "fix one of them", severity="bad", topic="fit",
-          lacks="parameters_separable", reason="terms cannot be separated"),
-    Issue("drift-in-state", "a drift that enters the {term} state is not a ramp of the signal",
-          severity="bad", topic="fit", lacks="drift_is_ramp", reason="the drift is no ramp"),
-    Issue("indistinct-terms", "two {kind} terms do not differ significantly ({first} = {one:.3g} "
-          "s, {second} = {other:.3g} s)", "use one fewer", severity="bad", topic="fit",
-          lacks="terms_distinct", reason="two terms look alike"),
-    Issue("level-missed", "at tau = {tau:.3g} s the data lie {errors} standard errors {side} the "
-          "model: it lacks a term there, or the recording has a fault", severity="bad",
-          topic="fit", lacks="describes_every_level", reason="the model misses one level"),
-    Issue("misfit", {
+    _fit("amplitude-bound", "not significantly above zero: only an upper limit is known",
+        lacks="amplitudes_above_zero", reason="a term was not found"),
+    _fit("confounded", "cannot be distinguished from {other} (their estimates have a correlation "
+        "of {correlation:.5f})", "fix one of them", lacks="parameters_separable",
+        reason="terms cannot be separated"),
+    _fit("drift-in-state", "a drift that enters the {term} state is not a ramp of the signal",
+        lacks="drift_is_ramp", reason="the drift is no ramp"),
+    _fit("indistinct-terms", "two {kind} terms do not differ significantly ({first} = {one:.3g} s, "
+        "{second} = {other:.3g} s)", "use one fewer", lacks="terms_distinct",
+        reason="two terms look alike"),
+    _fit("level-missed", "at tau = {tau:.3g} s the data lie {errors} standard errors {side} the "
+        "model: it lacks a term there, or the recording has a fault", lacks="describes_every_level",
+        reason="the model misses one level"),
+    _fit("misfit", {
         "": "predictions over {tau:.3g} s are too {scale}: there the data lie {share} {side} the "
-            "model's Allan deviation, by {errors} standard errors",
+        "model's Allan deviation, by {errors} standard errors",
         "chance": "at tau = {tau:.3g} s the data lie {share} {side} the model's Allan deviation, "
-                  "which may be chance: {chance:.0f} % of right models are missed as clearly",
+        "which may be chance: {chance:.0f} % of right models are missed as clearly",
         "slight": "describes the Allan deviation to {share} (least well at tau = {tau:.3g} s)",
         "allowed": "describes the Allan deviation to {share} (least well at tau = {tau:.3g} s), "
-                   "which the intervals allow for",
-        "lines": "the sum of the lines misses the Allan deviation by {share} at tau = {tau:.3g} s",
-    }, severity="bad", topic="fit", lacks="describes_data", reason="the model misses the data"),
-    Issue("no-curvature", "the likelihood has no curvature in some direction: too many parameters",
-          severity="bad", topic="fit", lacks="converged", reason="the search did not converge"),
-    Issue("no-region", "the Allan plot has no region of slope {named}, so it is not estimated",
-          severity="bad", topic="fit", lacks="regions_found", reason="no straight region found"),
-    Issue("no-test", "the fit is not tested: the gaps leave no wavelet variance, straight lines "
-          "bridge them", topic="fit"),
-    Issue("not-converged", {
+        "which the intervals allow for",
+        "lines": "the sum of the lines misses the Allan deviation by {share} at tau = {tau:.3g} s"},
+        lacks="describes_data", reason="the model misses the data"),
+    _fit("no-curvature", "the likelihood has no curvature in some direction: too many parameters",
+        lacks="converged", reason="the search did not converge"),
+    _fit("no-region", "the Allan plot has no region of slope {named}, so it is not estimated",
+        lacks="regions_found", reason="no straight region found"),
+    _fit("no-test", "the fit is not tested: the gaps leave no wavelet variance, straight lines "
+        "bridge them", severity="note"),
+    _fit("not-converged", {
         "": "the maximum of the likelihood was not reached",
         "em": "EM did not converge in {iterations} iterations",
-        "no-maximum": "EM did not reach a maximum of the likelihood",
-    }, severity="bad", topic="fit", lacks="converged", reason="the search did not converge"),
-    Issue("recordings-differ", {
+        "no-maximum": "EM did not reach a maximum of the likelihood"}, lacks="converged",
+        reason="the search did not converge"),
+    _fit("recordings-differ", {
         "": "the recordings do not have the same parameters (p = {equality_p:.2g}): the joint "
-            "values are their mean, see the spread",
+        "values are their mean, see the spread",
         "curves": "the wavelet variances differ from the joint model (p = {curves_p:.2g}): the "
-                  "recordings differ, or the model is wrong",
-    }, severity="bad", topic="fit", lacks="recordings_agree", reason="the recordings disagree"),
-    Issue("redundant-term", "the {term} does not improve the fit significantly: it is not "
-          "identifiable", "leave it out", severity="bad", topic="fit", lacks="terms_needed",
-          reason="a term is not needed"),
-    Issue("search-limit", "the {term} is at the limit of what this record can show: it is not "
-          "identifiable", "leave it out", severity="bad", topic="fit",
-          lacks="shapes_within_search", reason="a correlation time beyond reach"),
-    Issue("sensor-bandwidth", "the sensor's {bandwidth:.3g} Hz low-pass shapes this noise "
-          "({term}, N = {size:.3g} {unit}); a filter needs no state for it", topic="fit"),
-    Issue("too-few-levels", "{levels} levels cannot determine {parameters} parameters",
-          "record longer or take a smaller model", severity="bad", topic="fit",
-          lacks="enough_levels", reason="record too short"),
-    Issue("undetermined", "not determined by this record (standard error {stderr:.2g})",
-          severity="bad", topic="fit", lacks="shapes_determined",
-          reason="record too short for model"),
-    Issue("wrong-slope", "from {first:.4g} to {last:.4g} s the Allan plot has the slope "
-          "{slope:+.2f}, not {named}", "give another region", severity="bad", topic="fit",
-          lacks="slopes_agree", reason="slopes contradict the model"),
+        "recordings differ, or the model is wrong"}, lacks="recordings_agree",
+        reason="the recordings disagree"),
+    _fit("redundant-term", "the {term} does not improve the fit significantly: it is not "
+        "identifiable", "leave it out", lacks="terms_needed", reason="a term is not needed"),
+    _fit("search-limit", "the {term} is at the limit of what this record can show: it is not "
+        "identifiable", "leave it out", lacks="shapes_within_search",
+        reason="a correlation time beyond reach"),
+    _fit("sensor-bandwidth", "the sensor's {bandwidth:.3g} Hz low-pass shapes this noise ({term}, "
+        "N = {size:.3g} {unit}); a filter needs no state for it", severity="note"),
+    _fit("too-few-levels", "{levels} levels cannot determine {parameters} parameters",
+        "record longer or take a smaller model", lacks="enough_levels", reason="record too short"),
+    _fit("undetermined", "not determined by this record (standard error {stderr:.2g})",
+        lacks="shapes_determined", reason="record too short for model"),
+    _fit("wrong-slope", "from {first:.4g} to {last:.4g} s the Allan plot has the slope "
+        "{slope:+.2f}, not {named}", "give another region", lacks="slopes_agree",
+        reason="slopes contradict the model"),
 )  # fmt: skip
 
 _SELECTION = (
     Issue("ramp-or-walk", "a rate ramp of {ramp} or slow noise ({slow}): this record cannot tell "
-          "them apart, so the model has no ramp", topic="selection"),
+        "them apart, so the model has no ramp", topic="selection"),
     Issue("tie", {
         "": "{text}",
-        "log": "A tie: errors of {names} are equal as far as this log shows{but}. {resolution}",
-    }, topic="selection"),
+        "log": "A tie: errors of {names} are equal as far as this log shows{but}. {resolution}"},
+        topic="selection"),
 )  # fmt: skip
 
 _FILTER_NUMBERS = (
-    Issue("bounded-error",
-          "a {cause} moves the first integral by a bounded amount: its N, which is enough at any "
-          "time, is {factor:.2g} times too large after {horizon:g} s", topic="filter"),
-    Issue("estimate-it",
-          "larger numbers are a poor substitute for {cause}: N times {N_factor:.3g}, K times "
-          "{K_factor:.3g}", "estimate it as a state, or calibrate it", "warning", "filter"),
-    Issue("fast-peak-left-out",
-          "only the low-frequency density{also} of the {label} counts: it lies above {fast:.3g} Hz "
-          "and averages out", topic="filter"),
-    Issue("less-white-noise",
-          "N is {share:.3g} times that of the error model: use N and K as a pair, for outages of "
-          "the given lengths", topic="filter"),
-    Issue("line-left-out",
-          {"": "the {label} at {frequency:.4g} Hz, amplitude {size}, is left out",
-           "slow": "the {label} at {frequency:.4g} Hz, amplitude {size}, is left out: it is slow "
-                   "for this horizon, and errors are larger than the numbers say"}, topic="filter"),
-    Issue("loose-form",
-          "after an outage of {time:g} s predicted errors are {tightness:.3g} times the true ones; "
-          "with {tightest}, {with_state:.3g} times", topic="filter"),
-    Issue("more-than-random-walk",
-          {"": "the model has no random walk: K covers {parts}",
-           "more": "K is {times:.3g} times that of the model's random walk: it also covers "
-                   "{parts}"},
-          topic="filter"),
-    Issue("more-than-white-noise",
-          {"": "the model has no white noise: N covers {parts}",
-           "more": "N is {times:.3g} times that of the model's white noise: it also covers "
-                   "{parts}"},
-          topic="filter"),
-    Issue("no-navigation-filter", "the INS/GNSS filter is left out: {reason}", topic="filter"),
-    Issue("not-predicted", "the consistency is not predicted: {reason}", topic="filter"),
-    Issue("optimistic",
-          {"bound": "overconfident: NEES {nees:.3g} {when}; the numbers leave out too much here",
-           "reduce": "overconfident: NEES {nees:.3g} after an outage of {time:g} s; no such "
-                     "numbers are consistent at all times and on all axes that share them",
-           "beyond": "overconfident: NEES {nees:.3g} after an outage of {time:g} s, longer than "
-                     "the numbers are for"}, "estimate it as a state, or remove it from the data",
-          "warning", "filter"),
-    Issue("other-units",
-          "N in use is {factor:.3g} times that of the error model: it may be in other units",
-          "give it in {unit}/sqrt(Hz)", "warning", "filter"),
-    Issue("ramp-as-constant",
-          "the {label} counts as a constant of standard deviation {size}: |R| times the horizon",
-          "a filter that lasts longer needs a state for it", "warning", "filter"),
-    Issue("turn-on-left-out",
-          "the start bias leaves out the turn-on bias, which a recording at rest cannot show",
-          "add its variance", topic="filter"),
-    Issue("uncertainty-not-covered",
-          {"": "the uncertainty of the fitted parameters is not covered", "why": "{reason}"},
-          topic="filter"),
+    _filter("bounded-error", "a {cause} moves the first integral by a bounded amount: its N, which "
+        "is enough at any time, is {factor:.2g} times too large after {horizon:g} s"),
+    _filter("estimate-it", "larger numbers are a poor substitute for {cause}: N times "
+        "{N_factor:.3g}, K times {K_factor:.3g}", "estimate it as a state, or calibrate it",
+        severity="warning"),
+    _filter("fast-peak-left-out", "only the low-frequency density{also} of the {label} counts: it "
+        "lies above {fast:.3g} Hz and averages out"),
+    _filter("less-white-noise", "N is {share:.3g} times that of the error model: use N and K as a "
+        "pair, for outages of the given lengths"),
+    _filter("line-left-out", {
+        "": "the {label} at {frequency:.4g} Hz, amplitude {size}, is left out",
+        "slow": "the {label} at {frequency:.4g} Hz, amplitude {size}, is left out: it is slow for "
+        "this horizon, and errors are larger than the numbers say"}),
+    _filter("loose-form", "after an outage of {time:g} s predicted errors are {tightness:.3g} "
+        "times the true ones; with {tightest}, {with_state:.3g} times"),
+    _filter("more-than-random-walk", {
+        "": "the model has no random walk: K covers {parts}",
+        "more": "K is {times:.3g} times that of the model's random walk: it also covers {parts}"}),
+    _filter("more-than-white-noise", {
+        "": "the model has no white noise: N covers {parts}",
+        "more": "N is {times:.3g} times that of the model's white noise: it also covers {parts}"}),
+    _filter("no-navigation-filter", "the INS/GNSS filter is left out: {reason}"),
+    _filter("not-predicted", "the consistency is not predicted: {reason}"),
+    _filter("optimistic", {
+        "bound": "overconfident: NEES {nees:.3g} {when}; the numbers leave out too much here",
+        "reduce": "overconfident: NEES {nees:.3g} after an outage of {time:g} s; no such numbers "
+        "are consistent at all times and on all axes that share them",
+        "beyond": "overconfident: NEES {nees:.3g} after an outage of {time:g} s, longer than the "
+        "numbers are for"}, "estimate it as a state, or remove it from the data",
+        severity="warning"),
+    _filter("other-units", "N in use is {factor:.3g} times that of the error model: it may be in "
+        "other units", "give it in {unit}/sqrt(Hz)", severity="warning"),
+    _filter("ramp-as-constant", "the {label} counts as a constant of standard deviation {size}: "
+        "|R| times the horizon", "a filter that lasts longer needs a state for it",
+        severity="warning"),
+    _filter("turn-on-left-out", "the start bias leaves out the turn-on bias, which a recording at "
+        "rest cannot show", "add its variance"),
+    _filter("uncertainty-not-covered", {
+        "": "the uncertainty of the fitted parameters is not covered",
+        "why": "{reason}"}),
 )  # fmt: skip
 
 _INS = (
-    Issue("aligned-in-motion", "aligned in motion: roll {roll:.2f}, pitch {pitch:.2f}, yaw "
-          "{yaw:.2f} deg, 1 sigma {tilt_deg:.2g} deg of tilt and {heading_deg:.2g} of heading",
-          topic="navigation"),
-    Issue("attitude-given", "roll, pitch and yaw as given: {degrees} deg, 1 sigma {sd_deg:.2g} deg",
-          topic="navigation"),
-    Issue("axis-signs", "the sign of {wrong} is wrong{unseen}", "bring gyros and accelerometers "
-          "to the same axes forward, right, down: reverse {reverse}, and check every gyro by "
-          "hand, for a drive does not show them all: positive while the right side goes down (x), "
-          "the front goes up (y), it turns right (z)", severity="bad", topic="navigation"),
-    Issue("axis-up", "its mean is positive: the axis points up, and roll is near 180 deg", "if it "
-          "is mounted upside down, fine; else reverse gyro_z and accel_z, and gyro_y and accel_y "
-          "too if y points left", severity="warning", topic="navigation"),
-    Issue("barometer-set", "barometric heights are set to the first position fix, by {shift:.3g} m",
-          topic="navigation"),
-    Issue("better", "Take {where}: its errors after the outages are smaller{but}.", severity="good",
-          topic="navigation"),
-    Issue("biases-assumed", "turn-on biases, which a static calibration does not know, are "
-          "assumed to be {sd} (1 sigma)", topic="navigation"),
-    Issue("columns-unused", "columns not used: {columns}", topic="navigation"),
-    Issue("consistent", "The innovations agree with the filter's model: they are as large as it "
-          "expects, and white.", severity="good", topic="navigation"),
-    Issue("diverged", {
+    _navigation("aligned-in-motion", "aligned in motion: roll {roll:.2f}, pitch {pitch:.2f}, yaw "
+        "{yaw:.2f} deg, 1 sigma {tilt_deg:.2g} deg of tilt and {heading_deg:.2g} of heading"),
+    _navigation("attitude-given", "roll, pitch and yaw as given: {degrees} deg, 1 sigma "
+        "{sd_deg:.2g} deg"),
+    _navigation("axis-signs", "the sign of {wrong} is wrong{unseen}",
+        "bring gyros and accelerometers to the same axes forward, right, down: reverse {reverse}, "
+        "and check every gyro by hand, for a drive does not show them all: positive while the "
+        "right side goes down (x), the front goes up (y), it turns right (z)", severity="bad"),
+    _navigation("axis-up", "its mean is positive: the axis points up, and roll is near 180 deg",
+        "if it is mounted upside down, fine; else reverse gyro_z and accel_z, and gyro_y and "
+        "accel_y too if y points left", severity="warning"),
+    _navigation("barometer-set", "barometric heights are set to the first position fix, by "
+        "{shift:.3g} m"),
+    _navigation("better", "Take {where}: its errors after the outages are smaller{but}.",
+        severity="good"),
+    _navigation("biases-assumed", "turn-on biases, which a static calibration does not know, are "
+        "assumed to be {sd} (1 sigma)"),
+    _navigation("columns-unused", "columns not used: {columns}"),
+    _navigation("consistent", "The innovations agree with the filter's model: they are as large as "
+        "it expects, and white.", severity="good"),
+    _navigation("diverged", {
         "": "The filter diverged: the sensor models or the initial state are far off, or a fix is.",
-        "runs": "diverged in {diverged} of {runs} runs; figures are those of the other runs",
-    }, severity="bad", topic="navigation"),
-    Issue("fewer-runs", "{runs} runs in place of {asked}: the recording has no more stretches of "
-          "this length that do not overlap", severity="warning", topic="navigation"),
-    Issue("fixes-left-out", "{count} fixes before or after the IMU's record are left out",
-          topic="navigation"),
-    Issue("fixes-rejected", "{count} of {of} are rejected; the farthest is {size:.3g} sigma off "
-          "at {time:.10g} s", severity="warning", topic="navigation"),
-    Issue("heading", {
+        "runs": "diverged in {diverged} of {runs} runs; figures are those of the other runs"},
+        severity="bad"),
+    _navigation("fewer-runs", "{runs} runs in place of {asked}: the recording has no more "
+        "stretches of this length that do not overlap", severity="warning"),
+    _navigation("fixes-left-out", "{count} fixes before or after the IMU's record are left out"),
+    _navigation("fixes-rejected", "{count} of {of} are rejected; the farthest is {size:.3g} sigma "
+        "off at {time:.10g} s", severity="warning"),
+    _navigation("heading", {
         "": "{source}: {degrees:.2f} deg, 1 sigma {sd_deg:.2g} deg",
         "wrong": "the heading that the filter started with is wrong by {by:.1f} deg (standard "
-        "error {error_deg:.1g} deg): the IMU is mounted rotated, or drives backwards",
-    }, topic="navigation"),
-    Issue("judged-on-loiter", "judged on the loiter of a fixed-wing aircraft",
-          "give the motion that it is for, trajectory= or scenario=", topic="navigation"),
-    Issue("levelled", "levelled on {length:.3g} s {how}, from {start:.6g} s on{bias}",
-          topic="navigation"),
-    Issue("lever-arm", "the antenna is off the lever arm by {parts}, standard errors in brackets",
-          severity="bad", topic="navigation"),
-    Issue("lost", "The filter is lost: innovations are {times} times as large as it expects; do "
-          "not use the accuracy that it predicts. Look first at {first}the heading that it "
-          "started with, then at the units of the sensors and the clock of the fixes.",
-          severity="bad", topic="navigation"),
-    Issue("mixed-sizes", "The filter's model does not fit: innovations are {sizes} as it expects; "
-          "the standard deviations of the fixes do not fit each other.", severity="bad",
-          topic="navigation"),
-    Issue("more-honest", "Take {where}: errors are as large, but it predicts them better{but}.",
-          severity="good", topic="navigation"),
-    Issue("no-time-stamps", "the IMU has no time stamps: fixes are timed from its first sample",
-          topic="navigation"),
-    Issue("not-white", "The filter's model does not fit: innovations are as large as it expects, "
-          "but depend on those before; a slow error of the sensors is missing in their models.",
-          severity="bad", topic="navigation"),
-    Issue("outside-linearity",
-          "at {time:g} s the attitude is off by {tilt_deg:.2g} deg in tilt and {heading_deg:.2g} "
-          "deg in heading (1 sigma): products of errors count, and NEES and errors predicted there "
-          "are too small",
-          "check them by runs, as gmwm navigate does", "warning", "navigation"),
-    Issue("positions-at-zero", "{count} position{count:s?} at 0, 0 are left out",
-          severity="warning", topic="navigation"),
-    Issue("resolution", "this motion would show {shown}{missing}", topic="navigation"),
-    Issue("samples-filled", "{count:,} missing sample{count:s?}, at most {longest} in a row, are "
-          "interpolated", severity="warning", topic="navigation"),
-    Issue("sd-assumed", "the fixes have no standard deviations: {sd} to the north, east and down "
-          "are assumed", "give {where}_sd", topic="navigation"),
-    Issue("sd-not-used", "the fixes have standard deviations of their own: the given ones are not "
-          "used", severity="warning", topic="navigation"),
-    Issue("standstills", "{count} standstill{count:s?} of {length:g} s are recognised",
-          topic="navigation"),
-    Issue("standstills-unknown", "no standstill can be recognised: the vehicle does not stand at "
-          "the start", severity="warning", topic="navigation"),
-    Issue("time-offset", "the fixes are stamped {size:.3g} s too {late} (standard error "
-          "{error:.1g} s){scale}", "{change} their times", severity="bad", topic="navigation"),
-    Issue("time-scales", "both have dates, the fixes in {scale}: if the IMU's are in UTC, GPS "
-          "time is ahead of them by the leap seconds, {seconds:g} s since 2017",
-          "shift the fixes by as much", severity="warning", topic="navigation"),
-    Issue("too-large", {
+        "error {error_deg:.1g} deg): the IMU is mounted rotated, or drives backwards"}),
+    _navigation("judged-on-loiter", "judged on the loiter of a fixed-wing aircraft",
+        "give the motion that it is for, trajectory= or scenario="),
+    _navigation("levelled", "levelled on {length:.3g} s {how}, from {start:.6g} s on{bias}"),
+    _navigation("lever-arm", "the antenna is off the lever arm by {parts}, standard errors in "
+        "brackets", severity="bad"),
+    _navigation("lost", "The filter is lost: innovations are {times} times as large as it expects; "
+        "do not use the accuracy that it predicts. Look first at {first}the heading that it "
+        "started with, then at the units of the sensors and the clock of the fixes.",
+        severity="bad"),
+    _navigation("mixed-sizes", "The filter's model does not fit: innovations are {sizes} as it "
+        "expects; the standard deviations of the fixes do not fit each other.", severity="bad"),
+    _navigation("more-honest", "Take {where}: errors are as large, but it predicts them "
+        "better{but}.", severity="good"),
+    _navigation("no-time-stamps", "the IMU has no time stamps: fixes are timed from its first "
+        "sample"),
+    _navigation("not-white", "The filter's model does not fit: innovations are as large as it "
+        "expects, but depend on those before; a slow error of the sensors is missing in their "
+        "models.", severity="bad"),
+    _navigation("outside-linearity", "at {time:g} s the attitude is off by {tilt_deg:.2g} deg in "
+        "tilt and {heading_deg:.2g} deg in heading (1 sigma): products of errors count, and NEES "
+        "and errors predicted there are too small", "check them by runs, as gmwm navigate does",
+        severity="warning"),
+    _navigation("positions-at-zero", "{count} position{count:s?} at 0, 0 are left out",
+        severity="warning"),
+    _navigation("resolution", "this motion would show {shown}{missing}"),
+    _navigation("samples-filled", "{count:,} missing sample{count:s?}, at most {longest} in a row, "
+        "are interpolated", severity="warning"),
+    _navigation("sd-assumed", "the fixes have no standard deviations: {sd} to the north, east and "
+        "down are assumed", "give {where}_sd"),
+    _navigation("sd-not-used", "the fixes have standard deviations of their own: the given ones "
+        "are not used", severity="warning"),
+    _navigation("standstills", "{count} standstill{count:s?} of {length:g} s are recognised"),
+    _navigation("standstills-unknown", "no standstill can be recognised: the vehicle does not "
+        "stand at the start", severity="warning"),
+    _navigation("time-offset", "the fixes are stamped {size:.3g} s too {late} (standard error "
+        "{error:.1g} s){scale}", "{change} their times", severity="bad"),
+    _navigation("time-scales", "both have dates, the fixes in {scale}: if the IMU's are in UTC, "
+        "GPS time is ahead of them by the leap seconds, {seconds:g} s since 2017",
+        "shift the fixes by as much", severity="warning"),
+    _navigation("too-large", {
         "": "The filter's model does not fit: innovations are {sizes} as it expects; the sensors "
         "are worse than their models, or the fixes than their standard deviations.",
         "assumed": "Only the standard deviations assumed for the fixes do not fit these data: "
-        "innovations are {sizes} as they allow.",
-    }, severity="bad", topic="navigation"),
-    Issue("too-small", {
+        "innovations are {sizes} as they allow."}, severity="bad"),
+    _navigation("too-small", {
         "": "The filter's model does not fit: innovations are {sizes} as it expects; the sensors "
         "are better than their models, or the fixes than their standard deviations.",
         "assumed": "Only the standard deviations assumed for the fixes do not fit these data: "
-        "innovations are {sizes} as they allow.",
-    }, severity="bad", topic="navigation"),
+        "innovations are {sizes} as they allow."}, severity="bad"),
 )  # fmt: skip
 
 _POPULATION = (
-    Issue("channel-missing", "it has no such channel", severity="warning", topic="population"),
-    Issue("channel-skipped", "{reason}", severity="warning", topic="population"),
-    Issue("channels-differ", "{have} no such channel: {names}", severity="warning",
-          topic="population"),
-    Issue("curves-close", "{sentence}", topic="population"),
-    Issue("curves-differ", "{sentence}", severity="warning", topic="population"),
-    Issue("few-recordings", "{recordings} recordings know the spread within factors of {low:.2g} "
-          "and {factor:.2g} (95 %)", topic="population"),
-    Issue("few-units", "{units} unit{units:s?}: a distribution-free limit needs {needed}",
-          topic="population"),
-    Issue("left-over", "the folder also holds {units} calibration{units:s?} of other recordings: "
-          "{names}", topic="population"),
-    Issue("lengths-differ", "recordings are from {shortest:.6g} s ({name}) to {longest:.6g} s "
-          "long: short ones scatter more", topic="population"),
-    Issue("no-joint-model", "{error}", severity="warning", topic="population"),
-    Issue("no-numbers", "{error}", severity="warning", topic="population"),
-    Issue("not-noise", "{bad}", "not compared: the curve is not noise alone", severity="warning",
-          topic="population"),
-    Issue("rates-differ", {
+    _population("channel-missing", "it has no such channel"),
+    _population("channel-skipped", "{reason}"),
+    _population("channels-differ", "{have} no such channel: {names}"),
+    _population("curves-close", "{sentence}", severity="note"),
+    _population("curves-differ", "{sentence}"),
+    _population("few-recordings", "{recordings} recordings know the spread within factors of "
+        "{low:.2g} and {factor:.2g} (95 %)", severity="note"),
+    _population("few-units", "{units} unit{units:s?}: a distribution-free limit needs {needed}",
+        severity="note"),
+    _population("left-over", "the folder also holds {units} calibration{units:s?} of other "
+        "recordings: {names}", severity="note"),
+    _population("lengths-differ", "recordings are from {shortest:.6g} s ({name}) to {longest:.6g} "
+        "s long: short ones scatter more", severity="note"),
+    _population("no-joint-model", "{error}"),
+    _population("no-numbers", "{error}"),
+    _population("not-noise", "{bad}", "not compared: the curve is not noise alone"),
+    _population("rates-differ", {
         "": "at {rate:.6g} Hz, {others} at {usual:.6g} Hz",
-        "fleet": "{have} another sampling rate than {rate:g} Hz: {names}",
-    }, "not compared level by level", severity="warning", topic="population"),
-    Issue("same-recording", {
+        "fleet": "{have} another sampling rate than {rate:g} Hz: {names}"},
+        "not compared level by level"),
+    _population("same-recording", {
         "": "the same recording as {other}",
-        "fleet": "the same recording: {names}",
-    }, "left out", severity="warning", topic="population"),
-    Issue("units-differ", "in {own}, {others} in {common}", "not compared level by level",
-          severity="warning", topic="population"),
+        "fleet": "the same recording: {names}"}, "left out"),
+    _population("units-differ", "in {own}, {others} in {common}", "not compared level by level"),
 )  # fmt: skip
 
 _STUDY = (
-    Issue("no-line", "{axes}: the Allan plot has neither a floor nor a slope of +1/2; its lowest "
-          "point gives a Gauss-Markov process", topic="navigation"),
+    _navigation("no-line", "{axes}: the Allan plot has neither a floor nor a slope of +1/2; its "
+        "lowest point gives a Gauss-Markov process"),
 )  # fmt: skip
 
 CATALOGUE: Mapping[str, Issue] = _catalogue(

@@ -642,7 +642,7 @@ def test_channels_and_a_stretch(run, good_file, no_pages):
         (("--model", ""), "is not a term"),
         (("--model", "N + N"), "two WhiteNoise"),
         (("--model", "0 N"), "is not a term"),
-        (("--model", "gyro=N"), "gives accel_z no model"),
+        (("--model", "gyro=N"), "no model is given for channel 'accel_z': give e.g. --model"),
         (("--model", "mag=N"), "the channels are gyro_x, gyro_y, accel_z"),
         (("--model", "N", "--model", "K"), "give one"),
     ],

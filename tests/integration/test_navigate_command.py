@@ -126,7 +126,7 @@ def test_a_rate_is_that_of_the_trajectory_and_units_need_an_imu(run, no_pages):
     assert code == 0
     assert printed.startswith("car: 30 s at 10 Hz")
     code, _, told = run("study.yaml", "--gyro-unit", "deg/s")
-    assert (code, "is about reading --imu, and there is none" in told) == (2, True)
+    assert (code, "--gyro-unit is about your own data" in told) == (2, True)
 
 
 def test_paths_in_the_file_are_relative_to_it_and_those_of_options_to_here(run, no_pages):

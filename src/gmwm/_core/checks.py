@@ -41,6 +41,10 @@ def _cut(text: str, length: int) -> str:
     return f"{text[: length - 4]} ..."  # of one long word nothing would be left
 
 
+def _wrong(name: str, value: Any, hint: str) -> InputError:
+    return InputError(f"{name} = {shown(value)}: {hint}")
+
+
 def is_number(value: Any) -> bool:
     """Whether it is a finite real number; a truth value is none."""
     if isinstance(value, bool | np.bool_) or not isinstance(value, Real):
@@ -57,50 +61,45 @@ def positive(name: str, value: Any, hint: str = "give a positive number") -> flo
     Raises InputError for anything else; so do all functions of this module.
     """
     if not is_number(value) or not value > 0.0:
-        raise InputError(f"{name} = {shown(value)}: {hint}")
+        raise _wrong(name, value, hint)
     return float(value)
 
 
 def whole(name: str, value: Any, least: int, hint: str = "") -> int:
     """A whole number, which may be written as 1e6, not below the least one."""
     if not is_number(value) or value != int(value) or value < least:
-        raise InputError(f"{name} = {shown(value)}: {hint or f'give an integer, {least} or more'}")
+        raise _wrong(name, value, hint or f"give an integer, {least} or more")
     return int(value)
 
 
 def share(name: str, value: Any, example: float) -> float:
     """A number between 0 and 1, neither included."""
     if not is_number(value) or not 0.0 < value < 1.0:
-        raise InputError(
-            f"{name} = {shown(value)}: give a number between 0 and 1, e.g. {example:g}"
-        )
+        raise _wrong(name, value, f"give a number between 0 and 1, e.g. {example:g}")
     return float(value)
 
 
 def choice(name: str, value: Any, known: Sequence[str]) -> str:
     """One of the words that are known."""
     if not isinstance(value, str) or value not in known:
-        raise InputError(f"{name} = {shown(value)}: known are {', '.join(known)}")
+        raise _wrong(name, value, f"known are {', '.join(known)}")
     return value
 
 
 def truth(name: str, value: Any) -> bool:
     """True or False."""
     if not isinstance(value, bool | np.bool_):
-        raise InputError(f"{name} = {shown(value)}: give True or False")
+        raise _wrong(name, value, "give True or False")
     return bool(value)
 
 
 def samples(value: Any, least: int = 1) -> int:
     """A number of samples ``n`` that a computer can hold."""
-    hint = "give a positive integer number of samples"
-    if least > 1:
-        hint = f"give an integer number of samples, {least} or more"
+    more = f"an integer number of samples, {least} or more"
+    hint = f"give {more if least > 1 else 'a positive integer number of samples'}"
     n = whole("n", value, least, hint)
     if n > MOST_SAMPLES:
-        raise InputError(
-            f"n = {shown(value)}: that is too long, give at most {MOST_SAMPLES:,} samples"
-        )
+        raise _wrong("n", value, f"that is too long, give at most {MOST_SAMPLES:,} samples")
     return n
 
 
@@ -109,9 +108,7 @@ def sampling_interval(value: Any) -> float:
     hint = "give a positive sampling interval in seconds"
     dt = positive("dt", value, hint)
     if not SHORTEST_INTERVAL <= dt <= LONGEST_INTERVAL:
-        raise InputError(
-            f"dt = {shown(value)}: {hint}, {SHORTEST_INTERVAL:g} to {LONGEST_INTERVAL:g}"
-        )
+        raise _wrong("dt", value, f"{hint}, {SHORTEST_INTERVAL:g} to {LONGEST_INTERVAL:g}")
     return dt
 
 
@@ -120,9 +117,8 @@ def generator(seed: Any) -> np.random.Generator:
     try:
         return np.random.default_rng(seed)
     except (TypeError, ValueError):
-        raise InputError(
-            f"seed = {shown(seed)}: give an integer, zero or more, or a numpy.random.Generator"
-        ) from None
+        hint = "give an integer, zero or more, or a numpy.random.Generator"
+        raise _wrong("seed", seed, hint) from None
 
 
 def unmasked(values: Any) -> Any:

@@ -19,7 +19,7 @@ import numpy as np
 from annotated_types import Ge, Gt, Le, Lt
 
 from gmwm._core import checks
-from gmwm._core.files import opened, written
+from gmwm._core.files import opened, write_text
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError, printable
 
@@ -38,9 +38,6 @@ _NEGATIVE = -1e-4  # eigenvalue of correlations; all but redundant parameters le
 
 _DAMAGE = (LookupError, TypeError, ValueError, AttributeError, ArithmeticError, RecursionError)
 """What content that does not belong together raises somewhere in a constructor."""
-
-_DEEPEST = 32
-"""Levels of lists and mappings in a document; what is saved has 12 at most."""
 
 
 class NoneIs:
@@ -136,10 +133,9 @@ def plain_schema(read: Callable[[Any], Any], write: Callable[[Any], Any]) -> Any
 class Document:
     """A result that can be saved, and comes back from its file by `load_document`.
 
-    A subclass is a frozen dataclass that names its ``SCHEMA``; one without is a part of other
-    documents only. Its fields are the document:
-    pydantic reads and writes them by their annotations, with `OrNaN`, `OrInfinity` and `Array`
-    where JSON has no such value. A field that is another document is stored as one.
+    A subclass is a frozen dataclass that names its ``SCHEMA``; one without is a part of others.
+    Pydantic reads and writes its fields by their annotations, with `OrNaN`, `OrInfinity` and
+    `Array` where JSON has no such value.
     """
 
     SCHEMA: ClassVar[str] = ""
@@ -269,10 +265,7 @@ class Document:
 
         Raises InputError if it cannot be written.
         """
-        with written(path) as stream:
-            json.dump(self.to_dict(), stream, indent=1, allow_nan=False)
-            stream.write("\n")
-        return Path(path)
+        return write_text(path, json.dumps(self.to_dict(), indent=1, allow_nan=False))
 
 
 @cache
@@ -310,7 +303,7 @@ def check_covariance(matrix: Any, size: int, name: str = "covariance") -> None:
 
     Raises ValueError if it is none.
     """
-    if len(matrix) != size or any(len(row) != size for row in matrix):
+    if any(len(row) != size for row in (matrix, *matrix)):
         raise ValueError(f"{name} is not {size} x {size}")
     array = np.array(matrix, dtype=float).reshape(size, size)
     scale = np.sqrt(np.maximum(np.diag(array), 0.0))
@@ -328,10 +321,12 @@ def check_covariance(matrix: Any, size: int, name: str = "covariance") -> None:
 
 
 def read_json(path: str | os.PathLike[str]) -> Any:
-    """Content of a JSON file; its numbers are finite.
+    """Content of a JSON file.
 
     Raises InputError if the file is missing or too large, is not JSON, or is nested too deeply.
     """
+    from pydantic_core import from_json
+
     try:
         with opened(path) as stream:
             text = stream.read(_LARGEST + 1)
@@ -342,35 +337,10 @@ def read_json(path: str | os.PathLike[str]) -> Any:
             f"{path}: has more than {_LARGEST >> 20} MB, which no result has: check the path"
         )
     try:
-        content = json.loads(text, parse_constant=_finite, parse_float=_finite)
-        _check_depth(content)
-    except (ValueError, RecursionError) as error:
+        return from_json(text, allow_inf_nan=False)
+    except ValueError as error:
         which = checks.line(str(error))
         raise InputError(f"{path}: is not JSON ({which}): give a file that was saved") from None
-    return content
-
-
-def _finite(text: str) -> float:
-    value = float(text)
-    if not math.isfinite(value):
-        raise ValueError(f"{text[:20]} is no finite number")
-    return value
-
-
-def _check_depth(content: Any) -> None:
-    """Refuse what would be followed deeper than a program can."""
-    layer, depth = [content], 0
-    while layer:
-        depth += 1
-        if depth > _DEEPEST:
-            raise ValueError(f"nested deeper than {_DEEPEST} levels")
-        layer = [
-            child
-            for each in layer
-            if isinstance(each, dict | list)
-            for child in (each.values() if isinstance(each, dict) else each)
-            if isinstance(child, dict | list)
-        ]
 
 
 def load_document(path: str | os.PathLike[str]) -> Any:

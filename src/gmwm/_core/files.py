@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import os
-import signal
 import stat
 import tempfile
-import threading
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from io import BufferedReader
@@ -50,6 +48,16 @@ def written(path: str | os.PathLike[str]) -> Iterator[TextIO]:
         yield stream
 
 
+def write_text(path: str | os.PathLike[str], text: str) -> Path:
+    """Write a text file, with a line end at its end, whole or not at all; returns its path.
+
+    Raises InputError if it cannot be written.
+    """
+    with written(path) as stream:
+        stream.write(text if text.endswith("\n") else f"{text}\n")
+    return Path(path)
+
+
 @contextmanager
 def moved_together(folder: Path) -> Iterator[Path]:
     """A temporary folder to be filled; its files take their places together when all went well.
@@ -59,27 +67,10 @@ def moved_together(folder: Path) -> Iterator[Path]:
     try:
         with tempfile.TemporaryDirectory(prefix=".gmwm-", dir=folder) as name:
             yield Path(name)
-            with _interrupts_after():  # all files in the folder are of one run
-                for each in sorted(Path(name).iterdir()):
-                    os.replace(each, folder / each.name)
+            for each in sorted(Path(name).iterdir()):
+                os.replace(each, folder / each.name)
     except OSError as error:
         raise _not_written(folder, error) from None
-
-
-@contextmanager
-def _interrupts_after() -> Iterator[None]:
-    """Put an interrupt off to the end; other threads get none."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    waiting: list[int] = []
-    usual = signal.signal(signal.SIGINT, lambda number, _: waiting.append(number))
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, usual)
-        if waiting:
-            signal.raise_signal(signal.SIGINT)
 
 
 def existing_file(path: str | os.PathLike[str]) -> Path:
@@ -89,12 +80,13 @@ def existing_file(path: str | os.PathLike[str]) -> Path:
     """
     found = Path(path)
     try:
-        mode = found.stat().st_mode
-    except (OSError, ValueError):  # ValueError: a null character in the name
+        if found.is_dir():
+            raise InputError(f"{path} is a directory: name a file in it")
+        _check_regular(found)
+    except (OSError, ValueError) as error:  # ValueError: a null character in the name
+        if isinstance(error, InputError):
+            raise
         raise InputError(f"{str(path)[:200]} does not exist: check the path") from None
-    if stat.S_ISDIR(mode):
-        raise InputError(f"{path} is a directory: name a file in it")
-    _check_regular(found, mode)
     return found
 
 
@@ -104,13 +96,13 @@ def opened(path: str | os.PathLike[str]) -> BufferedReader:
     Raises OSError if it cannot be opened.
     Raises InputError if it is a pipe or a device.
     """
-    found = Path(path)
-    _check_regular(found, found.stat().st_mode)
-    return found.open("rb")
+    _check_regular(Path(path))
+    return open(path, "rb")
 
 
-def _check_regular(path: Path, mode: int) -> None:
+def _check_regular(path: Path) -> None:
     # Opened, it may wait for ever, or give for ever.
+    mode = path.stat().st_mode
     if not stat.S_ISREG(mode) and not stat.S_ISDIR(mode):
         raise InputError(f"{path} is a pipe or a device: write its content to a file first")
 
@@ -145,19 +137,6 @@ def replaceable(path: Path) -> Path:
     return path
 
 
-def output_folder(path: str | os.PathLike[str]) -> Path:
-    """Make a folder for outputs, and make sure that it can be written.
-
-    Raises InputError if it cannot be made or written.
-    """
-    folder = Path(path)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise _not_written(folder, error) from None
-    return _taking_files(folder, folder)
-
-
 def _taking_files(folder: Path, output: Path) -> Path:
     """The output; raises InputError if the folder takes no new file."""
     try:
@@ -177,7 +156,11 @@ def folder_to_fill(path: str | os.PathLike[str]) -> Iterator[Path]:
     folder = Path(path)
     missing = [each for each in (folder, *folder.parents) if not each.exists()]
     try:
-        yield output_folder(folder)
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise _not_written(folder, error) from None
+        yield _taking_files(folder, folder)
     except BaseException:
         for made in missing:
             with suppress(OSError):  # there is something in it

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import json
 import logging
-import zipfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
 from pathlib import Path
@@ -17,7 +16,7 @@ from typing import Any, Literal
 import numpy as np
 import numpy.typing as npt
 
-from gmwm._core import checks, memory
+from gmwm._core import checks
 from gmwm._core.files import folder_to_fill, moved_into_place, one_writer
 from gmwm._core.jobs import results
 from gmwm._core.typing import Progress
@@ -65,15 +64,12 @@ def do_runs(
     """
     with _store(folder, study, earlier) as store:
         todo = [run for run in range(runs) if run not in store.runs]
-        done = runs - len(todo)
-        if progress is not None:
-            progress(done, runs, "")
+        progress = progress or (lambda *_: None)
+        progress(runs - len(todo), runs, "")
         with closing(results(work, todo, jobs=jobs, cluster=cluster)) as found:
-            for run, values in found:
+            for done, (run, values) in enumerate(found, runs - len(todo) + 1):
                 store.add(run, values)
-                done += 1
-                if progress is not None:
-                    progress(done, runs, "")
+                progress(done, runs, "")
     return _stacked([store.runs[run] for run in range(runs)])
 
 
@@ -130,35 +126,19 @@ class _Store:
                 f"{part} belongs to another study (other {', '.join(names)}): give another folder",
                 "other-runs",
             )
-        expected = _shapes(next(iter(self.runs.values()), None))
         for i, run in enumerate(runs):
-            each = {name: of_runs[i] for name, of_runs in values.items()}
-            if expected not in (None, _shapes(each)):
-                _log.warning("%s has other values than the files before: it is left out", part)
-                return
-            self.runs[run] = each
+            self.runs[run] = {name: of_runs[i] for name, of_runs in values.items()}
 
 
 def _content(part: Path) -> tuple[dict[str, Any], list[int], Values]:
     """The study, the numbers of the runs and their values."""
-    with zipfile.ZipFile(part) as archive:
-        memory.require(sum(each.file_size for each in archive.infolist()), part.name)
     with part.open("rb") as file, np.load(file) as content:
-        runs = content["run"]
-        values = {
-            name.removeprefix(_VALUES): content[name]
-            for name in content.files
-            if name.startswith(_VALUES)
-        }
-        study = json.loads(str(content["study"]))
-    whole = runs.ndim == 1 and runs.dtype.kind == "i" and isinstance(study, dict)
-    if not whole or any(each.shape[:1] != runs.shape for each in values.values()):
+        arrays = dict(content)
+    study, runs = dict(json.loads(str(arrays.pop("study")))), arrays.pop("run")
+    values = {name.removeprefix(_VALUES): each for name, each in arrays.items()}
+    if any(each.shape[:1] != runs.shape for each in (runs.ravel(), *values.values())):
         raise ValueError("arrays of other shapes than those of runs")
     return study, runs.tolist(), values
-
-
-def _shapes(values: Mapping[str, Any] | None) -> dict[str, tuple[int, ...]] | None:
-    return None if values is None else {name: np.shape(each) for name, each in values.items()}
 
 
 def _stacked(rows: Sequence[Mapping[str, Any]]) -> Values:

@@ -8,9 +8,8 @@ here with the placeholder ``u`` for the channel's own unit.
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from gmwm.errors import InputError
 
@@ -148,8 +147,7 @@ AUXILIARY = ("temperature", "voltage", "clock")
 """Quantities of channels that are kept for what they explain; no error model is fitted to them."""
 
 
-@dataclass(frozen=True)
-class AuxiliaryUnit:
+class AuxiliaryUnit(NamedTuple):
     """A unit of a quantity of `AUXILIARY`; times scale, plus offset it is in ``unit``, as kept."""
 
     quantity: str
@@ -183,8 +181,7 @@ def auxiliary_unit(text: str) -> AuxiliaryUnit | None:
     return _AUXILIARY_UNITS.get(re.sub(r"[\s_.]", "", plain).lower())
 
 
-@dataclass(frozen=True)
-class FieldUnit:
+class FieldUnit(NamedTuple):
     """A unit in which the field quotes a parameter, and how many of it one SI unit is."""
 
     unit: str
@@ -193,28 +190,30 @@ class FieldUnit:
 
 # What data sheets and IEEE Std 952 / 1554 use for each parameter unit.
 _FIELD_UNITS = {
-    ("gyro", "u/sqrt(Hz)"): ("deg/sqrt(h)", "deg/h/sqrt(Hz)"),
-    ("gyro", "u"): ("deg/h",),
-    ("gyro", "u s"): ("arcsec",),
-    ("gyro", "u/s/sqrt(Hz)"): ("deg/h/sqrt(h)",),
-    ("gyro", "u/s"): ("deg/h/h",),
-    ("accel", "u/sqrt(Hz)"): ("ug/sqrt(Hz)", "m/s/sqrt(h)"),
-    ("accel", "u"): ("ug",),
-    ("accel", "u s"): ("m/s",),
-    ("accel", "u/s/sqrt(Hz)"): ("ug/sqrt(h)",),
-    ("accel", "u/s"): ("ug/h",),
+    "gyro u/sqrt(Hz)": "deg/sqrt(h) deg/h/sqrt(Hz)",
+    "gyro u": "deg/h",
+    "gyro u s": "arcsec",
+    "gyro u/s/sqrt(Hz)": "deg/h/sqrt(h)",
+    "gyro u/s": "deg/h/h",
+    "accel u/sqrt(Hz)": "ug/sqrt(Hz) m/s/sqrt(h)",
+    "accel u": "ug",
+    "accel u s": "m/s",
+    "accel u/s/sqrt(Hz)": "ug/sqrt(h)",
+    "accel u/s": "ug/h",
 }
 
 
 def si_parameter_unit(parameter_unit: str, quantity: str | None) -> str:
     """Spell a parameter's unit for a channel, e.g. ``u/sqrt(Hz)`` -> ``rad/s/sqrt(Hz)``."""
     base = SI_UNIT.get(quantity or "", "u")
-    if not parameter_unit.startswith("u"):
+    if parameter_unit[:1] != "u":
         return parameter_unit
-    rate = {"rad/s": "rad/s^2", "m/s^2": "m/s^3"}.get(base, f"{base}/s")
-    spelled = {"u s": f"{base} s", "u^2": f"({base})^2", "u/s": rate}
-    spelled["u/s/sqrt(Hz)"] = f"{rate}/sqrt(Hz)"
-    return spelled.get(parameter_unit, base + parameter_unit[1:])
+    if parameter_unit == "u^2":
+        return f"({base})^2"
+    if parameter_unit in ("u/s", "u/s/sqrt(Hz)"):
+        base = {"rad/s": "rad/s^2", "m/s^2": "m/s^3"}.get(base, f"{base}/s")
+        return base + parameter_unit[3:]
+    return base + parameter_unit[1:]
 
 
 def field_units(parameter_unit: str, quantity: str | None) -> tuple[FieldUnit, ...]:
@@ -222,16 +221,15 @@ def field_units(parameter_unit: str, quantity: str | None) -> tuple[FieldUnit, .
 
     parameter_unit: With the placeholder ``u``, e.g. ``"u/sqrt(Hz)"``.
     """
-    names = _FIELD_UNITS.get((quantity or "", parameter_unit), ())
+    names = _FIELD_UNITS.get(f"{quantity} {parameter_unit}", "").split()
     si_unit = si_parameter_unit(parameter_unit, quantity).replace(" s", "*s")
     return tuple(FieldUnit(name, 1.0 / factor(name, si_unit)) for name in names)
 
 
 def customary_unit(parameter_unit: str, quantity: str | None, unit: str) -> tuple[str, float]:
     """The first of `field_units` and its value per SI unit; else as written for the channel."""
-    known = field_units(parameter_unit, quantity)
-    if known:
-        return known[0].unit, known[0].per_si
+    for known in field_units(parameter_unit, quantity):
+        return known
     return parameter_unit.replace("u", unit or "u", 1), 1.0
 
 
@@ -242,5 +240,4 @@ def shown_unit(quantity: str | None, unit: str, units: str) -> tuple[str, float]
     """
     if units not in ("field", "si"):
         raise InputError(f"units = {units!r}: give 'field' or 'si'")
-    known = field_units("u", quantity) if units == "field" else ()
-    return (known[0].unit, known[0].per_si) if known else (unit or "u", 1.0)
+    return customary_unit("u", quantity, unit) if units == "field" else (unit or "u", 1.0)

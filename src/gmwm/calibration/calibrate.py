@@ -75,8 +75,8 @@ def calibrate(
         see `gmwm.JointFit`. A DataFrame or an Arrow table is read with `gmwm.read`, which needs a
         column of time stamps and units in the names of the others.
     model : Process, Model or mapping, optional
-        Fitted to every channel, or by channel name; by default the model of each channel is
-        selected.
+        Fitted to every channel, or by name of the channel or the sensor ("gyro", "accel"); by
+        default the model of each channel is selected.
     screening : collection of str, optional
         Some of "events", "lines", "resonances" and "outliers"; none leaves the recording as it is,
         unexamined.

@@ -12,7 +12,7 @@ from gmwm.calibration.steadiness import steadiness_notice
 from gmwm.calibration.summary import with_largest_walk
 from gmwm.errors import InputError
 from gmwm.estimate import Fit, estimate
-from gmwm.issues import Notice, notice
+from gmwm.issues import Notice, failure, notice
 from gmwm.process import Model, Process
 from gmwm.readers import Channel
 from gmwm.selection import Selection, select
@@ -45,12 +45,16 @@ class ChannelModel:
 
 
 def model_of(name: str, model: GivenModels) -> Process | Model | None:
-    """The model given for a channel."""
+    """The model given for a channel: its own, its sensor's, or that of "" for all."""
     if not isinstance(model, Mapping):
         return model
-    if name not in model:
-        raise InputError(f"no model is given for channel {name!r}: add one to the mapping")
-    return model[name]
+    for key in (name, name.partition("_")[0], ""):
+        if key in model:
+            return model[key]
+    hint = "add one to the mapping"
+    raise InputError(
+        f"no model is given for channel {name!r}", "model-missing", hint, {"channel": name}
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,7 +81,7 @@ class ChannelTask:
             try:
                 found: ChannelModel | Notice = self._model()
             except InputError as error:
-                found = Notice(error.code or "not-estimable", "bad", self.name, str(error))
+                found = failure(error.code or "not-estimable", self.name, str(error))
         return found, watch
 
     def _model(self) -> ChannelModel:

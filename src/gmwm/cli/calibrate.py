@@ -4,31 +4,17 @@ from __future__ import annotations
 
 import hashlib
 import json
-import shlex
-import sys
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from contextlib import nullcontext
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
+from gmwm._core.files import folder_to_fill, moved_together, replaceable
 from gmwm._core.text import wrapped
-from gmwm.cli.console import new_console, new_table, print_whole, progress_bar
+from gmwm.cli.console import command_line, new_console, new_table, print_whole, progress_bar
 from gmwm.cli.hints import in_options, with_option
-from gmwm.cli.options import (
-    PATH,
-    estimating_options,
-    memory_option,
-    models_of_channels,
-    option,
-    output_folder,
-    part_options,
-    printing_options,
-    read_recording,
-    reading_options,
-    written_models,
-)
+from gmwm.cli.options import PATH, folder_to_write, options, read_recording
 from gmwm.errors import InputError
 
 if TYPE_CHECKING:
@@ -49,62 +35,47 @@ _ARRAYS = 2.0
 """Memory of a file's columns and of the arrays made of them, in its size; a file whose samples are
 kept on disk is calibrated by one process."""
 
-_SHOWN_OTHERWISE = ("gap", "dead", "infinite")
-"""Codes of issues that notices of the reader or reasons to skip say already."""
-
 _FILES = ("calibration.json", "report.html", "imu.yaml")
 
 
-def output_option(default: str) -> Callable[[Any], Any]:
-    return output_folder(default, f"Folder for {', '.join(_FILES)}.", _FILES)
+def folder_of_results(default: str) -> dict[str, Any]:
+    """Settings of the option of a folder for what `write_files` writes."""
+    return folder_to_write(default, _FILES)
 
 
 @click.command()
 @click.argument("files", metavar="FILE...", nargs=-1, required=True, type=PATH)
-@output_option("gmwm-out")
-@reading_options
-@part_options
-@estimating_options
-@option(
-    "--remove-departures",
-    "Subtract steps, transients at the start and slow periods that are found, and "
-    "calibrate what is left.",
+@options(
+    """
+    -o --output  Folder for calibration.json, report.html, imu.yaml.
+    --reading
+    --part
+    --estimating
+    --remove-departures  Subtract steps, transients at the start and slow periods that are found,
+        and calibrate what is left.
+    --export NAME  Also write the file of this program into the folder; see gmwm export --list.
+    --datasheet
+    --jobs N  Processes at most; short recordings take one.
+    --timings  Print where the time went, stage by stage.
+    --memory
+    --json
+    --quiet
+    """,
+    output=folder_of_results("gmwm-out"),
+    export={"name": "target"},
+    jobs={"default": 2},
 )
-@option(
-    "--export NAME",
-    "Also write the file of this program into the folder; see gmwm export --list.",
-    name="target",
-)
-@option(
-    "--datasheet YAML",
-    "N, B and K by sensor or channel, each with its unit, to be drawn over the curves "
-    "of the report: 'gyro: {N: 0.15 deg/sqrt(h), B: 7 deg/h}'.",
-    type=PATH,
-)
-@option(
-    "--jobs N",
-    "Processes at most; short recordings take one.",
-    type=click.IntRange(min=1),
-    default=2,
-)
-@option("--timings", "Print where the time went, stage by stage.")
-@memory_option
-@printing_options
 def calibrate(
-    files: tuple[Path, ...],
+    files: Sequence[Path],
     output: Path,
-    models: tuple[str, ...],
-    left: tuple[str, ...],
-    everything: bool,
-    remove_departures: bool,
+    models: dict[str, Any],
     target: str | None,
     datasheet: Path | None,
-    jobs: int,
     timings: bool,
     memory: float | None,
     as_json: bool,
     quiet: bool,
-    **reading: Any,
+    **given: Any,
 ) -> None:
     """Find an error model for every channel of a recording at rest.
 
@@ -125,13 +96,12 @@ def calibrate(
       gmwm calibrate a.csv b.csv --rate 100 --gyro-unit deg/s --accel-unit g
       gmwm calibrate static.bag --export kalibr -o out
     """
-    _start_workers(files, jobs, memory)
-    from gmwm._core.files import folder_to_fill, replaceable
+    _start_workers(files, given["jobs"], memory)
     from gmwm._core.memory import limited
-    from gmwm.calibration import SCREENING, Stopwatch, calibrate as run, stage
+    from gmwm.calibration import Stopwatch, calibrate as run, stage
     from gmwm.report import read_datasheet
 
-    given = written_models(models)
+    work = {name: given.pop(name) for name in ("screening", "still", "remove_departures", "jobs")}
     if target is not None:
         from gmwm._core import checks
         from gmwm.export import TARGETS
@@ -140,19 +110,20 @@ def calibrate(
         replaceable(output / TARGETS[target].file_name)
     with folder_to_fill(output) as folder, Stopwatch().running() as watch:
         with stage("read"), limited(memory):
-            recordings = [read_recording(file, **reading) for file in files]
+            recordings = [read_recording(file, **given) for file in files]
         quantities = {c.name: c.quantity or "" for each in recordings for c in each.inertial}
-        model = models_of_channels(given, tuple(quantities))
+        for name in models:
+            if not any(name in (each, each.partition("_")[0], "") for each in quantities):
+                channels = ", ".join(quantities)
+                raise InputError(f"--model {name}=...: the channels are {channels}")
         if datasheet is not None:  # rejected before the work
             read_datasheet(datasheet, quantities)
-        with nullcontext() if quiet else progress_bar("calibrating", "channels") as bar:
+        with progress_bar("calibrating", "channels", quiet=quiet) as bar:
             if bar is not None:
                 bar(0, len(quantities), "being examined")
-            chosen = () if "all" in left else [name for name in SCREENING if name not in left]
-            how: dict[str, Any] = {"still": not everything, "remove_departures": remove_departures}
-            result = run(recordings, model, screening=chosen, jobs=jobs, progress=bar, **how)
+            result = run(recordings, models or None, progress=bar, **work)
         # The files first: who pipes the table into head must not lose them.
-        origin = {"command": shlex.join(["gmwm", *sys.argv[1:]])} | _hashes(files)
+        origin = {"command": command_line()} | _hashes(files)
         own = recordings[0] if len(recordings) == 1 else None
         written = write_files(result, folder, own, datasheet, origin, target)
     if as_json:
@@ -161,7 +132,7 @@ def calibrate(
         show(result)
         click.echo(written)
     if timings:
-        _show_timings(watch, jobs)
+        _show_timings(watch, work["jobs"])
     exit_unless(any(fit.valid for fit in result.values()), "channel")
 
 
@@ -239,7 +210,7 @@ def _is_shown(notice: Notice) -> bool:
         return True
     if notice.code == "length":
         return notice.severity != "good"
-    return notice.severity in ("warning", "bad") and notice.code not in _SHOWN_OTHERWISE
+    return notice.severity in ("warning", "bad") and notice.issue.repeats != "reader"
 
 
 def _table(result: Calibration) -> Table:
@@ -291,7 +262,6 @@ def write_files(
     target: str | None = None,
 ) -> str:
     """Write the files, all or none, then that of another program; returns what to say of them."""
-    from gmwm._core.files import moved_together
     from gmwm.calibration import stage
     from gmwm.export import TARGETS, export
 

@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from gmwm.cli.numbers import show, units_option
-from gmwm.cli.options import PATH, option, output_file, seconds
+from gmwm.cli.console import print_result
+from gmwm.cli.options import FILE_TO_WRITE, PATH, numbers, options, seconds
 from gmwm.errors import InputError
 
 if TYPE_CHECKING:
     from gmwm.calibration import Calibration
 
 _GRAVITY = 9.80665
-_SI = {
+_IN_SI = {
     "scale_error": 0.01,
     "misalignment": math.radians(1.0),
     "g_sensitivity": math.radians(1.0) / _GRAVITY,
@@ -24,59 +24,41 @@ _SI = {
     "vibration_rectification": 1e-3 / _GRAVITY,
     "vibration": _GRAVITY,
 }
-"""SI units of one unit of each option of errors."""
+"""SI units in one of each option of errors."""
 
 
 @click.command()
 @click.argument("file", type=PATH)
-@option(
-    "--imu FILE",
-    "Numbers in use: a file of Kalibr, OpenVINS, VINS, ORB-SLAM3, FAST-LIO, LIO-SAM or "
-    "their like, or of gmwm bound and gmwm reduce (.json).",
-    type=PATH,
+@options(
+    """
+    --imu FILE  Numbers in use: a file of Kalibr, OpenVINS, VINS, ORB-SLAM3, FAST-LIO, LIO-SAM or
+        their like, or of gmwm bound and gmwm reduce (.json).
+    -N GYRO,ACCEL  White noise in use, in place of --imu, rad/s/sqrt(Hz) and m/s^2/sqrt(Hz).
+    -K GYRO,ACCEL  Random walk in use, with -N, rad/s^2/sqrt(Hz) and m/s^3/sqrt(Hz).
+    --outages T,T,...  Lengths of outages in seconds.
+    --keyframe S  Interval of keyframes or scans in seconds.
+    --motion NAME  Motion in which the errors below act: handheld, drone, car, fixed-wing, or a
+        recording of your own.
+    --scale-error PERCENT  Scale error of both sensors.
+    --misalignment DEG  Misalignment of the axes.
+    --g-sensitivity DEG/S/G  g-sensitivity of the gyros.
+    --time-offset MS  Delay against what the IMU is fused with.
+    --vibration-rectification MG/G^2  Vibration rectification of the accelerometers, for the
+        vibration.
+    --vibration G  Vibration, root mean square.
+    -o --output JSON  File to save the certificate in.
+    --units
+    --json
+    """,
+    output=FILE_TO_WRITE,
+    N={"name": "white"},
+    K={"name": "walk"},
+    outages={"default": "10,60"},
+    keyframe={"default": 1.0},
+    **{name: {"default": 0.0} for name in _IN_SI},
 )
-@option(
-    "-N GYRO,ACCEL",
-    "White noise in use, in place of --imu, rad/s/sqrt(Hz) and m/s^2/sqrt(Hz).",
-    name="white",
-)
-@option(
-    "-K GYRO,ACCEL",
-    "Random walk in use, with -N, rad/s^2/sqrt(Hz) and m/s^3/sqrt(Hz).",
-    name="walk",
-)
-@option("--outages T,T,...", "Lengths of outages in seconds.", default="10,60")
-@option("--keyframe S", "Interval of keyframes or scans in seconds.", default=1.0)
-@option(
-    "--motion NAME",
-    "Motion in which the errors below act: handheld, drone, car, fixed-wing, or a "
-    "recording of your own.",
-)
-@option("--scale-error PERCENT", "Scale error of both sensors.", default=0.0)
-@option("--misalignment DEG", "Misalignment of the axes.", default=0.0)
-@option("--g-sensitivity DEG/S/G", "g-sensitivity of the gyros.", default=0.0)
-@option("--time-offset MS", "Delay against what the IMU is fused with.", default=0.0)
-@option(
-    "--vibration-rectification MG/G^2",
-    "Vibration rectification of the accelerometers, with --vibration.",
-    default=0.0,
-)
-@option("--vibration G", "Vibration, root mean square.", default=0.0)
-@output_file("File to save the certificate in.", "JSON")
-@units_option
-@option("--json", "Print JSON.", name="as_json")
 def certify(
-    file: Path,
-    imu: Path | None,
-    white: str | None,
-    walk: str | None,
-    outages: str,
-    keyframe: float,
-    motion: str | None,
-    output: Path | None,
-    units: str,
-    as_json: bool,
-    **errors: float,
+    file: Path, output: Path | None, units: str, as_json: bool, motion: str | None, **given: Any
 ) -> None:
     """Predict how consistent a filter is with the numbers in use.
 
@@ -92,20 +74,23 @@ def certify(
     """
     from gmwm.calibration import Calibration
     from gmwm.filter_numbers import Imperfections, certify as run
+    from gmwm.readers import read
 
     calibration = Calibration.load(file)
-    known = Imperfections(**{name: errors[name] * _SI[name] for name in errors})
-    if known.needs_motion and motion is None:
+    imperfections = Imperfections(**{name: given[name] * unit for name, unit in _IN_SI.items()})
+    if imperfections.needs_motion and motion is None:
         raise InputError("errors that come with motion do nothing at rest: add --motion drone")
     found = run(
         calibration,
-        _numbers(imu, white, walk, calibration),
-        outages=seconds("--outages", outages),
-        keyframe=keyframe,
-        imperfections=known,
-        motion=_motion(motion),
+        _numbers(given["imu"], given["white"], given["walk"], calibration),
+        outages=seconds("--outages", given["outages"]),
+        keyframe=given["keyframe"],
+        imperfections=imperfections,
+        motion=read(motion) if motion is not None and Path(motion).is_file() else motion,
     )
-    show(found, output=output, as_json=as_json, units=units)
+    if output is not None:
+        found.save(output)
+    print_result(found, output, text=found.text(units), as_json=as_json)
 
 
 def _numbers(
@@ -122,26 +107,11 @@ def _numbers(
         return SensorNumbers.load(imu) if is_saved else read_numbers(imu, calibration.rate)
     if white is None or walk is None:
         raise InputError("-N and -K belong together: give both")
-    kinds = {fit.wv.quantity or "" for fit in calibration.values()}
-    order = sorted(kinds, reverse=True)  # gyro before accel
-    columns = [_values(letter, text, order) for letter, text in (("-N", white), ("-K", walk))]
-    return dict(zip(order, zip(*columns, strict=True), strict=True))
-
-
-def _values(option: str, text: str, kinds: list[str]) -> list[float]:
-    try:
-        values = [float(part) for part in text.split(",")]
-    except ValueError:
-        values = []
-    if len(values) != len(kinds) or not all(value > 0.0 for value in values):
-        raise InputError(
-            f"{option} {text}: write a positive number for {' and '.join(kinds)}, such as "
-            f"{','.join(['1e-4', '1e-3'][: len(kinds)])}"
-        )
-    return values
-
-
-def _motion(text: str | None) -> Any:
-    from gmwm.readers import read
-
-    return read(text) if text is not None and Path(text).is_file() else text
+    kinds = sorted({fit.wv.quantity or "" for fit in calibration.values()}, reverse=True)
+    form = f"a positive number for {' and '.join(kinds)}, e.g. {'1e-4,1e-3'[: 5 * len(kinds) - 1]}"
+    columns = []
+    for flag, text in (("-N", white), ("-K", walk)):
+        columns.append(numbers(flag, text, form, len(kinds)))
+        if not min(columns[-1]) > 0.0:
+            raise InputError(f"{flag} {text}: write {form}")
+    return dict(zip(kinds, zip(*columns, strict=True), strict=True))  # gyro before accel

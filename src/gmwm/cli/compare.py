@@ -2,25 +2,14 @@
 
 from __future__ import annotations
 
-import json
-import shlex
-import sys
-from contextlib import nullcontext
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from gmwm.cli.console import progress_bar
-from gmwm.cli.options import (
-    PATH,
-    option,
-    output_file,
-    part_options,
-    printing_options,
-    read_recording,
-    reading_options,
-)
+from gmwm.cli.console import command_line, print_result, progress_bar
+from gmwm.cli.options import FILE_TO_WRITE, PATH, options, read_recording
 
 if TYPE_CHECKING:
     from gmwm.calibration import Calibration
@@ -28,25 +17,20 @@ if TYPE_CHECKING:
 
 @click.command()
 @click.argument("files", metavar="FILE FILE...", nargs=-1, required=True, type=PATH)
-@output_file("Page to write, of two printed ones.", "HTML")
-@option("--horizon S", "Longest outage that the filter numbers cover, in seconds.", default=60.0)
-@option(
-    "--datasheet YAML",
-    "N, B and K by sensor or channel, each with its unit, to be drawn over the curves "
-    "of the page: 'gyro: {N: 0.15 deg/sqrt(h), B: 7 deg/h}'.",
-    type=PATH,
+@options(
+    """
+    -o --output HTML  Page to write, of two printed ones.
+    --horizon
+    --datasheet
+    --reading
+    --part
+    --json
+    --quiet
+    """,
+    output=FILE_TO_WRITE,
 )
-@reading_options
-@part_options
-@printing_options
 def compare(
-    files: tuple[Path, ...],
-    output: Path | None,
-    horizon: float,
-    datasheet: Path | None,
-    as_json: bool,
-    quiet: bool,
-    **reading: Any,
+    files: Sequence[Path], output: Path | None, as_json: bool, quiet: bool, **given: Any
 ) -> None:
     """Compare recordings of a sensor, or units of a kind.
 
@@ -62,25 +46,18 @@ def compare(
     from gmwm.population import compare as run, labelled
     from gmwm.report import read_datasheet
 
+    horizon, datasheet = given.pop("horizon"), given.pop("datasheet")
     if datasheet is not None:  # rejected before the work
         read_datasheet(datasheet)
-    calibrations = [_calibration(file, reading, quiet) for file in files]
+    calibrations = [_calibration(file, given, quiet) for file in files]
     if datasheet is not None:
-        read_datasheet(
-            datasheet,
-            {name: fit.wv.quantity or "" for each in calibrations for name, fit in each.items()},
-        )
-    with nullcontext() if quiet else progress_bar("comparing", "axes") as bar:
+        quantities = {n: fit.wv.quantity or "" for each in calibrations for n, fit in each.items()}
+        read_datasheet(datasheet, quantities)
+    with progress_bar("comparing", "axes", quiet=quiet) as bar:
         found = run(labelled(calibrations, files), horizon=horizon, progress=bar)
     if output is not None:
-        origin = {"command": shlex.join(["gmwm", *sys.argv[1:]])}
-        found.report(output, datasheet=datasheet, provenance=origin)
-    if as_json:
-        click.echo(json.dumps(found.to_dict(), allow_nan=False))
-    elif not quiet:
-        click.echo(str(found))
-        if output is not None:
-            click.echo(f"wrote {output}")
+        found.report(output, datasheet=datasheet, provenance={"command": command_line()})
+    print_result(found, output, as_json=as_json, quiet=quiet)
 
 
 def _calibration(file: Path, reading: dict[str, Any], quiet: bool) -> Calibration:
@@ -88,5 +65,5 @@ def _calibration(file: Path, reading: dict[str, Any], quiet: bool) -> Calibratio
 
     if file.suffix.lower() == ".json":
         return Calibration.load(file)
-    with nullcontext() if quiet else progress_bar(f"calibrating {file.name}", "channels") as bar:
+    with progress_bar(f"calibrating {file.name}", "channels", quiet=quiet) as bar:
         return calibrate(read_recording(file, **reading), progress=bar)

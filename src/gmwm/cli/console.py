@@ -1,17 +1,42 @@
-"""What the terminal shows: tables, a bar of progress."""
+"""What the terminal shows: results, tables, a bar of progress."""
 
 from __future__ import annotations
 
+import json
+import shlex
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Literal
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+import click
 
 if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
 
     from gmwm._core.typing import Progress
+
+
+def print_result(
+    result: Any,
+    *written: str | Path | None,
+    text: str = "",
+    as_json: bool = False,
+    quiet: bool = False,
+) -> None:
+    """Print a result as text, with the files that were written, or as JSON."""
+    if as_json:
+        click.echo(json.dumps(result.to_dict(), allow_nan=False))
+    elif not quiet:
+        wrote = "\n".join(f"wrote {path}" for path in written if path is not None)
+        click.echo("\n\n".join(filter(None, (text or str(result), wrote))))
+
+
+def command_line() -> str:
+    """What was typed, for reports."""
+    return shlex.join(["gmwm", *sys.argv[1:]])
 
 
 def new_console(width: int | None = None, *, to_errors: bool = False) -> Console:
@@ -45,7 +70,7 @@ def new_table(*columns: str) -> Table:
 
 
 @contextmanager
-def progress_bar(title: str, unit: str) -> Iterator[Progress]:
+def progress_bar(title: str, unit: str, *, quiet: bool = False) -> Iterator[Progress | None]:
     """A bar with the time that is left, on a terminal only."""
     from rich.console import Console
     from rich.progress import (
@@ -57,8 +82,8 @@ def progress_bar(title: str, unit: str) -> Iterator[Progress]:
     )
 
     console = Console(stderr=True)
-    if not console.is_terminal:
-        yield lambda done, total, what: None
+    if quiet or not console.is_terminal:
+        yield None
         return
     columns = (
         TextColumn(title),
@@ -70,8 +95,6 @@ def progress_bar(title: str, unit: str) -> Iterator[Progress]:
     )
     with Bar(*columns, console=console, transient=True) as bar:
         task = bar.add_task("", total=None)
-
-        def advance(done: int, total: int, what: str) -> None:
-            bar.update(task, completed=done, total=total, description=what)
-
-        yield advance
+        yield lambda done, total, what: bar.update(
+            task, completed=done, total=total, description=what
+        )

@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING
 
 import click
 
-from gmwm.cli.calibrate import output_option, write_files
+from gmwm._core.files import folder_to_fill, moved_together
+from gmwm.cli.calibrate import folder_of_results, write_files
 from gmwm.cli.console import new_console, new_table, print_whole, progress_bar
-from gmwm.cli.options import option
+from gmwm.cli.options import options
 
 if TYPE_CHECKING:
     from gmwm.calibration import Calibration
@@ -17,18 +18,17 @@ if TYPE_CHECKING:
 
 
 @click.command()
-@output_option("gmwm-demo")
-@option(
-    "--hours X",
-    "Length of the simulated recording in hours.",
-    type=click.FloatRange(0.01, 100.0),
-    default=1.0,
-)
-@option("--seed NUMBER", "", type=int, default=1)
-@option(
-    "--files",
-    "Only write files to try the other commands with: static.csv of a sensor at rest, "
-    "imu.csv and fixes.csv of a drive with it.",
+@options(
+    """
+    -o --output  Folder for calibration.json, report.html, imu.yaml.
+    --hours NUMBER  Length of the simulated recording in hours.
+    --seed N  Of the noise.
+    --files  Only write files to try the other commands with: static.csv of a sensor at rest,
+        imu.csv and fixes.csv of a drive with it.
+    """,
+    output=folder_of_results("gmwm-demo"),
+    hours={"type": click.FloatRange(0.01, 100.0), "default": 1.0},
+    seed={"type": int, "default": 1},
 )
 def demo(output: Path, hours: float, seed: int, files: bool) -> None:
     """Simulate an IMU, calibrate it and compare with the truth.
@@ -44,7 +44,6 @@ def demo(output: Path, hours: float, seed: int, files: bool) -> None:
     if files:
         write_files_to_try(output, hours, seed)
         return
-    from gmwm._core.files import folder_to_fill
     from gmwm.calibration import calibrate as run
     from gmwm.report import duration_text
     from gmwm.study import simulated_imu
@@ -68,7 +67,6 @@ def demo(output: Path, hours: float, seed: int, files: bool) -> None:
 
 def write_files_to_try(output: Path, hours: float, seed: int) -> None:
     """Write the files, and print what can be done with them."""
-    from gmwm._core.files import folder_to_fill, moved_together
     from gmwm.study import write_demo_files
 
     with folder_to_fill(output) as folder, moved_together(folder) as new:

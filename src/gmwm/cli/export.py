@@ -6,22 +6,25 @@ from pathlib import Path
 
 import click
 
-from gmwm.cli.options import PATH, option, output_file
+from gmwm.cli.options import FILE_TO_WRITE, PATH, options
 from gmwm.errors import InputError
 
 
 @click.command()
 @click.argument("files", metavar="FILE...", nargs=-1, type=PATH)
-@option("--to NAME", "The program; see --list.", name="target")
-@option(
-    "--horizon T",
-    "Longest outage that the numbers cover, in seconds; by default 1 (keyframes,"
-    " scans) or 60, see --list.",
-    type=float,
+@options(
+    """
+    --to NAME  The program; see --list.
+    --horizon S  Longest outage that the numbers cover, in seconds; by default 1 (keyframes, scans)
+        or 60, see --list.
+    --form FORM  N+K, N+GM, ...: most programs hold one; state-space holds any.
+    -o --output FILE  File to write instead of printing; .npz for state-space.
+    --list  List the programs.
+    """,
+    to={"name": "target"},
+    output=FILE_TO_WRITE,
+    list={"name": "listed"},
 )
-@option("--form FORM", "N+K, N+GM, ...: most programs hold one; state-space holds any.")
-@output_file("File to write instead of printing; .npz for state-space.")
-@option("--list", "List the programs.", name="listed")
 def export(
     files: tuple[Path, ...],
     target: str | None,

@@ -2,58 +2,40 @@
 
 from __future__ import annotations
 
-import json
-import os
-from contextlib import nullcontext
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import click
 
 from gmwm.cli.calibrate import exit_unless
-from gmwm.cli.console import progress_bar
+from gmwm.cli.console import print_result, progress_bar
 from gmwm.cli.hints import with_hint
-from gmwm.cli.options import (
-    arguments_of_read,
-    estimating_options,
-    option,
-    output_folder,
-    part_options,
-    printing_options,
-    reading_options,
-    written_models,
-)
+from gmwm.cli.options import arguments_of_read, folder_to_write, options
+from gmwm.errors import InputError
+
+_PARTS = ("start", "stop", "screening", "still", "horizon", "resume", "jobs", "cluster")
 
 
 @click.command()
 @click.argument("patterns", metavar="PATTERN...", nargs=-1, required=True)
-@output_folder("gmwm-fleet", "Folder for calibrations, fleet.parquet, fleet.html, fleet.json.")
-@option("--jobs N", "Processes; one a core by default.", type=click.IntRange(min=1))
-@option(
-    "--cluster ADDRESS",
-    "Dask scheduler that does the work, e.g. tcp://10.0.0.1:8786; its workers read the files.",
+@options(
+    """
+    -o --output  Folder for calibrations, fleet.parquet, fleet.html, fleet.json.
+    --jobs
+    --cluster
+    --resume
+    --horizon
+    --reading
+    --part
+    --estimating
+    --json
+    --quiet
+    """,
+    output=folder_to_write("gmwm-fleet"),
 )
-@option("--resume", "Go on with what the folder holds; what changed is done again.")
-@option("--horizon S", "Longest outage that filter N and K cover, in seconds.", default=60.0)
-@reading_options
-@part_options
-@estimating_options
-@printing_options
 def fleet(
-    patterns: tuple[str, ...],
-    output: Path,
-    jobs: int | None,
-    cluster: str | None,
-    resume: bool,
-    horizon: float,
-    models: tuple[str, ...],
-    left: tuple[str, ...],
-    everything: bool,
-    start: float | None,
-    stop: float | None,
-    as_json: bool,
-    quiet: bool,
-    **reading: Any,
+    patterns: Sequence[str], output: Path, models: Any, as_json: bool, quiet: bool, **given: Any
 ) -> None:
     """Calibrate many units of a sensor and compare them.
 
@@ -73,36 +55,19 @@ def fleet(
       gmwm fleet 'lot-7/*.csv' --gyro-unit deg/s --accel-unit g -o lot-7-out \\
         --resume
     """
-    from gmwm.calibration import SCREENING
-    from gmwm.errors import InputError
     from gmwm.population import fleet as run
 
+    work = {name: given.pop(name) for name in _PARTS}
     try:
-        with nullcontext() if quiet else progress_bar("fleet", "units") as bar:
-            found = run(
-                patterns,
-                written_models(models) or None,
-                screening=() if "all" in left else [n for n in SCREENING if n not in left],
-                still=not everything,
-                horizon=horizon,
-                start=0.0 if start is None else start,
-                stop=stop,
-                folder=output,
-                resume=resume,
-                jobs=jobs or os.cpu_count() or 1,
-                cluster=cluster,
-                progress=bar,
-                **arguments_of_read(**reading),
-            )
+        with progress_bar("fleet", "units", quiet=quiet) as bar:
+            work |= {"folder": output, "progress": bar, **arguments_of_read(**given)}
+            found = run(patterns, models or None, **work)
     except KeyboardInterrupt:
         if (output / "calibrations").is_dir():
             click.echo(f"finished units are kept in {output}: add --resume to go on", err=True)
         raise
-    if as_json:
-        click.echo(json.dumps(found.to_dict(), allow_nan=False))
-    elif not quiet:
-        click.echo(found)
-        click.echo(f"wrote {output}/: calibrations, fleet.parquet, fleet.html, fleet.json")
+    files = f"{output}/: calibrations, fleet.parquet, fleet.html, fleet.json"
+    print_result(found, files, as_json=as_json, quiet=quiet)
     if found.failed:
         first = next(iter(found.failed.values()))
         reason = with_hint(InputError(first.text, first.code))

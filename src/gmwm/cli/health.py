@@ -2,30 +2,28 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
 import click
 
-from gmwm.cli.options import (
-    PATH,
-    memory_option,
-    output_file,
-    part_options,
-    printing_options,
-    read_recording,
-    reading_options,
-)
+from gmwm.cli.console import print_result
+from gmwm.cli.options import FILE_TO_WRITE, PATH, options, read_recording
 
 
 @click.command()
 @click.argument("file", type=PATH)
-@output_file("Write all findings with their numbers, in SI units, to this file.")
-@reading_options
-@part_options
-@memory_option
-@printing_options
+@options(
+    """
+    -o --output FILE  Write all findings with their numbers, in SI units, to this file.
+    --reading
+    --part
+    --memory
+    --json
+    --quiet
+    """,
+    output=FILE_TO_WRITE,
+)
 def health(
     file: Path,
     output: Path | None,
@@ -50,12 +48,6 @@ def health(
     with limited(memory):
         recording = read_recording(file, **reading)
     found = examine(recording)
-    # The file first: who pipes the table into head must not lose it.
-    if output is not None:
+    if output is not None:  # first: who pipes the table into head must not lose it
         found.save(output)
-    if as_json:
-        click.echo(json.dumps(found.to_dict(), allow_nan=False))
-    elif not quiet:
-        click.echo(found)
-        if output is not None:
-            click.echo(f"\nwrote {output}")
+    print_result(found, output, as_json=as_json, quiet=quiet)

@@ -24,6 +24,7 @@ HINTS = {
     "memory": "--channel gyro_x=COLUMN for each of some channels, or, if there is more, "
     "--memory GB with gmwm calibrate and health, and GMWM_MEMORY=GB before the others",
     "missing-key": "--trajectory, --truth and --filter, or --imu, --gnss and --sensors",
+    "model-missing": "--model '{channel}=N + K', or leave it out by --channels",
     "no-rest": "--all to take everything as static",
     "no-stamps": "--clock log",
     "other-runs": "-o FOLDER",

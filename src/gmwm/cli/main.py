@@ -40,20 +40,8 @@ def cli(context: click.Context) -> None:
         click.echo(context.get_help())
 
 
-for _command in (
-    calibrate,
-    fleet,
-    compare,
-    demo,
-    budget,
-    health,
-    bound,
-    reduce,
-    certify,
-    export,
-    navigate,
-    reproduce,
-):
+_COMMANDS = (calibrate, fleet, compare, demo, budget, health)
+for _command in (*_COMMANDS, bound, reduce, certify, export, navigate, reproduce):
     cli.add_command(_command)
 
 

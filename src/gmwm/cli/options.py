@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import os
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
+from gmwm._core.files import writable_file, writable_folder
 from gmwm.errors import InputError
 from gmwm.readers import CLOCKS, NAMES as FORMATS
 
@@ -16,29 +18,73 @@ if TYPE_CHECKING:
     from gmwm.process import Model, Process
     from gmwm.readers import Recording
 
+_SCREENING = ("events", "lines", "resonances", "outliers")
 _TERM = re.compile(r"\s*(?:([1-9])\s*\*?\s*)?([A-Za-z]+)\s*")
 
+Decorator = Callable[[Any], Any]
 
 PATH = click.Path(path_type=Path)
+_TYPES = {"FILE": PATH, "YAML": PATH, "N": click.IntRange(min=1), "NUMBER": float, "S": float}
+"""What is to be given -> its type; other values are texts."""
+
+FILE_TO_WRITE = {"type": PATH, "callback": lambda _, __, path: path and writable_file(path)}
+"""Settings of an option: a path that cannot be written is rejected before any work."""
 
 
-def option(usage: str, text: str, *, name: str = "", **settings: Any) -> Callable[[Any], Any]:
-    """An option of a command.
+def folder_to_write(default: str, names: Sequence[str] = ()) -> dict[str, Any]:
+    """Settings of the option of a folder to fill with files of these names, checked likewise."""
 
-    usage: Its flags, and what is to be given after them: ``"-o --output FILE"``; with nothing to
-        give it is a switch.
-    text: The help; a default is added to it, unless it is zero or settings hide it.
-    name: Of the argument, if not that of the flag.
-    settings: Of `click.option`.
+    def checked(_: click.Context, __: click.Parameter, path: Path) -> Path:
+        return writable_folder(path, names)
+
+    return {"type": PATH, "default": Path(default), "callback": checked}
+
+
+def options(declared: str, **settings: dict[str, Any]) -> Decorator:
+    """The options of a command, declared as its help shows them.
+
+    declared: On each line flags, what is to be given after them, if it is no switch, two blanks
+        and the help, which may go on on further lines; or only the name of an option or a group of
+        `_SHARED`, as a flag.
+    settings: Of `click.option`, by the name of the last flag; ``name`` is that of the argument.
     """
-    words = usage.split()
-    flags = [word for word in words if word.startswith("-")]
-    metavar = " ".join(words[len(flags) :])
-    if not metavar and "type" not in settings:
-        settings["is_flag"] = True
-    settings.setdefault("show_default", bool(settings.get("default")))
-    names = [*flags, name] if name else flags
-    return click.option(*names, metavar=metavar or None, help=text or None, **settings)
+    given = _group(declared, settings)
+
+    def decorated(command: Any) -> Any:
+        for each in reversed(given):
+            command = each(command)
+        return command
+
+    return decorated
+
+
+def _declared(declared: str, settings: dict[str, dict[str, Any]]) -> dict[str, list[Decorator]]:
+    """The option or the group of each name."""
+    found: dict[str, list[Decorator]] = {}
+    for entry in re.split(r"\n +(?=-)", declared)[1:]:
+        usage, _, text = entry.strip().partition("  ")
+        flags = [word for word in usage.split() if word.startswith("-")]
+        key = flags[-1].lstrip("-").replace("-", "_")
+        if not text and key in _SHARED:
+            found[key] = _SHARED[key]
+            continue
+        metavar, own = usage.removeprefix(" ".join(flags)).strip(), dict(settings.get(key, {}))
+        # A default is added to the help, unless it is zero or settings hide it.
+        usual: dict[str, Any] = {"show_default": bool(own.get("default"))}
+        if metavar in _TYPES:
+            usual["type"] = _TYPES[metavar]
+        elif not metavar and "type" not in own:
+            usual["is_flag"] = True
+        names = [*flags, own.pop("name")] if "name" in own else flags
+        usual |= {"metavar": metavar or None, "help": " ".join(text.split())}
+        found[key] = [click.option(*names, **(usual | own))]
+    if unknown := settings.keys() - found.keys():
+        raise KeyError(f"settings of options that are not declared: {unknown}")
+    return found
+
+
+def _group(declared: str, settings: dict[str, dict[str, Any]]) -> list[Decorator]:
+    return [each for group in _declared(declared, settings).values() for each in group]
 
 
 def _terms() -> str:
@@ -55,216 +101,176 @@ class _ModelOption(click.Option):
         return super().get_help_record(ctx)
 
 
-def together(*options: Callable[[Any], Any]) -> Callable[[Any], Any]:
-    """One decorator that gives a command several options, listed in this order."""
+def numbers(flag: str, text: str, form: str, *counts: int, separator: str = ",") -> list[float]:
+    """The numbers of an option.
 
-    def decorated(command: Any) -> Any:
-        for option in reversed(options):
-            command = option(command)
-        return command
-
-    return decorated
-
-
-def output_file(text: str, metavar: str = "FILE") -> Callable[[Any], Any]:
-    """The option of a file to write; a path that cannot be written is rejected before any work."""
-
-    def checked(_: click.Context, __: click.Parameter, path: Path | None) -> Path | None:
-        from gmwm._core.files import writable_file
-
-        return path and writable_file(path)
-
-    return click.option("-o", "--output", type=PATH, metavar=metavar, help=text, callback=checked)
+    form: How they are to be written, for messages.
+    counts: How many there may be; by default any number.
+    Raises InputError for anything else.
+    """
+    try:
+        found = [float(part) for part in text.split(separator)]
+    except ValueError:
+        found = []
+    if not found or (counts and len(found) not in counts):
+        raise InputError(f"{flag} {text}: write {form}")
+    return found
 
 
-def output_folder(default: str, text: str, names: Sequence[str] = ()) -> Callable[[Any], Any]:
-    """The option of a folder to fill with files of these names, checked likewise."""
-
-    def checked(_: click.Context, __: click.Parameter, path: Path) -> Path:
-        from gmwm._core.files import writable_folder
-
-        return writable_folder(path, names)
-
-    return option("-o --output", text, type=PATH, default=Path(default), callback=checked)
+def seconds(flag: str, text: str) -> list[float]:
+    """Times of an option, separated by commas."""
+    return numbers(flag, text, "seconds, e.g. 1,10,60")
 
 
-reading_options = together(
-    option("--rate NUMBER", "Sampling rate in Hz; needed without a time column.", type=float),
-    option("--gyro-unit TEXT", "Unit of the gyro columns: rad/s, deg/s, deg/h, ..."),
-    option("--accel-unit TEXT", "Unit of the accelerometer columns: m/s^2, g, mg, ..."),
-    option(
-        "--channel NAME=COLUMN",
-        "Role of a column by its name or 0-based number, e.g. gyro_x=wx or accel_z=5; "
-        "repeat. By default roles are guessed from the column names.",
-        name="channels",
-        multiple=True,
-    ),
-    option(
-        "--time COLUMN", "Time column by name or number; 'none' to ignore it.", name="time_column"
-    ),
-    option(
-        "--format NAME",
-        f"What the file is, where its content and its name do not show it: {', '.join(FORMATS)}.",
-        name="form",
-        type=click.Choice(FORMATS),
-    ),
-    option(
-        "--layout LAYOUT",
-        "Of a binary file without a header: IMAR, LN200, LN200IG, IXSEA, NAVCHIP_INT, "
-        "NAVCHIP_FLT, KF-GINS, or TYPE,GYRO_SCALE,ACCEL_SCALE[,rates][,little|big].",
-    ),
-    option(
-        "--damaged",
-        "Use the readable part of a text or a flight log that is cut off or damaged;"
-        " it is rejected otherwise.",
-    ),
+READING = ("rate", "gyro_unit", "accel_unit", "channel", "time", "format", "layout", "damaged")
+"""Arguments of the options of a file."""
+
+_SHARED: dict[str, list[Decorator]] = {}
+_SHARED["reading"] = _group(
+    f"""
+    --rate NUMBER  Sampling rate in Hz; needed without a time column.
+    --gyro-unit TEXT  Unit of the gyro columns: rad/s, deg/s, deg/h, ...
+    --accel-unit TEXT  Unit of the accelerometer columns: m/s^2, g, mg, ...
+    --channel NAME=COLUMN  Role of a column by its name or 0-based number, e.g. gyro_x=wx or
+        accel_z=5; repeat. By default roles are guessed from the column names.
+    --time COLUMN  Time column by name or number; 'none' to ignore it.
+    --format NAME  What the file is, where its content and its name do not show it:
+        {", ".join(FORMATS)}.
+    --layout LAYOUT  Of a binary file without a header: IMAR, LN200, LN200IG, IXSEA, NAVCHIP_INT,
+        NAVCHIP_FLT, KF-GINS, or TYPE,GYRO_SCALE,ACCEL_SCALE[,rates][,little|big].
+    --damaged  Use the readable part of a text or a flight log that is cut off or damaged; it is
+        rejected otherwise.
+    """,
+    {"channel": {"multiple": True}, "format": {"type": click.Choice(FORMATS)}},
 )
-"""What the file is, for `read_recording`."""
-
-part_options = together(
-    option(
-        "--topic NAME",
-        "Topic of a bag or a flight log; needed where several have an IMU. Repeat for gyros"
-        " and accelerometers in topics of their own.",
-        name="topics",
-        multiple=True,
-    ),
-    option(
-        "--clock",
-        "Stamps of messages: of their headers, or when they were recorded.",
-        type=click.Choice(CLOCKS),
-        default=CLOCKS[0],
-    ),
-    option(
-        "--channels NAME,...",
-        "Only these channels: gyro_x,accel_z, or gyro for all of them.",
-        name="only",
-    ),
-    option("--start S", "Leave out samples before this time, in seconds.", type=float),
-    option("--stop S", "Leave out samples after this time, in seconds.", type=float),
+_SHARED["part"] = _group(
+    """
+    --topic NAME  Topic of a bag or a flight log; needed where several have an IMU. Repeat for gyros
+        and accelerometers in topics of their own.
+    --clock  Stamps of messages: of their headers, or when they were recorded.
+    --channels NAME,...  Only these channels: gyro_x,accel_z, or gyro for all of them.
+    --start S  Leave out samples before this time, in seconds.
+    --stop S  Leave out samples after this time, in seconds.
+    """,
+    {
+        "topic": {"multiple": True},
+        "clock": {"type": click.Choice(CLOCKS), "default": CLOCKS[0]},
+        "start": {"default": 0.0},
+    },
 )
-"""Topics, channels and a stretch, for `read_recording`."""
-
-estimating_options = together(
-    option(
-        "--model [NAME=]MODEL",
-        "Fit this in place of selecting: terms {terms}, e.g. 'N + K + 2 GM'; or "
-        "'gyro=N + 2 GM' for a sensor or channel; repeat.",
-        cls=_ModelOption,
-        name="models",
-        multiple=True,
-    ),
-    option(
-        "--leave WHAT",
-        "Leave events, lines, resonances, outliers or all as they are: samples of shocks "
-        "are masked otherwise, lines and resonances are terms that a model may have, "
-        "outliers all over it make the variances robust; repeat.",
-        name="left",
-        multiple=True,
-        type=click.Choice(["events", "lines", "resonances", "outliers", "all"]),
-    ),
-    option(
-        "--all",
-        "Take everything as static; by default only the stretches at rest of a log that "
-        "moves are used.",
-        name="everything",
-    ),
+_SHARED["estimating"] = _group(  # named as arguments of `gmwm.calibrate`
+    """
+    --model [NAME=]MODEL  Fit this in place of selecting: terms {terms}, e.g. 'N + K + 2 GM'; or
+        'gyro=N + 2 GM' for a sensor or channel; repeat.
+    --leave WHAT  Leave events, lines, resonances, outliers or all as they are: samples of shocks
+        are masked otherwise, lines and resonances are terms that a model may have, outliers all
+        over it make the variances robust; repeat.
+    --all  Take everything as static; by default only the stretches at rest of a log that moves are
+        used.
+    """,
+    {
+        "model": {
+            "cls": _ModelOption,
+            "name": "models",
+            "multiple": True,
+            "callback": lambda _, __, texts: written_models(texts),
+        },
+        "leave": {
+            "name": "screening",
+            "multiple": True,
+            "type": click.Choice([*_SCREENING, "all"]),
+            "callback": lambda _, __, left: [
+                each for each in _SCREENING if each not in left and "all" not in left
+            ],
+        },
+        "all": {"name": "still", "callback": lambda _, __, everything: not everything},
+    },
 )
-"""What is fitted, and to which samples."""
-
-printing_options = together(
-    option("--json", "Print the result as JSON, in SI units.", name="as_json"),
-    option("-q --quiet", "Print nothing but errors."),
+_SHARED |= _declared(
+    """
+    --jobs N  Processes; one a core by default.
+    --cluster ADDRESS  Dask scheduler that does the work, e.g. tcp://10.0.0.1:8786.
+    --resume  Go on with what the folder holds.
+    --horizon S  Longest outage that the filter numbers cover, in seconds.
+    --datasheet YAML  N, B and K by sensor or channel, each with its unit, to be drawn over the
+        curves of the report: 'gyro: {N: 0.15 deg/sqrt(h), B: 7 deg/h}'.
+    --memory GB  For the samples: those of a longer file are kept on disk, in TMPDIR, and about
+        three times one channel is in memory. By default 1 GB.
+    --units  Units of the table; files and JSON are in SI.
+    --json  Print the result as JSON, in SI units.
+    -q --quiet  Print nothing but errors.
+    """,
+    {
+        "jobs": {"default": lambda: os.cpu_count() or 1, "show_default": False},
+        "horizon": {"default": 60.0},
+        "memory": {"type": float},
+        "units": {"type": click.Choice(["field", "si"]), "default": "field"},
+        "json": {"name": "as_json"},
+    },
 )
-"""How results are printed."""
-
-
-memory_option = option(
-    "--memory GB",
-    "For the samples: those of a longer file are kept on disk, in TMPDIR, and about "
-    "three times one channel is in memory. By default 1 GB.",
-    type=float,
-)
+"""Options and groups of options that several commands have."""
 
 
 def read_recording(
-    file: Path, start: float | None = None, stop: float | None = None, **options: Any
+    file: Path, *, start: float = 0.0, stop: float | None = None, **reading: Any
 ) -> Recording:
-    """Read a recording as the options say.
+    """Read a recording as the options of its reading, and of its part where there are some, say.
 
     Raises InputError if an option or the file cannot be used.
     """
     from gmwm.readers import read
 
-    recording = read(file, **arguments_of_read(**options))
-    return recording.part(0.0 if start is None else start, stop)
+    return read(file, **arguments_of_read(**reading)).part(start, stop)
 
 
-def arguments_of_read(**options: Any) -> dict[str, Any]:
-    """Arguments of `gmwm.read` for `reading_options` and, where there are some, `part_options`.
+def arguments_of_read(
+    *,
+    gyro_unit: str | None,
+    accel_unit: str | None,
+    channel: Sequence[str],
+    time: str | None,
+    damaged: bool,
+    channels: str | None = None,
+    **others: Any,
+) -> dict[str, Any]:
+    """Arguments of `gmwm.read` for those of these options that are given.
 
     Raises InputError if an option cannot be used.
     """
-    units = {kind: options[f"{kind}_unit"] for kind in ("gyro", "accel")}
-    return {
-        "rate": options["rate"],
+    units = {"gyro": gyro_unit, "accel": accel_unit}
+    found = {
         "units": {kind: unit for kind, unit in units.items() if unit is not None},
-        "channels": _chosen(roles(options["channels"]), options.get("only")),
-        "time": time_reference(options["time_column"]),
-        "layout": options.get("layout"),
-        "topic": options.get("topics", ()),
-        "clock": options.get("clock", CLOCKS[0]),
-        "format": options.get("form"),
-    } | ({"damaged": True} if options.get("damaged") else {})
+        "channels": _channels(channel, channels),
+        "time": False if (time or "").lower() == "none" else time and _column(time),
+        "damaged": damaged or None,
+        **others,
+    }
+    return {name: each for name, each in found.items() if each not in (None, {}, ())}
 
 
-def _chosen(
-    columns: dict[str, str | int] | None, only: str | None
-) -> dict[str, str | int] | list[str] | None:
-    """Channels with their columns, or their names alone."""
+def _channels(pairs: Sequence[str], only: str | None) -> dict[str, str | int] | list[str]:
+    """Channel name -> column, of NAME=COLUMN; of some names only, or these names alone."""
+    columns: dict[str, str | int] = {}
+    for pair in pairs:
+        name, _, column = pair.partition("=")
+        if not (name and column):
+            raise InputError(f"--channel {pair}: write NAME=COLUMN, e.g. gyro_x=wx or accel_z=5")
+        if name in columns:
+            raise InputError(f"--channel {name}=... is given twice: a channel has one column")
+        columns[name] = _column(column)
     if only is None:
         return columns
     names = [name.strip() for name in only.split(",") if name.strip()]
     if not names:
         raise InputError("--channels names no channel: write names, e.g. gyro_x,accel_z")
-    if columns is None:
-        return names
-    for name in names:
+    for name in names if columns else ():
         if name not in columns:
             raise InputError(f"--channels {only}: add --channel {name}=COLUMN, or leave it out")
-    return {name: columns[name] for name in names}
+    return {name: columns[name] for name in names} if columns else names
 
 
 def _column(text: str) -> str | int:
     return int(text) if text.isascii() and text.isdigit() else text
-
-
-def roles(pairs: tuple[str, ...]) -> dict[str, str | int] | None:
-    """Channel name -> column, of NAME=COLUMN."""
-    found: dict[str, str | int] = {}
-    for pair in pairs:
-        name, separator, column = pair.partition("=")
-        if not (name and separator and column):
-            raise InputError(f"--channel {pair}: write NAME=COLUMN, e.g. gyro_x=wx or accel_z=5")
-        if name in found:
-            raise InputError(f"--channel {name}=... is given twice: a channel has one column")
-        found[name] = _column(column)
-    return found or None
-
-
-def time_reference(text: str | None) -> str | int | bool | None:
-    """A column of time stamps; ``False`` for "none"."""
-    if text is None:
-        return None
-    return False if text.lower() == "none" else _column(text)
-
-
-def seconds(option: str, text: str) -> list[float]:
-    """Times of an option, separated by commas."""
-    try:
-        return [float(part) for part in text.split(",")]
-    except ValueError:
-        raise InputError(f"{option} {text}: write seconds, e.g. 1,10,60") from None
 
 
 # -- models ---------------------------------------------------------------------------------------
@@ -282,30 +288,6 @@ def written_models(texts: Sequence[str]) -> dict[str, Model]:
             raise InputError(f"--model {text}: {name or 'all channels'} have a model: give one")
         given[name] = _model(model)
     return given
-
-
-def models_of_channels(
-    given: Mapping[str, Model], channels: Sequence[str]
-) -> dict[str, Model] | None:
-    """The model of each channel: its own, its sensor's, or the one for all.
-
-    given: See `written_models`.
-    Returns: None if nothing is given.
-    Raises InputError if a channel has no model, or a model no channel.
-    """
-    if not given:
-        return None
-    keys = {name: (name, name.partition("_")[0], "") for name in channels}
-    for name in given:
-        if not any(name in each for each in keys.values()):
-            raise InputError(f"--model {name}=...: the channels are {', '.join(channels)}")
-    for name, each in keys.items():
-        if given.keys().isdisjoint(each):
-            raise InputError(
-                f"--model gives {name} no model: add one, e.g. --model '{name}=N + K', or "
-                "leave it out by --channels"
-            )
-    return {name: next(given[key] for key in each if key in given) for name, each in keys.items()}
 
 
 def _model(text: str) -> Model:

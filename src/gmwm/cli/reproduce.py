@@ -2,88 +2,55 @@
 
 from __future__ import annotations
 
-import os
-from collections.abc import Mapping
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
-from gmwm.cli.console import progress_bar
-from gmwm.cli.options import PATH, option, output_folder, read_recording, reading_options
+from gmwm._core.files import folder_to_fill, moved_into_place, write_text
+from gmwm.cli.console import print_result, progress_bar
+from gmwm.cli.options import folder_to_write, options, read_recording
 from gmwm.errors import InputError
 
-if TYPE_CHECKING:
-    import pyarrow as pa
-
-    from gmwm.readers import Recording
-    from gmwm.study import Study
-
-EXPERIMENTS = (
-    "table2",
-    "table3",
-    "table4",
-    "five-gm",
-    "fig2",
-    "fig3",
-    "fig4",
-    "appendix-a",
-    "fig5",
-    "fig6",
-    "fig7",
-    "fig8",
-    "fig9",
-    "selection",
-    "weights2",
-    "weights3",
-    "weights4",
+_SIMULATED = (
+    *("table2", "table3", "table4", "five-gm", "fig2", "fig3", "fig4"),
+    *("weights2", "weights3", "weights4"),
 )
+_NAVIGATED, _ROTATED = ("fig5", "fig6", "fig7", "fig8", "fig9"), ("fig8", "fig9")
+_TESTS = ("appendix-a", "selection")
 
-
-NAVIGATION = ("fig5", "fig6", "fig7", "fig8", "fig9")
-ROTATED = ("fig8", "fig9")
+Found = tuple[str, Sequence[Path]]
+"""What to print, and the files that were written."""
 
 
 @click.command()
-@click.argument("experiment", type=click.Choice(EXPERIMENTS), metavar="EXPERIMENT")
-@output_folder("gmwm-study", "Folder for tables, figures and raw estimates.")
-@option("--runs N", "Number of simulated series.", type=click.IntRange(min=2))
-@option("--seed N", "", type=click.IntRange(min=0), default=0)
-@option("--jobs N", "Processes; one a core by default.", type=click.IntRange(min=1))
-@option(
-    "--method NAME",
-    "Only this method, e.g. GMWM; repeat. By default all of the table.",
-    name="methods",
-    multiple=True,
+@click.argument(
+    "experiment", type=click.Choice([*_SIMULATED, *_NAVIGATED, *_TESTS]), metavar="EXPERIMENT"
 )
-@option("--resume", "Go on with the runs that the folder holds.")
-@option("--cluster ADDRESS", "Dask scheduler that does the runs, e.g. tcp://10.0.0.1:8786.")
-@option(
-    "--recording FILE",
-    "fig5 to fig9: a real static recording in place of a simulated one; the first is "
-    "calibrated, the others are navigated with; repeat.",
-    name="recordings",
-    multiple=True,
-    type=PATH,
+@options(
+    """
+    -o --output  Folder for tables, figures and raw estimates.
+    --runs N  Number of simulated series.
+    --seed N  Of the first series.
+    --jobs
+    --method NAME  Only this method, e.g. GMWM; repeat. By default all of the table.
+    --resume
+    --cluster
+    --recording FILE  fig5 to fig9: a real static recording in place of a simulated one; the first
+        is calibrated, the others are navigated with; repeat.
+    --rotate  fig8, fig9: calibrate every recording in turn and navigate with the others; further
+        filters, intervals over recordings.
+    --reading
+    """,
+    output=folder_to_write("gmwm-study"),
+    runs={"type": click.IntRange(min=2)},
+    seed={"type": click.IntRange(min=0), "default": 0},
+    method={"multiple": True},
+    recording={"multiple": True},
 )
-@option(
-    "--rotate",
-    "fig8, fig9: calibrate every recording in turn and navigate with the others; "
-    "further filters, intervals over recordings.",
-)
-@reading_options
 def reproduce(
-    experiment: str,
-    output: Path,
-    runs: int | None,
-    seed: int,
-    jobs: int | None,
-    methods: tuple[str, ...],
-    resume: bool,
-    cluster: str | None,
-    recordings: tuple[Path, ...],
-    rotate: bool,
-    **reading: Any,
+    experiment: str, output: Path, recording: Sequence[Path], rotate: bool, **options: Any
 ) -> None:
     """Repeat an experiment of the paper, or our own harder one.
 
@@ -105,114 +72,69 @@ def reproduce(
       gmwm reproduce fig9 --recording a.csv --recording b.csv --rate 100 \\
         --gyro-unit deg/s --accel-unit g --rotate
     """
-    from gmwm._core.files import folder_to_fill
-
-    processes = jobs or os.cpu_count() or 1
-    if experiment in NAVIGATION:
-        _check_alone(
-            experiment,
-            {
-                "--method": methods,
-                "--cluster": cluster,
-                "--resume": resume and not rotate,
-                "--rotate": rotate and experiment not in ROTATED,
-            },
-        )
-        given = [read_recording(file, **reading) for file in recordings]
-        with folder_to_fill(output) as folder:
-            options = {"runs": runs, "seed": seed, "jobs": processes}
-            options |= {"resume": resume} if rotate else {}
-            _navigated(experiment, folder, given, rotate, **options)
-        return
-    _check_alone(experiment, {"--recording": recordings, "--rotate": rotate})
-    if experiment in ("appendix-a", "selection"):
-        _check_alone(experiment, {"--method": methods, "--resume": resume, "--cluster": cluster})
-        with folder_to_fill(output) as folder:
-            _alone(experiment, folder, runs, seed, processes)
-        return
+    alone = {name: options.pop(name) for name in ("method", "cluster", "resume")}
+    known = set(alone) if experiment in _SIMULATED else set()
+    if experiment in _NAVIGATED:
+        known = {"recording"} | ({"rotate"} if experiment in _ROTATED else set())
+        known |= {"resume"} if rotate else set()
+    for name, each in {**alone, "recording": recording, "rotate": rotate}.items():
+        if each and name not in known:
+            raise InputError(f"{experiment} has no option --{name}: leave it out")
+    work = {name: options.pop(name) for name in ("runs", "seed", "jobs")}
+    recordings = [read_recording(file, **options) for file in recording]
     with folder_to_fill(output) as folder:
-        work: dict[str, Any] = {"jobs": processes, "resume": resume, "cluster": cluster}
-        _simulated(experiment, folder, seed, runs=runs, methods=methods or None, **work)
+        try:
+            if experiment in _SIMULATED:
+                text, paths = _simulated(experiment, folder, **work, **alone)
+            elif experiment in _NAVIGATED:
+                work |= {"recordings": recordings} | ({"resume": alone["resume"]} if rotate else {})
+                text, paths = _navigated(experiment, folder, rotate, **work)
+            else:
+                text = _tested(experiment, **work)
+                paths = [write_text(folder / f"{experiment}.txt", text)]
+        except KeyboardInterrupt:
+            if "resume" in known:
+                click.echo(f"finished runs are kept in {folder}: add --resume to go on", err=True)
+            raise
+    print_result(text, *paths)
 
 
-def _simulated(experiment: str, folder: Path, seed: int, *, runs: int | None, **work: Any) -> None:
+def _simulated(
+    experiment: str, folder: Path, *, runs: int | None, seed: int, method: Any, **work: Any
+) -> Found:
     """Tables and boxplots of simulated series."""
-    from gmwm.study import FIGURES, STUDIES, boxplots, run_study
-
-    study = FIGURES.get(experiment) or STUDIES[experiment]
-    try:
-        with progress_bar(study.name, "runs") as bar:
-            count = runs or study.runs
-            table = run_study(study, folder, runs=count, seed=seed, progress=bar, **work)
-    except KeyboardInterrupt:
-        click.echo(f"finished runs are kept in {folder}: add --resume to go on", err=True)
-        raise
-    written = [_raw(experiment, table, folder)]
-    if experiment in FIGURES:
-        written += boxplots(study, table, folder / experiment)
-    else:
-        written += _tables(study, table, seed, folder)
-    click.echo("\n".join(f"wrote {path}" for path in written))
-
-
-def _check_alone(experiment: str, options: Mapping[str, object]) -> None:
-    for name, given in options.items():
-        if given:
-            raise InputError(f"{experiment} has no option {name}: leave it out")
-
-
-def _raw(experiment: str, table: pa.Table, folder: Path) -> Path:
     import pyarrow.parquet as pq
 
-    from gmwm._core.files import moved_into_place
+    from gmwm.study import FIGURES, STUDIES, boxplots, run_study, summarise
 
-    target = folder / f"{experiment}.parquet"
-    with moved_into_place(target) as temporary:
+    study = FIGURES.get(experiment) or STUDIES[experiment]
+    with progress_bar(study.name, "runs") as bar:
+        work |= {"methods": method or None, "progress": bar}
+        table = run_study(study, folder, runs=runs or study.runs, seed=seed, **work)
+    raw = folder / f"{experiment}.parquet"
+    with moved_into_place(raw) as temporary:
         pq.write_table(table, temporary)
-    return target
-
-
-def _tables(study: Study, table: pa.Table, seed: int, folder: Path) -> list[Path]:
-    from gmwm._core.files import written
-    from gmwm.study import summarise
-
+    if experiment in FIGURES:
+        return "", [raw, *boxplots(study, table, folder / experiment)]
     summary = summarise(study, table, seed)
-    targets = [folder / f"{study.name}.txt", folder / f"{study.name}.md"]
-    for target, text in zip(targets, (str(summary), summary.markdown()), strict=True):
-        with written(target) as stream:
-            stream.write(text + "\n")
-    click.echo(f"{summary}\n")
-    return targets
+    texts = {"txt": str(summary), "md": summary.markdown()}
+    pages = [write_text(folder / f"{study.name}.{end}", text) for end, text in texts.items()]
+    return texts["txt"], [raw, *pages]
 
 
-def _alone(experiment: str, folder: Path, runs: int | None, seed: int, jobs: int) -> None:
-    """An experiment that is a table of its own kind."""
-    from gmwm._core.files import written
-    from gmwm.study import choice_study, choice_table, converge, convergence_table
-
-    if experiment == "selection":
-        report = choice_table(choice_study(runs or 100, seed, jobs))
-    else:
-        report = convergence_table(converge(runs or 200, seed, jobs))
-    target = folder / f"{experiment}.txt"
-    with written(target) as stream:
-        stream.write(report + "\n")
-    click.echo(f"{report}\n\nwrote {target}")
-
-
-def _navigated(
-    experiment: str, folder: Path, recordings: list[Recording], rotate: bool, **options: Any
-) -> None:
+def _navigated(experiment: str, folder: Path, rotate: bool, **work: Any) -> Found:
     """Figures 5 to 9; 8 and 9 with every recording calibrated in turn if ``rotate``."""
     from gmwm.study import reproduce_figure, reproduce_rotation
 
     run = reproduce_rotation if rotate else reproduce_figure
-    try:
-        with progress_bar(experiment, "recordings" if rotate else "runs") as bar:
-            text, paths = run(experiment, folder, recordings=recordings, progress=bar, **options)
-    except KeyboardInterrupt:
-        if rotate:
-            click.echo(f"finished work is kept in {folder}: add --resume to go on", err=True)
-        raise
-    click.echo(text)
-    click.echo("\n" + "\n".join(f"wrote {path}" for path in paths))
+    with progress_bar(experiment, "recordings" if rotate else "runs") as bar:
+        return run(experiment, folder, progress=bar, **work)
+
+
+def _tested(experiment: str, *, runs: int | None, seed: int, jobs: int) -> str:
+    """A table of its own kind."""
+    from gmwm.study import choice_study, choice_table, converge, convergence_table
+
+    if experiment == "selection":
+        return choice_table(choice_study(runs or 100, seed, jobs))
+    return convergence_table(converge(runs or 200, seed, jobs))

@@ -73,21 +73,8 @@ def below(imu: ImuNumbers, convention: str) -> list[str]:
     if any(triad.shared_nees is not None for triad in imu.triads):
         texts.append(
             "shared: for all axes of a sensor, which this file holds; the others: of each axis by "
-            "itself, which it does not hold"
+            "itself, which it does not hold; use N and K as a pair"
         )
-        has_more = (
-            getattr(axis, letter) > 1.0005 * getattr(triad, letter)
-            for triad in imu.triads
-            if triad.shared_nees is not None
-            for axis in triad.axes
-            for letter in "NK"
-            if letter not in axis.upper
-        )
-        if any(has_more):
-            texts.append(
-                "where an axis has more of N or K than all share it has less of the other: use N "
-                "and K as a pair, neither pair is overconfident"
-            )
     known = [axis.nees for triad in imu.triads for axis in triad.axes]
     known += [nees for triad in imu.triads for nees in (triad.shared_nees or {}).values()]
     if any(known):

@@ -23,22 +23,12 @@ from gmwm.export.target import Target
 from gmwm.filter_numbers import SensorNumbers
 from gmwm.process import Model
 
-_CONSUMERS: tuple[type[Target], ...] = (
-    *KEYED,
-    Gtsam,
-    GtsamCpp,
-    Ros,
-    Matlab,
-    StateSpaceFile,
-    Gazebo,
-    PyIns,
-    GnssInsSim,
-    KfGins,
-    Basalt,
-    Glim,
-)
+_FILTERS = (Gtsam, GtsamCpp, Ros, Matlab, StateSpaceFile)
+_OTHERS = (Gazebo, PyIns, GnssInsSim, KfGins, Basalt, Glim)
 
-TARGETS: Mapping[str, Target] = MappingProxyType({each.name: each() for each in _CONSUMERS})
+TARGETS: Mapping[str, Target] = MappingProxyType(
+    {each.name: each() for each in (*KEYED, *_FILTERS, *_OTHERS)}
+)
 """Every consumer by name."""
 
 _RATES = ("update_rate", "IMU.Frequency")

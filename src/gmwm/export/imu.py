@@ -93,20 +93,18 @@ class Triad:
     @property
     def initial_sd(self) -> float:
         """For all axes, u."""
-        if self.common is not None:
-            return self.common.initial_sd
-        return max(axis.initial_sd for axis in self.axes)
+        return self._for_all("initial_sd")
 
     def is_upper(self, letter: str) -> bool:
         """Whether no axis has the term."""
         return all(letter in axis.upper for axis in self.axes)
 
-    def _for_all(self, letter: str) -> float:
+    def _for_all(self, name: str) -> float:
         """The bound over the axes; the largest of their upper limits if no axis has the term."""
-        if self.common is not None and not self.is_upper(letter):
-            return float(getattr(self.common, letter))
-        found = [axis for axis in self.axes if letter not in axis.upper]
-        return max(getattr(axis, letter) for axis in found or self.axes)
+        if self.common is not None and not self.is_upper(name):
+            return float(getattr(self.common, name))
+        found = [axis for axis in self.axes if name not in axis.upper]
+        return max(getattr(axis, name) for axis in found or self.axes)
 
     @property
     def rate(self) -> float:

@@ -6,9 +6,10 @@ import contextlib
 import json
 import re
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import sqrt
+from typing import Any
 
 import numpy as np
 
@@ -25,10 +26,15 @@ ARW, DEG_H = factor("deg/sqrt(h)", "rad/sqrt(s)"), factor("deg/h", "rad/s")
 """SI units in deg/sqrt(h) and deg/h."""
 
 
+@dataclass(frozen=True)
 class Keys(ABC):
-    """Names of the values of a file: those of the gyros, then those of the accelerometers."""
+    """Names of the values of a file, with blanks between: of the gyros, then of accelerometers."""
 
-    names: tuple[str, ...]
+    text: str
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return tuple(self.text.split())
 
     @abstractmethod
     def read(self, values: Mapping[str, FloatArray], rate: float) -> list[list[Pair | Model]]:
@@ -39,17 +45,23 @@ class Keys(ABC):
         Raises InputError if they depend on a rate that is not known.
         """
 
+    @staticmethod
+    def by_axis(own: Sequence[FloatArray], item: Callable[..., Pair | Model]) -> list[list[Any]]:
+        """The items of gyro and accelerometer, of the SI values of each name."""
+        half = len(own) // 2
+        sensors = (np.broadcast_arrays(*each) for each in (own[:half], own[half:]))
+        return [[item(*map(float, axis)) for axis in zip(*one, strict=True)] for one in sensors]
+
 
 @dataclass(frozen=True)
 class WalkKeys(Keys):
     """N and K: a value is ``(N sqrt(white f))^power``, and likewise of K with ``walk``.
 
-    names: Of gyro N and K, then accelerometer N and K.
+    text: Of gyro N and K, then accelerometer N and K.
     white, walk: Factors of the rate f; zero where a value does not depend on it.
     rate: f, Hz, if it is not that of the IMU.
     """
 
-    names: tuple[str, str, str, str]
     white: float = 0.0
     walk: float = 0.0
     power: int = 1
@@ -60,42 +72,33 @@ class WalkKeys(Keys):
         """Whether values depend on the rate of the IMU."""
         return self.white > 0.0 and self.rate is None
 
+    def _scale(self, letter: str, rate: float) -> float:
+        share = self.white if letter == "N" else self.walk
+        return sqrt(share * (self.rate or rate)) if share > 0.0 else 1.0
+
     def written(self, letter: str, value: float, rate: float) -> float:
         """The value in the file of N or K."""
-        share = self.white if letter == "N" else self.walk
-        scale = sqrt(share * (self.rate or rate)) if share > 0.0 else 1.0
-        return (value * scale) ** self.power
+        return (value * self._scale(letter, rate)) ** self.power
 
     def read(self, values: Mapping[str, FloatArray], rate: float) -> list[list[Pair | Model]]:
-        f = self.rate or rate
-        if self.white > 0.0 and not f > 0.0:
+        if self.needs_rate and not rate > 0.0:
             raise InputError("its numbers depend on the rate of the IMU: give it in Hz")
-        scales = [sqrt(share * f) if share > 0.0 else 1.0 for share in (self.white, self.walk)] * 2
         own = [
-            values[name] ** (1.0 / self.power) / scale
-            for name, scale in zip(self.names, scales, strict=True)
+            values[name] ** (1.0 / self.power) / self._scale(letter, rate)
+            for name, letter in zip(self.names, "NKNK", strict=True)
         ]
-        pairs = [np.broadcast_arrays(*own[i : i + 2]) for i in (0, 2)]
-        return [[(float(N), float(K)) for N, K in zip(*pair, strict=True)] for pair in pairs]
+        return self.by_axis(own, lambda N, K: (N, K))
 
 
 @dataclass(frozen=True)
 class MemoryKeys(Keys):
     """N, sigma and tau of gyro and accelerometer, and their units in SI."""
 
-    names: tuple[str, str, str, str, str, str]
-    units: tuple[float, float, float, float, float, float]
+    units: tuple[float, ...]
 
     def read(self, values: Mapping[str, FloatArray], rate: float) -> list[list[Pair | Model]]:
         own = [values[name] * unit for name, unit in zip(self.names, self.units, strict=True)]
-        triples = [np.broadcast_arrays(*own[i : i + 3]) for i in (0, 3)]
-        return [
-            [
-                WhiteNoise(float(N)) + GaussMarkov(float(sigma), float(tau))
-                for N, sigma, tau in zip(*triple, strict=True)
-            ]
-            for triple in triples
-        ]
+        return self.by_axis(own, lambda N, sigma, tau: WhiteNoise(N) + GaussMarkov(sigma, tau))
 
 
 _COMMENT = re.compile(r"(#|//).*$", re.MULTILINE)

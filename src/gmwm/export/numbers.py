@@ -27,20 +27,15 @@ OUTAGES = (1.0 / 6.0, 0.5, 1.0)
 _TOPIC = re.compile(r"/[A-Za-z0-9_/]+")  # a name of ROS, which no file can misread
 
 
-def method_for(models: Mapping[str, Fit | Model], form: str) -> str:
-    """How numbers of a form are found: "bound" (never overconfident), or else "reduce".
+def find_numbers(
+    models: Calibration | Mapping[str, Any], form: str, horizon: float, tau: float | str | None
+) -> SensorNumbers:
+    """Numbers of a form that are never overconfident; ``tau`` as in `gmwm.bound`.
 
     No stationary process bounds a random walk. So "N+GM" numbers of a model with one are those that
     are consistent at the end of outages.
     """
-    return "reduce" if form == "N+GM" and any(map(_has_walk, models.values())) else "bound"
-
-
-def find_numbers(
-    models: Calibration | Mapping[str, Any], form: str, horizon: float, tau: float | str | None
-) -> SensorNumbers:
-    """Numbers of a form by `method_for`; ``tau`` as in `gmwm.bound`."""
-    if method_for(models, form) == "reduce":
+    if form == "N+GM" and any(map(_has_walk, models.values())):
         return reduce(models, form, [share * horizon for share in OUTAGES], tau=tau)
     return bound(models, form, horizon=horizon, tau=tau)
 
@@ -128,10 +123,22 @@ def imu_of(
     if outlook is None:
         outlook = _outlook(calibrations) if len(calibrations) == len(given) else {}
     method = next(one.method for each in numbers for one in each.values())
-    about = (tuple(map(_source, numbers)), outlook)
-    remarks = (_remarks(given, numbers), _remarks(given, numbers, cautions=True))
-    topic = _topic(calibrations)
-    return ImuNumbers(gyro, accel, form, horizons[0], method, *about, *remarks, topic)
+    return ImuNumbers(
+        gyro,
+        accel,
+        form,
+        horizons[0],
+        method,
+        sources=tuple(
+            f"{each.source or 'recording'}"
+            + (f", {each.duration:.0f} s static" if each.duration > 0.0 else "")
+            for each in numbers
+        ),
+        outlook=outlook,
+        remarks=_remarks(given, numbers),
+        cautions=_remarks(given, numbers, cautions=True),
+        topic=_topic(calibrations),
+    )
 
 
 def _triad(
@@ -218,11 +225,8 @@ def _common_tau(given: Sequence[Any], numbers: Sequence[SensorNumbers], form: st
     taus = {one.tau[0] for one in slow} or {horizon}
     if len(taus) == 1:
         return taus.pop()
-    models = {
-        name: one.model if isinstance(one, FilterNumbers) else one
-        for each in given
-        for name, one in each.items()
-    }
+    axes = {name: one for each in given for name, one in each.items()}
+    models = {n: one.model if isinstance(one, FilterNumbers) else one for n, one in axes.items()}
     return next(iter(find_numbers(models, form, horizon, "shared").values())).tau[0]
 
 
@@ -259,16 +263,7 @@ def _remarks(
 
 def _topic(calibrations: Sequence[Calibration]) -> str:
     """The topic of ROS that all calibrations come from; empty if there is none, or several."""
-    names = {
-        str(notice.values.get("topic"))
-        for each in calibrations
-        for notice in each.notices
-        if notice.code == "topic"
-    }
+    notices = [notice for each in calibrations for notice in each.notices]
+    names = {str(each.values.get("topic")) for each in notices if each.code == "topic"}
     name = names.pop() if len(names) == 1 else ""
     return name if _TOPIC.fullmatch(name) else ""
-
-
-def _source(numbers: SensorNumbers) -> str:
-    source = numbers.source or "recording"
-    return f"{source}, {numbers.duration:.0f} s static" if numbers.duration > 0.0 else source

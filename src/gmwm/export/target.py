@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from typing import Any, ClassVar
 
 from gmwm._core import checks
-from gmwm._core.files import written
+from gmwm._core.files import write_text
 from gmwm.errors import InputError
 from gmwm.export.comments import above, below, comment, wrapped
 from gmwm.export.imu import ImuNumbers
@@ -36,6 +36,7 @@ class Target(ABC):
     horizon: Time without aiding unless another is given, s.
     warnings: What to know before use.
     file_name: How `gmwm calibrate` calls the file; by default name.yaml.
+    to_copy: Title by which reports offer the text to copy; empty where they do not.
     keys: By which the numbers are read back; None if they cannot be.
     """
 
@@ -48,6 +49,7 @@ class Target(ABC):
     horizon: ClassVar[float] = OUTAGE
     warnings: ClassVar[tuple[str, ...]] = ()
     file_name: ClassVar[str] = ""
+    to_copy: ClassVar[str] = ""
     keys: ClassVar[Keys | None] = None
 
     def __init_subclass__(cls) -> None:
@@ -63,16 +65,11 @@ class Target(ABC):
         """
 
     def save(
-        self,
-        path: str | os.PathLike[str],
-        given: Sequence[Any],
-        horizon: float | None,
-        form: str | None,
+        self, path: str | os.PathLike[str], given: Sequence[Any], horizon: float | None, form: Any
     ) -> str:
         """Write the file whole or not at all; returns its text."""
         text = self.export(given, horizon, form)
-        with written(path) as stream:
-            stream.write(text)
+        write_text(path, text)
         return text
 
 

@@ -284,10 +284,7 @@ def fit_notices(axis: AxisModel, level: float | None) -> list[Notice]:
     if axis.fit is None:
         return found
     if not axis.fit.valid:
-        text = "the fit failed; do not use these numbers"
-        found.append(
-            notice("fit-not-valid", severity="warning", hint="read its notices first", text=text)
-        )
+        found.append(notice("fit-not-valid"))
     if axis.bias_sd == 0.0:
         found.append(notice("turn-on-left-out"))
     if level is None:

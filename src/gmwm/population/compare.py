@@ -262,7 +262,9 @@ def _axis(
         codes = ", ".join(n.code for n in fit.notices if n.severity == "bad")
         if codes:
             values, hint = {"reasons": codes}, "the curve is compared all the same"
-            invalid = notice("fit-not-valid", name, values, variant="compared", hint=hint)
+            invalid = notice(
+                "fit-not-valid", name, values, variant="compared", severity="note", hint=hint
+            )
             notices.append(replace(invalid, source=label))
     inflation = float("nan")
     if joint and test and test.tau.size:

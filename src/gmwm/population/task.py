@@ -24,7 +24,7 @@ from gmwm._core.memory import OUT_OF_MEMORY
 from gmwm.calibration import SCREENING, calibrate, floor, noise_density, random_walk
 from gmwm.errors import InputError, printable
 from gmwm.estimate import Fit
-from gmwm.issues import Notice
+from gmwm.issues import failure
 from gmwm.population.unit import Number, Unit
 from gmwm.process import Model, as_model
 from gmwm.readers import read
@@ -137,13 +137,9 @@ class Task:
             )
         digest = digest_of(item.path)
         recording = read(item.path, **self.reading).part(self.start, self.stop)
-        models = {}
-        for name in (channel.name for channel in recording.inertial):
-            own = [self.models.get(key) for key in (name, name.partition("_")[0], "")]
-            if known := [each for each in own if each is not None]:
-                models[name] = known[0]
-        options: dict[str, Any] = {"screening": self.screening, "still": self.still, "jobs": 1}
-        calibration = calibrate(recording, models if self.models else None, **options)
+        calibration = calibrate(
+            recording, self.models or None, screening=self.screening, still=self.still, jobs=1
+        )
         if digest_of(item.path) != digest:
             raise InputError(
                 f"{item.path}: changed while it was calibrated: calibrate it again with resume",
@@ -154,7 +150,7 @@ class Task:
 
 
 def _failed(item: Item, code: str, text: str) -> Unit:
-    return Unit(item.path, item.name, Notice(code, "bad", item.name, text))
+    return Unit(item.path, item.name, failure(code, item.name, text))
 
 
 def digest_of(path: str) -> str:

@@ -22,8 +22,6 @@ from gmwm.report.page import begun, duration_text
 _AIM = 0.1  # relative standard error of a deviation or a parameter that is well enough known
 _COUNTED = {"bad": "severe issue", "warning": "warning", "note": "note"}
 _LEAST_CHANGE = 1e-3
-_COUNTED_ELSEWHERE = ("missing-samples", "events-left-out")
-"""Of an examined recording, notices of gaps and events have the same numbers."""
 
 
 def health(calibration: Calibration) -> dict[str, Any]:
@@ -66,7 +64,7 @@ def _of_recording(calibration: Calibration) -> list[Notice]:
         notice
         for notice in gathered(calibration.notices)
         if notice.code not in (AMBIGUITY, LONGEST_PART)
-        and not (calibration.is_examined and notice.code in _COUNTED_ELSEWHERE)
+        and not (calibration.is_examined and notice.issue.repeats == "diagnosis")
     ]
 
 

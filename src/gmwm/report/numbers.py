@@ -18,12 +18,7 @@ HORIZONS = (1.0, 10.0, 60.0, 600.0)
 SHOWN = 60.0
 """s: the horizon that a page opens with."""
 
-_TITLES = {
-    "kalibr": "YAML, Kalibr",
-    "gtsam": "Python, GTSAM",
-    "gtsam-cpp": "C++, GTSAM",
-    "matlab": "MATLAB",
-}
+_TITLES = {name: each.to_copy for name, each in TARGETS.items() if each.to_copy}
 """Of the files of programs, by their languages."""
 
 _NOT_VALID = "the fit failed; do not use these numbers"

@@ -130,26 +130,6 @@ def test_of_two_processes_one_compiles_and_the_other_loads_it(tmp_path):
     assert not list(tmp_path.rglob("*.lock"))
 
 
-def test_a_process_that_does_not_go_on_is_not_waited_for(tmp_path, monkeypatch):
-    index = tmp_path / "folder" / "loop.nbi"
-    index.parent.mkdir()
-    monkeypatch.setattr(compiled, "_LONGEST_WAIT", 0.05)
-    script = (
-        "import sys, time\nfrom filelock import FileLock\n"
-        "with FileLock(sys.argv[1]):\n    print(flush=True)\n    time.sleep(60.0)\n"
-    )
-    other = subprocess.Popen(
-        [sys.executable, "-c", script, index.with_suffix(".lock")], stdout=subprocess.PIPE
-    )
-    try:
-        other.stdout.readline()
-        with compiled._alone(index):
-            pass
-    finally:
-        other.kill()
-        other.communicate()
-
-
 def test_an_interrupt_that_is_swallowed_while_compiling_is_one():
     def swallowed():
         try:

@@ -37,9 +37,7 @@ GYRO = "channels.gyro_x."
 WV = GYRO + "wavelet_variance."
 CASES = [
     ("calibration", "rate_hz", -100, "rate_hz = -100: input should be greater"),
-    ("calibration", "rate_hz", 1e300, "rate_hz = 1e+300: input should be less"),
     ("calibration", "n", -5, "n = -5: input should be greater than or equal to 1"),
-    ("calibration", "n", 2.5, "n = 2.5: input should be a valid integer"),
     ("calibration", "n", True, "n = True: input should be a valid integer"),
     ("calibration", "skipped.gyro_z.severity", "worst", "skipped.gyro_z: severity = 'worst'"),
     ("calibration", "source", 3, "source = 3: input should be a valid string"),
@@ -50,9 +48,6 @@ CASES = [
     ("calibration", GYRO + "covariance", [[1.0]], "covariance is not 2 x 2"),
     ("calibration", GYRO + "keys", ["N", "N"], "stands twice"),
     ("calibration", GYRO + "upper_bounds", {"N": -1.0}, "upper_bounds.N = -1.0"),
-    ("calibration", GYRO + "discrepancy", -0.5, "discrepancy = -0.5"),
-    ("calibration", GYRO + "dof", "8", "dof = '8': input should be a valid integer"),
-    ("calibration", GYRO + "slope_dof", -1.0, "slope_dof = -1.0"),
     ("calibration", GYRO + "model.0.N", -1.0, "N"),
     ("calibration", WV + "dt", 0.0, "dt = 0.0"),
     ("calibration", WV + "n", 10**6, "levels where 1,000,000 samples have 19"),
@@ -60,7 +55,6 @@ CASES = [
     ("calibration", WV + "mean", [0.0], "mean is no list of"),
     ("calibration", WV + "tau.1", 0.5, "not octaves"),
     ("calibration", WV + "efficiency", 2.0, "efficiency = 2.0"),
-    ("calibration", WV + "confidence", 1.0, "confidence = 1.0"),
     ("calibration", WV + "block", 10**6, "blocks hold more samples"),
     ("calibration", WV + "wavelet", "db99", "db99"),
     ("calibration", "channels.gyro_y.wavelet_variance.gaps.missing", 701, "of another series"),
@@ -72,14 +66,12 @@ CASES = [
     ),
     ("joint", "parts", [], "parts = []"),
     ("joint", "equality_p", 1.5, "equality_p = 1.5"),
-    ("health", "channels.gyro_x.lsb", -1.0, "lsb = -1.0"),
     ("health", "channels.gyro_x.events", [[5, 4]], "not an interval of samples"),
     ("health", "channels.gyro_x.lines", [[1.0]], "channels.gyro_x.lines.0"),
     ("selection", "chosen", 99, "the chosen model is not in the ranking"),
     ("selection", "ranking.0.n_parameters", 0, "ranking.0.n_parameters = 0"),
     ("selection", "ranking.0.dof", None, "ranking.0.dof = None"),
     ("bootstrap", "draws", [[1.0], [2.0]], "draws are not one value a key"),
-    ("bound", "dt_s", -1.0, "dt_s = -1.0"),
     ("bound", "keys", ["N", "X"], "keys are not those of the model"),
 ]
 
@@ -114,7 +106,12 @@ def test_a_wrong_value_is_named_with_its_place(stored, tmp_path, kind, place, va
 def test_every_result_comes_back(stored, tmp_path, kind):
     result = stored[kind]
     path = result.save(tmp_path / "stored.json")
-    assert gmwm.load(path).to_dict() == result.to_dict()
+    found = gmwm.load(path)
+    assert type(found) is type(result)
+    assert found.to_dict() == type(result).load(path).to_dict() == result.to_dict()
+    if kind == "health":
+        with pytest.raises(InputError, match=r"stored\.json: this is not a calibration"):
+            gmwm.Calibration.load(path)
     again = copy.deepcopy(result.to_dict()) | {"of a later version": 1}
     assert type(result).from_dict(again).to_dict() == result.to_dict()
 
@@ -126,7 +123,7 @@ def test_numbers_are_finite(stored, tmp_path, number):
     refusal(path)
 
 
-@pytest.mark.parametrize("depth", [40, 900, 100_000])
+@pytest.mark.parametrize("depth", [900, 100_000])
 def test_what_is_nested_deeply_is_refused(tmp_path, depth):
     path = tmp_path / "deep.json"
     path.write_text('{"schema": "gmwm.calibration", "channels": ' + "[" * depth + "]" * depth + "}")
@@ -166,11 +163,3 @@ def test_a_pipe_is_refused_before_it_is_opened(tmp_path):
         gmwm.load(path)
     with pytest.raises(InputError, match="pipe is a pipe or a device: write its content to a file"):
         gmwm.read(path)
-
-
-def test_the_chosen_model_is_one_of_the_ranking(stored, tmp_path):
-    content = stored["selection"].to_dict()
-    content["chosen"] = len(content["ranking"])
-    path = tmp_path / "stored.json"
-    path.write_text(json.dumps(content))
-    assert "the chosen model is not in the ranking" in refusal(path)

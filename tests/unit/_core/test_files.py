@@ -3,11 +3,10 @@
 import errno
 import os
 import shutil
-import signal
 
 import pytest
 
-from gmwm._core.files import moved_together, one_writer, output_folder, written
+from gmwm._core.files import folder_to_fill, moved_together, one_writer, written
 from gmwm.errors import InputError
 
 
@@ -15,23 +14,14 @@ def names(folder):
     return sorted(path.name for path in folder.iterdir())
 
 
-def test_text_arrives_whole_and_in_utf8(tmp_path):
-    path = tmp_path / "out.txt"
-    with written(path) as stream:
-        stream.write("µg/√Hz\n")
-        assert names(tmp_path) != ["out.txt"]  # not yet under its own name
-    assert path.read_bytes() == "µg/√Hz\n".encode()
-    assert names(tmp_path) == ["out.txt"]
-
-
-def test_old_file_is_there_until_the_new_one_is_complete(tmp_path):
+def test_text_arrives_whole_in_utf8_and_the_old_one_is_there_until_then(tmp_path):
     path = tmp_path / "out.txt"
     path.write_text("old")
     with written(str(path)) as stream:
-        stream.write("new")
+        stream.write("µg/√Hz\n")
         stream.flush()
         assert path.read_text() == "old"
-    assert path.read_text() == "new"
+    assert path.read_bytes() == "µg/√Hz\n".encode()
     assert names(tmp_path) == ["out.txt"]
 
 
@@ -79,18 +69,14 @@ def test_missing_folder(tmp_path):
     assert names(tmp_path) == []
 
 
-def test_a_file_for_a_folder(tmp_path):
+def test_a_file_for_a_folder_and_a_folder_for_a_file(tmp_path):
     (tmp_path / "file").write_text("x")
-    with pytest.raises(InputError, match="cannot be written"), written(tmp_path / "file" / "out"):
-        pass
+    (tmp_path / "folder").mkdir()
+    for path in (tmp_path / "file" / "out", tmp_path / "folder"):
+        with pytest.raises(InputError, match="cannot be written"), written(path):
+            pass
     assert (tmp_path / "file").read_text() == "x"
-
-
-def test_a_folder_for_a_file(tmp_path):
-    (tmp_path / "out").mkdir()
-    with pytest.raises(InputError, match="out: cannot be written"), written(tmp_path / "out"):
-        pass
-    assert names(tmp_path) == ["out"]
+    assert names(tmp_path) == ["file", "folder"]
 
 
 @pytest.mark.skipif(os.name != "posix" or os.geteuid() == 0, reason="root may write anywhere")
@@ -99,42 +85,39 @@ def test_folder_without_permission(tmp_path):
     folder.mkdir(mode=0o500)
     with pytest.raises(InputError, match="Permission denied"), written(folder / "out.txt"):
         pass
-    with pytest.raises(InputError, match="Permission denied"):
-        output_folder(folder)
+    with pytest.raises(InputError, match="Permission denied"), folder_to_fill(folder):
+        pass
 
 
 # -- folders --------------------------------------------------------------------------------------
 
 
-def test_output_folder_is_made_with_its_parents_and_left_empty(tmp_path):
-    folder = output_folder(str(tmp_path / "a" / "b"))
-    assert folder == tmp_path / "a" / "b"
-    assert names(folder) == []
+def test_a_folder_is_made_with_its_parents_and_keeps_what_is_there(tmp_path):
+    with folder_to_fill(tmp_path / "a" / "b") as folder:
+        assert folder == tmp_path / "a" / "b"
+        (folder / "calibration.json").write_text("old")
+    with folder_to_fill(str(folder)):
+        assert names(folder) == ["calibration.json"]
+    assert (folder / "calibration.json").read_text() == "old"
 
 
-def test_output_folder_keeps_what_is_there(tmp_path):
-    (tmp_path / "calibration.json").write_text("old")
-    assert output_folder(tmp_path) == tmp_path
-    assert names(tmp_path) == ["calibration.json"]
-    assert (tmp_path / "calibration.json").read_text() == "old"
-
-
-def test_output_folder_in_the_way(tmp_path):
+def test_a_file_in_the_way_of_a_folder(tmp_path):
     (tmp_path / "file").write_text("x")
     for path in (tmp_path / "file", tmp_path / "file" / "under"):
-        with pytest.raises(InputError) as caught:
-            output_folder(path)
+        with pytest.raises(InputError) as caught, folder_to_fill(path):
+            pass
         assert str(caught.value).startswith(f"{path}: cannot be written (")
     assert (tmp_path / "file").read_text() == "x"
 
 
-def test_output_folder_is_tried_before_any_work(tmp_path, monkeypatch):
+def test_a_folder_is_tried_before_any_work(tmp_path, monkeypatch):
     def refuse(*args, **kwargs):
         raise OSError(errno.EROFS, "Read-only file system")
 
     monkeypatch.setattr("gmwm._core.files.tempfile.TemporaryFile", refuse)
-    with pytest.raises(InputError, match=r"cannot be written \(Read-only file system\)"):
-        output_folder(tmp_path)
+    message = r"cannot be written \(Read-only file system\)"
+    with pytest.raises(InputError, match=message), folder_to_fill(tmp_path):
+        pass
 
 
 def test_files_of_one_run_stand_together(tmp_path):
@@ -151,20 +134,6 @@ def test_files_of_one_run_stand_together(tmp_path):
     assert {path.name: path.read_text() for path in tmp_path.iterdir()} == dict.fromkeys(
         "abc", "new"
     )
-
-
-def test_an_interrupt_comes_before_or_after_the_files(tmp_path, monkeypatch):
-    replace = os.replace
-
-    def interrupted(source, target):
-        signal.raise_signal(signal.SIGINT)
-        replace(source, target)
-
-    monkeypatch.setattr(os, "replace", interrupted)
-    with pytest.raises(KeyboardInterrupt), moved_together(tmp_path) as folder:
-        for name in ("a", "b"):
-            (folder / name).write_text("new")
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["a", "b"]
 
 
 def test_a_folder_that_was_removed_meanwhile_hides_no_error(tmp_path):

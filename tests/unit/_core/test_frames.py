@@ -81,18 +81,3 @@ def test_looks(results, name):
     assert "\n" not in repr(result)
     assert len(repr(result)) < 120
     assert re.match(r"<(pre|p)>", result._repr_html_())
-
-
-def test_every_result_comes_back_from_its_file(results, tmp_path):
-    results = results | {
-        "bootstrap": gmwm.bootstrap(results["fit"], 4, seed=1),
-        "bound": gmwm.cramer_rao(WhiteNoise(1.0) + RandomWalk(1e-2), 1000, 0.01),
-    }
-    for name in ("fit", "selection", "calibration", "health", "bootstrap", "bound"):
-        path = results[name].save(tmp_path / f"{name}.json")
-        again = gmwm.load(path)
-        assert type(again) is type(results[name])
-        assert again.to_dict() == results[name].to_dict()
-        assert type(again).load(path).to_dict() == again.to_dict()
-    with pytest.raises(InputError, match=r"fit\.json: this is not a calibration"):
-        gmwm.Calibration.load(tmp_path / "fit.json")

@@ -16,21 +16,21 @@ from places import REPOSITORY
 ROOT = REPOSITORY / "src" / "gmwm"
 
 
-def test_a_hint_follows_the_message():
-    error = InputError("the rate is missing: give rate=100", "rate")
-    assert with_hint(error) == f"{error} (on the command line: --rate 100)"
-    assert with_hint(InputError("the rate is missing")) == "the rate is missing"
-
-
-def test_a_mend_is_said_in_the_words_of_the_command_line():
-    error = InputError("there is no rate and no unit", "rate gyro-unit-missing", "give rate=100")
-    assert str(error) == "there is no rate and no unit: give rate=100"
-    assert with_hint(error) == (
-        "there is no rate and no unit: give e.g. --rate 100 --gyro-unit deg/s"
-    )
-    error = InputError("the rates differ", "rate-contradicted", "give time=False")
-    assert with_hint(error) == f"the rates differ: {HINTS['rate-contradicted']}"
-    assert with_hint(InputError("wrong", "unknown-code", "do this")) == "wrong: do this"
+@pytest.mark.parametrize(
+    ("error", "words"),
+    [
+        (("the rate is missing: give rate=100", "rate"),
+         "the rate is missing: give rate=100 (on the command line: --rate 100)"),
+        (("the rate is missing",), "the rate is missing"),
+        (("there is no rate and no unit", "rate gyro-unit-missing", "give rate=100"),
+         "there is no rate and no unit: give e.g. --rate 100 --gyro-unit deg/s"),
+        (("the rates differ", "rate-contradicted", "give time=False"),
+         f"the rates differ: {HINTS['rate-contradicted']}"),
+        (("wrong", "unknown-code", "do this"), "wrong: do this"),
+    ],
+)  # fmt: skip
+def test_a_hint_is_said_in_the_words_of_the_command_line(error, words):
+    assert with_hint(InputError(*error)) == words
 
 
 def test_the_unit_that_is_advised_is_that_of_gravity(tmp_path):

@@ -61,13 +61,8 @@ def test_one_correlation_time_may_be_asked_for(run, calibration):
 
 
 def test_the_bias_at_switch_on_is_asked_for(run, calibration):
-    _, printed, _ = run("bound", calibration)
-    assert "--gyro-bias and --accel-bias" in printed
-    _, printed, _ = run("bound", calibration, "--gyro-bias", 0.01)
-    assert "--accel-bias" in printed
-    assert "--gyro-bias" not in printed
-    _, printed, _ = run("bound", calibration, "--gyro-bias", 0.01, "--accel-bias", 0.1)
-    assert "-bias" not in printed
+    for given, asked in (((), True), (("--gyro-bias", 0.01, "--accel-bias", 0.1), False)):
+        assert ("--gyro-bias and --accel-bias" in run("bound", calibration, *given)[1]) == asked
 
 
 def test_reduce(run, calibration):
@@ -95,21 +90,18 @@ def test_certify_a_file_and_numbers(run, calibration, tmp_path):
     assert str(expected) in again
 
 
-def test_certify_a_json_file_of_a_program(run, calibration, tmp_path):
+def test_certify_json_of_a_program_and_what_bound_saved(run, calibration, tmp_path):
     entries = {"gyro_noise_std": [1e-4] * 3, "gyro_bias_std": [1e-6] * 3}
     entries |= {"accel_noise_std": [1e-3] * 3, "accel_bias_std": [2e-5] * 3}
     (tmp_path / "basalt.json").write_text(json.dumps({"value0": entries}, indent=1))
-    code, printed, _ = run("certify", calibration, "--imu", "basalt.json", "--json")
-    assert code == 0
-    assert len(json.loads(printed)["checks"]) > 0
-
-
-def test_certify_what_bound_saved(run, calibration):
     run("bound", calibration, "-o", "numbers.json")
-    code, printed, _ = run("certify", calibration, "--imu", "numbers.json", "--json")
-    assert code == 0
-    checks = json.loads(printed)["checks"]
-    assert all(check["nees"] < 1.001 for check in checks)
+    found = {}
+    for name in ("basalt.json", "numbers.json"):
+        code, printed, _ = run("certify", calibration, "--imu", name, "--json")
+        assert code == 0
+        found[name] = json.loads(printed)["checks"]
+    assert len(found["basalt.json"]) > 0
+    assert all(check["nees"] < 1.001 for check in found["numbers.json"])
 
 
 def test_units_of_imperfections(run, calibration):

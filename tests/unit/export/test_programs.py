@@ -24,6 +24,7 @@ from imu_numbers import FORMS, RATE, SIGMA, TAU, K, N, numbers
 DT = 1.0 / RATE
 STEPS = 2000
 TOLERANCE = 0.03
+F = np.array([[1.0, DT], [0.0, 1.0]])
 
 
 @dataclass
@@ -63,7 +64,7 @@ def kalibr(q):
     sample = content[f"{sensor}_noise_density"] / sqrt(1.0 / content["update_rate"])
     # IccSensors.py addBiasMotionTerms: the integral of (db/dt)^2/walk^2
     walk = content[f"{sensor}_random_walk"]
-    return Step(np.array([[1.0, DT], [0.0, 1.0]]), np.diag([sample**2 * DT**2, walk**2 * DT]))
+    return Step(F, np.diag([sample**2 * DT**2, walk**2 * DT]))
 
 
 def openvins(q):
@@ -71,9 +72,7 @@ def openvins(q):
     sensor = {"gyro": "gyroscope", "accel": "accelerometer"}[q]
     noise, walk = content[f"{sensor}_noise_density"], content[f"{sensor}_random_walk"]
     # Propagator.cpp predict_and_compute: Qc = diag(sigma^2/dt, walk^2/dt), G = diag(dt, dt)
-    return Step(
-        np.array([[1.0, DT], [0.0, 1.0]]), np.diag([noise**2 / DT * DT**2, walk**2 / DT * DT**2])
-    )
+    return Step(F, np.diag([noise**2 / DT * DT**2, walk**2 / DT * DT**2]))
 
 
 def vins(q):
@@ -82,7 +81,7 @@ def vins(q):
     noise, walk = content[f"{letter}_n"], content[f"{letter}_w"]
     # integration_base.h midPointIntegration: V has dt/2 for each end of the step, dt for the walk
     v = np.array([[0.5 * DT, 0.5 * DT, 0.0], [0.0, 0.0, DT]])
-    return Step(np.array([[1.0, DT], [0.0, 1.0]]), v @ np.diag([noise**2, noise**2, walk**2]) @ v.T)
+    return Step(F, v @ np.diag([noise**2, noise**2, walk**2]) @ v.T)
 
 
 def orbslam3(q):
@@ -91,7 +90,7 @@ def orbslam3(q):
     root = sqrt(content["IMU.Frequency"])
     # Tracking.cc: Calib(Tbc, Ng sf, Na sf, Ngw/sf, Naw/sf); ImuTypes.cc: C += B Nga B', B = dt
     noise, walk = content[f"IMU.Noise{word}"] * root, content[f"IMU.{word}Walk"] / root
-    return Step(np.array([[1.0, DT], [0.0, 1.0]]), np.diag([(noise * DT) ** 2, walk**2]))
+    return Step(F, np.diag([(noise * DT) ** 2, walk**2]))
 
 
 def fastlio(q):
@@ -99,7 +98,7 @@ def fastlio(q):
     letter = {"gyro": "gyr", "accel": "acc"}[q]
     # esekfom.hpp predict: P += (dt f_w) Q (dt f_w)'
     q_matrix = np.diag([content[f"{letter}_cov"], content[f"b_{letter}_cov"]])
-    return Step(np.array([[1.0, DT], [0.0, 1.0]]), DT**2 * q_matrix)
+    return Step(F, DT**2 * q_matrix)
 
 
 def liosam(q):
@@ -122,7 +121,7 @@ def okvis2(q):
     letter = {"gyro": "g", "accel": "a"}[q]
     # ImuError.cpp propagation: P += dt sigma^2
     noise, walk = content[f"sigma_{letter}_c"], content[f"sigma_{letter}w_c"]
-    return Step(np.array([[1.0, DT], [0.0, 1.0]]), DT * np.diag([noise**2, walk**2]))
+    return Step(F, DT * np.diag([noise**2, walk**2]))
 
 
 def maplab(q):
@@ -131,7 +130,7 @@ def maplab(q):
     # imu-integrator-inl.h: dP/dt = F P + P F' + diag(sigma^2)
     noise = content[f"{word}_noise_density"]
     walk = content[f"{word}_bias_random_walk_noise_density"]
-    return Step(np.array([[1.0, DT], [0.0, 1.0]]), DT * np.diag([noise**2, walk**2]))
+    return Step(F, DT * np.diag([noise**2, walk**2]))
 
 
 def px4(q):
@@ -181,8 +180,7 @@ def diagonal(text, pattern):
 def gtsam_steps(noise, walk):
     # CombinedImuFactor.cpp integrateMeasurement: dt (wCov/dt) dt, dt biasOmegaCovariance
     return [
-        Step(np.array([[1.0, DT], [0.0, 1.0]]), np.diag([DT * (a / DT) * DT, DT * b]))
-        for a, b in zip(noise, walk, strict=True)
+        Step(F, np.diag([DT * (a / DT) * DT, DT * b])) for a, b in zip(noise, walk, strict=True)
     ]
 
 
@@ -197,7 +195,7 @@ def matlab(q):
     rate = float(re.search(r"'SampleRate', (.*?),", text).group(1))
     # imuSensor: samples of NoiseDensity sqrt(rate), a walk by RandomWalk/sqrt(rate)
     return [
-        Step(np.array([[1.0, DT], [0.0, 1.0]]), np.diag([(n * sqrt(rate) * DT) ** 2, k**2 / rate]))
+        Step(F, np.diag([(n * sqrt(rate) * DT) ** 2, k**2 / rate]))
         for n, k in zip(values["NoiseDensity"], values["RandomWalk"], strict=True)
     ]
 
@@ -207,7 +205,7 @@ def basalt(q):
     rate = content["imu_update_rate"]
     # calibration.hpp: noise sqrt(rate); imu_block.hpp: weight of a step 1/(bias_std sqrt(dt))
     return [
-        Step(np.array([[1.0, DT], [0.0, 1.0]]), np.diag([(n * sqrt(rate) * DT) ** 2, k**2 * DT]))
+        Step(F, np.diag([(n * sqrt(rate) * DT) ** 2, k**2 * DT]))
         for n, k in zip(content[f"{q}_noise_std"], content[f"{q}_bias_std"], strict=True)
     ]
 

@@ -73,15 +73,9 @@ class Gtsam(ImuFile):
         "integrateMeasurement; PreintegrationCombinedParams.h"
     )
     horizon = KEYFRAME
-    file_name = "gtsam_imu.py"
+    file_name, to_copy = "gtsam_imu.py", "Python, GTSAM"
     keys = WalkKeys(
-        (
-            "gyroscopeCovariance",
-            "biasOmegaCovariance",
-            "accelerometerCovariance",
-            "biasAccCovariance",
-        ),
-        power=2,
+        "gyroscopeCovariance biasOmegaCovariance accelerometerCovariance biasAccCovariance", power=2
     )
 
     @staticmethod
@@ -112,7 +106,7 @@ class GtsamCpp(Gtsam):
 
     name, title = "gtsam-cpp", "GTSAM (C++)"
     mark = "//"
-    file_name = "gtsam_imu.h"
+    file_name, to_copy = "gtsam_imu.h", "C++, GTSAM"
 
     def body(self, imu: ImuNumbers) -> list[str]:
         make = "gtsam::PreintegrationCombinedParams::MakeSharedU(9.81)"
@@ -151,7 +145,7 @@ class KfGins(ImuFile):
     warnings = ("gsstd and asstd, of the scale factors, are not in a static recording: keep yours",)
     file_name = "kf-gins.yaml"
     keys = MemoryKeys(
-        ("arw", "gbstd", "corrtime", "vrw", "abstd", "corrtime"),
+        "arw gbstd corrtime vrw abstd corrtime",
         (ARW, DEG_H, _HOUR, 1.0 / 60.0, _MGAL, _HOUR),
     )
 
@@ -186,7 +180,7 @@ class Basalt(JsonFile):
     )
     horizon = KEYFRAME
     file_name = "basalt.json"
-    keys = WalkKeys(("gyro_noise_std", "gyro_bias_std", "accel_noise_std", "accel_bias_std"))
+    keys = WalkKeys("gyro_noise_std gyro_bias_std accel_noise_std accel_bias_std")
 
     def body(self, imu: ImuNumbers) -> dict[str, Any]:
         values = {

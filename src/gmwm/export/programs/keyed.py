@@ -10,6 +10,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import ClassVar
 
+import numpy as np
+
 from gmwm.export.imu import ImuNumbers
 from gmwm.export.keys import WalkKeys
 from gmwm.export.target import KEYFRAME, OUTAGE, ImuFile
@@ -24,8 +26,6 @@ _PER_SAMPLE = {key: unit.removesuffix("/sqrt(Hz)") for key, unit in _UNITS.items
 _SQUARED = {key: f"({unit})^2" for key, unit in _PER_SAMPLE.items()}
 
 _CONTINUOUS = "N and K for all axes, continuous time"
-_IDENTITY = ("    - [1.0, 0.0, 0.0]", "    - [0.0, 1.0, 0.0]", "    - [0.0, 0.0, 1.0]")
-_ZERO = ("    - [0.0, 0.0, 0.0]",) * 3
 
 
 class KeyedFile(ImuFile):
@@ -33,50 +33,41 @@ class KeyedFile(ImuFile):
 
     keys: How they are called and converted.
     units: (quantity, letter) -> unit of the value.
-    before, after: Lines around the values, with places for {rate} and {topic}.
-    indent, prefix, separator, ending: Before the key, between it and the value, and after it.
+    template: The file, with places for {values}, a line each, {rate} and {topic}.
+    line: Of a value, with places for {key}, {value} and {unit}.
     """
 
     shared = True
     horizon = KEYFRAME
     keys: ClassVar[WalkKeys]
     units: ClassVar[Mapping[tuple[str, str], str]] = _UNITS
-    before: ClassVar[tuple[str, ...]] = ()
-    after: ClassVar[tuple[str, ...]] = ()
-    indent: ClassVar[str] = ""
-    prefix: ClassVar[str] = ""
-    separator: ClassVar[str] = ": "
-    ending: ClassVar[str] = "  # {unit}"
+    template: ClassVar[str] = "{values}"
+    line: ClassVar[str] = "{key}: {value:.6e}  # {unit}"
 
     def body(self, imu: ImuNumbers) -> list[str]:
-        keys = self.keys
-        has_rate = any("{rate}" in line for line in (*self.before, *self.after))
-        rate = imu.rate if keys.needs_rate or has_rate else float("nan")
+        needs_rate = self.keys.needs_rate or "{rate}" in self.template
+        rate = imu.rate if needs_rate else float("nan")
         shown = f"{rate:.9g}"
         # With a point, since OpenCV distinguishes whole numbers from others.
         shown = shown if "." in shown or "e" in shown else f"{shown}.0"
-        topic = imu.topic or "/imu0  # set to the topic of your bag"
-        before, after = (
-            [line.format(rate=shown, topic=topic) for line in lines]
-            for lines in (self.before, self.after)
-        )
-        gyro_noise, gyro_walk, accel_noise, accel_walk = keys.names
+        gyro_noise, gyro_walk, accel_noise, accel_walk = self.keys.names
         lines = []
-        for name, triad, letter in (
+        for key, triad, letter in (
             (accel_noise, imu.accel, "N"),
             (accel_walk, imu.accel, "K"),
             (gyro_noise, imu.gyro, "N"),
             (gyro_walk, imu.gyro, "K"),
         ):
-            value = keys.written(letter, getattr(triad, letter), rate)
-            ending = self.ending.format(unit=self.units[triad.quantity, letter])
-            lines.append(f"{self.indent}{self.prefix}{name}{self.separator}{value:.6e}{ending}")
+            value = self.keys.written(letter, getattr(triad, letter), rate)
+            unit = self.units[triad.quantity, letter]
+            lines.append(self.line.format(key=key, value=value, unit=unit))
             if triad.is_upper(letter):
                 what = "white noise" if letter == "N" else "random walk"
-                lines.append(
-                    f"{self.indent}#   no {what} was found: this is the largest 95 % upper limit"
-                )
-        return [*before, *lines, *after]
+                lines.append(f"#   no {what} was found: this is the largest 95 % upper limit")
+        indent = self.template.partition("{values}")[0].rpartition("\n")[2]
+        values = f"\n{indent}".join(lines)
+        topic = imu.topic or "/imu0  # set to the topic of your bag"
+        return self.template.format(values=values, rate=shown, topic=topic).splitlines()
 
 
 class Kalibr(KeyedFile):
@@ -87,15 +78,11 @@ class Kalibr(KeyedFile):
         "getGyroStatistics; IccSensors.py: addBiasMotionTerms"
     )
     keys = WalkKeys(
-        (
-            "gyroscope_noise_density",
-            "gyroscope_random_walk",
-            "accelerometer_noise_density",
-            "accelerometer_random_walk",
-        )
+        "gyroscope_noise_density gyroscope_random_walk "
+        "accelerometer_noise_density accelerometer_random_walk"
     )
-    after = ("rostopic: {topic}", "update_rate: {rate}  # Hz")
-    file_name = "imu.yaml"
+    template = "{values}\nrostopic: {topic}\nupdate_rate: {rate}  # Hz"
+    file_name, to_copy = "imu.yaml", "YAML, Kalibr"
 
 
 class OpenVins(KeyedFile):
@@ -104,30 +91,26 @@ class OpenVins(KeyedFile):
     source = "ov_msckf/src/state/Propagator.cpp: predict_and_compute; core/VioManagerOptions.h"
     keys = Kalibr.keys
     head = ("%YAML:1.0",)
-    before = (
-        "imu0:",
-        "  T_i_b:",
-        "    - [1.0, 0.0, 0.0, 0.0]",
-        "    - [0.0, 1.0, 0.0, 0.0]",
-        "    - [0.0, 0.0, 1.0, 0.0]",
-        "    - [0.0, 0.0, 0.0, 1.0]",
-    )
-    indent = "  "
-    after = (
-        "  rostopic: {topic}",
-        "  time_offset: 0.0",
-        "  update_rate: {rate}  # Hz",
-        '  model: "kalibr"',
-        "  Tw:",
-        *_IDENTITY,
-        "  R_IMUtoGYRO:",
-        *_IDENTITY,
-        "  Ta:",
-        *_IDENTITY,
-        "  R_IMUtoACC:",
-        *_IDENTITY,
-        "  Tg:",
-        *_ZERO,
+    template = (
+        """\
+imu0:
+  T_i_b:
+    - [1.0, 0.0, 0.0, 0.0]
+    - [0.0, 1.0, 0.0, 0.0]
+    - [0.0, 0.0, 1.0, 0.0]
+    - [0.0, 0.0, 0.0, 1.0]
+  {values}
+  rostopic: {topic}
+  time_offset: 0.0
+  update_rate: {rate}  # Hz
+  model: "kalibr"
+"""
+        + "".join(
+            f"  {name}:\n" + "".join(f"    - {row}\n" for row in np.eye(3).tolist())
+            for name in ("Tw", "R_IMUtoGYRO", "Ta", "R_IMUtoACC")
+        )
+        + "  Tg:\n"
+        + 3 * "    - [0.0, 0.0, 0.0]\n"
     )
     file_name = "kalibr_imu_chain.yaml"
 
@@ -140,7 +123,7 @@ class Vins(KeyedFile):
         "and K sqrt(f), f the rate of the IMU; for all axes"
     )
     source = "vins_estimator/src/factor/integration_base.h: IntegrationBase, midPointIntegration"
-    keys = WalkKeys(("gyr_n", "gyr_w", "acc_n", "acc_w"), white=2.0, walk=1.0)
+    keys = WalkKeys("gyr_n gyr_w acc_n acc_w", white=2.0, walk=1.0)
     units = _PER_SAMPLE
 
 
@@ -150,8 +133,8 @@ class OrbSlam3(KeyedFile):
     source = (
         "src/Tracking.cc: newParameterLoader (IMU::Calib); src/ImuTypes.cc: IntegrateNewMeasurement"
     )
-    keys = WalkKeys(("IMU.NoiseGyro", "IMU.GyroWalk", "IMU.NoiseAcc", "IMU.AccWalk"))
-    after = ("IMU.Frequency: {rate}  # Hz",)
+    keys = WalkKeys("IMU.NoiseGyro IMU.GyroWalk IMU.NoiseAcc IMU.AccWalk")
+    template = "{values}\nIMU.Frequency: {rate}  # Hz"
 
 
 class FastLio(KeyedFile):
@@ -160,19 +143,17 @@ class FastLio(KeyedFile):
     source = (
         "include/IKFoM_toolkit/esekfom/esekfom.hpp: predict; src/IMU_Processing.hpp: UndistortPcl"
     )
-    keys = WalkKeys(("gyr_cov", "b_gyr_cov", "acc_cov", "b_acc_cov"), white=1.0, walk=1.0, power=2)
+    keys = WalkKeys("gyr_cov b_gyr_cov acc_cov b_acc_cov", white=1.0, walk=1.0, power=2)
     units = _SQUARED
-    before = ("mapping:",)
-    indent = "  "
+    template = "mapping:\n  {values}"
 
 
 class LioSam(KeyedFile):
     name, title, file = "liosam", "LIO-SAM", "the IMU settings of params.yaml"
     convention = _CONTINUOUS
     source = "src/imuPreintegration.cpp: IMUPreintegration"
-    keys = WalkKeys(("imuGyrNoise", "imuGyrBiasN", "imuAccNoise", "imuAccBiasN"))
-    before = ("lio_sam:",)
-    indent = "  "
+    keys = WalkKeys("imuGyrNoise imuGyrBiasN imuAccNoise imuAccBiasN")
+    template = "lio_sam:\n  {values}"
 
 
 class Kimera(KeyedFile):
@@ -184,7 +165,7 @@ class Kimera(KeyedFile):
     )
     keys = Kalibr.keys
     head = ("%YAML:1.0",)
-    before = ("rate_hz: {rate}",)
+    template = "rate_hz: {rate}\n{values}"
 
 
 class Okvis2(KeyedFile):
@@ -197,9 +178,8 @@ class Okvis2(KeyedFile):
         "okvis_ceres/src/ImuError.cpp: ImuError::propagation; "
         "okvis_common/src/ViParametersReader.cpp"
     )
-    keys = WalkKeys(("sigma_g_c", "sigma_gw_c", "sigma_a_c", "sigma_aw_c"))
-    before = ("imu_parameters:",)
-    indent = "    "
+    keys = WalkKeys("sigma_g_c sigma_gw_c sigma_a_c sigma_aw_c")
+    template = "imu_parameters:\n    {values}"
 
 
 class Maplab(KeyedFile):
@@ -210,15 +190,10 @@ class Maplab(KeyedFile):
         "imu-integrator-inl.h: getCovarianceTransitionDerivativesRungeKutta"
     )
     keys = WalkKeys(
-        (
-            "gyro_noise_density",
-            "gyro_bias_random_walk_noise_density",
-            "acc_noise_density",
-            "acc_bias_random_walk_noise_density",
-        )
+        "gyro_noise_density gyro_bias_random_walk_noise_density "
+        "acc_noise_density acc_bias_random_walk_noise_density"
     )
-    before = ("sigmas:",)
-    indent = "  "
+    template = "sigmas:\n  {values}"
 
 
 class Px4(KeyedFile):
@@ -230,13 +205,13 @@ class Px4(KeyedFile):
     )
     source = "src/modules/ekf2/EKF/covariance.cpp: predictCovariance; src/modules/ekf2/module.yaml"
     keys = WalkKeys(
-        ("EKF2_GYR_NOISE", "EKF2_GYR_B_NOISE", "EKF2_ACC_NOISE", "EKF2_ACC_B_NOISE"),
+        "EKF2_GYR_NOISE EKF2_GYR_B_NOISE EKF2_ACC_NOISE EKF2_ACC_B_NOISE",
         white=1.0,
         walk=1.0,
         rate=1.0 / interval,
     )
     horizon = OUTAGE
-    prefix, separator, ending = "1\t1\t", "\t", "\t9"
+    line = "1\t1\t{key}\t{value:.6e}\t9"
     file_name = "px4.params"
     warnings = (
         "LEAST VALUES, NOT FOR FLIGHT AS THEY ARE: vibration, which a recording on the bench "

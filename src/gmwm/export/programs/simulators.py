@@ -94,14 +94,7 @@ class GnssInsSim(ImuFile):
     form = "N+GM"
     file_name = "gnss_ins_sim.py"
     keys = MemoryKeys(
-        (
-            "gyro_arw",
-            "gyro_b_stability",
-            "gyro_b_corr",
-            "accel_vrw",
-            "accel_b_stability",
-            "accel_b_corr",
-        ),
+        "gyro_arw gyro_b_stability gyro_b_corr accel_vrw accel_b_stability accel_b_corr",
         (ARW, DEG_H, 1.0, 1.0 / 60.0, 1.0, 1.0),
     )
 
@@ -137,7 +130,7 @@ class Matlab(ImuFile):
     )
     source = "manual of imuSensor, Algorithms; gyroparams, NoiseType"
     mark = "%"
-    file_name = "imu_noise.m"
+    file_name, to_copy = "imu_noise.m", "MATLAB"
 
     def body(self, imu: ImuNumbers) -> list[str]:
         lines = []

@@ -30,6 +30,8 @@ from gmwm.process import Model, Process, StateSpace, block_diagonal
 Matrices = dict[str, FloatArray]
 """F, G, H, Q, R, mean x0 and covariance P0 of the start."""
 
+_KINDS = ("discrete", "continuous")
+
 
 class StateSpaceFile(Target):
     """Needs one sensor at least and holds any model; a form makes the numbers of that form."""
@@ -46,44 +48,35 @@ class StateSpaceFile(Target):
     file_name = "state-space.json"
 
     def export(self, given: Sequence[Any], horizon: float | None, form: str | None) -> str:
-        channels = self._channels(given, horizon, form)
-        content = {
-            "comment": [
-                line
-                for text in (f"{self.title}: {self.convention}", *self.warnings)
-                for line in wrapped(text)
-            ],
-            "channels": {
-                name: each
-                | {
-                    kind: each[kind] and {key: v.tolist() for key, v in each[kind].items()}
-                    for kind in ("discrete", "continuous")
-                }
-                for name, each in channels.items()
-            },
+        return self._text(self._channels(given, horizon, form))
+
+    def _text(self, channels: dict[str, dict[str, Any]]) -> str:
+        about = (f"{self.title}: {self.convention}", *self.warnings)
+        content: dict[str, Any] = {"comment": [line for text in about for line in wrapped(text)]}
+        content["channels"] = {
+            name: {
+                key: {k: v.tolist() for k, v in value.items()} if key in _KINDS and value else value
+                for key, value in each.items()
+            }
+            for name, each in channels.items()
         }
         return json_text(content) + "\n"
 
     def save(
-        self,
-        path: str | os.PathLike[str],
-        given: Sequence[Any],
-        horizon: float | None,
-        form: str | None,
+        self, path: str | os.PathLike[str], given: Sequence[Any], horizon: float | None, form: Any
     ) -> str:
         if Path(path).suffix != ".npz":
             return super().save(path, given, horizon, form)
-        text = self.export(given, horizon, form)
+        channels = self._channels(given, horizon, form)
         arrays: dict[str, Any] = {}
-        for name, each in self._channels(given, horizon, form).items():
+        for name, each in channels.items():
             arrays[f"{name}/dt"] = each["dt"]
             arrays[f"{name}/states"] = np.array(each["states"], dtype=np.str_)
-            for kind in ("discrete", "continuous"):
-                for key, value in (each[kind] or {}).items():
-                    arrays[f"{name}/{kind}/{key}"] = value
+            for kind in _KINDS:
+                arrays |= {f"{name}/{kind}/{key}": v for key, v in (each[kind] or {}).items()}
         with moved_into_place(path) as temporary, open(temporary, "wb") as stream:
             np.savez(stream, **arrays)
-        return text
+        return self._text(channels)
 
     def _channels(
         self, given: Sequence[Any], horizon: float | None, form: str | None

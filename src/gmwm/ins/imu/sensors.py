@@ -86,11 +86,10 @@ class SensorModels:
         """That models come from fits that are not valid."""
         if not self.not_valid:
             return ()
-        fit, are = ("fits", "are") if self.not_valid[1:] else ("fit", "is")
-        text = f"the {fit} {are} not valid: do not use these numbers in a filter"
+        axes, count = ", ".join(self.not_valid), len(self.not_valid)
         hint = "read the notices of the calibration first"
-        axes = ", ".join(self.not_valid)
-        return (notice("fit-not-valid", axes, severity="warning", hint=hint, text=text),)
+        are = "are" if count > 1 else "is"
+        return (notice("fit-not-valid", axes, variant="filter", hint=hint, count=count, are=are),)
 
     def simulate(self, n: int, dt: float, rng: np.random.Generator) -> SensorErrors:
         """Draw the errors of all axes over ``n`` samples; constant biases are drawn too.

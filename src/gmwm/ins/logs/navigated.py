@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -241,7 +241,8 @@ class Navigated:
             else ". That does not explain all: something else is wrong too."
         )
         values = {**first.values, "explained": found.explained, "faults": len(faults)}
-        return Notice(first.code, worst_first(faults)[0].severity, first.where, text, values)
+        severity = worst_first(faults)[0].severity
+        return replace(first, severity=severity, text=text, values=values, hint="", source="")
 
     def __str__(self) -> str:
         imu = self.measured.imu
