@@ -331,7 +331,7 @@ def whole() -> None:
                 print(f"{name:<15}{form:<8}" + "".join(cells), flush=True)
 
 
-def _filter(numbers: Mapping[str, gmwm.FilterNumbers]) -> SensorModels:
+def _filter(numbers: Mapping[str, gmwm.AxisFilterNumbers]) -> SensorModels:
     return SensorModels.of(
         {axis: each.model for axis, each in numbers.items()},
         {axis: each.initial_sd for axis, each in numbers.items()},

@@ -72,7 +72,7 @@ def chains() -> None:
                   f"{np.sum(estimate > 1.001):>6}", flush=True)  # fmt: skip
 
 
-def _worst(truth: Model, numbers: gmwm.FilterNumbers) -> float:
+def _worst(truth: Model, numbers: gmwm.AxisFilterNumbers) -> float:
     times = (0.1 * HORIZON, HORIZON, 10.0 * HORIZON)
     return max(
         float(

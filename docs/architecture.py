@@ -21,7 +21,7 @@ MADE = {
     "selection": "-> Selection",
     "calibration": "-> Calibration",
     "ins": "-> Solution",
-    "filter_numbers": "-> FilterNumbers",
+    "filter_numbers": "-> AxisFilterNumbers",
     "export": "-> file of a program",
     "population": "-> SensorComparison, Fleet",
     "report": "-> page",

@@ -1,7 +1,7 @@
 """Numbers of an IMU whose axes differ, for all tests of this room."""
 
 from gmwm import GaussMarkov, RandomWalk, WhiteNoise
-from gmwm.filter_numbers import FilterNumbers, Predicted, SensorNumbers
+from gmwm.filter_numbers import AxisFilterNumbers, FilterNumbers, Predicted
 
 RATE = 200.0
 N = {"gyro": (1e-4, 1.1e-4, 1.2e-4), "accel": (2e-3, 2.4e-3, 2.2e-3)}
@@ -21,7 +21,7 @@ def numbers(form, axes="xyz", quantities=("gyro", "accel"), **changes):
             slow = RandomWalk(K[quantity][i])
             if form == "N+GM":
                 slow = GaussMarkov(SIGMA[quantity][i], TAU[quantity][i])
-            found[f"{quantity}_{axis}"] = FilterNumbers(
+            found[f"{quantity}_{axis}"] = AxisFilterNumbers(
                 form=form,
                 model=WhiteNoise(N[quantity][i]) + slow,
                 horizon=60.0,
@@ -31,4 +31,4 @@ def numbers(form, axes="xyz", quantities=("gyro", "accel"), **changes):
                 quantity=quantity,
             )
     given = {"source": "bench.csv", "rate": RATE, "duration": 3600.0}
-    return SensorNumbers(found, **(given | changes))
+    return FilterNumbers(found, **(given | changes))

@@ -1,6 +1,7 @@
 from . import ins as ins
 from .calibration import (
     Calibration as Calibration,
+    SensorNumbers as SensorNumbers,
     calibrate as calibrate,
     load as load,
     without_departures as without_departures,
@@ -35,13 +36,13 @@ from .estimate import (
 )
 from .export import export as export
 from .filter_numbers import (
+    AxisFilterNumbers as AxisFilterNumbers,
     Certificate as Certificate,
     ErrorBudget as ErrorBudget,
     ErrorRow as ErrorRow,
     FilterNumbers as FilterNumbers,
     Imperfections as Imperfections,
     Motion as Motion,
-    SensorNumbers as SensorNumbers,
     bound as bound,
     certify as certify,
     error_budget as error_budget,

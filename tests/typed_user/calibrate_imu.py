@@ -49,7 +49,7 @@ def main(path: Path) -> None:
     calibration.save("calibration.json")
     numbers = gmwm.bound(calibration, "N+K", horizon=10.0)
     walk: float = numbers["gyro_x"].K
-    small: gmwm.FilterNumbers = gmwm.reduce(calibration["gyro_x"], "N+2GM", outages=(10, 60))
+    small: gmwm.AxisFilterNumbers = gmwm.reduce(calibration["gyro_x"], "N+2GM", outages=(10, 60))
     certificate = gmwm.certify(calibration, {"gyro": (1e-4, walk), "accel": (1e-3, 1e-5)})
     print(small.sigma, certificate.worst.nees, certificate.recommended.horizon)
     text: str = gmwm.export(numbers, "openvins")

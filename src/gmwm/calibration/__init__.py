@@ -14,16 +14,9 @@ from gmwm.calibration.numbers import (
     SensorNumbers as SensorNumbers,
     axis_numbers as axis_numbers,
     fast_density as fast_density,
+    upper_limit as upper_limit,
 )
 from gmwm.calibration.removal import without_departures as without_departures
 from gmwm.calibration.screening import SCREENING as SCREENING
 from gmwm.calibration.stages import Stopwatch as Stopwatch, stage as stage
-from gmwm.calibration.summary import (
-    Level as Level,
-    floor as floor,
-    left_open as left_open,
-    noise_density as noise_density,
-    random_walk as random_walk,
-    sentence as sentence,
-    white_density as white_density,
-)
+from gmwm.calibration.unresolved import left_open as left_open

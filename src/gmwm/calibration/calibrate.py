@@ -32,7 +32,7 @@ from gmwm.calibration.screening import (
     with_outcomes,
 )
 from gmwm.calibration.stages import current, stage
-from gmwm.calibration.summary import unresolved_notice
+from gmwm.calibration.unresolved import unresolved_notice
 from gmwm.diagnosis import first_in_common, thinned
 from gmwm.errors import InputError
 from gmwm.issues import Notice, notice

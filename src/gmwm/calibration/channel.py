@@ -9,7 +9,7 @@ from gmwm.calibration.departures import Departure, departure_notices, departures
 from gmwm.calibration.removal import variance_without
 from gmwm.calibration.stages import Stopwatch, stage
 from gmwm.calibration.steadiness import steadiness_notice
-from gmwm.calibration.summary import with_largest_walk
+from gmwm.calibration.unresolved import with_largest_walk
 from gmwm.errors import InputError
 from gmwm.estimate import Fit, estimate
 from gmwm.issues import Notice, failure, notice

@@ -12,7 +12,7 @@ from gmwm._core.tables import frame, plain_table
 from gmwm._core.text import Printed, brief, with_error
 from gmwm._core.typing import FloatArray
 from gmwm.calibration import tuning
-from gmwm.errors import MissingNameError
+from gmwm.errors import InputError, MissingNameError
 from gmwm.estimate import Estimate, Fit, estimate
 from gmwm.estimate.result import confidence_interval
 from gmwm.process import BiasInstability, Model, Process, RandomWalk, WhiteNoise
@@ -185,7 +185,7 @@ def axis_numbers(fit: Fit, rivals: Sequence[Model] = ()) -> AxisNumbers:
     rivals: Models that fit equally well; the interval of B covers them.
     """
     bias, tau = _bias_instability(fit, rivals)
-    n, k = (_random_walk(fit, letter) for letter in "NK")
+    n, k = (random_walk(fit, letter) for letter in "NK")
     return AxisNumbers(n, bias, k, tau, fit.valid, fit.wv.quantity or "")
 
 
@@ -193,9 +193,9 @@ def fast_density(model: Model, dt: float) -> float:
     """Density at low frequencies of the terms that average out, u^2/Hz.
 
     These are the terms with at least half of this density at the corner frequency of a Gauss-Markov
-    process of 0.1 s. Quantization noise and periodic lines leave none: their integrals stay bounded.
+    process of 0.1 s. Quantization noise and periodic lines leave none: their integrals are bounded.
 
-    dt: Sampling interval, s; where it is long, the corner is at a quarter of the Nyquist frequency.
+    dt: Sampling interval, s; if it is long, the corner is at a quarter of the Nyquist frequency.
     """
     corner = 1.0 / (2.0 * np.pi * max(tuning.FAST, 4.0 * dt / np.pi))
     total = 0.0
@@ -215,7 +215,7 @@ def fast_density(model: Model, dt: float) -> float:
     return total
 
 
-def _random_walk(fit: Fit, key: str) -> Estimate:
+def random_walk(fit: Fit, key: str) -> Estimate:
     """N or K of a fit: that of its own term, for N the density of fast terms, or an upper limit."""
     process, own = PROCESSES[key], fit.params.get(key, 0.0)
 
@@ -229,11 +229,28 @@ def _random_walk(fit: Fit, key: str) -> Estimate:
         error = 0.5 * float(fit.logarithmic_error(density)[0]) * total**0.5
         interval = confidence_interval(process.parameters[0], total**0.5, error, 0.95)
         return Estimate.of(process, "estimated", total**0.5, error, interval, fit.wv)
+    limit = (0.0, _limit(fit, process, key))
+    return Estimate.of(process, "bound", 0.0, None, limit, fit.wv)
+
+
+def upper_limit(fit: Fit, key: str) -> float:
+    """95 % upper limit of N or K of a model without such a term, in SI.
+
+    Raises InputError if the data do not limit it.
+    """
+    limit = _limit(fit, PROCESSES[key], key)
+    if not np.isfinite(limit):
+        raise InputError(
+            f"channel {fit.wv.name!r}: {key} cannot be limited by this record: record longer"
+        )
+    return limit
+
+
+def _limit(fit: Fit, process: Process, key: str) -> float:
     # Given shapes, such as that of a line or of a low-pass, stay as they are.
     opened = fit.model.with_params(dict.fromkeys([*fit.keys, *fit.upper_bounds]))
     again = estimate(opened if key in fit.params else opened + process, fit.wv)
-    limit = float(again.interval()[key][1])
-    return Estimate.of(process, "bound", 0.0, None, (0.0, limit), fit.wv)
+    return float(again.interval()[key][1])
 
 
 def _bias_instability(fit: Fit, rivals: Sequence[Model]) -> tuple[Estimate, float]:

@@ -97,14 +97,14 @@ def _numbers(
     imu: Path | None, white: str | None, walk: str | None, calibration: Calibration
 ) -> Any:
     from gmwm.export import read_numbers
-    from gmwm.filter_numbers import SensorNumbers
+    from gmwm.filter_numbers import FilterNumbers
 
     if (imu is None) == (white is None and walk is None):
         raise InputError("the numbers in use: give --imu FILE, or -N GYRO,ACCEL and -K GYRO,ACCEL")
     if imu is not None:
         is_basalt = imu.is_file() and b"gyro_noise_std" in imu.read_bytes()
         is_saved = imu.suffix.lower() == ".json" and not is_basalt
-        return SensorNumbers.load(imu) if is_saved else read_numbers(imu, calibration.rate)
+        return FilterNumbers.load(imu) if is_saved else read_numbers(imu, calibration.rate)
     if white is None or walk is None:
         raise InputError("-N and -K belong together: give both")
     kinds = sorted({fit.wv.quantity or "" for fit in calibration.values()}, reverse=True)

@@ -13,7 +13,7 @@ from gmwm.cli.console import print_result, progress_bar
 from gmwm.cli.options import FILE_TO_WRITE, PATH, options, seconds
 
 if TYPE_CHECKING:
-    from gmwm.filter_numbers import SensorNumbers
+    from gmwm.filter_numbers import FilterNumbers
 
 
 _number_options = options(
@@ -126,7 +126,7 @@ def budget(file: Path, times: str, unknown_start: bool) -> None:
 
 
 def _show(
-    find: Callable[..., SensorNumbers],
+    find: Callable[..., FilterNumbers],
     *,
     output: Path | None,
     as_json: bool,

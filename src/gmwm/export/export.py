@@ -20,7 +20,7 @@ from gmwm.export.programs.keyed import KEYED
 from gmwm.export.programs.simulators import Gazebo, GnssInsSim, Matlab, PyIns
 from gmwm.export.programs.state_space import StateSpaceFile
 from gmwm.export.target import Target
-from gmwm.filter_numbers import SensorNumbers
+from gmwm.filter_numbers import FilterNumbers
 from gmwm.process import Model
 
 _FILTERS = (Gtsam, GtsamCpp, Ros, Matlab, StateSpaceFile)
@@ -36,7 +36,7 @@ _RATES = ("update_rate", "IMU.Frequency")
 
 
 def export(
-    numbers: Calibration | SensorNumbers | Sequence[Calibration | SensorNumbers],
+    numbers: Calibration | FilterNumbers | Sequence[Calibration | FilterNumbers],
     target: str,
     *,
     horizon: float | None = None,
@@ -47,7 +47,7 @@ def export(
 
     Parameters
     ----------
-    numbers : Calibration, SensorNumbers, or a sequence of them
+    numbers : Calibration, FilterNumbers, or a sequence of them
         Of a calibration, those of `gmwm.bound` are written; those of `gmwm.reduce` if it has a
         random walk and the program has no place for one. Several together make one IMU, such as
         gyros and accelerometers of different rates.
@@ -74,7 +74,7 @@ def export(
         cannot be written.
     """
     chosen = TARGETS[checks.choice("target", target, tuple(TARGETS))]
-    alone = isinstance(numbers, Calibration | SensorNumbers) or not isinstance(numbers, Sequence)
+    alone = isinstance(numbers, Calibration | FilterNumbers) or not isinstance(numbers, Sequence)
     given: list[Any] = [numbers] if alone else list(numbers)
     if path is None:
         return chosen.export(given, horizon, form)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from gmwm.errors import InputError
-from gmwm.filter_numbers import FilterNumbers
+from gmwm.filter_numbers import AxisFilterNumbers
 from gmwm.issues import Notice
 from gmwm.process import GaussMarkov, Model, RandomWalk, WhiteNoise
 
@@ -77,7 +77,7 @@ class Triad:
 
     quantity: str
     axes: tuple[Axis, ...]
-    common: FilterNumbers | None = None
+    common: AxisFilterNumbers | None = None
     shared_nees: Mapping[str, Mapping[float, float]] | None = None
 
     @property

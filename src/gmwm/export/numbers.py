@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 
 from gmwm._core import checks
-from gmwm.calibration import Calibration, noise_density, random_walk
+from gmwm.calibration import Calibration, upper_limit
 from gmwm.errors import InputError
 from gmwm.estimate import Fit
 from gmwm.export.imu import LETTERS, SENSORS, Axis, ImuNumbers, Outlook, Triad
-from gmwm.filter_numbers import FilterNumbers, SensorNumbers, bound, judged, reduce
+from gmwm.filter_numbers import AxisFilterNumbers, FilterNumbers, bound, judged, reduce
 from gmwm.process import Model, RandomWalk, WhiteNoise
 
 OUTLOOK = (10.0, 60.0, 600.0)
@@ -29,7 +29,7 @@ _TOPIC = re.compile(r"/[A-Za-z0-9_/]+")  # a name of ROS, which no file can misr
 
 def find_numbers(
     models: Calibration | Mapping[str, Any], form: str, horizon: float, tau: float | str | None
-) -> SensorNumbers:
+) -> FilterNumbers:
     """Numbers of a form that are never overconfident; ``tau`` as in `gmwm.bound`.
 
     No stationary process bounds a random walk. So "N+GM" numbers of a model with one are those that
@@ -42,7 +42,7 @@ def find_numbers(
 
 def numbers_of(
     given: Any, form: str, horizon: float | None, usual: float, tau: float | None = None
-) -> SensorNumbers:
+) -> FilterNumbers:
     """Those found of a calibration, or given ones if they have the form and the horizon.
 
     tau: One correlation time for all axes, s; given numbers are then moved to it.
@@ -50,7 +50,7 @@ def numbers_of(
     """
     if isinstance(given, Calibration):
         return find_numbers(given, form, usual if horizon is None else horizon, tau)
-    if not isinstance(given, SensorNumbers):
+    if not isinstance(given, FilterNumbers):
         raise InputError(
             f"{checks.shown(given)} has no numbers to export: give a calibration, or what "
             "gmwm.bound or gmwm.reduce made of one"
@@ -142,7 +142,7 @@ def imu_of(
 
 
 def _triad(
-    quantity: str, numbers: Sequence[SensorNumbers], axes: Mapping[str, Axis], form: str
+    quantity: str, numbers: Sequence[FilterNumbers], axes: Mapping[str, Axis], form: str
 ) -> Triad:
     """The axes of a quantity; raises InputError if a file could not hold them."""
     own = tuple(axes[name] for each in numbers for name in each.of(quantity))
@@ -169,7 +169,7 @@ def _triad(
 def _with_shared(
     triad: Triad,
     given: Sequence[Any],
-    numbers: Sequence[SensorNumbers],
+    numbers: Sequence[FilterNumbers],
     fits: Mapping[str, Fit],
     form: str,
 ) -> Triad:
@@ -184,7 +184,7 @@ def _with_shared(
     return replace(triad, shared_nees={axis.name: _nees(axis, alike, fits) for axis in triad.axes})
 
 
-def _nees(axis: Axis, numbers: FilterNumbers, fits: Mapping[str, Fit]) -> Mapping[float, float]:
+def _nees(axis: Axis, numbers: AxisFilterNumbers, fits: Mapping[str, Fit]) -> Mapping[float, float]:
     """Consistency of an axis with numbers in place of its own; empty if unknown."""
     if axis.name in fits:
         return judged({axis.name: fits[axis.name]}, numbers).nees
@@ -193,7 +193,7 @@ def _nees(axis: Axis, numbers: FilterNumbers, fits: Mapping[str, Fit]) -> Mappin
 
 
 def axis_of(
-    name: str, numbers: FilterNumbers, rate: float, fitted: Fit | None, tau: float | None = None
+    name: str, numbers: AxisFilterNumbers, rate: float, fitted: Fit | None, tau: float | None = None
 ) -> Axis:
     """An axis by its numbers; consumers reject zeros, so upper limits of its fit replace them."""
     sigma, own = (values[0] if values else float("nan") for values in (numbers.sigma, numbers.tau))
@@ -204,13 +204,13 @@ def axis_of(
     if not rate > 0.0:  # channels of several rates
         axis = replace(axis, rate=1.0 / fitted.wv.dt)
     if axis.N <= 0.0:
-        axis = replace(axis, N=noise_density(fitted).value, upper=axis.upper | {"N"})
+        axis = replace(axis, N=upper_limit(fitted, "N"), upper=axis.upper | {"N"})
     if "K" in numbers.form and axis.K <= 0.0:
-        axis = replace(axis, K=random_walk(fitted).value, upper=axis.upper | {"K"})
+        axis = replace(axis, K=upper_limit(fitted, "K"), upper=axis.upper | {"K"})
     if "GM" in numbers.form and not axis.sigma > 0.0:
         tau = numbers.horizon if tau is None else tau
         # At high frequencies this process rises as a random walk of this K does.
-        sigma = random_walk(fitted).value * float(np.sqrt(tau / 2.0))
+        sigma = upper_limit(fitted, "K") * float(np.sqrt(tau / 2.0))
         axis = replace(axis, sigma=sigma, tau=tau, upper=axis.upper | {"sigma"})
     if axis.upper:
         filled = replace(numbers, model=axis.model)
@@ -218,7 +218,7 @@ def axis_of(
     return axis
 
 
-def _common_tau(given: Sequence[Any], numbers: Sequence[SensorNumbers], form: str) -> float:
+def _common_tau(given: Sequence[Any], numbers: Sequence[FilterNumbers], form: str) -> float:
     """The one correlation time for all axes that costs least over them, s."""
     slow = [one for each in numbers for one in each.values() if one.sigma[0] > 0.0]
     horizon = numbers[0].horizon
@@ -226,7 +226,9 @@ def _common_tau(given: Sequence[Any], numbers: Sequence[SensorNumbers], form: st
     if len(taus) == 1:
         return taus.pop()
     axes = {name: one for each in given for name, one in each.items()}
-    models = {n: one.model if isinstance(one, FilterNumbers) else one for n, one in axes.items()}
+    models = {
+        n: one.model if isinstance(one, AxisFilterNumbers) else one for n, one in axes.items()
+    }
     return next(iter(find_numbers(models, form, horizon, "shared").values())).tau[0]
 
 
@@ -246,7 +248,7 @@ def _outlook(calibrations: Sequence[Calibration]) -> Outlook:
 
 
 def _remarks(
-    given: Sequence[Any], numbers: Sequence[SensorNumbers], *, cautions: bool = False
+    given: Sequence[Any], numbers: Sequence[FilterNumbers], *, cautions: bool = False
 ) -> tuple[str, ...]:
     """Each notice once, after its channels: of fits that are not valid, or else the others."""
     places: dict[str, list[str]] = {}

@@ -32,7 +32,7 @@ from gmwm.filter_numbers.propagation import Chain as Chain, ChainErrors as Chain
 from gmwm.filter_numbers.reduce import reduce as reduce
 from gmwm.filter_numbers.result import (
     FORMS as FORMS,
+    AxisFilterNumbers as AxisFilterNumbers,
     FilterNumbers as FilterNumbers,
     Predicted as Predicted,
-    SensorNumbers as SensorNumbers,
 )

@@ -14,7 +14,7 @@ from gmwm.calibration import Calibration
 from gmwm.errors import InputError
 from gmwm.estimate import Fit
 from gmwm.filter_numbers.propagation import Chain
-from gmwm.filter_numbers.result import FilterNumbers, SensorNumbers
+from gmwm.filter_numbers.result import AxisFilterNumbers, FilterNumbers
 from gmwm.process import Model, Process, as_model
 
 One = Process | Model | Fit
@@ -35,13 +35,13 @@ class PerAxis(Protocol[P]):
     """A function that gives the numbers of one axis, or those of several by channel name."""
 
     @overload
-    def __call__(self, source: One, *args: P.args, **kwargs: P.kwargs) -> FilterNumbers: ...
+    def __call__(self, source: One, *args: P.args, **kwargs: P.kwargs) -> AxisFilterNumbers: ...
     @overload
-    def __call__(self, source: Several, *args: P.args, **kwargs: P.kwargs) -> SensorNumbers: ...
+    def __call__(self, source: Several, *args: P.args, **kwargs: P.kwargs) -> FilterNumbers: ...
 
 
 def per_axis(
-    function: Callable[Concatenate[One | Several, P], FilterNumbers | SensorNumbers],
+    function: Callable[Concatenate[One | Several, P], AxisFilterNumbers | FilterNumbers],
 ) -> PerAxis[P]:
     """The function itself; the type of its result depends on that of the source."""
     return cast(PerAxis[P], function)
@@ -125,7 +125,7 @@ class SensorAxes:
             return cls(axes, source.source, rate, source.duration, False)
         return cls(axes, "", 1.0 / axes[0].dt, float("nan"), False)
 
-    def as_given(self, numbers: SensorNumbers) -> FilterNumbers | SensorNumbers:
+    def as_given(self, numbers: FilterNumbers) -> AxisFilterNumbers | FilterNumbers:
         """The numbers of the one axis, or of all by channel."""
         return next(iter(numbers.values())) if self.single else numbers
 
@@ -148,8 +148,8 @@ class SensorAxes:
         return self.groups if shared else tuple((axis,) for axis in self.axes)
 
     def numbers(
-        self, found: Callable[[tuple[AxisModel, ...]], Sequence[FilterNumbers]], shared: bool
-    ) -> SensorNumbers:
+        self, found: Callable[[tuple[AxisModel, ...]], Sequence[AxisFilterNumbers]], shared: bool
+    ) -> FilterNumbers:
         """The numbers by channel, given those of axes that share them."""
         by_name = {
             axis.name: each
@@ -157,7 +157,7 @@ class SensorAxes:
             for axis, each in zip(group, found(group), strict=True)
         }
         ordered = {axis.name: by_name[axis.name] for axis in self.axes}
-        return SensorNumbers(ordered, self.source, self.rate, self.duration, shared)
+        return FilterNumbers(ordered, self.source, self.rate, self.duration, shared)
 
 
 def given_tau(form: str, tau: float | str | None) -> float | str | None:

@@ -14,7 +14,7 @@ from gmwm.errors import InputError
 from gmwm.filter_numbers import tuning
 from gmwm.filter_numbers.axes import AxisModel, One, Sd, SensorAxes, Several, given_tau, per_axis
 from gmwm.filter_numbers.propagation import Chain
-from gmwm.filter_numbers.result import FilterNumbers, Predicted, SensorNumbers
+from gmwm.filter_numbers.result import AxisFilterNumbers, FilterNumbers, Predicted
 from gmwm.filter_numbers.spectra import (
     KINDS,
     TIGHTEST,
@@ -41,7 +41,7 @@ def bound(
     shared: bool = False,
     tau: float | str | None = None,
     dt: float | None = None,
-) -> FilterNumbers | SensorNumbers:
+) -> AxisFilterNumbers | FilterNumbers:
     """The smallest numbers of a form with which a linear filter is never overconfident.
 
     Parameters
@@ -69,7 +69,7 @@ def bound(
 
     Returns
     -------
-    FilterNumbers or SensorNumbers
+    AxisFilterNumbers or FilterNumbers
         Of one axis, or by channel; N and K of valid fits with their standard errors.
 
     Raises
@@ -113,7 +113,7 @@ def bound_of(
     horizon: float,
     level: float | None,
     tau: float | None = None,
-) -> tuple[FilterNumbers, ...]:
+) -> tuple[AxisFilterNumbers, ...]:
     """The bound of axes that share their numbers; see `bound`.
 
     Cached: reports and exports ask for some of them again.
@@ -149,7 +149,7 @@ def bound_of(
         notices += covered_terms_notices(axis, target, model, problem.targets)
         notices += fit_notices(axis, level)
         about = (form, model, horizon, sd, "bound", found, tuple(notices), axis.quantity, stderr)
-        numbers.append(FilterNumbers(*about))
+        numbers.append(AxisFilterNumbers(*about))
     return tuple(numbers)
 
 
@@ -198,7 +198,7 @@ def predicted(
     return tuple(Predicted(time, float(nees), float(sd)) for time, nees, sd in rows)
 
 
-def judged(source: One | Several, numbers: FilterNumbers) -> FilterNumbers:
+def judged(source: One | Several, numbers: AxisFilterNumbers) -> AxisFilterNumbers:
     """The same numbers with the predictions where an error model is the truth, at their times."""
     axis = SensorAxes.of(source, None, 0.0).axes[0]
     times = [each.time for each in numbers.predicted]

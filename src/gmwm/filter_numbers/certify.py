@@ -20,7 +20,7 @@ from gmwm.filter_numbers.axes import AxisModel, One, Sd, SensorAxes, Several, gi
 from gmwm.filter_numbers.bound import bound_of
 from gmwm.filter_numbers.imperfections import Imperfections, Motion
 from gmwm.filter_numbers.propagation import Chain
-from gmwm.filter_numbers.result import FilterNumbers, InUnits, SensorNumbers, shown_unit
+from gmwm.filter_numbers.result import AxisFilterNumbers, FilterNumbers, InUnits, shown_unit
 from gmwm.ins import SensorModels, covariance_analysis, loiter_with_outages
 from gmwm.issues import Notice, notice
 from gmwm.process import Model, Process, RandomWalk, WhiteNoise, as_model
@@ -29,8 +29,8 @@ from gmwm.readers import Recording
 if TYPE_CHECKING:
     import pandas
 
-Given = FilterNumbers | SensorNumbers | Mapping[str, Any]
-"""Numbers of all axes, or by axis or kind (gyro, accel): `FilterNumbers`, a model, or N and K."""
+Given = AxisFilterNumbers | FilterNumbers | Mapping[str, Any]
+"""Numbers of all axes, or by axis or kind (gyro, accel) numbers, a model, or N and K."""
 
 _SHOWN = {
     1: ("angle", "deg", float(np.degrees(1.0))),
@@ -96,9 +96,9 @@ class Certificate(Document, InUnits):
 
     Attributes
     ----------
-    numbers : SensorNumbers
+    numbers : FilterNumbers
         In use.
-    recommended : SensorNumbers
+    recommended : FilterNumbers
         With which a filter is never overconfident about the error model.
     checks : tuple of Check
     causes : tuple of Cause
@@ -107,8 +107,8 @@ class Certificate(Document, InUnits):
 
     SCHEMA: ClassVar[str] = "gmwm.certificate"
 
-    numbers: SensorNumbers
-    recommended: SensorNumbers
+    numbers: FilterNumbers
+    recommended: FilterNumbers
     checks: Annotated[tuple[Check, ...], MinLen(1), MaxLen(10_000)]
     causes: Annotated[tuple[Cause, ...], MaxLen(1000)]
     notices: tuple[Notice, ...] = ()
@@ -191,8 +191,8 @@ def certify(
     ----------
     source : Process, Model, Fit, Calibration or mapping
         The truth.
-    numbers : FilterNumbers, SensorNumbers or mapping
-        In use; a mapping has (N, K), a model or `FilterNumbers` by axis or kind ("gyro", "accel").
+    numbers : AxisFilterNumbers, FilterNumbers or mapping
+        In use; a mapping has (N, K), a model or the numbers of an axis by axis or kind ("gyro").
     outages : sequence of float, optional
         Times without aiding, s.
     keyframe : float, optional
@@ -247,7 +247,7 @@ def certify(
     return Certificate(own, safe, (*found, *in_flight), tuple(causes), tuple(notices))
 
 
-def _in_use(given: Given, axis: AxisModel, horizon: float, start: float) -> FilterNumbers:
+def _in_use(given: Given, axis: AxisModel, horizon: float, start: float) -> AxisFilterNumbers:
     """The numbers of one axis in use; those without a horizon (s) or start (u) get the given."""
     kind = axis.quantity or axis.name
     names = [name for name in (axis.name, kind) if isinstance(given, Mapping) and name in given]
@@ -257,7 +257,7 @@ def _in_use(given: Given, axis: AxisModel, horizon: float, start: float) -> Filt
             f"{kind or 'gyro and accel'}"
         )
     item: Any = given[names[0]] if isinstance(given, Mapping) else given
-    if isinstance(item, FilterNumbers):
+    if isinstance(item, AxisFilterNumbers):
         return item
     if isinstance(item, Process | Model):
         model = as_model(item)
@@ -273,11 +273,11 @@ def _in_use(given: Given, axis: AxisModel, horizon: float, start: float) -> Filt
     kinds = [type(term).__name__ for term in model.terms]
     slow = {0: "", 1: "+GM", 2: "+2GM"}.get(kinds.count("GaussMarkov"), "+?")
     form = "N" + "+K" * ("RandomWalk" in kinds) + slow
-    return FilterNumbers(form, model, horizon, start, "given", quantity=axis.quantity)
+    return AxisFilterNumbers(form, model, horizon, start, "given", quantity=axis.quantity)
 
 
 def _of_axis(
-    axis: AxisModel, numbers: SensorNumbers, times: Sequence[float], keyframe: float
+    axis: AxisModel, numbers: FilterNumbers, times: Sequence[float], keyframe: float
 ) -> list[Check]:
     """Errors of one axis without aiding, and between keyframes."""
     believed = numbers[axis.name]
@@ -299,7 +299,7 @@ def _of_axis(
 
 
 def _in_flight(
-    axes: SensorAxes, numbers: SensorNumbers, times: Sequence[float]
+    axes: SensorAxes, numbers: FilterNumbers, times: Sequence[float]
 ) -> tuple[list[Check], list[Notice]]:
     """Errors of an INS/GNSS filter at the end of outages, where there are six axes."""
     try:
@@ -326,7 +326,7 @@ def _in_flight(
 
 def _causes(
     group: tuple[AxisModel, ...],
-    numbers: SensorNumbers,
+    numbers: FilterNumbers,
     horizon: float,
     known: Imperfections,
     motion: Motion | None,
@@ -334,10 +334,10 @@ def _causes(
     """What N and K of a kind of sensor have to cover."""
     kind = group[0].quantity
 
-    def least(axes: tuple[AxisModel, ...], level: float | None = None) -> FilterNumbers:
+    def least(axes: tuple[AxisModel, ...], level: float | None = None) -> AxisFilterNumbers:
         return bound_of(axes, "N+K", horizon, level)[0]
 
-    def row(name: str, found: FilterNumbers, over: tuple[float, float]) -> Cause:
+    def row(name: str, found: AxisFilterNumbers, over: tuple[float, float]) -> Cause:
         factors = _ratio(found.N, over[0]), _ratio(found.K, over[1])
         return Cause(kind, name, found.N, found.K, *factors)
 

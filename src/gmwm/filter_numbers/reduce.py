@@ -29,7 +29,7 @@ from gmwm.filter_numbers.bound import (
     start_sd,
 )
 from gmwm.filter_numbers.propagation import Chain, ChainErrors
-from gmwm.filter_numbers.result import FORMS, FilterNumbers, Predicted, SensorNumbers
+from gmwm.filter_numbers.result import FORMS, AxisFilterNumbers, FilterNumbers, Predicted
 from gmwm.filter_numbers.spectra import Problem, RequiredSpectrum, with_correlation_times
 from gmwm.ins.covariance import smallest_score
 from gmwm.issues import Notice, notice
@@ -51,7 +51,7 @@ def reduce(
     tau: float | str | None = None,
     dt: float | None = None,
     progress: Progress | None = None,
-) -> FilterNumbers | SensorNumbers:
+) -> AxisFilterNumbers | FilterNumbers:
     """The numbers of a form that make a small filter consistent, and as accurate as it can be.
 
     Unlike those of `gmwm.bound` they may be overconfident in some direction or at other times.
@@ -74,7 +74,7 @@ def reduce(
 
     Returns
     -------
-    FilterNumbers or SensorNumbers
+    AxisFilterNumbers or FilterNumbers
         Of one axis, or by channel; the horizon is the longest outage or the interval of keyframes,
         and predictions are at each of them and at ten times the longest.
 
@@ -105,7 +105,7 @@ def reduce(
     time = search.correlation_time(axes.sharing(shared)) if isinstance(tau, str) else tau
     tell, done, total = progress or (lambda *_: None), 0, len(axes.axes)
 
-    def found(group: tuple[AxisModel, ...]) -> list[FilterNumbers]:
+    def found(group: tuple[AxisModel, ...]) -> list[AxisFilterNumbers]:
         nonlocal done
         tell(done, total, group[0].name)
         done += len(group)
@@ -127,7 +127,7 @@ class _Search:
     def chain(self, axis: AxisModel) -> Chain:
         return Chain.of_poses(axis.quantity, self.times[-1]) if self.is_relative else axis.chain
 
-    def numbers(self, group: Sequence[AxisModel], tau: float | None) -> list[FilterNumbers]:
+    def numbers(self, group: Sequence[AxisModel], tau: float | None) -> list[AxisFilterNumbers]:
         """The numbers of axes that share them."""
         _, model, sd = self.least(group, tau)
         longest, numbers = self.times[-1], []
@@ -143,7 +143,7 @@ class _Search:
             notices += covered_terms_notices(axis, target, model, targets)
             notices += fit_notices(axis, None)
             about = (self.form, model, longest, sd, "reduce", found, tuple(notices), axis.quantity)
-            numbers.append(FilterNumbers(*about))
+            numbers.append(AxisFilterNumbers(*about))
         return numbers
 
     def correlation_time(self, groups: Sequence[Sequence[AxisModel]]) -> float:

@@ -75,7 +75,7 @@ class Predicted:
 
 
 @dataclass(frozen=True, repr=False)
-class FilterNumbers(Document, InUnits):
+class AxisFilterNumbers(Document, InUnits):
     """The numbers that a small filter should believe of one axis.
 
     Attributes
@@ -154,7 +154,7 @@ class FilterNumbers(Document, InUnits):
         return {each.time: each.tightness for each in self.predicted}
 
     def __repr__(self) -> str:
-        return f"<FilterNumbers {self.model!r}, {self.method} for {self.horizon:g} s>"
+        return f"<AxisFilterNumbers {self.model!r}, {self.method} for {self.horizon:g} s>"
 
     def text(self, units: str = "field") -> str:
         lines = [f"{self.form} for {self.horizon:g} s, {self.method}"]
@@ -174,7 +174,7 @@ class FilterNumbers(Document, InUnits):
         return values | {"initial_sd": self.initial_sd}
 
     def row(self) -> dict[str, Any]:
-        """A row of `SensorNumbers.to_frame`, SI."""
+        """A row of `FilterNumbers.to_frame`, SI."""
         first = self.predicted[0] if self.predicted else Predicted(self.horizon, _NAN, _NAN)
         return {
             "form": self.form,
@@ -188,13 +188,13 @@ class FilterNumbers(Document, InUnits):
 
 
 @dataclass(frozen=True, repr=False)
-class SensorNumbers(Mapping[str, FilterNumbers], Document, InUnits):
-    """The numbers that a small filter should believe of a sensor: channel -> `FilterNumbers`.
+class FilterNumbers(Mapping[str, AxisFilterNumbers], Document, InUnits):
+    """The numbers that a small filter should believe of a sensor: channel -> `AxisFilterNumbers`.
 
     Attributes
     ----------
     axes : dict
-        Channel name -> `FilterNumbers`.
+        Channel name -> `AxisFilterNumbers`.
     source : str
         Of the calibration.
     rate : float
@@ -212,7 +212,7 @@ class SensorNumbers(Mapping[str, FilterNumbers], Document, InUnits):
         "duration": "duration_s",
     }
 
-    axes: Annotated[Mapping[Text, FilterNumbers], MinLen(1), MaxLen(10_000)]
+    axes: Annotated[Mapping[Text, AxisFilterNumbers], MinLen(1), MaxLen(10_000)]
     source: Text = ""
     rate: Annotated[Rate, NoneIs(_NAN)] = _NAN
     duration: Annotated[Positive, NoneIs(_NAN)] = _NAN
@@ -221,7 +221,7 @@ class SensorNumbers(Mapping[str, FilterNumbers], Document, InUnits):
     def __post_init__(self) -> None:
         freeze(self, "axes")
 
-    def __getitem__(self, name: str) -> FilterNumbers:
+    def __getitem__(self, name: str) -> AxisFilterNumbers:
         if name not in self.axes:
             raise MissingNameError(
                 f"there are no filter numbers of channel {name!r}: there are {', '.join(self.axes)}"
@@ -234,7 +234,7 @@ class SensorNumbers(Mapping[str, FilterNumbers], Document, InUnits):
     def __len__(self) -> int:
         return len(self.axes)
 
-    def of(self, quantity: str) -> dict[str, FilterNumbers]:
+    def of(self, quantity: str) -> dict[str, AxisFilterNumbers]:
         """The axes of the gyros ("gyro") or accelerometers ("accel")."""
         return {name: each for name, each in self.items() if each.quantity == quantity}
 
@@ -245,7 +245,7 @@ class SensorNumbers(Mapping[str, FilterNumbers], Document, InUnits):
 
     @property
     def form(self) -> str:
-        """Their form; see `FilterNumbers`."""
+        """Their form; see `AxisFilterNumbers`."""
         return next(iter(self.values())).form
 
     @property
@@ -257,7 +257,7 @@ class SensorNumbers(Mapping[str, FilterNumbers], Document, InUnits):
 
     def __repr__(self) -> str:
         where = self.source or "a sensor"
-        return f"<SensorNumbers of {where}: {self.form} for {self.horizon:g} s, {', '.join(self)}>"
+        return f"<FilterNumbers of {where}: {self.form} for {self.horizon:g} s, {', '.join(self)}>"
 
     def text(self, units: str = "field") -> str:
         first = next(iter(self.values()))
@@ -291,7 +291,7 @@ def shown_unit(key: str, quantity: str, units: str) -> tuple[str, float]:
     return (known[0].unit, known[0].per_si) if known else (si_parameter_unit(unit, quantity), 1.0)
 
 
-def _tables(axes: Mapping[str, FilterNumbers], quantity: str, units: str) -> list[str]:
+def _tables(axes: Mapping[str, AxisFilterNumbers], quantity: str, units: str) -> list[str]:
     """The values of axes with their units, and the predictions below them."""
     longest = max(axes.values(), key=lambda each: len(each._shown()) + len(each.stderr))
     heads, columns = [quantity or "channel"], [list(axes)]

@@ -16,12 +16,12 @@ import numpy as np
 from gmwm._core import checks
 from gmwm._core.distributions import chi2
 from gmwm._core.typing import FloatArray, Progress
-from gmwm.calibration import Calibration, calibrate, noise_density, random_walk
+from gmwm.calibration import Calibration, calibrate, upper_limit
 from gmwm.errors import InputError, printable
 from gmwm.estimate import Fit, JointFit
 from gmwm.estimate.problem import Scales
 from gmwm.estimate.result import between
-from gmwm.filter_numbers import FilterNumbers, bound
+from gmwm.filter_numbers import AxisFilterNumbers, bound
 from gmwm.issues import Notice, notice
 from gmwm.population import tuning
 from gmwm.population.comparison import (
@@ -332,7 +332,7 @@ def axis_numbers(
     name: str, fits: Mapping[str, Fit], joint: Fit | None, horizon: float
 ) -> tuple[AxisNumbers, tuple[Notice, ...]]:
     """Filter numbers of a channel from its fits by recording, and what could not be found."""
-    each: dict[str, FilterNumbers] = {}
+    each: dict[str, AxisFilterNumbers] = {}
     notices = []
     for label, fit in fits.items():
         try:
@@ -354,10 +354,10 @@ def axis_numbers(
     except InputError as error:
         notices.append(notice("no-numbers", name, error=error))
     upper: dict[str, float] = {}
-    for letter, level in (("N", noise_density), ("K", random_walk)):
+    for letter in "NK":
         for fit in fits.values() if covering and getattr(covering, letter) == 0.0 else ():
             with suppress(InputError):  # this recording gives no limit
-                upper[letter] = max(level(fit).value, upper.get(letter, 0.0))
+                upper[letter] = max(upper_limit(fit, letter), upper.get(letter, 0.0))
     return AxisNumbers(each, whole, covering, nees, upper), tuple(notices)
 
 

@@ -22,7 +22,7 @@ from gmwm._core.units import customary_unit
 from gmwm.calibration import Calibration
 from gmwm.errors import MissingNameError
 from gmwm.estimate import Estimate, Fit, JointFit
-from gmwm.filter_numbers import FilterNumbers
+from gmwm.filter_numbers import AxisFilterNumbers
 from gmwm.issues import Notice, worst_first
 from gmwm.population import tuning
 from gmwm.population.curves import Difference, Equality
@@ -83,9 +83,9 @@ class AxisNumbers:
     upper: Letters that no recording determines -> the largest of their 95 % upper limits.
     """
 
-    each: Mapping[str, FilterNumbers]
-    joint: FilterNumbers | None
-    covering: FilterNumbers | None
+    each: Mapping[str, AxisFilterNumbers]
+    joint: AxisFilterNumbers | None
+    covering: AxisFilterNumbers | None
     nees: Mapping[str, float]
     upper: Mapping[str, float]
 

@@ -21,7 +21,7 @@ from gmwm._core import checks
 from gmwm._core.files import opened
 from gmwm._core.jobs import ENDED
 from gmwm._core.memory import OUT_OF_MEMORY
-from gmwm.calibration import SCREENING, calibrate, floor, noise_density, random_walk
+from gmwm.calibration import SCREENING, axis_numbers, calibrate, upper_limit
 from gmwm.errors import InputError, printable
 from gmwm.estimate import Fit
 from gmwm.issues import failure
@@ -172,12 +172,13 @@ def _numbers(fit: Fit, horizon: float) -> dict[str, Number]:
     found: dict[str, Number] = {}
     with suppress(InputError):  # no white noise and random walk bound this model
         bound = filter_numbers.bound(fit, horizon=horizon)
-        for letter, value, level in (("N", bound.N, noise_density), ("K", bound.K, random_walk)):
+        for letter, value in (("N", bound.N), ("K", bound.K)):
             known = value > 0.0
-            value = value if known else level(fit).value
+            value = value if known else upper_limit(fit, letter)
             found[f"filter_{letter}"] = Number(value, bound.stderr.get(letter), known)
-    low = floor(fit)
-    return found | {"floor_B": Number(low.bias_instability, None, not low.falls)}
+    b = axis_numbers(fit).B
+    is_limit = b.kind == "bound"
+    return found | {"floor_B": Number(b.upper if is_limit else b.value, None, not is_limit)}
 
 
 # -- recordings ------------------------------------------------------------------------------------

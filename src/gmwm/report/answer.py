@@ -9,7 +9,7 @@ import numpy as np
 
 from gmwm._core.pages import page_of
 from gmwm._core.text import brief, per_cent
-from gmwm.calibration import AMBIGUITY, Calibration, floor
+from gmwm.calibration import AMBIGUITY, Calibration, axis_numbers
 from gmwm.diagnosis import gathered
 from gmwm.estimate import Fit
 from gmwm.export import Axis, Triad
@@ -112,9 +112,9 @@ def quantity_text(value: float, unit: str, fit: Fit) -> dict[str, str]:
 
 def bias_instability(fit: Fit) -> dict[str, str]:
     """B from the lowest point of the curve; an upper bound where it falls to the end."""
-    low = floor(fit)
-    sign = "≤ " if low.falls else ""
-    text = quantity_text(low.bias_instability, "u", fit)
+    b = axis_numbers(fit).B
+    sign = "≤ " if b.kind == "bound" else ""
+    text = quantity_text(b.upper if sign else b.value, "u", fit)
     return {key: sign + each for key, each in text.items()}
 
 

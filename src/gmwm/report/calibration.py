@@ -13,7 +13,7 @@ from gmwm._core.files import writable_file, written
 from gmwm._core.jobs import shared
 from gmwm._core.pages import page_of
 from gmwm._core.text import brief, per_cent
-from gmwm.calibration import Calibration, floor, sentence, white_density
+from gmwm.calibration import Calibration, axis_numbers
 from gmwm.estimate import Fit
 from gmwm.issues import worst_first
 from gmwm.readers import Channel, Recording
@@ -121,7 +121,7 @@ def fragment(calibration: Calibration) -> str:
             [
                 name,
                 fit.model.title(),
-                quantity_text(white_density(fit), "u/sqrt(Hz)", fit)["field"],
+                calibration.numbers[name].text("N"),
                 bias_instability(fit)["field"],
                 "; ".join(term["field"] for term in slow_terms(fit)) or "none found",
                 f"{'valid' if is_valid else 'not valid'}: {why}",
@@ -178,7 +178,6 @@ def _channel(
         "model": fit.model.title(),
         "valid": is_valid,
         "why": why,
-        "sentence": sentence(fit),
         "noise": "" if own is None else _noise(fit, own.N),
         "ambiguity": ambiguity(calibration, name),
         "stated": _stated(name, fit, sheet),
@@ -193,7 +192,7 @@ def _channel(
 
 def _noise(fit: Fit, number: float) -> str:
     """Which of the values of white noise is which, where they differ."""
-    density = white_density(fit)
+    density = axis_numbers(fit).N.value
     if not abs(number - density) > 0.01 * density > 0.0:
         return ""
     text = quantity_text(number, "u/sqrt(Hz)", fit)["field"]
@@ -221,11 +220,7 @@ def _stated(name: str, fit: Fit, sheet: Datasheet | None) -> str:
     if not values:
         return ""
     units = {"N": "u/sqrt(Hz)", "B": "u", "K": "u/s/sqrt(Hz)"}
-    measured = {
-        "N": white_density(fit),
-        "B": floor(fit).bias_instability,
-        "K": 0.0 if "K" in fit.upper_bounds else fit.params.get("K", 0.0),
-    }
+    measured = {number.key: number.value for number in axis_numbers(fit)}
     parts = []
     for key, value in values.items():
         text = f"{key} {quantity_text(value, units[key], fit)['field']}"

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from gmwm._core.typing import FloatArray
-from gmwm.calibration import Calibration, floor
+from gmwm.calibration import PLATEAU, Calibration, axis_numbers
 from gmwm.diagnosis import spectrum
 from gmwm.estimate import Fit
 from gmwm.estimate.result import dense_curves
@@ -125,8 +125,9 @@ def deviation_figure(
 
 def _marks(fitted: Fit, numbers: tuple[float, float] | None, factor: float) -> Figure:
     """N where its line passes 1 s, K where its line passes 3 s, 0.664 B at the lowest point."""
-    low = floor(fitted)
-    places = [("0.664 B", low.tau, low.deviation)]
+    own = axis_numbers(fitted)
+    bias = own.B.upper if own.B.kind == "bound" else own.B.value
+    places = [("0.664 B", own.tau, PLATEAU * bias)]
     if numbers is not None:
         places += [("N at 1 s", 1.0, numbers[0]), ("K at 3 s", 3.0, numbers[1])]
     shown = [each for each in places if each[2] > 0.0]

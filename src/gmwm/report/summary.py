@@ -13,10 +13,9 @@ from gmwm.calibration import LONGEST_PART, Calibration
 from gmwm.export import Triad
 from gmwm.issues import Notice, worst_first
 from gmwm.report.answer import quantity_text, trust
-from gmwm.report.health import findings
-from gmwm.report.length import length_sentence
+from gmwm.report.health import findings, length_sentence
 from gmwm.report.numbers import SHOWN, certified
-from gmwm.report.text import duration_text
+from gmwm.report.page import duration_text
 
 _ACTIONS = 3  # notices that matter most
 _LINES = 2  # of each
@@ -60,8 +59,8 @@ def _sensor(calibration: Calibration) -> list[str]:
         if name in calibration and not calibration[name].valid:
             why = trust(name, calibration[name], calibration)[1]
             lines[place] = f"{line.partition('not valid')[0]}not valid: {why}"[:WIDTH]
-    for name, why in calibration.skipped.items():
-        lines += wrapped(f"{name}  no model: {why.text}", indent=2)
+    for name, skipped in calibration.skipped.items():
+        lines += wrapped(f"{name}  no model: {skipped.text}", indent=2)
     return lines
 
 

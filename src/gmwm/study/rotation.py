@@ -26,7 +26,7 @@ from gmwm._core.text import bullets, wrapped
 from gmwm._core.typing import FloatArray, Progress
 from gmwm.calibration import Calibration, calibrate
 from gmwm.errors import InputError
-from gmwm.filter_numbers import SensorNumbers
+from gmwm.filter_numbers import FilterNumbers
 from gmwm.ins import tuning
 from gmwm.ins.imu import AXES, Recorded, SensorModels
 from gmwm.ins.simulation import GROUPS, Experiment, FilterErrors, Validation
@@ -396,7 +396,7 @@ def _filters(
         ("N+K+GM bound", "bound-N+K+GM", lambda: bound(calibration, "N+K+GM", horizon)),
         ("N+K reduced", "reduce-N+K", lambda: reduce(calibration, "N+K", [horizon])),
     ):
-        numbers = kept(SensorNumbers, f"{what}-{horizon:g}", make)
+        numbers = kept(FilterNumbers, f"{what}-{horizon:g}", make)
         models = {axis: numbers[axis].model for axis in AXES}
         filters[name] = SensorModels(models, {axis: numbers[axis].initial_sd for axis in AXES})
     axes = found.lineless()

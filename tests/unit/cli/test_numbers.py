@@ -5,7 +5,7 @@ import json
 import pytest
 
 import gmwm
-from gmwm import GaussMarkov, SensorNumbers, WhiteNoise
+from gmwm import FilterNumbers, GaussMarkov, WhiteNoise
 from gmwm.cli.certify import _numbers
 
 MODELS = {
@@ -43,7 +43,7 @@ def test_options_reach_the_bound(run, calibration):
         "--tau", 2.5, "--json",
     )  # fmt: skip
     assert code == 0
-    found = SensorNumbers.from_dict(json.loads(printed))
+    found = FilterNumbers.from_dict(json.loads(printed))
     assert found.shared
     assert found["gyro_x"].form == "N+K+GM"
     assert found["gyro_x"].tau == (2.5,)
@@ -53,7 +53,7 @@ def test_options_reach_the_bound(run, calibration):
 
 def test_one_correlation_time_may_be_asked_for(run, calibration):
     _, printed, _ = run("bound", calibration, "--form", "N+GM", "--tau", "shared", "--json")
-    found = SensorNumbers.from_dict(json.loads(printed))
+    found = FilterNumbers.from_dict(json.loads(printed))
     assert found["gyro_x"].tau == found["accel_x"].tau
     code, _, error = run("bound", calibration, "--form", "N+GM", "--tau", "one")
     assert code == 2
@@ -68,7 +68,7 @@ def test_the_bias_at_switch_on_is_asked_for(run, calibration):
 def test_reduce(run, calibration):
     code, printed, _ = run("reduce", calibration, "--outages", "5,20", "--json")
     assert code == 0
-    found = SensorNumbers.from_dict(json.loads(printed))
+    found = FilterNumbers.from_dict(json.loads(printed))
     assert found.to_dict() == gmwm.reduce(gmwm.load(calibration), outages=(5.0, 20.0)).to_dict()
     code, printed, _ = run("reduce", calibration, "--keyframe", "0.5", "--json")
     assert (code, json.loads(printed)["channels"]["gyro_x"]["horizon_s"]) == (0, 0.5)

@@ -8,7 +8,7 @@ import pytest
 import gmwm
 from gmwm import GaussMarkov, InputError, RandomWalk, WhiteNoise
 from gmwm.export import Axis, Triad
-from gmwm.filter_numbers import SensorNumbers
+from gmwm.filter_numbers import FilterNumbers
 from gmwm.process import as_model
 from imu_numbers import RATE, numbers
 
@@ -61,4 +61,4 @@ def test_numbers_by_which_a_filter_divides_are_there(target, form, model, key):
     given = numbers(form)
     lacking = replace(given["gyro_y"], model=as_model(model))
     with pytest.raises(InputError, match=f": {key} of gyro_y is zero, by which filters divide"):
-        gmwm.export(SensorNumbers({**given, "gyro_y": lacking}, rate=RATE), target)
+        gmwm.export(FilterNumbers({**given, "gyro_y": lacking}, rate=RATE), target)

@@ -10,6 +10,7 @@ from error_models import DT, TRUTHS
 from gmwm import (
     ARIMA,
     MA,
+    AxisFilterNumbers,
     FilterNumbers,
     GaussMarkov,
     InputError,
@@ -20,7 +21,6 @@ from gmwm import (
     RandomWalk,
     RateRamp,
     Resonance,
-    SensorNumbers,
     Sinusoid,
     WhiteNoise,
 )
@@ -467,7 +467,7 @@ def test_standard_errors_of_shared_axes_and_of_none(fitted):
     assert not gmwm.bound(ONE).stderr
     assert not gmwm.bound(fitted, level=0.95).stderr
     assert not gmwm.bound(fitted, "N+GM").stderr
-    assert FilterNumbers.from_dict(one.to_dict()) == one
+    assert AxisFilterNumbers.from_dict(one.to_dict()) == one
     assert f"+- {one.stderr['K']:.2g}" in one.text("si")
 
 
@@ -575,7 +575,7 @@ def test_a_turn_on_bias_is_part_of_the_start():
 def test_axes_may_share_their_numbers():
     models = {"gyro_x": ONE, "gyro_y": TRUTHS["two"], "accel_x": TRUTHS["three"]}
     own, shared = gmwm.bound(models), gmwm.bound(models, shared=True)
-    assert isinstance(own, SensorNumbers)
+    assert isinstance(own, FilterNumbers)
     assert list(shared) == list(models)
     assert shared["gyro_x"].model == shared["gyro_y"].model
     assert shared["accel_x"].model == own["accel_x"].model
@@ -599,7 +599,7 @@ def test_a_calibration_gives_numbers_by_channel():
     assert (found.rate, found.duration) == (100.0, 50.0)
     assert [each.quantity for each in found.values()] == ["gyro", "accel"]
     single = gmwm.bound(calibration["gyro_x"])
-    assert isinstance(single, FilterNumbers)
+    assert isinstance(single, AxisFilterNumbers)
     assert single == found["gyro_x"]
 
 

@@ -6,20 +6,20 @@ from dataclasses import FrozenInstanceError, replace
 import pytest
 
 import gmwm
-from gmwm import FilterNumbers, GaussMarkov, InputError, RandomWalk, SensorNumbers, WhiteNoise
+from gmwm import AxisFilterNumbers, FilterNumbers, GaussMarkov, InputError, RandomWalk, WhiteNoise
 from gmwm.filter_numbers import Predicted
 from gmwm.issues import Notice
 
 NOTICE = Notice("quantization-left-out", "note", "", "quantization noise is left out", {"Q": 1e-6})
-WALK = FilterNumbers(
+WALK = AxisFilterNumbers(
     "N+K", WhiteNoise(1e-4) + RandomWalk(5e-6), 60.0, 3e-5, "bound",
     (Predicted(60.0, 0.91, 1.12), Predicted(600.0, 0.75, 1.4)), (NOTICE,), "gyro",
 )  # fmt: skip
-TWO = FilterNumbers(
+TWO = AxisFilterNumbers(
     "N+2GM", WhiteNoise(1e-3) + GaussMarkov(2e-3, 5.0) + GaussMarkov(1e-3, 500.0), 10.0, 0.0,
     "reduce", (Predicted(10.0, math.nan, math.nan),), (), "accel",
 )  # fmt: skip
-SENSOR = SensorNumbers({"gyro_x": WALK, "accel_x": TWO}, "static.csv", 100.0, 3600.0)
+SENSOR = FilterNumbers({"gyro_x": WALK, "accel_x": TWO}, "static.csv", 100.0, 3600.0)
 
 
 def test_numbers_that_a_form_has_and_those_that_it_lacks():
@@ -50,20 +50,20 @@ def test_it_does_not_change():
 def test_files_bring_back_what_was_saved(tmp_path):
     path = SENSOR.save(tmp_path / "numbers.json")
     again = gmwm.load(path)
-    assert isinstance(again, SensorNumbers)
+    assert isinstance(again, FilterNumbers)
     assert again["gyro_x"] == WALK
     assert again.to_dict() == SENSOR.to_dict()
     assert math.isnan(again["accel_x"].nees[10.0])
-    assert FilterNumbers.load(WALK.save(tmp_path / "axis.json")) == WALK
-    unknown = SensorNumbers({"x": WALK})
-    assert math.isnan(SensorNumbers.from_dict(unknown.to_dict()).rate)
+    assert AxisFilterNumbers.load(WALK.save(tmp_path / "axis.json")) == WALK
+    unknown = FilterNumbers({"x": WALK})
+    assert math.isnan(FilterNumbers.from_dict(unknown.to_dict()).rate)
 
 
 def test_a_damaged_file_is_refused():
     content = WALK.to_dict()
     for change in ({"form": "N"}, {"horizon_s": "long"}, {"model": [{"process": "X"}]}):
         with pytest.raises(InputError, match="make it again"):
-            FilterNumbers.from_dict(content | change)
+            AxisFilterNumbers.from_dict(content | change)
 
 
 def test_text_names_units_and_every_number():
@@ -91,12 +91,12 @@ def test_text_names_units_and_every_number():
         with pytest.raises(InputError, match="units = 'SI': known are field, si"):
             numbers.text("SI")
     assert "<pre>" in SENSOR._repr_html_()
-    assert repr(SENSOR) == "<SensorNumbers of static.csv: N+K for 60 s, gyro_x, accel_x>"
+    assert repr(SENSOR) == "<FilterNumbers of static.csv: N+K for 60 s, gyro_x, accel_x>"
 
 
 def test_errors_that_only_some_axes_have():
     axes = {"none": WALK, "known": replace(WALK, stderr={"N": 1e-6, "K": 2e-7})}
-    rows = [line.split() for line in str(SensorNumbers(axes)).splitlines()]
+    rows = [line.split() for line in str(FilterNumbers(axes)).splitlines()]
     values = {row[0]: row[1:] for row in rows[2:7] if row and row[0] in axes}
     assert values["none"] == ["0.3438", "-", "61.88", "-", "6.188"]
     assert values["known"] == ["0.3438", "0.0034", "61.88", "2.5", "6.188"]
@@ -105,7 +105,7 @@ def test_errors_that_only_some_axes_have():
 @pytest.mark.parametrize("name", ["gyro_x", "x" * 58, "x" * 90])
 def test_tables_fit_a_terminal(name):
     known = replace(WALK, stderr={"N": 1.234e-6, "K": 2.345e-7})
-    numbers = SensorNumbers({name: known, "accel_x": TWO}, "static.csv")
+    numbers = FilterNumbers({name: known, "accel_x": TWO}, "static.csv")
     for text in (str(numbers), numbers.text("si")):
         tables = text.partition("NEES: predicted")[0]
         assert max(map(len, tables.splitlines())) <= 80

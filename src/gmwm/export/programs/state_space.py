@@ -24,7 +24,7 @@ from gmwm.export.comments import wrapped
 from gmwm.export.imu import NO_RATE
 from gmwm.export.numbers import numbers_of
 from gmwm.export.target import Target, json_text
-from gmwm.filter_numbers import FORMS, SensorNumbers
+from gmwm.filter_numbers import FORMS, FilterNumbers
 from gmwm.process import Model, Process, StateSpace, block_diagonal
 
 Matrices = dict[str, FloatArray]
@@ -94,7 +94,7 @@ class StateSpaceFile(Target):
                     )
                 models = {n: (f.model, f.wv.dt, f.wv.quantity or "", 0.0) for n, f in each.items()}
             else:
-                wanted = form or (each.form if isinstance(each, SensorNumbers) else "")
+                wanted = form or (each.form if isinstance(each, FilterNumbers) else "")
                 numbers = numbers_of(each, wanted, horizon, self.horizon)
                 if not numbers.rate > 0.0:
                     raise InputError(NO_RATE)
