@@ -15,7 +15,7 @@ from gmwm.ins.logs.fix_log import (
     read_fixes as read_fixes,
     read_heights as read_heights,
 )
-from gmwm.ins.logs.hypotheses import LEVEL as LEVEL, TESTS as TESTS, Fault as Fault
+from gmwm.ins.logs.hypotheses import Fault as Fault
 from gmwm.ins.logs.imu_log import read_imu as read_imu, read_imu_log as read_imu_log
 from gmwm.ins.logs.measured import LogSpec as LogSpec, Measured as Measured
 from gmwm.ins.logs.navigated import Navigated as Navigated

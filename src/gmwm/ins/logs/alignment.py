@@ -5,21 +5,18 @@ Levelling and gyrocompassing after Groves (2013), secs. 5.6.2 and 5.6.3.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
 from gmwm._core.spool import Spool, is_spooled, release, windows
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
-from gmwm.ins.filter import Aiding, Fixes, InitialSd
+from gmwm.ins.filter import Aiding, InitialSd
 from gmwm.ins.geometry import (
     RATE,
     STANDARD_GRAVITY,
     matrix_from_rpy,
-    ned_difference,
     offset,
     rpy_from_matrix,
 )
@@ -33,8 +30,10 @@ from gmwm.ins.logs.attitude import (
     positions_of,
     steady,
     turned,
+    velocities_between,
     velocity_at_rest,
 )
+from gmwm.ins.logs.measured import Measured
 from gmwm.ins.trajectory import NavState
 from gmwm.issues import Notice, notice
 
@@ -58,101 +57,34 @@ class Alignment:
     stood: float = 0.0
 
 
-@dataclass(frozen=True, eq=False)
-class _Start:
-    """The data of an alignment, and the position fix at which the filter starts."""
-
-    imu: Imu
-    aiding: Aiding
-    positions: Fixes
-    epoch: int
-    fix: int
-
-    @classmethod
-    def of(cls, imu: Imu, aiding: Aiding, first: int = 0) -> _Start:
-        """The first position fix from an epoch on."""
-        positions = positions_of(aiding)
-        later = np.flatnonzero(positions.time >= (first - 0.5) * imu.dt)
-        if not later.size:
-            raise InputError("there is no position fix once the IMU is steady: give later ones")
-        fix = int(later[0])
-        return cls(imu, aiding, positions, int(np.rint(positions.time[fix] / imu.dt)), fix)
-
-    @property
-    def lla(self) -> FloatArray:
-        """Position of the fix."""
-        return np.asarray(self.positions.value[self.fix])
-
-    def velocity(self) -> tuple[FloatArray, float]:
-        """Velocity and its standard deviation: of a fix, or of the way to the next position."""
-        velocity, now = self.aiding.of("velocity"), self.epoch * self.imu.dt
-        if velocity is not None:
-            i = int(np.argmin(np.abs(velocity.time - now)))
-            if abs(velocity.time[i] - now) < self.imu.dt:
-                return velocity.value[i], float(np.sqrt(np.mean(velocity.sd[i] ** 2)))
-        time, value = self.positions.time, self.positions.value
-        i = int(np.argmin(np.abs(time - now)))
-        if i + 1 >= time.size or time[i + 1] - time[i] > tuning.CHORD:
-            raise InputError(
-                "the first position fix has no other near it: begin where fixes are dense"
-            )
-        step, way = time[i + 1] - time[i], ned_difference(value[i + 1], value[i])
-        sd = np.hypot(self.positions.sd[i], self.positions.sd[i + 1]) / step
-        # The vehicle may speed up by 1 m/s^2 on the way.
-        return way / step, float(np.hypot(np.sqrt(np.mean(sd**2)), 0.5 * step))
-
-    def state(
-        self, C: FloatArray, tilt_sd: float, heading_sd: float, rest_sd: float | None = None
-    ) -> tuple[NavState, InitialSd]:
-        """The state with an attitude C_bn; ``rest_sd`` is the velocity's of a vehicle at rest."""
-        velocity, sd = (np.zeros(3), rest_sd) if rest_sd is not None else self.velocity()
-        later = velocity * (self.epoch * self.imu.dt - self.positions.time[self.fix])
-        lla = offset(self.lla, later - C @ np.asarray(self.aiding.lever_arm))
-        position = float(np.sqrt(np.mean(self.positions.sd[self.fix] ** 2)))
-        return (
-            NavState(lla, velocity, rpy_from_matrix(C)),
-            InitialSd(position=position, velocity=sd, tilt=tilt_sd, heading=heading_sd),
-        )
-
-
-def align(
-    imu: Imu,
-    aiding: Aiding,
-    models: SensorModels,
-    heading: float | None = None,
-    heading_sd: float = tuning.HEADING_SD,
-    attitude: Sequence[float] | None = None,
-    attitude_sd: float = tuning.ATTITUDE_SD,
-) -> Alignment:
+def align(measured: Measured) -> Alignment:
     """Find an initial state in the data.
 
-    heading, heading_sd: Forward axis at the first fix, rad from north to the east. By default the
-        course of GNSS once the vehicle moves, or from the Earth's rotation if the gyros show it.
-    attitude, attitude_sd: Roll, pitch and yaw at the first fix, rad. By default the vehicle is
-        levelled while steady; if it never is, the attitude follows from changes of its velocity.
+    The heading is the given one, the course of GNSS once the vehicle moves, or that of the Earth's
+    rotation if the gyros show it. A vehicle without a given attitude is levelled while steady; if
+    it never is, the attitude follows from changes of its velocity.
+
     Raises InputError if there is no fix, no steady stretch or acceleration to level by, or no way
         to know the heading.
     """
-    positions_of(aiding)
-    if attitude is None:
-        stretch = steady(imu)
-        if stretch is not None:
-            given = None if heading is None else Heading(heading, heading_sd, "heading as given")
-            return _levelled(imu, aiding, models, stretch, given)
-    start = _Start.of(imu, aiding)
+    imu, models, attitude = measured.imu, measured.sensors, measured.attitude
+    stretch = steady(imu) if attitude is None else None
+    if stretch is not None:
+        return _levelled(measured, stretch)
+    fix, epoch = _first_fix(measured)
     if attitude is not None:
+        values = {"attitude": list(attitude), "sd": measured.attitude_sd}
         degrees = ", ".join(f"{each:.2f}" for each in np.degrees(attitude))
-        values = {"attitude": [float(each) for each in attitude], "sd": attitude_sd}
-        sd_deg = np.degrees(attitude_sd)
+        sd_deg = np.degrees(measured.attitude_sd)
         how = notice("attitude-given", values=values, degrees=degrees, sd_deg=sd_deg)
-        C, tilt_sd, yaw_sd = matrix_from_rpy(np.asarray(attitude)), attitude_sd, attitude_sd
+        C, tilt_sd = matrix_from_rpy(np.asarray(attitude)), measured.attitude_sd
+        yaw_sd = tilt_sd
     else:
-        length = tuning.MOTION_LEAST
         gyro_sd, accel_sd = (
-            float(np.hypot(_bias(models, kind), mean_sd(models, kind, length, imu.dt)))
-            for kind in ("gyro", "accel")
+            biased_sd(models, kind, tuning.MOTION_LEAST, imu.dt) for kind in ("gyro", "accel")
         )
-        C, sd = attitude_in_motion(imu, aiding, start.epoch, start.lla, (gyro_sd, accel_sd))
+        place = positions_of(measured.aiding).value[fix]
+        C, sd = attitude_in_motion(imu, measured.aiding, epoch, place, (gyro_sd, accel_sd))
         tilt_sd, yaw_sd = float(np.max(sd[:2])), float(sd[2])
         roll, pitch, yaw = np.degrees(rpy_from_matrix(C))
         how = notice(
@@ -164,34 +96,78 @@ def align(
             tilt_deg=np.degrees(tilt_sd),
             heading_deg=np.degrees(yaw_sd),
         )
-    return Alignment(start.epoch, *start.state(C, tilt_sd, yaw_sd), np.zeros(3), None, (how,))
+    state = _state(measured, fix, C, InitialSd(tilt=tilt_sd, heading=yaw_sd))
+    return Alignment(epoch, *state, np.zeros(3), None, (how,))
 
 
-def _levelled(
-    imu: Imu, aiding: Aiding, models: SensorModels, stretch: tuple[int, int], given: Heading | None
-) -> Alignment:
+def _first_fix(measured: Measured, first: int = 0) -> tuple[int, int]:
+    """Number of the first position fix from an epoch on, and its epoch."""
+    time, dt = positions_of(measured.aiding).time, measured.imu.dt
+    fix = int(np.searchsorted(time, (first - 0.5) * dt))
+    if fix == time.size:
+        raise InputError("there is no position fix once the IMU is steady: give later ones")
+    return fix, int(np.rint(time[fix] / dt))
+
+
+def _state(
+    measured: Measured, fix: int, C: FloatArray, sd: InitialSd, is_at_rest: bool = False
+) -> tuple[NavState, InitialSd]:
+    """State at a position fix; completes ``sd``, but for the velocity of a vehicle at rest."""
+    positions, dt = positions_of(measured.aiding), measured.imu.dt
+    now = np.rint(positions.time[fix] / dt) * dt
+    velocity = np.zeros(3)
+    if not is_at_rest:
+        velocity, velocity_sd = _velocity(measured.aiding, fix, now, dt)
+        sd = replace(sd, velocity=velocity_sd)
+    later = velocity * (now - positions.time[fix])
+    lla = offset(positions.value[fix], later - C @ np.asarray(measured.aiding.lever_arm))
+    sd = replace(sd, position=float(np.sqrt(np.mean(positions.sd[fix] ** 2))))
+    return NavState(lla, velocity, rpy_from_matrix(C)), sd
+
+
+def _velocity(aiding: Aiding, fix: int, now: float, dt: float) -> tuple[FloatArray, float]:
+    """Velocity and its standard deviation: of a fix, or of the way to the next position."""
+    velocity = aiding.of("velocity")
+    if velocity is not None:
+        i = int(np.argmin(np.abs(velocity.time - now)))
+        if abs(velocity.time[i] - now) < dt:
+            return velocity.value[i], float(np.sqrt(np.mean(velocity.sd[i] ** 2)))
+    positions = positions_of(aiding)
+    since = positions.time - positions.time[fix]
+    near = positions.part((since >= 0.0) & (since <= tuning.CHORD))
+    way = velocities_between(near)
+    if not way.time.size:
+        raise InputError("the first position fix has no other near it: begin where fixes are dense")
+    # The vehicle may speed up by 1 m/s^2 on the way.
+    faster = 0.5 * float(near.time[1] - near.time[0])
+    return way.value[0], float(np.hypot(np.sqrt(np.mean(way.sd[0] ** 2)), faster))
+
+
+def _levelled(measured: Measured, stretch: tuple[int, int]) -> Alignment:
     """A start that is levelled on a steady stretch, with a given heading or one from the data."""
+    imu, aiding, models = measured.imu, measured.aiding, measured.sensors
     first, last = stretch
     length = (last - first) * imu.dt
     rest_sd = velocity_at_rest(aiding, imu.dt, first, last)
     still = rest_sd is not None
     rate, force = (np.mean(e[first:last], axis=0) / imu.dt for e in (imu.rotation, imu.velocity))
     bias = rate if still else np.zeros(3)
-    start = _Start.of(imu, aiding, first)
-    epoch, lat = start.epoch, float(start.lla[0])
+    fix, epoch = _first_fix(measured, first)
+    lat = float(positions_of(aiding).value[fix, 0])
     # The time of levelling is the middle of the stretch unless all of it is at rest.
     levelled = epoch if still and first <= epoch <= last else (first + last) // 2
     level = np.array(
         [np.arctan2(-force[1], -force[2]), np.arctan2(force[0], np.hypot(*force[1:])), 0]
     )
     body = turned(imu, bias, matrix_from_rpy(level), levelled, epoch)
-    gyro_sd = mean_sd(models, "gyro", length, imu.dt)
-    biased = float(np.hypot(gyro_sd, _bias(models, "gyro")))
+    gyro_sd, biased = (each(models, "gyro", length, imu.dt) for each in (mean_sd, biased_sd))
     drift = gyro_sd if still else float(np.hypot(biased, RATE))
-    since_levelled = (epoch - levelled) * imu.dt
-    tilt_sd = float(np.hypot(_tilt_sd(models, length, imu.dt, still), drift * since_levelled))
-    heading = given
-    if heading is None:
+    tilt_sd = float(
+        np.hypot(_tilt_sd(models, length, imu.dt, still), drift * (epoch - levelled) * imu.dt)
+    )
+    if measured.heading is not None:
+        heading = Heading(measured.heading, measured.heading_sd, "heading as given")
+    else:
         by_course = heading_from_course(imu, aiding, bias, body, epoch, drift)
         by_gyros = gyrocompass(rate, level, lat, biased) if still else None
         known = [each for each in (by_course, by_gyros) if each is not None]
@@ -204,20 +180,25 @@ def _levelled(
             )
         heading = min(known, key=lambda each: each.sd)
     yaw, yaw_sd = heading.yaw, heading.sd
-    upright = rpy_from_matrix(body) * [1.0, 1.0, 0.0]
-    C = matrix_from_rpy(np.array([0.0, 0.0, yaw])) @ matrix_from_rpy(upright)
-    values = {"length": length, "start": first * imu.dt, "at rest": still}
-    words: dict[str, Any] = {"how": "in steady motion", "bias": ""}
-    if still:
-        words = {"how": "at rest", "bias": "; the gyros' mean there is subtracted"}
-    notices = [notice("levelled", values=values, **words)]
-    values = {"heading": yaw, "sd": yaw_sd}
-    degrees, sd_deg = np.degrees(yaw) % 360.0, np.degrees(yaw_sd)
-    notices.append(
-        notice("heading", values=values, source=heading.source, degrees=degrees, sd_deg=sd_deg)
+    C = matrix_from_rpy(rpy_from_matrix(body) * [1.0, 1.0, 0.0] + [0.0, 0.0, yaw])
+    notices = (
+        notice(
+            "levelled",
+            values={"length": length, "start": first * imu.dt, "at rest": still},
+            how="at rest" if still else "in steady motion",
+            bias="; the gyros' mean there is subtracted" if still else "",
+        ),
+        notice(
+            "heading",
+            values={"heading": yaw, "sd": yaw_sd},
+            source=heading.source,
+            degrees=np.degrees(yaw) % 360.0,
+            sd_deg=np.degrees(yaw_sd),
+        ),
     )
-    state = start.state(C, tilt_sd, yaw_sd, rest_sd)
-    found = Alignment(epoch, *state, bias, None, tuple(notices))
+    sd = InitialSd(velocity=rest_sd or 1.0, tilt=tilt_sd, heading=yaw_sd)
+    state = _state(measured, fix, C, sd, still)
+    found = Alignment(epoch, *state, np.zeros(3), None, notices)
     if not still:
         return found
     earth = C.T @ np.array([RATE * np.cos(lat), 0.0, -RATE * np.sin(lat)])
@@ -237,19 +218,25 @@ def mean_sd(models: SensorModels, kind: str, length: float, dt: float) -> float:
     return float(np.sqrt(4.0 * max(variances)))
 
 
+def biased_sd(models: SensorModels, kind: str, length: float, dt: float) -> float:
+    """The same with the turn-on bias."""
+    return float(np.hypot(_bias(models, kind), mean_sd(models, kind, length, dt)))
+
+
 def _tilt_sd(models: SensorModels, length: float, dt: float, still: bool) -> float:
     """Standard deviation of the tilt of levelling, rad."""
     errors = []
     for axis in (axis for axis in AXES if axis.startswith("accel")):
         form = models.models[axis].state_space(dt)
         errors.append(float(np.sqrt(form.output @ form.initial_covariance @ form.output)))
-    error = np.hypot(max(errors), mean_sd(models, "accel", length, dt))
-    sd = np.hypot(np.hypot(error, _bias(models, "accel")) / STANDARD_GRAVITY, tuning.TILT_FLOOR)
+    error = np.hypot(max(errors), biased_sd(models, "accel", length, dt))
+    sd = np.hypot(error / STANDARD_GRAVITY, tuning.TILT_FLOOR)
     return float(sd if still else np.hypot(sd, tuning.TILT_MOVING))
 
 
-def started(imu: Imu, aiding: Aiding, alignment: Alignment) -> tuple[Imu, Aiding]:
+def started(measured: Measured, alignment: Alignment) -> tuple[Imu, Aiding]:
     """Increments and fixes after the initial state, with the gyros' bias subtracted."""
+    imu, aiding = measured.imu, measured.aiding
     first, bias = alignment.epoch, alignment.gyro_bias * imu.dt
     fixes = []
     for each in aiding.fixes:

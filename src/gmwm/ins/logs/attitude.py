@@ -16,7 +16,6 @@ from gmwm.ins.geometry import (
     RATE,
     STANDARD_GRAVITY,
     gravity,
-    matrix_from_rotation_vector,
     matrix_from_rpy,
     ned_difference,
     rpy_from_matrix,
@@ -34,6 +33,16 @@ def positions_of(aiding: Aiding) -> Fixes:
     if found is None:
         raise InputError("there is no position fix: a filter starts at one")
     return found
+
+
+def velocities_between(position: Fixes) -> Fixes:
+    """Mean velocity from each position to the next one near in time, at the time between."""
+    step = np.diff(position.time)[:, None]
+    way = ned_difference(position.value[1:], position.value[:-1])
+    sd = np.hypot(position.sd[1:], position.sd[:-1])
+    between = 0.5 * (position.time[1:] + position.time[:-1])
+    near = step[:, 0] <= tuning.CHORD
+    return Fixes("velocity", between[near], (way / step)[near], (sd / step)[near])
 
 
 def steady(imu: Imu) -> tuple[int, int] | None:
@@ -75,25 +84,24 @@ def velocity_at_rest(aiding: Aiding, dt: float, first: int, last: int) -> float 
 
     Fixes show it: velocities near zero, or positions at one place.
     """
-    begin, end = (first - 0.5) * dt, (last + 0.5) * dt
+
+    def inside(fixes: Fixes) -> Fixes:
+        return fixes.part((fixes.time >= (first - 0.5) * dt) & (fixes.time <= (last + 0.5) * dt))
+
     velocity = aiding.of("velocity")
-    if velocity is not None:
-        inside = (velocity.time >= begin) & (velocity.time <= end)
-        if np.any(inside):
-            mean, sd = np.mean(velocity.value[inside], axis=0), np.mean(velocity.sd[inside], axis=0)
-            sd = sd / np.sqrt(np.count_nonzero(inside))
-            if np.any(np.abs(mean) >= tuning.SIGMAS * sd):
-                return None
-            return max(float(np.max(sd)), tuning.STILL_VELOCITY_SD)
-    position = positions_of(aiding)
-    part = position.part((position.time >= begin) & (position.time <= end))
-    if part.time.size < 2:
+    part = None if velocity is None else inside(velocity)
+    if part is not None and part.time.size:
+        mean, sd = np.mean(part.value, axis=0), np.mean(part.sd, axis=0) / np.sqrt(part.time.size)
+    else:
+        part = inside(positions_of(aiding))
+        if part.time.size < 2:
+            return None
+        between = part.time[-1] - part.time[0]
+        mean = ned_difference(part.value[-1], part.value[0]) / between
+        sd = np.hypot(part.sd[0], part.sd[-1]) / between
+    if np.any(np.abs(mean) > tuning.SIGMAS * sd):
         return None
-    sd = np.hypot(part.sd[0], part.sd[-1])
-    if np.any(np.abs(ned_difference(part.value[-1], part.value[0])) > tuning.SIGMAS * sd):
-        return None
-    speed_sd = float(np.max(sd)) / float(part.time[-1] - part.time[0])
-    return max(speed_sd, tuning.STILL_VELOCITY_SD)
+    return max(float(np.max(sd)), tuning.STILL_VELOCITY_SD)
 
 
 def standstills(imu: Imu, aiding: Aiding, sd: float) -> Fixes | None:
@@ -149,7 +157,7 @@ class _Course(NamedTuple):
 
 def turned(imu: Imu, bias: FloatArray, C: FloatArray, levelled: int, epoch: int) -> FloatArray:
     """Attitude at an epoch, from the attitude at the epoch of levelling, by the gyros."""
-    begin, end = min(epoch, levelled), max(epoch, levelled)
+    begin, end = sorted((epoch, levelled))
     turn = np.eye(3)
     _carry(turn, imu.rotation[begin:end] - bias * imu.dt, np.empty((0, 3, 3)))
     return np.ascontiguousarray(C, dtype=float) @ (turn.T if epoch < levelled else turn)
@@ -189,11 +197,7 @@ def heading_from_course(
 
 
 def _course(aiding: Aiding, start: float) -> _Course | None:
-    """Course of the first fast velocity, or between positions near in time and far apart.
-
-    Fixes between the two and the next one lie on the line, or one of the two is an outlier; if no
-    other fixes are far apart, the first two are taken all the same.
-    """
+    """Course of the first fast velocity, or between positions near in time and far apart."""
     velocity = aiding.of("velocity")
     if velocity is not None:
         speed = np.hypot(velocity.value[:, 0], velocity.value[:, 1])
@@ -205,13 +209,18 @@ def _course(aiding: Aiding, start: float) -> _Course | None:
             at = float(velocity.time[k])
             angle = float(np.arctan2(velocity.value[k, 1], velocity.value[k, 0]))
             return _Course(angle, float(sd[k] / speed[k]), at, at)
-    positions = positions_of(aiding)
+    return _course_of_positions(positions_of(aiding), start)
+
+
+def _course_of_positions(positions: Fixes, start: float) -> _Course | None:
+    """Course between two fixes; those between them and the next one lie on the line.
+
+    Else one of the two is an outlier; if no others are far apart, the first two are taken.
+    """
     time, sd = positions.time, np.sqrt(np.mean(positions.sd[:, :2] ** 2, axis=1))
     first = None
     for i in np.flatnonzero((time >= start - 1e-6) & (time <= start + tuning.SEARCHED)):
-        for j in range(i + 1, time.size):
-            if time[j] - time[i] > tuning.CHORD:
-                break
+        for j in range(i + 1, int(np.searchsorted(time, time[i] + tuning.CHORD, side="right"))):
             way = ned_difference(positions.value[i : j + 2], positions.value[i])[:, :2]
             (north, east), error = way[j - i], np.hypot(sd[i], sd[j])
             length = float(np.hypot(north, east))
@@ -256,25 +265,16 @@ def attitude_in_motion(
     constant_sd: Standard deviations of constant errors of gyros and accelerometers, rad/s, m/s^2.
     Raises InputError if no stretch of up to `gmwm.ins.logs.tuning.MOTION_MOST` s shows the heading.
     """
-    start, velocity = epoch * imu.dt, aiding.of("velocity")
-    if velocity is None:  # differences of positions at the times between them
-        position = positions_of(aiding)
-        step = np.diff(position.time)
-        near = np.flatnonzero(step <= tuning.CHORD)
-        way = np.array([ned_difference(position.value[i + 1], position.value[i]) for i in near])
-        way_sd = np.hypot(position.sd[1:], position.sd[:-1])[near]
-        between = 0.5 * (position.time[1:] + position.time[:-1])[near]
-        each = step[near, None]
-        velocity = Fixes("velocity", between, way.reshape(-1, 3) / each, way_sd / each)
-    lever = np.asarray(aiding.lever_arm, dtype=float)
+    start = epoch * imu.dt
+    velocity = aiding.of("velocity") or velocities_between(positions_of(aiding))
+    after = velocity.part(velocity.time >= start)
     best: tuple[FloatArray, FloatArray] | None = None
     for length in np.arange(tuning.MOTION_LEAST, tuning.MOTION_MOST + 1.0, tuning.MOTION_LEAST):
-        inside = (velocity.time >= start) & (velocity.time <= start + length)
+        part = after.part(after.time <= start + length)
         last = round((start + length) / imu.dt)
-        if last > imu.n or np.count_nonzero(inside) < 3:
+        if last > imu.n or part.time.size < 3:
             break
-        part = velocity.part(inside)
-        body = _velocity_in_body_axes(imu, epoch, last, part.time, lever)
+        body = _velocity_in_body_axes(imu, epoch, last, part.time, np.asarray(aiding.lever_arm))
         found = _rotation(part, body, place, constant_sd)
         if best is None or found[1][2] < best[1][2]:
             best = found
@@ -292,22 +292,17 @@ def _velocity_in_body_axes(
     imu: Imu, epoch: int, last: int, times: FloatArray, lever: FloatArray
 ) -> FloatArray:
     """Velocity of the antenna that the IMU measures since an epoch, in the body's axes there."""
-    turns = np.empty((last - epoch + 1, 3, 3))
-    turns[0] = np.eye(3)
-    for i, turn in enumerate(matrix_from_rotation_vector(imu.rotation[epoch:last])):
-        turns[i + 1] = turns[i] @ turn
+    turns = np.tile(np.eye(3), (last - epoch + 1, 1, 1))
+    _carry(np.eye(3), imu.rotation[epoch:last], turns[1:])
     # Half of a sample's turn has happened when its force is resolved.
     middle = 0.5 * (turns[1:] + turns[:-1])
     force = np.einsum("kij,kj->ki", middle, imu.velocity[epoch:last])
     summed = np.vstack([np.zeros(3), np.cumsum(force, axis=0)])
     rates = imu.rotation[np.clip(np.arange(epoch, last + 1), 0, imu.n - 1)] / imu.dt
     # The antenna swings about the IMU.
-    swing = np.einsum("kij,kj->ki", turns, np.cross(rates, lever))
+    antenna = summed + np.einsum("kij,kj->ki", turns, np.cross(rates, lever))
     samples, at = (times - epoch * imu.dt) / imu.dt, np.arange(len(summed))
-    columns = [
-        np.interp(samples, at, summed[:, j]) + np.interp(samples, at, swing[:, j]) for j in range(3)
-    ]
-    return np.stack(columns, axis=1)
+    return np.stack([np.interp(samples, at, each) for each in antenna.T], axis=1)
 
 
 def _rotation(

@@ -23,7 +23,7 @@ from gmwm.ins.geometry import ned_difference
 from gmwm.ins.imu import SensorModels
 from gmwm.ins.logs import tuning
 from gmwm.ins.logs.measured import LogSpec, Measured
-from gmwm.ins.logs.replay import Replay, alignment_of
+from gmwm.ins.logs.replay import Replay
 from gmwm.ins.logs.smoother import Smoothed, smooth
 from gmwm.ins.simulation import InnovationTest, Ratio, mean_ratio
 from gmwm.ins.spec import read_models
@@ -188,10 +188,11 @@ class Comparison:
                 "compare: write two names or more, each with its sensor models, and no sensors "
                 "beside it"
             )
-        specs = {str(n): LogSpec.parse({**rest, "sensors": each}) for n, each in named.items()}
         models = {
-            name: read_models(f"compare, {name}", spec.sensors, folder)
-            for name, spec in specs.items()
+            str(name): read_models(
+                f"compare, {name}", LogSpec.parse({**rest, "sensors": each}).sensors, folder
+            )
+            for name, each in named.items()
         }
         measured = Measured.of({**rest, "sensors": next(iter(named.values()))}, folder)
         return compare(measured, models, outages)
@@ -226,11 +227,10 @@ class Comparison:
             for name, nees in wrong.items()
         )
         but = f", but {but}" if wrong else ""
-        if len(unbeaten) == 1:
-            codes = {beats(unbeaten[0], b) for b in names if b != unbeaten[0]}
-            if "" not in codes:
-                code = "better" if "better" in codes else "more-honest"
-                return notice(code, unbeaten[0], values, but=but)
+        codes = {beats(unbeaten[0], b) for b in names if b != unbeaten[0]} if unbeaten else {""}
+        if "" not in codes:
+            code = "better" if "better" in codes else "more-honest"
+            return notice(code, unbeaten[0], values, but=but)
         resolution = "Errors that differ by 10 % would have been found."
         if self.resolved <= tuning.WORTH:
             resolution = (
@@ -238,8 +238,9 @@ class Comparison:
                 f"record {self.length_needed / 60.0:.0f} min."
             )
         tied = " and ".join(shown)
-        words: dict[str, Any] = {"names": tied, "but": but, "resolution": resolution}
-        return notice("tie", values=values, variant="log", **words)
+        return notice(
+            "tie", values=values, variant="log", names=tied, but=but, resolution=resolution
+        )
 
     @property
     def resolved(self) -> float:
@@ -326,11 +327,16 @@ class Comparison:
         ]
         lines += plain_table(("", *PARTS, "NEES/dof", "NIS/dof"), rows).splitlines()
         lines += ["", f"Errors over those of {first}, paired"]
-        cells = []
-        for name, p in ((name, self.pairs[name, first]) for name in others):
-            interval = f"({p.lower:.3f} .. {p.upper:.3f})"
-            score = f"{p.score:+.2f}", f"{p.score_p_value:.2g}"
-            cells.append((name, f"{p.ratio:.3f}", interval, *score))
+        cells = [
+            (
+                name,
+                f"{p.ratio:.3f}",
+                f"({p.lower:.3f} .. {p.upper:.3f})",
+                f"{p.score:+.2f}",
+                f"{p.score_p_value:.2g}",
+            )
+            for name, p in ((name, self.pairs[name, first]) for name in others)
+        ]
         lines += plain_table(("", "ratio", "95 %", "score", "p"), cells).splitlines()
         return "\n".join([*lines, "", *wrapped(self.verdict.text)])
 
@@ -374,7 +380,7 @@ def compare(
     for name, each in models.items():
         bias = {axis: sd or measured.sensors.bias_sd[axis] for axis, sd in each.bias_sd.items()}
         own = replace(measured, sensors=replace(each, bias_sd=bias))
-        replays[name] = Replay.of(own, alignment_of(own))
+        replays[name] = Replay.of(own)
     epochs = min(replay.imu.n for replay in replays.values())
     duration = epochs * measured.imu.dt
     length = tuning.OUTAGE
@@ -415,18 +421,15 @@ def compare(
 def _outcome(
     name: str, replay: Replay, smoothed: Smoothed, lla: FloatArray, every: tuple[Outage, ...]
 ) -> Outcome:
-    found: dict[float, tuple[FloatArray, FloatArray]] = {}
-    for part in (every[::2], every[1::2]):  # two runs, each with its outages in the other's gaps
-        ends = tuple(each.end for each in part)
-        cut = replace(replay, aiding=replay.aiding.without(part))
+    estimate, covariance = np.empty((len(every), 3)), np.empty((len(every), 3, 3))
+    for part in (slice(0, None, 2), slice(1, None, 2)):  # each has outages in the other's gaps
+        cut = replace(replay, aiding=replay.aiding.without(every[part]))
+        ends = tuple(each.end for each in every[part])
         solution = cut.solution(cut.imu.n * cut.imu.dt, ends)
         if solution.diverged_at is not None:
             raise InputError(f"{name}: the filter diverges in an outage: compare without it")
-        kept = np.flatnonzero(solution.before)
-        for end, i in zip(ends, kept, strict=True):
-            found[end] = solution.lla[i], solution.covariance[i, :3, :3]
-    estimate = np.array([found[each.end][0] for each in every])
-    covariance = np.array([found[each.end][1] for each in every])
+        estimate[part] = solution.lla[solution.before]
+        covariance[part] = solution.covariance[solution.before, :3, :3]
     error = ned_difference(estimate, lla)
     variance = covariance - smoothed.covariance
     predicted = np.einsum("kii->ki", covariance)

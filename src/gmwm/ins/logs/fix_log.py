@@ -24,29 +24,23 @@ from gmwm.readers import DATE, TIME
 
 _POSITION = ("latitude", "longitude", "height")
 _NED = ("north", "east", "down")
-_VELOCITY = tuple(f"velocity {axis}" for axis in _NED)
 _LIMITS = {"latitude": 0.5 * np.pi, "longitude": 2.0 * np.pi}
 _DIRECTIONS = {short: name for name in (*_NED, "up") for short in (name, name[0])}
 _AXIS_OF_POSITION = dict(zip(_POSITION, _NED, strict=True))
 _AXES_OF_ACCURACY = {"horizontal": ("north", "east"), "vertical": ("down",)}
 _VELOCITY_WORDS = frozenset({"velocity", "vel", "v", "speed"})
-_SHORT_VELOCITIES = ("vn", "ve", "vd", "vu")
 _SD_WORDS = frozenset({"sd", "std", "stdev", "sigma", "accuracy", "acc"})
 _SPEED_UNIT = frozenset({"m", "s", "mps", "ms", "per", "sec"})
 _OTHER_WORDS = frozenset({"gps", "gnss", "fix", "position", "pos", "ned", "enu"})
+_SHORT = re.compile(r"(sd)?(v)?([nedu])")  # vn, sdn, sdvn
 _SPEEDS = {"km/h": 1.0 / 3.6, "knots": 1852.0 / 3600.0, "ft/s": 0.3048, "cm/s": 0.01, "mm/s": 0.001}
 
 _HEAD = 1 << 16  # bytes that are searched for dates
-_RTKLIB = re.compile(r"^%\s*(GPST|UTC|JST)\s")
-_WEEK = re.compile(r"^\s*(\d{4})\s+(\d{1,6}\.\d+)(?=\s)")
+_RTKLIB = re.compile(r"^%\s*(GPST|UTC|JST)(\s.*)", re.MULTILINE)
+_WEEK = re.compile(r"^\s*(\d{4})\s+(\d{1,6}\.\d+)(?=\s)", re.MULTILINE)
+_DAY = re.compile(r"^\s*(\d{4})/(\d\d)/(\d\d)\s+", re.MULTILINE)
 _GPS_EPOCH = 315964800  # s from 1970-01-01 to 1980-01-06, on one calendar
 _WEEK_LENGTH = 604800
-_RTKLIB_COLUMNS = """
-sdn(m):sd_north sde(m):sd_east sdu(m):sd_up vn(m/s):velocity_north ve(m/s):velocity_east
-vu(m/s):velocity_up sdvn:sd_velocity_north sdve:sd_velocity_east sdvu:sd_velocity_up
-latitude(deg):latitude_deg longitude(deg):longitude_deg height(m):height_m ns:satellites
-"""
-_RTKLIB_NAMES = dict(each.split(":") for each in _RTKLIB_COLUMNS.split())
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,10 +64,10 @@ class FixLog:
 
     def aiding(
         self,
-        start: float = 0.0,
-        position_sd: Sequence[float] = tuning.POSITION_SD,
-        velocity_sd: Sequence[float] = tuning.VELOCITY_SD,
-        lever_arm: Sequence[float] = (0.0, 0.0, 0.0),
+        start: float,
+        position_sd: Sequence[float],
+        velocity_sd: Sequence[float],
+        lever_arm: Sequence[float],
     ) -> Aiding:
         """The fixes on the clock of an IMU; see `read_fixes`."""
         fixes = []
@@ -150,8 +144,8 @@ def read_fix_log(path: str | os.PathLike[str]) -> FixLog:
     if "velocity up" in values:
         values["velocity down"] = -values["velocity up"]
     velocity = None
-    if all(name in values for name in _VELOCITY):
-        velocity = np.stack([values[name] for name in _VELOCITY], axis=1)
+    if "velocity down" in values:
+        velocity = np.stack([values[f"velocity {axis}"] for axis in _NED], axis=1)
     notices = []
     if scale:
         notices.append(notice("dates", values={"scale": scale}, variant="fixes"))
@@ -191,23 +185,16 @@ def _as_table(path: Path) -> Iterator[tuple[Path, str]]:
     if not scale:
         yield path, "UTC" if DATE.search(head) else ""
         return
-    lines = []
-    for text in path.read_text(errors="replace").splitlines():
-        if _RTKLIB.match(text):
-            names = ["time_s", *text[1:].split()[1:]]
-            lines.append(",".join(_RTKLIB_NAMES.get(n, n.partition("(")[0]) for n in names))
-        elif text.startswith("%"):
-            lines.append("#")
-        else:
-            if week := _WEEK.match(text):
-                seconds = _GPS_EPOCH + int(week[1]) * _WEEK_LENGTH + float(week[2])
-                text = f"{seconds:.6f} {text[week.end() :]}"
-            else:  # a date and a time of day in one field
-                text = re.sub(r"^\s*(\d{4})/(\d\d)/(\d\d)\s+", r"\1-\2-\3T", text)
-            lines.append(",".join(text.split()))
+
+    def seconds(week: re.Match[str]) -> str:
+        return f"{_GPS_EPOCH + int(week[1]) * _WEEK_LENGTH + float(week[2]):.6f}"
+
+    text = path.read_text(errors="replace")
+    text = _RTKLIB.sub(lambda head: "time_s" + head[2].replace(" ns ", " satellites "), text)
+    text = _DAY.sub(r"\1-\2-\3T", _WEEK.sub(seconds, re.sub("(?m)^%.*", "#", text)))
     with tempfile.TemporaryDirectory() as folder:
         table = Path(folder) / path.name
-        table.write_text("\n".join(lines) + "\n")
+        table.write_text(text)
         yield table, scale
 
 
@@ -215,16 +202,12 @@ def _quantities(name: str) -> tuple[str, ...]:
     """Quantities of a column; two for a horizontal standard deviation."""
     if is_time(name):
         return (TIME,)
-    words = words_of(name)
-    if not _VELOCITY_WORDS.isdisjoint(words) or (words and words[0] in _SHORT_VELOCITIES):
-        while len(words) > 1 and words[-1] in _SPEED_UNIT:
-            words.pop()
+    words = [part for word in words_of(name) for part in _parts(word)]
     is_sd = not _SD_WORDS.isdisjoint(words)
-    words = [word for word in words if word not in _SD_WORDS | _OTHER_WORDS]
-    if len(words) == 1 and words[0] in _SHORT_VELOCITIES:
-        words = ["v", words[0][1]]
     is_velocity = not _VELOCITY_WORDS.isdisjoint(words)
-    words = [word for word in words if word not in _VELOCITY_WORDS]
+    while is_velocity and len(words) > 1 and words[-1] in _SPEED_UNIT:
+        words.pop()
+    words = [word for word in words if word not in _SD_WORDS | _VELOCITY_WORDS | _OTHER_WORDS]
     if len(words) != 1:
         return ()
     prefix = ("sd " if is_sd else "") + ("velocity " if is_velocity else "")
@@ -237,6 +220,12 @@ def _quantities(name: str) -> tuple[str, ...]:
     if direction is None or not prefix:
         return ()
     return (prefix + ("down" if is_sd and direction == "up" else direction),)
+
+
+def _parts(word: str) -> list[str]:
+    """Words of a short name: vn is v n, sdvn is sd v n."""
+    found = _SHORT.fullmatch(word)
+    return [part for part in found.groups() if part] if found else [word]
 
 
 def _times(log: LogColumns, stamps: FloatArray) -> FloatArray:
@@ -280,8 +269,8 @@ def _check_axes(source: str, time: FloatArray, position: FloatArray, velocity: F
     if time.size < 2:
         return
     step = np.diff(time)[:, None]
-    gone = np.cumsum(0.5 * (velocity[1:] + velocity[:-1]) * step, axis=0)
-    gone = np.concatenate([np.zeros((1, 3)), gone])
+    steps = 0.5 * (velocity[1:] + velocity[:-1]) * step
+    gone = np.concatenate([np.zeros((1, 3)), np.cumsum(steps, axis=0)])
     gaps = np.concatenate([[0], np.cumsum(step[:, 0] > tuning.CHORD)])
     marks = np.searchsorted(time, np.arange(time[0], time[-1], 0.5 * tuning.WAY))
     first, last = marks[:-2], marks[2:]
@@ -289,7 +278,6 @@ def _check_axes(source: str, time: FloatArray, position: FloatArray, velocity: F
     first, last = first[whole], last[whole]
     if first.size < tuning.FEWEST_WAYS:
         return
-    by_velocity = gone[last] - gone[first]
 
     def mismatch(here: FloatArray, way: FloatArray, part: slice) -> float:
         """Median square of the difference over that of the way, which has the same unit."""
@@ -298,9 +286,11 @@ def _check_axes(source: str, time: FloatArray, position: FloatArray, velocity: F
         return float(np.median(np.sum(off**2, axis=1))) / size
 
     better: dict[str, float] = {}
-    for what, part, here, way in _misreadings(position, by_velocity):
+    by_velocity = gone[last] - gone[first]
+    for what, part, here, factor in _misreadings(position):
         if np.all(np.abs(here[:, 0]) < 0.5 * np.pi):
-            left, now = mismatch(here, way, part), mismatch(position, by_velocity, part)
+            left = mismatch(here, by_velocity @ factor, part)
+            now = mismatch(position, by_velocity, part)
             if now > tuning.MIXED_UP**2 * left:
                 better[what] = left / now
     if better:
@@ -308,20 +298,20 @@ def _check_axes(source: str, time: FloatArray, position: FloatArray, velocity: F
         raise InputError(f"{source}: positions agree with velocities only if {what}")
 
 
-def _misreadings(
-    position: FloatArray, way: FloatArray
-) -> Iterator[tuple[str, slice, FloatArray, FloatArray]]:
-    """Each possible mistake with its hint, the axes that show it, and what is right then."""
+def _misreadings(position: FloatArray) -> Iterator[tuple[str, slice, FloatArray, FloatArray]]:
+    """Each possible mistake with its hint, the axes that show it, right positions and velocities.
+
+    The velocities are those of the file times a matrix.
+    """
     level, vertical = slice(0, 2), slice(2, 3)
-    which = "check which column is which"
+    same, which = np.eye(3), "check which column is which"
     swap, degrees = [1, 0, 2], np.array([np.degrees(1.0), np.degrees(1.0), 1.0])
-    yield f"velocity north and east are exchanged: {which}", level, position, way[:, swap]
-    yield f"velocity down and up are exchanged: {which}", vertical, position, -way
-    yield f"latitude and longitude are exchanged: {which}", level, position[:, swap], way
-    for i, name, axis in ((0, "latitude", "north"), (1, "longitude", "east")):
-        sign = np.where(np.arange(3) == i, -1.0, 1.0)
+    yield f"velocity north and east are exchanged: {which}", level, position, same[swap]
+    yield f"velocity down and up are exchanged: {which}", vertical, position, -same
+    yield f"latitude and longitude are exchanged: {which}", level, position[:, swap], same
+    for name, axis, signs in (("latitude", "north", (-1, 1, 1)), ("longitude", "east", (1, -1, 1))):
         text = f"the sign of {name}, or of velocity {axis}, is reversed: check it"
-        yield text, level, position, way * sign
-    yield "latitude and longitude are in rad: give that unit", level, position * degrees, way
+        yield text, level, position, np.diag(signs)
+    yield "latitude and longitude are in rad: give that unit", level, position * degrees, same
     for unit, factor in _SPEEDS.items():
-        yield f"velocities are in {unit}: convert them to m/s", level, position, way * factor
+        yield f"velocities are in {unit}: convert them to m/s", level, position, factor * same

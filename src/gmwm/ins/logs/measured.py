@@ -37,6 +37,7 @@ from gmwm.ins.spec import (
 )
 from gmwm.issues import Notice, notice
 
+_START = ("heading", "heading_sd", "attitude", "attitude_sd")
 _UNITS = {"position": "m", "velocity": "m/s"}
 
 
@@ -154,9 +155,8 @@ class Measured:
         spec = LogSpec.parse(content)
         if spec.attitude is not None and spec.heading is not None:
             raise InputError("heading and attitude: the attitude has a yaw; leave the heading out")
-        sensors, assumed = with_turn_on_bias(
-            read_models("sensors", spec.sensors, folder), spec.bias.given
-        )
+        models = read_models("sensors", spec.sensors, folder)
+        sensors, assumed = with_turn_on_bias(models, spec.bias.given)
         log = read_imu_log(folder / spec.imu.file, **spec.imu.options())
         found = read_fix_log(folder / spec.gnss_fixes)
         aiding = found.aiding(
@@ -165,43 +165,39 @@ class Measured:
         aiding = replace(
             aiding, coloured_sd=spec.coloured_sd, coloured_tau=spec.coloured_tau, gate=spec.gate
         )
-        aiding, noticed = _within(aiding, log, found.source)
+        aiding, left_out = _within(aiding, log, found.source)
         notices = [*log.notices, *found.notices]
         scale = next((n.values["scale"] for n in found.notices if n.code == "dates"), "UTC")
         if scale != "UTC" and any(n.code == "dates" for n in log.notices):
             seconds = tuning.LEAP_SECONDS
             notices.append(notice("time-scales", values={"scale": scale}, seconds=seconds))
-        notices += noticed
+        notices += left_out
         if spec.barometer is not None:
-            aiding, noticed = _with_barometer(aiding, spec.barometer, folder, log)
-            notices += noticed
+            aiding, set_to = _with_barometer(aiding, spec.barometer, folder, log)
+            notices.append(set_to)
         if spec.zero_velocity is not None:
-            aiding, noticed = _with_standstills(aiding, log.imu, spec.zero_velocity)
-            notices += noticed
+            stands = standstills(log.imu, aiding, spec.zero_velocity)
+            if stands is None:
+                notices.append(notice("standstills-unknown"))
+            else:
+                aiding = replace(aiding, fixes=(*aiding.fixes, stands))
+                count, length = {"count": stands.time.size}, tuning.ZERO_VELOCITY[1]
+                notices.append(notice("standstills", values=count, length=length))
         notices += assumed
         for kind, own, usual in (
             ("position", found.position_sd, spec.position_sd),
             ("velocity", found.velocity_sd, spec.velocity_sd),
         ):
-            name = f"{kind}_sd"
-            if own is not None and name in spec.given:
+            is_given = f"{kind}_sd" in spec.given
+            if own is not None and is_given:
                 notices.append(notice("sd-not-used", kind))
-            if own is None and name not in spec.given and aiding.of(kind) is not None:
-                sizes = ", ".join(f"{each:g}" for each in usual)
+            if own is None and not is_given and aiding.of(kind) is not None:
+                sd = f"{', '.join(f'{each:g}' for each in usual)} {_UNITS[kind]}"
                 values = dict(zip(("north", "east", "down"), usual, strict=True))
-                sd = f"{sizes} {_UNITS[kind]}"
                 notices.append(notice("sd-assumed", kind, values, sd=sd))
+        start = {name: getattr(spec, name) for name in _START}
         return cls(
-            imu=log.imu,
-            aiding=aiding,
-            sensors=sensors,
-            start=log.start,
-            heading=spec.heading,
-            heading_sd=spec.heading_sd,
-            attitude=spec.attitude,
-            attitude_sd=spec.attitude_sd,
-            title=log.source,
-            notices=tuple(notices),
+            log.imu, aiding, sensors, log.start, **start, title=log.source, notices=tuple(notices)
         )
 
 
@@ -215,12 +211,12 @@ def with_turn_on_bias(
         bias_sd[axis] = given.get(kind, models.bias_sd[axis] or tuning.TURN_ON_SD[kind])
         if kind not in given and not models.bias_sd[axis]:
             assumed[kind] = bias_sd[axis]
-    words = []
-    if "gyro" in assumed:
-        words.append(f"gyros {np.degrees(assumed['gyro']):g} deg/s")
-    if "accel" in assumed:
-        words.append(f"accelerometers {assumed['accel']:g} m/s^2")
-    notices = [notice("biases-assumed", values=assumed, sd=" and ".join(words))] if words else []
+    shown = {
+        "gyro": f"gyros {np.degrees(assumed.get('gyro', 0.0)):g} deg/s",
+        "accel": f"accelerometers {assumed.get('accel', 0.0):g} m/s^2",
+    }
+    sd = " and ".join(shown[kind] for kind in assumed)
+    notices = [notice("biases-assumed", values=assumed, sd=sd)] if assumed else []
     return replace(models, bias_sd=bias_sd), notices
 
 
@@ -232,10 +228,10 @@ def _within(aiding: Aiding, log: ImuLog, source: str) -> tuple[Aiding, list[Noti
     total = sum(each.size for each in inside)
     left_out = total - sum(int(np.count_nonzero(each)) for each in inside)
     if left_out == total:
-        times = np.concatenate([[np.nan], *(each.time + log.start for each in aiding.fixes)])
         spans = "no fix at all"
         if total:
-            spans = f"fixes from {np.nanmin(times):.10g} s to {np.nanmax(times):.10g} s"
+            times = np.concatenate([each.time + log.start for each in aiding.fixes])
+            spans = f"fixes from {np.min(times):.10g} s to {np.max(times):.10g} s"
         raise InputError(
             f"{source} has {spans}, none in the time of {log.source}, {log.start:.10g} s to "
             f"{log.start + end:.10g} s: bring both to one clock"
@@ -246,7 +242,7 @@ def _within(aiding: Aiding, log: ImuLog, source: str) -> tuple[Aiding, list[Noti
 
 def _with_barometer(
     aiding: Aiding, spec: BarometerSpec, folder: Path, log: ImuLog
-) -> tuple[Aiding, list[Notice]]:
+) -> tuple[Aiding, Notice]:
     """The fixes with heights, which are set to the first position fix."""
     source, time, height = read_heights(folder / spec.file)
     time = time - log.start
@@ -265,14 +261,4 @@ def _with_barometer(
     value[:, 0], sd[:, 0] = height + shift, spec.sd
     fixes = (*aiding.fixes, Fixes("height", time, value, sd))
     aiding = replace(aiding, fixes=fixes, barometer_sd=spec.drift_sd, barometer_tau=spec.drift_tau)
-    return aiding, [notice("barometer-set", values={"shift": shift})]
-
-
-def _with_standstills(aiding: Aiding, imu: Imu, sd: float) -> tuple[Aiding, list[Notice]]:
-    """The fixes with the standstills that the IMU shows."""
-    found = standstills(imu, aiding, sd)
-    if found is None:
-        return aiding, [notice("standstills-unknown")]
-    values = {"count": found.time.size}
-    noticed = notice("standstills", values=values, length=tuning.ZERO_VELOCITY[1])
-    return replace(aiding, fixes=(*aiding.fixes, found)), [noticed]
+    return aiding, notice("barometer-set", values={"shift": shift})

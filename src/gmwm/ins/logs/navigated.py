@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import numpy.typing as npt
 
 from gmwm._core.distributions import chi2
 from gmwm._core.files import written
@@ -19,11 +20,11 @@ from gmwm.errors import InputError
 from gmwm.ins.filter import KINDS, Solution
 from gmwm.ins.geometry import ned_difference
 from gmwm.ins.logs import tuning
-from gmwm.ins.logs.alignment import Alignment
+from gmwm.ins.logs.alignment import Alignment, align
 from gmwm.ins.logs.faults import Faults, fault_notice, resolution_notice
 from gmwm.ins.logs.hypotheses import LEVEL
 from gmwm.ins.logs.measured import Measured
-from gmwm.ins.logs.replay import Replay, alignment_of, innovation_sizes
+from gmwm.ins.logs.replay import Replay, innovation_sizes
 from gmwm.ins.simulation import InnovationTest
 from gmwm.issues import Notice, notice, worst_first
 
@@ -87,26 +88,24 @@ class Navigated:
         InputError
             If the initial state cannot be known, or no fix follows it.
         """
-        alignment = alignment_of(measured)
+        alignment = align(measured)
         replay = Replay.of(measured, alignment)
-        imu = replay.imu
         positions = replay.aiding.of("position")
         if positions is None:
             raise InputError("no position fix follows the first one: there is nothing to filter")
-        ends = np.concatenate([[0.0], positions.time, [imu.n * imu.dt]])
+        ends = np.concatenate([[0.0], positions.time, [replay.imu.n * replay.imu.dt]])
         longest = int(np.argmax(np.diff(ends)))
-        start, end = float(ends[longest]), float(ends[longest + 1])
+        start, end = ends[longest : longest + 2].tolist()
         solution = replay.solution(interval, (end,))
         # The one epoch that is kept before its measurements is the nearest to the end; none, if the
         # filter diverged earlier.
-        early = np.flatnonzero(solution.before)
-        sd = solution.sd[early[0], :3] if early.size else np.full(3, np.nan)
-        innovations, distance = solution.innovations, None
+        sd = np.vstack([solution.sd[solution.before, :3], np.full(3, np.nan)])[0].tolist()
+        innovations = solution.innovations
         is_next = np.abs(innovations.time - end) < 1e-5
-        value = innovations.value[is_next & (innovations.kind == KINDS["position"])][:1, :2]
-        if value.size and np.all(np.isfinite(value)):
-            distance = float(np.hypot(*value[0]))
-        outage = LongestOutage(start, end, (float(sd[0]), float(sd[1]), float(sd[2])), distance)
+        value = innovations.value[is_next & (innovations.kind == KINDS["position"]), :2]
+        is_known = len(value) and np.all(np.isfinite(value[0]))
+        distance = float(np.hypot(*value[0])) if is_known else None
+        outage = LongestOutage(start, end, (sd[0], sd[1], sd[2]), distance)
         return cls(measured, alignment, solution, outage)
 
     def test(self, kind: str | None = None) -> InnovationTest:
@@ -127,8 +126,7 @@ class Navigated:
     @property
     def fault_notices(self) -> tuple[Notice, ...]:
         """Faults that were found, by code and values."""
-        start = float(self.clock(np.zeros(1))[0])
-        return tuple(fault_notice(each, start) for each in self.faults.found)
+        return tuple(fault_notice(each, self.measured.start) for each in self.faults.found)
 
     @property
     def kinds(self) -> tuple[str, ...]:
@@ -140,17 +138,19 @@ class Navigated:
     def rejections(self) -> tuple[Notice, ...]:
         """Fixes that were beyond their gate and not used, kind by kind."""
         innovations = self.solution.innovations
-        notices = []
+        sizes, notices = np.sqrt(innovations.nis), []
         for kind, code in KINDS.items():
-            rejected = np.flatnonzero((innovations.kind == code) & ~innovations.used)
-            if not rejected.size:
-                continue
-            size = np.sqrt(innovations.nis[rejected])
-            far = int(np.argmax(size))
-            at = float(self.clock(innovations.time[rejected[far : far + 1]])[0])
-            of = int(np.count_nonzero(innovations.kind == code))
-            values = {"count": rejected.size, "of": of, "size": float(size[far]), "time": at}
-            notices.append(notice("fixes-rejected", kind, values))
+            own = innovations.kind == code
+            size = np.where(own & ~innovations.used, sizes, -1.0)
+            if np.any(size >= 0.0):
+                far = int(np.argmax(size))
+                values = {
+                    "count": int(np.count_nonzero(size >= 0.0)),
+                    "of": int(np.count_nonzero(own)),
+                    "size": float(size[far]),
+                    "time": float(self.clock(innovations.time[far])),
+                }
+                notices.append(notice("fixes-rejected", kind, values))
         return tuple(notices)
 
     @property
@@ -158,12 +158,12 @@ class Navigated:
         """Largest innovation in its expected standard deviation, and its time on the clock, s."""
         size = np.nanmax(np.abs(self.solution.innovations.standard), axis=1, initial=0.0)
         i = int(np.argmax(size))
-        return float(size[i]), float(self.clock(self.solution.innovations.time[i : i + 1])[0])
+        return float(size[i]), float(self.clock(self.solution.innovations.time[i]))
 
-    def clock(self, time: FloatArray) -> FloatArray:
+    def clock(self, time: npt.ArrayLike) -> FloatArray:
         """Times of the files, s, of times since the filter's start."""
-        imu = self.measured.imu
-        return np.asarray(time + self.measured.start + self.alignment.epoch * imu.dt, dtype=float)
+        first = self.measured.start + self.alignment.epoch * self.measured.imu.dt
+        return np.asarray(time, dtype=float) + first
 
     @property
     def fits(self) -> bool:
@@ -231,16 +231,14 @@ class Navigated:
         return notice(code, values=sizes, **words)
 
     def _fault_verdict(self, faults: tuple[Notice, ...]) -> Notice:
-        first, found = faults[0], self.faults
+        first, is_explained = faults[0], self.faults.explained
         text = "The filter's model does not fit these data: " + "; ".join(map(str, faults))
-        if found.alternatives:
-            text += f"; nearly as probable: {', '.join(found.alternatives)}"
         text += (
             ". With that, the innovations are as large as expected, and white."
-            if found.explained
+            if is_explained
             else ". That does not explain all: something else is wrong too."
         )
-        values = {**first.values, "explained": found.explained, "faults": len(faults)}
+        values = {**first.values, "explained": is_explained, "faults": len(faults)}
         severity = worst_first(faults)[0].severity
         return replace(first, severity=severity, text=text, values=values, hint="", source="")
 
@@ -275,7 +273,7 @@ class Navigated:
         """Sentences on the predicted accuracy: at the end, and in the longest outage."""
         sentences = []
         if self.solution.diverged_at is not None:
-            at = float(self.clock(np.array([self.solution.diverged_at]))[0])
+            at = float(self.clock(self.solution.diverged_at))
             sentences.append(f"The filter diverged at {at:.10g} s and was stopped")
         elif self.solution.time.size:
             sd = self.solution.sd[-1]
@@ -384,11 +382,9 @@ class Navigated:
         innovations = self.solution.innovations
         time = np.append(0.0, innovations.time[innovations.kind == KINDS["position"]])
         steps = np.diff(time)
-        if not steps.size:
-            return []
-        long = np.flatnonzero(steps > max(5.0 * float(np.median(steps)), 5.0))
-        long = long[np.argsort(-steps[long], kind="stable")][: tuning.OUTAGES_SHOWN]
-        return [(float(time[i]), float(time[i + 1])) for i in long]
+        least = max(5.0 * float(np.median(steps)), 5.0) if steps.size else np.inf
+        order = np.argsort(-steps, kind="stable")[: tuning.OUTAGES_SHOWN]
+        return [(float(time[i]), float(time[i + 1])) for i in order if steps[i] > least]
 
     def plot_outages(self) -> list[tuple[str, Figure]]:
         """A title and a figure of each time without position fixes: track, and errors with bands.
@@ -399,36 +395,39 @@ class Navigated:
         from gmwm import plotting
 
         solution, innovations = self.solution, self.solution.innovations
-        positions = innovations.kind == KINDS["position"]
-        fix_time, error = innovations.time[positions], innovations.value[positions]
         fixes = next(each for each in self.measured.aiding.fixes if each.kind == "position")
-        time = fixes.time - self.alignment.epoch * self.measured.imu.dt
+        fix_time = fixes.time - self.alignment.epoch * self.measured.imu.dt
+        is_position = innovations.kind == KINDS["position"]
         pictures = []
         for start, end in self.position_outages():
             margin = max(0.25 * (end - start), 5.0)
-            first, last = start - margin, end + margin
-            shown = (solution.time >= first) & (solution.time <= last)
+            shown, inside, error, near = (
+                (time >= start - by) & (time <= end + by)
+                for time, by in (
+                    (solution.time, margin),
+                    (solution.time, 0.0),
+                    (innovations.time, margin),
+                    (fix_time, margin),
+                )
+            )
             # At the end of the longest one, the state before the fix comes first.
             if np.count_nonzero(shown) < 2:
                 continue
-            inside = shown & (solution.time >= start) & (solution.time <= end)
-            seen = (fix_time >= first) & (fix_time <= last)
-            near = (time >= first) & (time <= last)
             origin = solution.lla[shown][0]
             track, without, around = (
                 ned_difference(lla, origin)[:, 1::-1]
                 for lla in (solution.lla[shown], solution.lla[inside], fixes.value[near])
             )
-            begin = self.clock(np.array([start]))[0]
-            title = f"{end - start:.4g} s without position fixes, from {begin:.10g} s"
             figure = plotting.measured_outage(
                 track=track,
                 without=without,
                 fixes=around,
                 time=solution.time[shown] - start,
                 sd=solution.sd[shown, :3],
-                fix_time=fix_time[seen] - start,
-                error=error[seen],
+                fix_time=innovations.time[error & is_position] - start,
+                error=innovations.value[error & is_position],
             )
+            begin = float(self.clock(start))
+            title = f"{end - start:.4g} s without position fixes, from {begin:.10g} s"
             pictures.append((title, figure))
         return pictures

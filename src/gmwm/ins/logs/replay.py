@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -19,15 +18,13 @@ from gmwm.ins.logs.measured import Measured
 from gmwm.ins.simulation import InnovationTest, chi_square_ratio, lag_one
 from gmwm.ins.trajectory import NavState
 
-Shift = Callable[[FloatArray], FloatArray]
-"""Delay of the stamps of fixes, s, as a function of their times."""
-
 
 @dataclass(frozen=True, eq=False)
 class Replay:
     """The inputs of a filter of real data, from the first epoch of the filter on.
 
     is_at_rest: Whether the vehicle stands still at that epoch.
+    start: Time of that epoch since the first one of the record, s.
     """
 
     imu: Imu
@@ -36,17 +33,19 @@ class Replay:
     models: SensorModels
     aiding: Aiding
     is_at_rest: bool = False
+    start: float = 0.0
 
     @classmethod
-    def of(cls, measured: Measured, alignment: Alignment) -> Replay:
+    def of(cls, measured: Measured, alignment: Alignment | None = None) -> Replay:
         """Real data from the alignment on."""
-        imu, aiding = started(measured.imu, measured.aiding, alignment)
+        alignment = alignment or align(measured)
+        imu, aiding = started(measured, alignment)
         models = measured.sensors
         if alignment.gyro_bias_sd is not None:
             known = dict.fromkeys(AXES[:3], alignment.gyro_bias_sd)
             models = replace(models, bias_sd={**models.bias_sd, **known})
-        is_at_rest = alignment.stood > 0.0
-        return cls(imu, alignment.state, alignment.sd, models, aiding, is_at_rest)
+        found = cls(imu, alignment.state, alignment.sd, models, aiding)
+        return replace(found, is_at_rest=alignment.stood > 0.0, start=alignment.epoch * imu.dt)
 
     def solution(self, interval: float, before: tuple[float, ...] = ()) -> Solution:
         """The filter's solution every ``interval`` (s), and ``before`` the fixes of some times."""
@@ -102,20 +101,18 @@ class Replay:
         """Size and whiteness of the innovations of a kind, or of all."""
         return innovation_sizes(self.innovations, kind)
 
-    def later(self, shift: Shift) -> Replay:
+    def later(self, seconds: float) -> Replay:
         """Fixes with later stamps, and with them the one that made the initial state.
 
         Fixes that would leave the record stay at its end: only filters of the same fixes compare.
         """
-        fixes = []
-        for each in self.aiding.fixes:
-            time = np.clip(each.time + shift(each.time), 0.0, self.imu.n * self.imu.dt)
-            order = np.argsort(time, kind="stable")
-            value, sd = each.value[order], each.sd[order]
-            fixes.append(replace(each, time=time[order], value=value, sd=sd))
-        return self._with_fixes(fixes, -float(shift(np.zeros(1))[0]))
+        end = self.imu.n * self.imu.dt
+        fixes = [
+            replace(each, time=np.clip(each.time + seconds, 0.0, end)) for each in self.aiding.fixes
+        ]
+        return self._with_fixes(fixes, -seconds)
 
-    def along(self, shift: Shift) -> Replay:
+    def along(self, seconds: float) -> Replay:
         """Fixes moved along the track instead of later stamps.
 
         By the velocity of the filter, and by the accelerometers over a second: less averages no
@@ -126,32 +123,34 @@ class Replay:
             np.cumsum(np.vstack([np.zeros(3), each]), axis=0)
             for each in (self.imu.velocity, self.imu.rotation)
         )
+        reach = 0.5 * max(abs(seconds), tuning.TRACK_STEP)
         fixes = []
         for each in self.aiding.fixes:
-            seconds = shift(each.time)
-            reach = 0.5 * np.maximum(np.abs(seconds), tuning.TRACK_STEP)
             middle = each.time + 0.5 * seconds
-            ends = (np.clip(middle + by, 0.0, self.imu.n * dt) for by in (-reach, reach))
-            first, last = (np.rint(end / dt).astype(int) for end in ends)
+            first, at, last = (
+                np.rint(np.clip(middle + by, 0.0, self.imu.n * dt) / dt).astype(int)
+                for by in (-reach, 0.0, reach)
+            )
             force = (summed[last] - summed[first]) / (np.maximum(last - first, 1) * dt)[:, None]
-            middle_at = np.clip(np.rint(middle / dt), 0, self.imu.n).astype(int)
-            near = np.searchsorted(track.time, middle_at * dt - 0.5 * tuning.TRACK_STEP)
+            near = np.searchsorted(track.time, at * dt - 0.5 * tuning.TRACK_STEP)
             near = np.clip(near, 0, track.time.size - 1)
             # The track's attitude there, and the turn of the vehicle from then on.
             since = np.rint(track.time[near] / dt).astype(int)
-            force += np.cross(turned[middle_at] - turned[since], force)
-            change = seconds[:, None] * np.einsum("eij,ej->ei", track.matrix[near], force)
+            force += np.cross(turned[at] - turned[since], force)
+            change = seconds * np.einsum("eij,ej->ei", track.matrix[near], force)
             change[:, 2] += seconds * gravity_at(np.sin(track.lla[near, 0]), track.lla[near, 2])
             velocity = np.stack(
                 [np.interp(each.time, track.time, one) for one in track.velocity.T], axis=1
             )
-            by = {"velocity": change, "standstill": 0.0 * change}.get(
-                each.kind, seconds[:, None] * (velocity + 0.5 * change)
-            )
-            if each.kind == "height":
-                by = -by[:, 2:]
-            fixes.append(replace(each, value=each.moved(-by)))
-        return self._with_fixes(fixes, -float(shift(np.zeros(1))[0]))
+            way = seconds * (velocity + 0.5 * change)
+            by = {
+                "position": way,
+                "velocity": change,
+                "height": -way[:, 2:],
+                "standstill": 0.0 * way,
+            }
+            fixes.append(replace(each, value=each.moved(-by[each.kind])))
+        return self._with_fixes(fixes, -seconds)
 
     def _with_fixes(self, fixes: list[Fixes], seconds: float) -> Replay:
         """Other fixes, and the initial state some time later; earlier if negative."""
@@ -179,14 +178,13 @@ class Replay:
         sd = self.sd.heading if sd is None else sd
         return replace(self, state=replace(self.state, rpy=rpy), sd=replace(self.sd, heading=sd))
 
-    def with_signs(self, kind: str, signs: tuple[float, ...]) -> Replay:
+    def with_signs(self, kind: str, signs: FloatArray) -> Replay:
         """Axes of a kind of sensors times signs; levelled by the accelerometers anew."""
-        turn = np.array(signs)
         if kind == "gyro":
-            return replace(self, imu=replace(self.imu, rotation=self.imu.rotation * turn))
-        x, y, z = -turn * matrix_from_rpy(self.state.rpy)[2]
+            return replace(self, imu=replace(self.imu, rotation=self.imu.rotation * signs))
+        x, y, z = -signs * matrix_from_rpy(self.state.rpy)[2]
         rpy = np.array([np.arctan2(-y, -z), np.arctan2(x, np.hypot(y, z)), self.state.rpy[2]])
-        imu = replace(self.imu, velocity=self.imu.velocity * turn)
+        imu = replace(self.imu, velocity=self.imu.velocity * signs)
         return replace(self, imu=imu, state=replace(self.state, rpy=rpy))
 
     def anywhere(self) -> Replay:
@@ -210,13 +208,6 @@ class Replay:
             each.part((each.time > margin) & (each.time < end)) for each in self.aiding.fixes
         )
         return replace(self, imu=imu, aiding=replace(self.aiding, fixes=fixes, gate=None))
-
-
-def alignment_of(measured: Measured) -> Alignment:
-    """The start of a filter of real data; `align` with all that is known."""
-    heading = measured.heading, measured.heading_sd
-    attitude = measured.attitude, measured.attitude_sd
-    return align(measured.imu, measured.aiding, measured.sensors, *heading, *attitude)
 
 
 def innovation_sizes(innovations: FilterInnovations, kind: str | None = None) -> InnovationTest:

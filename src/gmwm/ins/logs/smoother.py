@@ -7,11 +7,13 @@ backwards, an adjoint vector collects the innovations, and a matrix their inform
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
-from gmwm._core.typing import FloatArray
+from gmwm._core.typing import FloatArray, IntArray
 from gmwm.ins.filter import (
     NAVIGATION,
     Events,
@@ -40,8 +42,7 @@ class Smoothed:
     solution: Solution
 
 
-@dataclass(frozen=True, eq=False)
-class _Update:
+class _Update(NamedTuple):
     """One scalar measurement: its row, gain and innovation with its variance."""
 
     row: FloatArray
@@ -71,8 +72,8 @@ def smooth(replay: Replay, at: FloatArray) -> Smoothed:
         if epoch in place:
             i, C = place[epoch], kept[epoch]
             error = -C[:3] @ adjoint
-            here = solution.lla[forward.index[epoch]]
-            lla[i] = offset(here[None], -error[None])[0]
+            here = solution.lla[np.searchsorted(forward.nodes, epoch)]
+            lla[i] = offset(here, -error)
             covariance[i] = C[:3, :3] - C[:3] @ information @ C[:, :3]
         for update in reversed(updates):
             h, K = update.row, update.gain
@@ -86,60 +87,60 @@ def smooth(replay: Replay, at: FloatArray) -> Smoothed:
     return Smoothed(lla, covariance, solution)
 
 
+@dataclass(frozen=True, eq=False)
 class _Forward:
     """The covariance along a solution, and the measurements for the way back.
 
     Transitions are computed again on the way back: kept, they would be most of the memory.
     """
 
-    def __init__(
-        self, replay: Replay, ready: Filter, events: Events, solution: Solution, P: FloatArray
-    ) -> None:
-        self._imu, self._ready, self._P = replay.imu, ready, P
-        self._aiding = replay.aiding
-        nodes = np.rint(solution.time / replay.imu.dt).astype(np.int64)
-        self.index = {int(epoch): i for i, epoch in enumerate(nodes)}
-        self._nodes, self._solution = nodes, solution
-        self.steps: list[tuple[int, int, list[_Update]]] = []
-        self._events = events
+    replay: Replay
+    ready: Filter
+    events: Events
+    solution: Solution
+    P: FloatArray
+    steps: list[tuple[int, int, list[_Update]]] = field(default_factory=list)
+
+    @cached_property
+    def nodes(self) -> IntArray:
+        """Epochs of the solution."""
+        return np.rint(self.solution.time / self.replay.imu.dt).astype(np.int64)
 
     def run(self, wanted: set[int]) -> dict[int, FloatArray]:
         """Run forwards; the covariance after the measurements of the wanted epochs."""
-        epochs = np.union1d(self._nodes, self._events.epoch)
-        table, kept, event, before = self._ready.states.table, {}, 0, int(epochs[0])
+        epochs = np.union1d(self.nodes, self.events.epoch)
+        table, kept, before = self.ready.states.table, {}, int(epochs[0])
         for epoch in epochs.tolist():
             for first, count in self.strides(before, epoch):
-                propagate(self._P, self.transition(first, count)[1], table, count)
-            updates = []
-            while event < self._events.epoch.size and self._events.epoch[event] == epoch:
-                updates += self._updates(event, epoch)
-                event += 1
+                propagate(self.P, self.transition(first, count)[1], table, count)
+            first, last = np.searchsorted(self.events.epoch, [epoch, epoch + 1])
+            updates = [each for event in range(first, last) for each in self.update(event, epoch)]
             self.steps.append((before, epoch, updates))
             before = epoch
             if epoch in wanted:
-                kept[epoch] = self._P.copy()
+                kept[epoch] = self.P.copy()
         return kept
 
     def strides(self, before: int, epoch: int) -> list[tuple[int, int]]:
         """First epoch and number of samples of each step of the covariance between two epochs."""
-        stride = self._ready.stride
+        stride = self.ready.stride
         return [(k, min(stride, epoch - k)) for k in range(before, epoch, stride)]
 
-    def _nominal(self, epoch: float) -> tuple[FloatArray, FloatArray, FloatArray, int]:
-        i = int(np.clip(np.searchsorted(self._nodes, epoch, side="right") - 1, 0, None))
-        return self._solution.velocity[i], self._solution.lla[i], self._solution.matrix[i], i
+    def nominal(self, epoch: float) -> tuple[FloatArray, FloatArray, FloatArray, int]:
+        i = int(np.clip(np.searchsorted(self.nodes, epoch, side="right") - 1, 0, None))
+        return self.solution.velocity[i], self.solution.lla[i], self.solution.matrix[i], i
 
     def transition(self, epoch: int, count: int) -> tuple[FloatArray, Transition]:
         """Transition of all states over some samples, and its parts: navigation, and by sensors."""
-        v, lla, C, i = self._nominal(epoch + 0.5 * count)
-        if i + 1 < self._nodes.size:
-            step = max(int(self._nodes[i + 1] - self._nodes[i]), 1)
-            share = (epoch + 0.5 * count - self._nodes[i]) / step
-            v = (1.0 - share) * v + share * self._solution.velocity[i + 1]
-            C = (1.0 - share) * C + share * self._solution.matrix[i + 1]
+        v, lla, C, i = self.nominal(epoch + 0.5 * count)
+        if i + 1 < self.nodes.size:
+            step = max(int(self.nodes[i + 1] - self.nodes[i]), 1)
+            share = (epoch + 0.5 * count - self.nodes[i]) / step
+            v = (1.0 - share) * v + share * self.solution.velocity[i + 1]
+            C = (1.0 - share) * C + share * self.solution.matrix[i + 1]
         change = new_transition()
-        transition(Kinematics(np.ascontiguousarray(C), v, lla), count * self._imu.dt, change)
-        table, m = self._ready.states.table, self._ready.states.m
+        transition(Kinematics(np.ascontiguousarray(C), v, lla), count * self.replay.imu.dt, change)
+        table, m = self.ready.states.table, self.ready.states.m
         whole, index = np.zeros((NAVIGATION + m, NAVIGATION + m)), np.arange(m)
         whole[:NAVIGATION, :NAVIGATION] = change.A
         whole[NAVIGATION + index, NAVIGATION + index] = table.phi[count]
@@ -149,30 +150,30 @@ class _Forward:
         whole[:NAVIGATION, NAVIGATION + own] = change.B[:, table.axis[own]] * table.gain[count][own]
         return whole, change
 
-    def _updates(self, event: int, epoch: int) -> list[_Update]:
+    def update(self, event: int, epoch: int) -> list[_Update]:
         """Update the covariance by the components of a fix, with the filter's innovations."""
-        innovations = self._solution.innovations
+        innovations = self.solution.innovations
         kind = int(innovations.kind[event])
-        v, lla, C, _ = self._nominal(epoch)
+        v, lla, C, _ = self.nominal(epoch)
         at = Kinematics(np.ascontiguousarray(C), v, lla)
-        last = min(max(epoch - 1, 0), self._imu.n - 1)
-        rate = self._imu.rotation[last] / self._imu.dt
-        found, n = [], self._P.shape[0]
+        last = min(max(epoch - 1, 0), self.replay.imu.n - 1)
+        rate = self.replay.imu.rotation[last] / self.replay.imu.dt
+        found, n = [], self.P.shape[0]
         for component in range(3):
-            value, sd = innovations.value[event, component], self._events.sd[event, component]
+            value, sd = innovations.value[event, component], self.events.sd[event, component]
             if not (np.isfinite(value) and innovations.used[event]):
                 continue
             h, row, gain = np.zeros(NAVIGATION), np.zeros(n), np.zeros(n)
-            lever = np.asarray(self._aiding.lever_arm)
-            observe(kind, component, self._events.value[event], at, rate, lever, h)
+            lever = np.asarray(self.replay.aiding.lever_arm)
+            observe(kind, component, self.events.value[event], at, rate, lever, h)
             row[:NAVIGATION] = h
-            state = int(self._ready.noise_states[kind, component])
+            state = int(self.ready.noise_states[kind, component])
             if state >= 0:
                 state += NAVIGATION
                 row[state] = -1.0
             # The filter's own variance, which allows for more than the noise of the fix.
-            predicted = float(row @ self._P @ row)
+            predicted = float(row @ self.P @ row)
             noise = max(float(innovations.sd[event, component] ** 2) - predicted, float(sd**2))
-            _, variance = measurement_update(self._P, h, state, noise, 0.0, np.zeros(n), gain)
+            _, variance = measurement_update(self.P, h, state, noise, 0.0, np.zeros(n), gain)
             found.append(_Update(row, gain, float(value), float(variance)))
         return found

@@ -7,7 +7,7 @@ from gmwm import GaussMarkov, RandomWalk, WhiteNoise
 from gmwm.ins.filter import Aiding, Fixes
 from gmwm.ins.geometry import RATE, gravity, matrix_from_rpy, ned_difference, offset
 from gmwm.ins.imu import Imu, SensorModels
-from gmwm.ins.logs import align, tuning
+from gmwm.ins.logs import Measured, align, tuning
 
 DT, N, LLA = 0.1, 300, np.array([0.8, 0.2, 300.0])
 RPY = np.array([0.02, -0.03, 1.1])
@@ -51,7 +51,11 @@ def at_rest(gyro=QUIET, accel=QUIET, gyro_bias=1e-7, accel_bias=0.0, position_sd
     for _ in range(DRAWS):
         errors = models.simulate(2 * N, DT, rng).total
         seen = fixes(rng, "position", np.tile(LLA, (TIMES.size, 1)), position_sd)
-        start = align(steady(errors[:N], RPY), Aiding((seen,)), models, heading, 1e-4)
+        start = align(
+            Measured(
+                steady(errors[:N], RPY), Aiding((seen,)), models, heading=heading, heading_sd=1e-4
+            )
+        )
         yield start, seen, np.mean(errors[N:, :3], axis=0)
 
 
@@ -119,7 +123,7 @@ def test_heading_from_the_course():
             fixes(rng, "position", positions, 1.0),
             fixes(rng, "velocity", np.tile(velocity, (TIMES.size, 1)), 0.4),
         ))  # fmt: skip
-        start = align(imu, aiding, models)
+        start = align(Measured(imu, aiding, models))
         assert start.gyro_bias_sd is None
         errors.append(turned(start.state.rpy[2] - heading) / start.sd.heading)
     near_one(errors)

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gmwm.ins import Fixes, Measured, Navigated, Straight, emulate, gnss, perform
+from gmwm.ins import Measured, Navigated, Straight, emulate, gnss, perform
 from gmwm.ins.filter import InitialSd
 from gmwm.ins.logs import Fault, Faults, Replay, fault_notice, tuning
 from gmwm.ins.logs.faults import far_offset, resolution_notice
@@ -28,6 +28,30 @@ def codes(navigated):
     return [each.code for each in navigated.fault_notices]
 
 
+@pytest.mark.parametrize(
+    ("seed", "faults", "options", "expected"),
+    [
+        (204, ["off-grid"], {}, []),  # fixes between samples
+        *(
+            (300 + seed, [], {"vehicle": each}, [])
+            for seed in range(3)
+            for each in ("car", "loiter")
+        ),
+        (208, ["stamps", "lever arm"], {"duration": 200.0}, ["lever-arm", "time-offset"]),
+        # The filter diverges with either sign of any axis.
+        (7105, ["one far"], {"vehicle": "loiter"}, ["outliers"]),
+        # Of positions alone: the filter started from the line to an outlier, and was lost.
+        (7109, ["outliers"], {"velocity": False}, ["outliers"]),
+        slow(7113, ["outliers"], {"vehicle": "helicopter", "velocity": False}, ["outliers"]),
+    ],
+)
+def test_each_fault_is_named_and_no_other(seed, faults, options, expected):
+    navigated = found(seed, *faults, **options)
+    assert sorted(codes(navigated)) == expected
+    assert navigated.fits is not bool(expected)
+    assert navigated.faults.explained
+
+
 def within(fault, name, truth, sigmas=4.0):
     error = fault.values[f"{name} error"]
     assert abs(fault.values[name] - truth) < sigmas * error, (fault.values, name)
@@ -40,7 +64,6 @@ def test_stamps_that_are_late():
     assert navigated.verdict.code == fault.code == "time-offset"
     assert within(fault, "time offset", 0.2) < 0.02
     assert navigated.verdict.values["explained"]
-    assert not navigated.faults.alternatives
 
 
 def test_leap_seconds_and_an_outlier():
@@ -77,7 +100,7 @@ def test_the_offset_is_looked_for_at_the_beginning_of_a_long_log(monkeypatch):
     """Fixes after that part do not count as missing."""
     log, _ = emulated_log(1, duration=300.0, rate=5.0, faults=("leap seconds",))
     monkeypatch.setattr(tuning, "DIAGNOSED", 120.0)
-    offset, replay, _ = far_offset(log)
+    offset, replay = far_offset(log)
     assert offset == pytest.approx(18.0, abs=0.2)
     assert replay.imu.n * log.imu.dt <= 120.0
 
@@ -90,7 +113,7 @@ def test_right_stamps_have_no_other_offset():
 def test_circles_at_constant_speed_do_not_tell_stamps_from_a_lever_arm():
     faults = found(201, "stamps", vehicle="loiter").faults
     (fault,) = faults.found
-    assert {fault.code, *faults.alternatives} == {"time-offset", "lever-arm"}
+    assert fault.code in {"time-offset", "lever-arm"}
     assert faults.resolution["time offset"] > 0.03
 
 
@@ -100,15 +123,13 @@ def test_stamps_that_are_late_in_a_start_in_motion():
     (fault,) = navigated.fault_notices
     assert fault.code == "time-offset"
     assert within(fault, "time offset", 0.2) < 0.02
-    assert navigated.faults.alternatives == ("lever-arm",)
 
 
 @pytest.mark.parametrize("by", [-0.15, 0.15])
 def test_fixes_along_the_track_are_as_good_as_stamps_where_a_vehicle_rolls(by):
     """The attitude was that of the next second of the track."""
     replay = found(201, vehicle="loiter").faults.replay
-    exact, smooth = (move(lambda time: np.full(time.shape, by)).standard
-                     for move in (replay.later, replay.along))  # fmt: skip
+    exact, smooth = (move(by).standard for move in (replay.later, replay.along))
     moved = np.nansum((exact - replay.standard) ** 2)
     assert np.nansum((smooth - exact) ** 2) < 0.15 * moved
 
@@ -134,12 +155,6 @@ def held(samples, axis, start, dt):
     first, result = round(start / dt), samples.copy()
     result[first:, axis] = result[first, axis]
     return result
-
-
-def test_a_filter_that_diverges_under_every_sign_shows_none():
-    """A fix 500 m off, without velocities: this ended in an error."""
-    navigated = found(7105, "one far", vehicle="loiter", velocity=True)
-    assert codes(navigated) == ["outliers"]
 
 
 @pytest.mark.parametrize(
@@ -168,28 +183,20 @@ def test_only_what_the_motion_shows_of_a_lever_arm_is_advised(down, advice):
     if down:
         errors["down"] = down
     values = {"forward": 1.0, "right": 0.3, "down": -1.8}
-    fault = Fault("lever-arm", "", lambda r: r, replay, 20.0, 8.0, values, errors)
+    fault = Fault("lever-arm", "", replay, 20.0, 8.0, values, errors)
     assert fault_notice(fault, 0.0).hint.startswith(advice)
-
-
-def test_fixes_between_samples_are_no_fault():
-    assert found(204, "off-grid").verdict.code == "consistent"
 
 
 def test_one_fix_far_off_is_dated_on_the_clock_of_the_files():
     log, _ = emulated_log(205, duration=DURATION, rate=10.0, faults=("one far",))
-    (fault,) = Navigated.of(replace(log, start=1e5)).fault_notices
+    navigated = Navigated.of(replace(log, start=1e5))
+    (fault,) = navigated.fault_notices
     assert (fault.code, fault.where) == ("outliers", "position")
     assert fault.values["count"] == 1.0
     assert 1e5 < fault.values["time"] < 1e5 + DURATION
-
-
-@pytest.mark.parametrize(("vehicle", "seed"), [slow("helicopter", 7113), ("car", 7109)])
-def test_outliers_give_no_course(vehicle, seed):
-    """Of positions alone: the filter started from the line to an outlier, and was lost."""
-    navigated = found(seed, "outliers", vehicle=vehicle, velocity=False)
-    assert codes(navigated) == ["outliers"]
-    assert navigated.faults.explained
+    size, at = navigated.farthest
+    assert size > 20.0
+    assert at == pytest.approx(fault.values["time"])
 
 
 def test_outliers_are_counted():
@@ -234,20 +241,6 @@ def test_axes_that_point_the_other_way_are_no_noise(kind, signs, shown):
     assert navigated.faults.explained
     assert ("reverse gyro_z" if kind == "gyro" else "y, accel_z") in fault.hint
     assert "check every gyro by hand" in fault.hint
-
-
-def test_two_faults_together():
-    navigated = found(208, "stamps", "lever arm", duration=200.0)
-    assert set(codes(navigated)) == {"time-offset", "lever-arm"}
-    assert navigated.verdict.values["explained"]
-
-
-def test_right_models_are_not_blamed():
-    for seed in range(3):
-        for vehicle in ("car", "loiter"):
-            navigated = found(300 + seed, vehicle=vehicle, duration=160.0)
-            assert navigated.verdict.code == "consistent"
-            assert navigated.fits
 
 
 @pytest.mark.parametrize(
@@ -332,14 +325,3 @@ def test_the_fix_that_a_filter_starts_from_may_be_an_outlier():
     (fault,) = navigated.fault_notices
     assert (fault.code, fault.values["count"], fault.values["time"]) == ("outliers", 2.0, start)
     assert navigated.faults.explained
-
-
-def test_the_wake_of_an_outlier_is_not_counted():
-    log, _ = emulated_log(210, duration=DURATION, rate=10.0)
-    position = log.aiding.fixes[0]
-    value = position.value.copy()
-    value[80:82, 2] += 80.0
-    fixes = (Fixes("position", position.time, value, position.sd), *log.aiding.fixes[1:])
-    changed = type(log)(log.imu, type(log.aiding)(fixes, log.aiding.lever_arm), log.sensors)
-    (fault,) = Navigated.of(changed).fault_notices
-    assert fault.values["count"] == 2.0

@@ -46,66 +46,48 @@ def test_velocities(tmp_path: Path, header: str, sign: float) -> None:
     np.testing.assert_allclose(velocity.value, np.tile([1.0, 2.0, 3.0 * sign], (5, 1)))
 
 
-@pytest.mark.parametrize(
-    ("column", "what"),
-    [
-        ("latitude_deg,longitude_deg,height_m,vn,ve,vd", ""),
-        ("longitude_deg,latitude_deg,height_m,vn,ve,vd", "latitude and longitude"),
-        ("latitude_deg,longitude_deg,height_m,ve,vn,vd", "velocity north and east"),
-        ("latitude_deg,longitude_deg,height_m,vn,ve,vu", "velocity down and up"),
-    ],
-)
-@pytest.mark.parametrize("outliers", [False, True])
-def test_columns_that_are_exchanged(tmp_path: Path, column: str, what: str, outliers: bool) -> None:
-    """Silently, a filter would blame its sensors."""
-    rng = np.random.default_rng(5)
-    time = np.arange(400.0)
+def drive(seconds: int, outliers: bool) -> np.ndarray:
+    """Rows of a drive with turns and climbs, with noise."""
+    rng, time = np.random.default_rng(6), np.arange(float(seconds))
     velocity = np.stack(
-        [12.0 * np.cos(time / 40.0), 9.0 * np.sin(time / 30.0), 0.4 * np.sin(time / 20.0)], axis=1
+        [12.0 * np.cos(time / 40.0), 9.0 * np.sin(time / 15.0), 0.8 * np.sin(time / 20.0)], axis=1
     )
-    gone = np.cumsum(velocity, axis=0) + rng.standard_normal((400, 3)) * [1.0, 1.0, 1.5]
+    gone = np.cumsum(velocity, axis=0) + rng.standard_normal((seconds, 3)) * [1.0, 1.0, 1.5]
     if outliers:
-        gone[rng.random(400) < 0.03] += 50.0
-    noisy = velocity + 0.1 * rng.standard_normal((400, 3))
-    latitude, longitude = 46.0 + gone[:, 0] / 111e3, 7.0 + gone[:, 1] / 77e3
-    rows = np.column_stack([time, latitude, longitude, 400.0 - gone[:, 2], noisy])
-    path = write(tmp_path, rows.tolist(), f"time_s,{column}")
-    if what:
-        with pytest.raises(InputError, match=f"only if {what} are exchanged"):
-            read_fixes(path)
-    else:
-        assert len(read_fixes(path).fixes) == 2
-
-
-def drive(seconds: int) -> tuple[np.ndarray, np.ndarray]:
-    """Positions (deg, deg, m) and velocities of a drive with turns, with noise."""
-    rng = np.random.default_rng(6)
-    time = np.arange(float(seconds))
-    velocity = np.stack([12.0 * np.cos(time / 40.0), 9.0 * np.sin(time / 15.0), 0.0 * time], axis=1)
-    gone = np.cumsum(velocity, axis=0) + rng.standard_normal((seconds, 3))
+        gone[rng.random(seconds) < 0.03] += 50.0
     position = [46.0 + gone[:, 0] / 111e3, 7.0 + gone[:, 1] / 77e3, 400.0 - gone[:, 2]]
-    return np.stack(position, axis=1), velocity + 0.1 * rng.standard_normal((seconds, 3))
+    noisy = velocity + 0.1 * rng.standard_normal((seconds, 3))
+    return np.column_stack([time, *position, noisy])
+
+
+RIGHT = "time_s,latitude_deg,longitude_deg,height_m,vn,ve,vd"
+RAD = np.pi / 180.0
 
 
 @pytest.mark.parametrize(
-    ("position", "velocity", "what"),
+    ("header", "factors", "what"),
     [
-        ((1.0, 1.0, 1.0), 1.0, ""),
-        ((1.0, -1.0, 1.0), 1.0, "the sign of longitude"),
-        ((-1.0, 1.0, 1.0), 1.0, "the sign of latitude"),
-        ((np.pi / 180.0, np.pi / 180.0, 1.0), 1.0, "latitude and longitude are in rad"),
-        ((1.0, 1.0, 1.0), 3.6, "velocities are in km/h"),
-        ((1.0, 1.0, 1.0), 3600.0 / 1852.0, "velocities are in knots"),
-        ((1.0, 1.0, 1.0), 1000.0, "velocities are in mm/s"),
+        (RIGHT, (1, 1, 1), ""),
+        ("time_s,longitude_deg,latitude_deg,height_m,vn,ve,vd", (1, 1, 1),
+         "latitude and longitude are exchanged"),
+        (RIGHT.replace("vn,ve", "ve,vn"), (1, 1, 1), "velocity north and east are exchanged"),
+        (RIGHT.replace("vd", "vu"), (1, 1, 1), "velocity down and up are exchanged"),
+        (RIGHT, (1, -1, 1), "the sign of longitude"),
+        (RIGHT, (-1, 1, 1), "the sign of latitude"),
+        (RIGHT, (RAD, RAD, 1), "latitude and longitude are in rad"),
+        (RIGHT, (1, 1, 3.6), "velocities are in km/h"),
+        (RIGHT, (1, 1, 3600.0 / 1852.0), "velocities are in knots"),
+        (RIGHT, (1, 1, 1000.0), "velocities are in mm/s"),
     ],
-)
-def test_units_and_signs_that_do_not_go_together(
-    tmp_path: Path, position: tuple[float, ...], velocity: float, what: str
+)  # fmt: skip
+@pytest.mark.parametrize(("seconds", "outliers"), [(120, False), (400, True)])
+def test_columns_and_units_that_do_not_fit_each_other(
+    tmp_path: Path, header: str, factors: tuple[float, ...], what: str, seconds: int, outliers: bool
 ) -> None:
-    """In two minutes; the fixes were said to be noisy, or the heading wrong."""
-    places, speeds = drive(120)
-    rows = np.column_stack([np.arange(120.0), places * position, speeds * velocity])
-    path = write(tmp_path, rows.tolist(), f"{HEAD},vn,ve,vd")
+    """The fixes were said to be noisy, the heading wrong, or the sensors bad."""
+    latitude, longitude, speed = factors
+    rows = drive(seconds, outliers) * [1.0, latitude, longitude, 1.0, speed, speed, speed]
+    path = write(tmp_path, rows.tolist(), header)
     if what:
         with pytest.raises(InputError, match=f"only if {what}"):
             read_fixes(path)

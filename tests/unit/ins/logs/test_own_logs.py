@@ -11,7 +11,7 @@ from click.testing import CliRunner
 
 from gmwm.cli.navigate import navigate
 from gmwm.errors import InputError
-from gmwm.ins import Measured, Navigated, Outage, car_drive, emulate, fixed_wing_loiter, gnss
+from gmwm.ins import Measured, Navigated, Outage, car_drive, emulate, gnss
 from gmwm.ins.geometry import ned_difference
 from gmwm.ins.spec import sensor_models
 
@@ -116,23 +116,6 @@ def test_stamps_that_jitter_by_a_millisecond_change_centimetres(log, as_it_is, t
     assert np.abs(ned_difference(ours, theirs)).max() < 0.05
 
 
-def test_a_missing_sample_is_filled_and_reported(log, as_it_is, tmp_path):
-    kept = np.delete(np.arange(log.stamps.size), 1500)
-    log.imu(tmp_path, keep=kept)
-    log.fixes(tmp_path)
-    found = navigated(tmp_path)
-    notice = next(each for each in found.measured.notices if each.code == "samples-filled")
-    assert notice.values == {"count": 1, "longest": 1}
-    assert apart(found, as_it_is).max() < 0.05
-
-
-def test_a_long_hole_is_refused_with_its_place(log, tmp_path):
-    log.imu(tmp_path, keep=np.delete(np.arange(log.stamps.size), np.arange(1500, 1520)))
-    log.fixes(tmp_path)
-    with pytest.raises(InputError, match="sample 1,501 of gyro_x, 60 s after the first"):
-        navigated(tmp_path)
-
-
 def test_a_record_without_stamps_starts_when_its_start_says(log, as_it_is, tmp_path):
     log.imu(tmp_path, stamped=False)
     log.fixes(tmp_path)
@@ -141,11 +124,18 @@ def test_a_record_without_stamps_starts_when_its_start_says(log, as_it_is, tmp_p
     np.testing.assert_allclose(apart(found, as_it_is), 0.0, atol=1e-3)
 
 
-def test_a_start_beside_stamps_is_refused(log, tmp_path):
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"imu": {"start": START}}, "has time stamps: leave its start out"),
+        ({"attitude": [0, 0, 0], "heading": 1.0}, "leave the heading out"),
+    ],
+)
+def test_what_contradicts_the_rest_is_refused(log, tmp_path, changes, message):
     log.imu(tmp_path)
     log.fixes(tmp_path)
-    with pytest.raises(InputError, match="has time stamps: leave its start out"):
-        navigated(tmp_path, imu={"start": START})
+    with pytest.raises(InputError, match=message):
+        navigated(tmp_path, **changes)
 
 
 def iso(t):
@@ -156,12 +146,13 @@ def zoned(t):
     return datetime.fromtimestamp(t + 5400.0, UTC).strftime("%Y-%m-%d %H:%M:%S.%f") + "+01:30"
 
 
-@pytest.mark.parametrize("write", [iso, zoned])
-def test_dates_are_seconds(log, as_it_is, tmp_path, write):
-    log.imu(tmp_path)
+@pytest.mark.parametrize(("write", "both"), [(iso, False), (zoned, False), (iso, True)])
+def test_dates_are_seconds(log, as_it_is, tmp_path, write, both):
+    (partial(dated, log) if both else log.imu)(tmp_path)
     log.fixes(tmp_path, write, "time")
     found = navigated(tmp_path)
     assert "dates" in codes(found)
+    assert "time-scales" not in codes(found)
     np.testing.assert_allclose(apart(found, as_it_is), 0.0, atol=1e-3)
 
 
@@ -173,14 +164,6 @@ def dated(log, folder):
         f"{iso(float(stamp))},{rest}" for stamp, _, rest in (row.partition(",") for row in rows)
     ]
     (folder / "imu.csv").write_text("\n".join([head.replace("time_s", "UTC"), *rows]) + "\n")
-
-
-def test_dates_of_both_files_are_one_clock(log, as_it_is, tmp_path):
-    dated(log, tmp_path)
-    log.fixes(tmp_path, iso, "time")
-    found = navigated(tmp_path)
-    np.testing.assert_allclose(apart(found, as_it_is), 0.0, atol=1e-3)
-    assert "time-scales" not in codes(found)
 
 
 def test_a_date_that_is_none_is_named_with_its_line(log, tmp_path):
@@ -249,14 +232,6 @@ def test_an_attitude_that_is_given_starts_a_record_in_motion(underway, tmp_path)
     assert np.mean(standardised(found, underway)[5:] ** 2) < 2.5
 
 
-def test_a_heading_beside_an_attitude_is_refused(underway, tmp_path):
-    log = Log(underway, 2)
-    log.imu(tmp_path)
-    log.fixes(tmp_path)
-    with pytest.raises(InputError, match="leave the heading out"):
-        navigated(tmp_path, attitude=[0, 0, 0], heading=1.0)
-
-
 @pytest.mark.parametrize("velocity", [True, False])
 def test_a_record_that_never_is_steady_is_aligned_by_its_accelerations(
     underway, tmp_path, velocity, monkeypatch
@@ -274,18 +249,6 @@ def test_a_record_that_never_is_steady_is_aligned_by_its_accelerations(
         squares.append(np.mean(standard[0, 6:] ** 2))
         assert np.mean(standard[-60:] ** 2) < 3.0
     assert np.mean(squares) < 4.0
-
-
-def test_motion_without_acceleration_shows_no_heading(tmp_path, monkeypatch):
-    monkeypatch.setattr("gmwm.ins.logs.alignment.steady", lambda imu: None)
-    straight = Log(car_drive(duration=110.0, dt=1.0 / RATE).segment(0.0, 18.0))
-    straight.imu(tmp_path)
-    straight.fixes(tmp_path)
-    with pytest.raises(InputError, match="the attitude cannot be known"):
-        navigated(tmp_path)
-
-
-# ---- More aids ----
 
 
 def test_rejected_fixes_are_reported(log, tmp_path):
@@ -356,14 +319,6 @@ def test_coloured_noise_of_the_fixes_is_a_state(log, tmp_path):
     log.fixes(tmp_path)
     found = navigated(tmp_path, coloured_sd=[0.5, 0.5, 1.0], coloured_tau="60 s")
     assert found.solution.state_names[-3:] == ("GNSS north", "GNSS east", "GNSS down")
-
-
-def test_a_flight_is_still_levelled_in_steady_motion(tmp_path):
-    log = Log(fixed_wing_loiter(duration=60.0, dt=1.0 / RATE), 3)
-    log.imu(tmp_path)
-    log.fixes(tmp_path)
-    found = navigated(tmp_path)
-    assert found.alignment.notices[0].code == "levelled"
 
 
 def test_each_outage_is_drawn_with_its_band_and_what_the_next_fix_showed(tmp_path):
