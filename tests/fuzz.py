@@ -750,7 +750,7 @@ def main() -> None:
     parser.add_argument("--cases", type=int, default=1000)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--first", type=int, default=0)
-    parser.add_argument("--only", choices=sorted(KINDS), hint="append")
+    parser.add_argument("--only", choices=sorted(KINDS), action="append")
     parser.add_argument("--store", type=Path, help="of the cases that are done; gone on with")
     given = parser.parse_args()
     logging.disable()
