@@ -1,6 +1,7 @@
 """Values of the wrong type, size or shape: one sentence, never a traceback of another kind."""
 
 import json
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
@@ -311,13 +312,10 @@ def test_what_is_no_fit(content):
 
 
 @pytest.mark.parametrize("key", sorted(FIT.to_dict()))
-@pytest.mark.parametrize("value", [3, "a", ["a"], {"a": "b"}], ids=repr)
-def test_a_damaged_fit_is_refused_or_still_prints(key, value):
-    try:
-        again = Fit.from_dict({**FIT.to_dict(), key: value})
-    except InputError:
-        return
-    str(again)
+def test_a_damaged_fit_is_refused_or_still_prints(key):
+    for value in (3, "a", ["a"], {"a": "b"}):
+        with suppress(InputError):
+            str(Fit.from_dict({**FIT.to_dict(), key: value}))
 
 
 @pytest.mark.parametrize("key", ["objective", "params", "model", "keys", "wavelet_variance"])

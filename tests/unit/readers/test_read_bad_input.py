@@ -11,8 +11,8 @@ import pytest
 from gmwm.errors import InputError
 from gmwm.readers import read
 from gmwm.readers.names import CANONICAL
+from reading import SI
 
-SI = {"gyro": "rad/s", "accel": "m/s^2"}
 HEADER = ",".join(CANONICAL)
 
 

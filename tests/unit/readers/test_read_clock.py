@@ -8,12 +8,7 @@ import pytest
 from gmwm.errors import InputError
 from gmwm.readers import read
 from gmwm.readers.grid import find_change
-
-
-def texts(recording):
-    """What the reader noticed."""
-    return tuple(map(str, recording.notices))
-
+from reading import texts
 
 UNITS = {"gyro": "rad/s"}
 

@@ -15,8 +15,7 @@ from gmwm.errors import InputError
 from gmwm.readers import read
 from gmwm.readers.names import CANONICAL
 from gmwm.readers.text import csv_table
-
-SI = {"gyro": "rad/s", "accel": "m/s^2"}
+from reading import SI
 
 thorough = settings(deadline=None, database=None)
 

@@ -6,6 +6,7 @@ import pytest
 import gmwm
 from gmwm.errors import InputError
 from marks import slow
+from reading import codes
 
 pd = pytest.importorskip("pandas")
 N = 4000
@@ -20,10 +21,6 @@ def frame(time, name="time_s", accel=(0.0, 0.0, 9.81)):
         for a, g in zip("xyz", accel, strict=True)
     }
     return pd.DataFrame(columns)
-
-
-def codes(recording):
-    return {notice.code for notice in recording.notices}
 
 
 @pytest.mark.parametrize("seed", [0, 1, slow(2), slow(3)])

@@ -17,9 +17,9 @@ import gmwm
 from bags import START, at_rest
 from gmwm.readers.formats import hdf5
 from gmwm.readers.names import CANONICAL
+from reading import SI, refusal
 
 X = at_rest()
-SI = {"gyro": "rad/s", "accel": "m/s^2"}
 NAMES = [f"gyro_{a} [rad/s]" for a in "xyz"] + [f"accel_{a} [m/s^2]" for a in "xyz"]
 
 
@@ -28,13 +28,6 @@ def exact(recording, samples=X):
         np.array_equal(recording[name].values, column)
         for name, column in zip(CANONICAL, samples.T, strict=True)
     )
-
-
-def refusal(data, **arguments):
-    with pytest.raises(gmwm.InputError) as caught:
-        gmwm.read(data, **arguments)
-    assert "\n" not in str(caught.value)
-    return str(caught.value)
 
 
 @pytest.fixture(scope="module")
