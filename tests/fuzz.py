@@ -396,6 +396,14 @@ def read_as_people_do(rng: random.Random, path: Path) -> Any:
     if rng.random() < 0.3:
         options["time"] = rng.choice((False, False, False, 0, 3, "time_s"))
     found = gmwm.read(path, **options)
+    assert found.source == gmwm.errors.printable(path.name)
+    assert 0.0 < found.dt < np.inf
+    assert found.n - min(channel.missing for channel in found.values()) >= 64
+    for channel in found.values():
+        assert channel.values.shape == (found.n,)
+        assert channel.values.dtype == np.float64
+        assert not np.any(np.isinf(channel.values))
+    assert all(str(notice).isprintable() for notice in found.notices)
     str(found)
     return found
 
