@@ -7,9 +7,12 @@ import gmwm
 from gmwm import InputError, Recording, read
 from gmwm._core.units import auxiliary_unit
 from gmwm.readers.names import meaning
-from reading import codes
 
 UNITS = {"gyro": "rad/s", "accel": "m/s^2"}
+
+
+def codes(recording):
+    return [notice.code for notice in recording.notices]
 
 
 @pytest.fixture
