@@ -59,6 +59,15 @@ def run(monkeypatch, capsys, tmp_path):
 
 
 @pytest.fixture
+def interpreted_pyins(monkeypatch):
+    """The loop of pyins without numba, which takes longer to compile than a flight of minutes."""
+    loops = pytest.importorskip("pyins._numba_integrate")
+    monkeypatch.setattr("pyins.strapdown.integrate", loops.integrate.py_func)
+    for name in ("gravity", "mat_from_rotvec"):
+        monkeypatch.setattr(loops, name, getattr(loops, name).py_func)
+
+
+@pytest.fixture
 def no_pages(monkeypatch):
     """Pages take most of the time of a command: tests that do not look at one go without."""
     from gmwm.calibration.calibration import Calibration

@@ -1,11 +1,10 @@
 # ruff: noqa: E501 - tables of hostile values
 """Damaged inputs: every file that gmwm reads, mutated, is used or refused in one sentence.
 
-``python tests/fuzz.py --cases 70000 --store cases.jsonl`` draws as many over all kinds of files,
-prints how many were used and refused, and ends with status 1 if any was neither: a traceback, a
-warning, more than 20 s of the processor, or more than 2 GB. The store has a line for each case, with
-its time and memory; a run that ended goes on with what is not in it. ``--only KIND --first CASE
---cases 1`` repeats one. The suite runs some of each.
+``python tests/fuzz.py --cases 70000`` draws as many over all kinds of files, prints how many were used
+and refused, and ends with status 1 if any was neither: a traceback, a warning, more than 20 s of the
+processor, or more than 2 GB. ``--only KIND --first CASE --cases 1`` repeats one. The suite runs some of
+each.
 """
 
 from __future__ import annotations
@@ -27,7 +26,7 @@ import traceback
 import warnings
 import zipfile
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cache, partial
@@ -397,6 +396,14 @@ def read_as_people_do(rng: random.Random, path: Path) -> Any:
     if rng.random() < 0.3:
         options["time"] = rng.choice((False, False, False, 0, 3, "time_s"))
     found = gmwm.read(path, **options)
+    assert found.source == gmwm.errors.printable(path.name)
+    assert 0.0 < found.dt < np.inf
+    assert found.n - min(channel.missing for channel in found.values()) >= 64
+    for channel in found.values():
+        assert channel.values.shape == (found.n,)
+        assert channel.values.dtype == np.float64
+        assert not np.any(np.isinf(channel.values))
+    assert all(str(notice).isprintable() for notice in found.notices)
     str(found)
     return found
 
@@ -609,7 +616,7 @@ class Tally:
 
     @property
     def failures(self) -> int:
-        return sum(self.outcomes[each] for each in ("failed", TOO_LARGE, "ended the process"))
+        return sum(self.outcomes[each] for each in ("failed", TOO_LARGE))
 
     def __str__(self) -> str:
         counts = ", ".join(f"{count:,} {outcome}" for outcome, count in self.outcomes.items())
@@ -617,37 +624,6 @@ class Tally:
             f"{counts}; {self.total:.0f} s, one at most {self.slowest:.2f} s and "
             f"{self.largest / (1 << 30):.2f} GB"
         )
-
-
-class Cases:
-    """What became of each case, a line of JSON each: a run that ended goes on."""
-
-    def __init__(self, path: Path | None):
-        self._path = path
-        self._done: dict[tuple[str, int, int], tuple[str, float, int]] = {}
-        begun: Counter[tuple[str, int, int]] = Counter()
-        if path is None:
-            return
-        if path.exists():
-            for line in path.read_text().splitlines():
-                with suppress(ValueError, KeyError):  # the last line may be cut off
-                    each = json.loads(line)
-                    key = each["kind"], each["seed"], each["case"]
-                    if "outcome" in each:
-                        self._done[key] = each["outcome"], each["seconds"], each["bytes"]
-                    else:
-                        begun[key] += 1
-        # One that ended the process twice is not tried again.
-        lost = (key for key, count in begun.items() if count > 1 and key not in self._done)
-        self._done |= {key: ("ended the process", 0.0, 0) for key in lost}
-
-    def known(self, kind: str, seed: int, case: int) -> tuple[str, float, int] | None:
-        return self._done.get((kind, seed, case))
-
-    def write(self, **content: Any) -> None:
-        if self._path is not None:
-            with self._path.open("a") as stream:
-                stream.write(json.dumps(content) + "\n")
 
 
 class TooSlowError(Exception):
@@ -696,50 +672,34 @@ def attempt(name: str, seed: int, case: int, folder: Path) -> str | None:
     return None
 
 
-def cases_of(names: list[str], cases: int, first: int) -> Iterator[tuple[str, int]]:
-    """Kinds, and cases of each in proportion to its share."""
+def run(names: list[str], cases: int, seed: int, first: int = 0) -> dict[str, Tally]:
+    """Many inputs of all kinds, in proportion to their shares; prints each failure."""
+    tallies = {}
+    failures: Counter[str] = Counter()
     total = sum(KINDS[name].share for name in names)
     for name in names:
-        for case in range(first, first + max(round(cases * KINDS[name].share / total), 1)):
-            yield name, case
-
-
-def run(
-    names: list[str], cases: int, seed: int, first: int = 0, store: Path | None = None
-) -> dict[str, Tally]:
-    """Many inputs of all kinds, in proportion to their shares; prints each failure."""
-    tallies = {name: Tally() for name in names}
-    failures: Counter[str] = Counter()
-    stored = Cases(store)
-    with tempfile.TemporaryDirectory() as folder:
-        for name, case in cases_of(names, cases, first):
-            known = stored.known(name, seed, case)
-            if known is not None:
-                tallies[name].add(*known)
-                continue
-            stored.write(kind=name, seed=seed, case=case)
-            start, outcome, held = time.process_time(), "refused", _peak(begin=True)
-            try:
-                outcome = "used" if attempt(name, seed, case, Path(folder)) is None else "refused"
-            except Exception as error:  # whatever is no InputError is what is looked for
-                outcome = "failed"
-                where = traceback.extract_tb(error.__traceback__)[-1]
-                which = f"{type(error).__name__} {Path(where.filename).name}:{where.lineno}"
-                failures[which] += 1
-                if failures[which] == 1:
-                    text = f"--only {name} --seed {seed} --first {case}: {which}: {error}"[:500]
-                    print(text, flush=True)
-            seconds, size = time.process_time() - start, max(_peak() - held, 0)
-            if size > BYTES:
-                outcome = TOO_LARGE
-                print(f"--only {name} --seed {seed} --first {case}: {size:,} bytes", flush=True)
-            tallies[name].add(outcome, seconds, size)
-            stored.write(
-                kind=name, seed=seed, case=case, outcome=outcome, seconds=round(seconds, 4),
-                bytes=size,
-            )  # fmt: skip
-    for name, tally in tallies.items():
-        print(f"{name}: {tally}")
+        tally = tallies[name] = Tally()
+        with tempfile.TemporaryDirectory() as folder:
+            for case in range(first, first + max(round(cases * KINDS[name].share / total), 1)):
+                start, outcome, held = time.process_time(), "refused", _peak(begin=True)
+                try:
+                    outcome = (
+                        "used" if attempt(name, seed, case, Path(folder)) is None else "refused"
+                    )
+                except Exception as error:  # whatever is no InputError is what is looked for
+                    outcome = "failed"
+                    where = traceback.extract_tb(error.__traceback__)[-1]
+                    which = f"{type(error).__name__} {Path(where.filename).name}:{where.lineno}"
+                    failures[which] += 1
+                    if failures[which] == 1:
+                        text = f"--only {name} --seed {seed} --first {case}: {which}: {error}"[:500]
+                        print(text, flush=True)
+                seconds, size = time.process_time() - start, max(_peak() - held, 0)
+                if size > BYTES:
+                    outcome = TOO_LARGE
+                    print(f"--only {name} --seed {seed} --first {case}: {size:,} bytes", flush=True)
+                tally.add(outcome, seconds, size)
+        print(f"{name}: {tally}", flush=True)
     for which, count in failures.most_common():
         print(f"{count:6} x {which}")
     return tallies
@@ -750,12 +710,11 @@ def main() -> None:
     parser.add_argument("--cases", type=int, default=1000)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--first", type=int, default=0)
-    parser.add_argument("--only", choices=sorted(KINDS), hint="append")
-    parser.add_argument("--store", type=Path, help="of the cases that are done; gone on with")
+    parser.add_argument("--only", choices=sorted(KINDS), action="append")
     given = parser.parse_args()
     logging.disable()
     names = given.only or list(KINDS)
-    tallies = run(names, given.cases, given.seed, given.first, given.store).values()
+    tallies = run(names, given.cases, given.seed, given.first).values()
     total = sum(sum(each.outcomes.values()) for each in tallies)
     failures = sum(each.failures for each in tallies)
     seconds, largest = sum(each.total for each in tallies), max(each.largest for each in tallies)

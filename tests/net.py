@@ -31,7 +31,9 @@ import warnings
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import fields, is_dataclass
+from functools import partial
 from pathlib import Path
+from shlex import split
 from typing import Any
 
 import numpy as np
@@ -299,28 +301,25 @@ def calibrations() -> list[str]:
 @part
 def readers() -> Iterator[tuple[str, Callable[[], Any]]]:
     for name, path in {"drive": drive() / "imu.csv", "mems": mems(), "faulty": faulty()}.items():
-        yield name, lambda path=path: recording(gmwm.read(path))
+        yield name, partial(_recorded, path)
     for number in ADIS_ROWS:
         if path := adis(number):
             given = {"rate": 100.0, "units": {"gyro": "deg/s", "accel": "g"}}
-            yield (
-                f"adis_{number}",
-                lambda path=path, given=given: recording(gmwm.read(path, **given)),
-            )
+            yield f"adis_{number}", partial(_recorded, path, **given)
     yield "imu", lambda: ins.read_imu(drive() / "imu.csv")
     yield "fixes", lambda: ins.read_fixes(drive() / "fixes.csv")
-    yield (
-        "columns",
-        lambda: recording(
-            gmwm.read(mems(), channels={"gyro_x": 1, "accel_z": 6}, units=SI, time=0)
-        ),
-    )
+    columns = {"gyro_x": 1, "accel_z": 6}
+    yield "columns", partial(_recorded, mems(), channels=columns, units=SI, time=0)
     yield "part", lambda: recording(gmwm.read(faulty()).part(50.0, 150.0))
     for path in made("formats", _make_formats).iterdir():
         files = [each for each in sorted(path.iterdir()) if each.name != "layout"]
         layout = path / "layout"
         given = {"layout": layout.read_text()} if layout.exists() else {}
-        yield path.name, lambda path=files[0], given=given: recording(gmwm.read(path, **given))
+        yield path.name, partial(_recorded, files[0], **given)
+
+
+def _recorded(path: Path, **given: Any) -> Any:
+    return recording(gmwm.read(path, **given))
 
 
 def _make_formats(folder: Path) -> None:
@@ -362,10 +361,7 @@ def variance() -> Iterator[tuple[str, Callable[[], Any]]]:
     for tau in ("octave", "decade", [0.01, 0.05, 1.0]):
         yield f"deviations_{tau}", lambda tau=tau: gmwm.deviations(x[:8000], 0.01, tau=tau)
     yield "modwt", lambda: [*gmwm.modwt(x[:500], "db2").detail, gmwm.modwt(x[:500], "db2").smooth]
-    yield (
-        "stream",
-        lambda: [plain(each.to_dict()) for each in gmwm.stream(mems()).variances.values()],
-    )
+    yield "stream", lambda: list(map(plain, gmwm.stream(mems()).variances.values()))
     yield "live", _live
 
 
@@ -385,16 +381,13 @@ def _live() -> Any:
 
 @part
 def diagnosis() -> Iterator[tuple[str, Callable[[], Any]]]:
-    yield "mems", lambda: command("health", mems(), "--json")
-    yield "faulty", lambda: command("health", faulty(), "--json")
-    yield "drive", lambda: command("health", drive() / "imu.csv", "--json")
+    files = {"mems": mems(), "faulty": faulty(), "drive": drive() / "imu.csv"}
+    for name, path in files.items():
+        yield name, partial(command, "health", path, "--json")
     yield "still", lambda: gmwm.find_still(gmwm.read(drive() / "imu.csv"))
     for number in ADIS_ROWS:
         if path := adis(number):
-            yield (
-                f"adis_{number}",
-                lambda path=path: command("health", path, *ADIS_OPTIONS, "--json"),
-            )
+            yield f"adis_{number}", partial(command, "health", path, *ADIS_OPTIONS, "--json")
 
 
 MODELS = {
@@ -429,30 +422,28 @@ def process() -> Iterator[tuple[str, Callable[[], Any]]]:
     tau, f = 0.1 * 2.0 ** np.arange(12), np.geomspace(1e-3, 5.0, 30)
     for name, model in MODELS.items():
         model = model if isinstance(model, gmwm.Model) else gmwm.Model((model,))
-        yield (
-            name,
-            lambda model=model: {
-                "params": model.params,
-                "keys": [each.key for each in model.parameters],
-                "terms": [each.to_dict() for each in model.terms],
-                "labels": model.term_labels(),
-                "haar": outcome(lambda: model.haar_variance(tau, 0.1)),
-                "db2": outcome(lambda: model.wavelet_variance(tau, 0.1, "db2")),
-                "psd": outcome(lambda: model.psd(f, 0.1)),
-                "autocovariance": outcome(lambda: model.autocovariance(np.arange(5), 0.1)),
-                "states": outcome(lambda: model.state_space(0.1)),
-                "drawn": outcome(lambda: model.simulate(500, 0.1, seed=2)),
-                "white": model.white_density(),
-                "drift": model.drift_rate(),
-                "lines": model.lines(),
-            },
-        )
+        yield name, partial(_laws, model, tau, f)
     for each in ("WhiteNoise", "GaussMarkov", "Resonance", "LowPassNoise", "ARMA", "Sinusoid"):
         for values in ((-1.0,), (0.0,), (float("nan"),), (1.0, -1.0), (1.0, 1.0, 1.0, 1.0)):
-            yield (
-                f"{each}{values}",
-                lambda each=each, values=values: str(getattr(gmwm, each)(*values)),
-            )
+            yield f"{each}{values}", lambda e=each, v=values: str(getattr(gmwm, e)(*v))
+
+
+def _laws(model: gmwm.Model, tau: np.ndarray, f: np.ndarray) -> dict[str, Any]:
+    return {
+        "params": model.params,
+        "keys": [each.key for each in model.parameters],
+        "terms": [each.to_dict() for each in model.terms],
+        "labels": model.term_labels(),
+        "haar": outcome(lambda: model.haar_variance(tau, 0.1)),
+        "db2": outcome(lambda: model.wavelet_variance(tau, 0.1, "db2")),
+        "psd": outcome(lambda: model.psd(f, 0.1)),
+        "autocovariance": outcome(lambda: model.autocovariance(np.arange(5), 0.1)),
+        "states": outcome(lambda: model.state_space(0.1)),
+        "drawn": outcome(lambda: model.simulate(500, 0.1, seed=2)),
+        "white": model.white_density(),
+        "drift": model.drift_rate(),
+        "lines": model.lines(),
+    }
 
 
 @part
@@ -463,22 +454,13 @@ def estimate() -> Iterator[tuple[str, Callable[[], Any]]]:
         wv = gmwm.wavelet_variance(series[name], 0.1)
         octave = gmwm.wavelet_variance(series[name], 0.1, data_covariance="octave")
         for weights in WEIGHTS:
-            yield (
-                f"{name}_{weights}",
-                lambda free=free, wv=wv, octave=octave, weights=weights: gmwm.fit(
-                    free, octave if weights == "data" else wv, weights=weights
-                ),
-            )
+            given = octave if weights == "data" else wv
+            yield f"{name}_{weights}", partial(gmwm.fit, free, given, weights=weights)
         for method in METHODS[1:]:
             if method == "em" and name not in ("N+K", "N+GM", "N+R"):
                 continue
             n = 1500 if method in ("mle", "em") else 6000
-            yield (
-                f"{name}_{method}",
-                lambda free=free, x=series[name][:n], method=method: gmwm.fit(
-                    free, x, 0.1, method=method
-                ),
-            )
+            yield f"{name}_{method}", partial(gmwm.fit, free, series[name][:n], 0.1, method=method)
     model = MODELS["N+K"]
     x = series["N+K"]
     halves = [gmwm.wavelet_variance(each, 0.1) for each in np.split(x, 2)]
@@ -486,15 +468,11 @@ def estimate() -> Iterator[tuple[str, Callable[[], Any]]]:
     yield "robust", lambda: gmwm.fit(model.opened(), gmwm.wavelet_variance(x, 0.1, robust=True))
     yield "fixed", lambda: gmwm.fit(WhiteNoise() + GaussMarkov(tau=5.0), series["N+GM"], 0.1)
     yield "bootstrap", lambda: gmwm.bootstrap(gmwm.fit(model.opened(), x, 0.1), 8, seed=1)
-    yield (
-        "test",
-        lambda: gmwm.bootstrap_test(
-            gmwm.fit(WhiteNoise(), x[:1000], 0.1), WhiteNoise() + RandomWalk(), 8
-        ),
-    )
+    white = gmwm.fit(WhiteNoise(), x[:1000], 0.1)
+    yield "test", lambda: gmwm.bootstrap_test(white, WhiteNoise() + RandomWalk(), 8)
     yield "parts", lambda: _parts_of(gmwm.fit(model.opened(), x, 0.1))
     for name in ("N+K", "N+GM", "N+2GM", "Q+N", "N+R", "lowpass", "N+B"):
-        yield f"cramer_rao_{name}", lambda name=name: gmwm.cramer_rao(MODELS[name], 2000, 0.1)
+        yield f"cramer_rao_{name}", partial(gmwm.cramer_rao, MODELS[name], 2000, 0.1)
 
 
 def _parts_of(fit: Any) -> Any:
@@ -513,44 +491,29 @@ def _parts_of(fit: Any) -> Any:
 def selection() -> Iterator[tuple[str, Callable[[], Any]]]:
     series = np.load(made("series.npz", _make_series))
     for name in ("N", "N+K", "N+2GM", "N+B", "Q+N", "N+R", "lowpass", "AR"):
-        yield name, lambda name=name: gmwm.select(series[name], 0.1)
+        yield name, partial(gmwm.select, series[name], 0.1)
     yield "validity", lambda: gmwm.select(series["N+GM"], 0.1, max_gauss_markov=2, rule="validity")
-    yield (
-        "extra",
-        lambda: gmwm.select(series["N+line"], 0.1, max_gauss_markov=1, extra=[Sinusoid()]),
-    )
+    line = {"max_gauss_markov": 1, "extra": [Sinusoid()]}
+    yield "extra", partial(gmwm.select, series["N+line"], 0.1, **line)
 
 
 @part
 def calibration_() -> Iterator[tuple[str, Callable[[], Any]]]:
     out = ("--jobs", 1, "--json", "-o", tempfile.mkdtemp())
-    yield "mems", lambda: command("calibrate", mems(), *out)
-    yield "faulty", lambda: command("calibrate", faulty(), *out)
-    yield (
-        "departures",
-        lambda: command(
-            "calibrate", faulty(), "--remove-departures", "--channels", "gyro_z,accel_z", *out
-        ),
-    )
-    yield "given", lambda: command("calibrate", mems(), "--model", "N + GM", *out)
-    yield (
-        "left",
-        lambda: command("calibrate", faulty(), "--leave", "all", "--channels", "gyro", *out),
-    )
-    yield (
-        "several",
-        lambda: command(
-            "calibrate", mems(), mems(2), "--model", "N + K", "--channels", "gyro_x,accel_x", *out
-        ),
-    )
-    yield "drive", lambda: command("calibrate", drive() / "imu.csv", "--channels", "gyro_x", *out)
+    for name, files, options in (
+        ("mems", [mems()], ""),
+        ("faulty", [faulty()], ""),
+        ("departures", [faulty()], "--remove-departures --channels gyro_z,accel_z"),
+        ("given", [mems()], "--model 'N + GM'"),
+        ("left", [faulty()], "--leave all --channels gyro"),
+        ("several", [mems(), mems(2)], "--model 'N + K' --channels gyro_x,accel_x"),
+        ("drive", [drive() / "imu.csv"], "--channels gyro_x"),
+    ):
+        yield name, partial(command, "calibrate", *files, *split(options), *out)
     for number, channels in {1: "gyro,accel", 3: "gyro_z,accel_y", 4: "gyro_x,accel_z"}.items():
         if path := adis(number):
-            more = (*ADIS_OPTIONS, "--channels", channels)
-            yield (
-                f"adis_{number}",
-                lambda path=path, more=more: command("calibrate", path, *more, *out),
-            )
+            more = (*ADIS_OPTIONS, "--channels", channels, *out)
+            yield f"adis_{number}", partial(command, "calibrate", path, *more)
     for name in calibrations():
         yield f"loaded_{name}", lambda name=name: _loaded(gmwm.load(calibration(name)))
 
@@ -568,70 +531,34 @@ def filter_numbers() -> Iterator[tuple[str, Callable[[], Any]]]:
             for kind in ("bound", "reduce"):
                 more = () if kind == "reduce" or "GM" not in form else ("--tau", 100)
                 given = (kind, path, "--form", form, *more, "--json")
-                yield f"{kind}_{form}_{name}", lambda given=given: command(*given)
-        yield (
-            f"keyframe_{name}",
-            lambda path=path: command("reduce", path, "--keyframe", 1, "--json"),
-        )
-        for kind, tau in {"bound": 50, "reduce": "shared"}.items():
-            yield (
-                f"{kind}_shared_{name}",
-                lambda kind=kind, path=path, tau=tau: command(
-                    kind,
-                    path,
-                    "--form",
-                    "N+GM",
-                    "--shared",
-                    "--tau",
-                    tau,
-                    "--gyro-bias",
-                    1e-3,
-                    "--accel-bias",
-                    1e-2,
-                    "--json",
-                ),
-            )
-        yield (
-            f"level_{name}",
-            lambda path=path: command("bound", path, "--level", 0.9, "--horizon", 10, "--json"),
-        )
-        certify = ("certify", path, "-N", "1e-4,2e-3", "-K", "1e-6,3e-5", "--json")
-        yield f"certify_{name}", lambda certify=certify: command(*certify)
-        yield (
-            f"imperfections_{name}",
-            lambda certify=certify: command(
-                *certify,
-                "--motion",
-                "car",
-                "--scale-error",
-                1,
-                "--misalignment",
-                0.2,
-                "--g-sensitivity",
-                0.01,
-                "--time-offset",
-                5,
-                "--keyframe",
-                0.5,
-            ),
-        )
+                yield f"{kind}_{form}_{name}", partial(command, *given)
+        shared = "--form N+GM --shared --gyro-bias 0.001 --accel-bias 0.01 --json --tau"
+        certify = ("certify", path, *split("-N 1e-4,2e-3 -K 1e-6,3e-5 --json"))
+        motion = "--motion car --scale-error 1 --misalignment 0.2 --g-sensitivity 0.01"
+        motion += " --time-offset 5 --keyframe 0.5"
+        for kind, given in {
+            "keyframe": ("reduce", path, "--keyframe", 1, "--json"),
+            "bound_shared": ("bound", path, *split(shared), 50),
+            "reduce_shared": ("reduce", path, *split(shared), "shared"),
+            "level": ("bound", path, *split("--level 0.9 --horizon 10 --json")),
+            "certify": certify,
+            "imperfections": (*certify, *split(motion)),
+            "unknown": ("budget", path, "--unknown-start"),
+        }.items():
+            yield f"{kind}_{name}", partial(command, *given)
         yield f"budget_{name}", lambda path=path: gmwm.error_budget(gmwm.load(path), dt=0.01)
-        yield f"unknown_{name}", lambda path=path: command("budget", path, "--unknown-start")
-        yield (
-            f"own_{name}",
-            lambda path=path: gmwm.certify(gmwm.load(path), gmwm.bound(gmwm.load(path))),
-        )
+        yield f"own_{name}", lambda path=path: _certified(gmwm.load(path))
     truth = WhiteNoise(1e-4) + GaussMarkov(2e-4, 5.0) + RandomWalk(2e-6)
     for form in ("N+K", "N+GM", "N+K+GM"):
-        yield (
-            f"model_bound_{form}",
-            lambda form=form: gmwm.bound(
-                truth, form, tau=None if form == "N+K" else 100.0, dt=0.01
-            ),
-        )
-        yield f"model_reduce_{form}", lambda form=form: gmwm.reduce(truth, form, dt=0.01)
+        tau = None if form == "N+K" else 100.0
+        yield f"model_bound_{form}", partial(gmwm.bound, truth, form, tau=tau, dt=0.01)
+        yield f"model_reduce_{form}", partial(gmwm.reduce, truth, form, dt=0.01)
     for name, model in MODELS.items():
-        yield f"model_{name}", lambda model=model: gmwm.bound(model, dt=0.1)
+        yield f"model_{name}", partial(gmwm.bound, model, dt=0.1)
+
+
+def _certified(found: Any) -> Any:
+    return gmwm.certify(found, gmwm.bound(found))
 
 
 STUDY = """\
@@ -675,33 +602,14 @@ def _analysis() -> Any:
 
 @part
 def ins_() -> Iterator[tuple[str, Callable[[], Any]]]:
-    log = (f"--imu={drive() / 'imu.csv'}", f"--gnss={drive() / 'fixes.csv'}")
+    log = ("navigate", f"--imu={drive() / 'imu.csv'}", f"--gnss={drive() / 'fixes.csv'}")
     out = ("--json", "-o", tempfile.mkdtemp())
     cal, other = (f"{calibration(f'mems_{k}')}" for k in (1, 2))
-    yield "own", lambda: command("navigate", *log, f"--sensors={cal}", *out)
-    yield (
-        "arm",
-        lambda: command(
-            "navigate",
-            *log,
-            f"--sensors={cal}",
-            "--lever-arm",
-            "1,0.3,-1",
-            "--gate",
-            1e-5,
-            "--zero-velocity",
-            "0.02 m/s",
-            "--heading",
-            30,
-            *out,
-        ),
-    )
-    yield (
-        "compared",
-        lambda: command(
-            "navigate", *log, f"--sensors=A={cal}", f"--sensors=B={other}", "--outages", 30, *out
-        ),
-    )
+    arm = split("--lever-arm 1,0.3,-1 --gate 1e-5 --zero-velocity '0.02 m/s' --heading 30")
+    models = (f"--sensors=A={cal}", f"--sensors=B={other}")
+    yield "own", partial(command, *log, f"--sensors={cal}", *out)
+    yield "arm", partial(command, *log, f"--sensors={cal}", *arm, *out)
+    yield "compared", partial(command, *log, *models, "--outages", 30, *out)
     yield "study", _validation
     yield "covariance", _analysis
     yield "reduce", lambda: _reduction(ins.reduce(_study().truth, "N+K", (10.0,)))
@@ -711,10 +619,8 @@ def ins_() -> Iterator[tuple[str, Callable[[], Any]]]:
     yield "emulate", lambda: ins.emulate(path)
     yield "integrate", lambda: ins.integrate(ins.emulate(path), path.state(0))
     yield "preintegrate", lambda: ins.preintegrate(ins.emulate(path), _study().truth)
-    yield (
-        "gnss",
-        lambda: ins.gnss(path, velocity_sd=0.1, lever_arm=(1.0, 0.0, 0.0), imu=ins.emulate(path)),
-    )
+    arm_of = {"lever_arm": (1.0, 0.0, 0.0), "imu": ins.emulate(path)}
+    yield "gnss", partial(ins.gnss, path, velocity_sd=0.1, **arm_of)
 
 
 def _reduction(found: Any) -> Any:
@@ -733,26 +639,12 @@ def population() -> Iterator[tuple[str, Callable[[], Any]]]:
         more = (calibration("mems_1"), calibration("adis_1"))
         yield "unequal", lambda: command("compare", *more, "--json", "-o", _new("compare.html"))
     lot = made("lot", _make_lot)
-    yield (
-        "fleet",
-        lambda: command(
-            "fleet",
-            str(lot / "*.csv"),
-            "--jobs",
-            1,
-            "--model",
-            "N + K",
-            "--json",
-            "-o",
-            _new("fleet"),
-        ),
-    )
-    yield (
-        "selected",
-        lambda: command(
-            "fleet", str(lot / "unit_[12].csv"), "--jobs", 1, "--json", "-o", _new("fleet")
-        ),
-    )
+    for name, files, more in (
+        ("fleet", lot / "*.csv", ("--model", "N + K")),
+        ("selected", lot / "unit_[12].csv", ()),
+    ):
+        given = ("fleet", files, "--jobs", 1, *more, "--json", "-o", _new("fleet"))
+        yield name, partial(command, *given)
 
 
 def _new(name: str) -> str:

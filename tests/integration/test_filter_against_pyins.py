@@ -30,7 +30,9 @@ with warnings.catch_warnings():
     pyins = pytest.importorskip("pyins")
     pd = pytest.importorskip("pandas")
 
-pytestmark = pytest.mark.filterwarnings("ignore")
+pytestmark = [
+    pytest.mark.filterwarnings("ignore"), pytest.mark.usefixtures("interpreted_pyins")
+]  # fmt: skip
 
 DT = 1.0 / 32.0  # sums of it are exact, so both filters cut their steps at the same epochs
 STEP = 8 * DT

@@ -11,6 +11,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from gmwm import WhiteNoise
+from marks import slow
 
 READING = ("--rate", "1", "--gyro-unit", "rad/s", "--model", "N", "--leave", "all", "--jobs", "1")
 
@@ -80,7 +81,7 @@ def test_it_refuses_in_one_sentence_and_writes_nothing(run, lot, tmp_path, argum
 
 
 @pytest.mark.skipif(not hasattr(signal, "SIGHUP"), reason="this system has no such signals")
-@pytest.mark.parametrize("name", ["SIGTERM", "SIGHUP"])
+@pytest.mark.parametrize("name", [slow("SIGTERM"), "SIGHUP"])
 def test_what_ends_a_fleet_leaves_nothing_and_is_said_in_the_status(tmp_path, name):
     number = getattr(signal, name)
     before = signal.signal(number, signal.SIG_DFL)  # nohup has it ignored, by what it starts too

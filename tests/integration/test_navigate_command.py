@@ -357,7 +357,7 @@ class _References(HTMLParser):
 
     def handle_starttag(self, tag, attrs):
         self.found += [
-            value for name, value in attrs if name in ("src", "href", "xlink:href", "hint")
+            value for name, value in attrs if name in ("src", "href", "xlink:href", "action")
         ]
 
 

@@ -94,7 +94,7 @@ STATIONARY = {
 @pytest.mark.parametrize("model", STATIONARY.values(), ids=STATIONARY)
 def test_stationary_noise_has_departures_in_one_of_a_hundred_records_at_most(model):
     """And a fit is not valid for one in one of 200 records (`python benchmarks/departures.py`)."""
-    runs = 20
+    runs = 8
     free = fitted(noise(0), WhiteNoise() + RandomWalk())
     records = [noise(100 + seed, model) for seed in range(runs)]
     found = [x for x in records if departures(free, gmwm.wavelet_variance(x, dt=DT))]
@@ -361,7 +361,7 @@ def test_how_many_times_a_step_enlarges_the_deviation_is_judged_by_the_model(see
 def test_the_noise_that_an_estimated_step_takes_is_given_back():
     """Without that, the coarsest levels of white noise come out too small."""
     ratios = []
-    for seed in range(12):
+    for seed in range(8):
         x = noise(500 + seed, WHITE) + SAMPLE * (TIME > 2000.0) - SAMPLE * (TIME > 5000.0)
         fit = gmwm.calibrate(recording(x), WhiteNoise(), screening=(), remove_departures=True)
         wv = fit["gyro_x"].wv

@@ -21,7 +21,7 @@ def of_kind(record, x, kind):
 
 
 def test_white_noise_does_not_drift(record):
-    runs = 100
+    runs = 50
     count = sum(bool(of_kind(record, white(10_000, seed), "drift")) for seed in range(runs))
     assert count <= binom.isf(1e-6, runs, FALSE_ALARM)
 
@@ -55,7 +55,7 @@ def test_size_of_the_wander(record):
 
 @pytest.mark.parametrize("model", [WhiteNoise(0.1), slow(RandomWalk(1.0))])
 def test_noise_of_one_size_does_not_change(record, model):
-    runs = 100
+    runs = 50
     count = 0
     for seed in range(runs):
         x = gmwm.simulate(model, n=6000, dt=DT, seed=seed)

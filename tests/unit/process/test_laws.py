@@ -43,18 +43,18 @@ def test_every_built_in_process_has_examples():
     assert [kind.__name__ for kind in CATALOGUE if not kind.examples()] == []
 
 
-@pytest.mark.parametrize("dt", [1.0, 0.01])
 @pytest.mark.parametrize("process", EXAMPLES, ids=name)
-def test_closed_form_equals_spectral_integral(process, dt):
+def test_closed_form_equals_spectral_integral(process):
     if isinstance(process, gmwm.RateRamp):
         pytest.skip("a ramp is deterministic: it has no spectrum")
-    tau = LEVELS * dt
-    integral = haar_variance(process.psd, tau, dt)
-    for frequency, amplitude in process.lines():
-        alias = abs(frequency * dt - np.rint(frequency * dt))
-        gain = np.array([haar_gain(m, np.array([alias]))[0] for m in LEVELS])
-        integral = integral + 0.5 * amplitude**2 * gain
-    np.testing.assert_allclose(process.haar_variance(tau, dt), integral, rtol=1e-9)
+    for dt in (1.0, 0.01):
+        tau = LEVELS * dt
+        integral = haar_variance(process.psd, tau, dt)
+        for frequency, amplitude in process.lines():
+            alias = abs(frequency * dt - np.rint(frequency * dt))
+            gain = np.array([haar_gain(m, np.array([alias]))[0] for m in LEVELS])
+            integral = integral + 0.5 * amplitude**2 * gain
+        np.testing.assert_allclose(process.haar_variance(tau, dt), integral, rtol=1e-9)
 
 
 @pytest.mark.parametrize("process", EXAMPLES, ids=name)
@@ -284,7 +284,6 @@ def test_simulation_repeats_with_the_seed_and_starts_stationary():
     assert np.std(first) == pytest.approx(2.0, rel=4.0 / np.sqrt(2 * 2000))
 
 
-@pytest.mark.parametrize("n", [1, 2, 3])
 @pytest.mark.parametrize("process", EXAMPLES, ids=name)
-def test_the_shortest_simulations(process, n):
-    assert process.simulate(n, 1.0, 0).shape == (n,)
+def test_the_shortest_simulations(process):
+    assert [process.simulate(n, 1.0, 0).size for n in (1, 2, 3)] == [1, 2, 3]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gzip
 from collections.abc import Callable
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -45,3 +46,17 @@ def write(tmp_path: Path) -> Writer:
         return path
 
     return _write
+
+
+# These tests write files with the libraries of the extras, which `.[test]` installs. Where the
+# lowest versions are tested, the extras are absent.
+collect_ignore = [
+    file
+    for file, modules in {
+        "logs/test_damaged_logs.py": ("pyulog",),
+        "logs/test_read_rosbag.py": ("rosbags",),
+        "formats/test_read_frames.py": ("rosbags", "h5py", "polars"),
+        "logs/test_read_flight_logs.py": ("rosbags", "pyulog", "pymavlink"),
+    }.items()
+    if not all(map(find_spec, modules))
+]

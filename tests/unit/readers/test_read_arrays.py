@@ -9,21 +9,9 @@ from gmwm.errors import InputError
 from gmwm.readers import read
 from gmwm.readers.formats.arrays import Array, ArrayTable
 from gmwm.readers.names import CANONICAL
+from reading import SI, assert_holds, texts
 
-
-def texts(recording):
-    """What the reader noticed."""
-    return tuple(map(str, recording.notices))
-
-
-SI = {"gyro": "rad/s", "accel": "m/s^2"}
 TIME = 0.01 * np.arange(80)
-
-
-def assert_holds(recording, samples, names=CANONICAL):
-    assert recording.names == tuple(names)
-    for channel, column in zip(recording.values(), samples.T, strict=True):
-        np.testing.assert_array_equal(channel.values, column)
 
 
 @pytest.fixture

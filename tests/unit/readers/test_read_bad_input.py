@@ -11,8 +11,8 @@ import pytest
 from gmwm.errors import InputError
 from gmwm.readers import read
 from gmwm.readers.names import CANONICAL
+from reading import SI
 
-SI = {"gyro": "rad/s", "accel": "m/s^2"}
 HEADER = ",".join(CANONICAL)
 
 
@@ -74,29 +74,27 @@ def test_unreadable(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("data", [b"", b"\n", b" \r\n\t\n", b"\xef\xbb\xbf"])
-@pytest.mark.parametrize("name", ["a.csv", "a.csv.gz"])
-def test_empty(tmp_path, data, name):
+def test_empty(tmp_path, data):
+    (tmp_path / "a.csv").write_bytes(data)
+    assert problem(tmp_path / "a.csv") == "a.csv is empty: give a file with samples"
+    for content in (gzip.compress(data), b""):
+        (tmp_path / "a.csv.gz").write_bytes(content)
+        assert problem(tmp_path / "a.csv.gz") == "a.csv.gz is empty: give a file with samples"
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "words"),
+    [
+        ("a.csv", "# a\n% b\n", "holds only comments"),
+        ("a.csv", HEADER + "\n\n", "a.csv has a header (line 1) but no data: add samples"),
+        ("a.py", "import this\n\nprint('hello')\n", "a.py holds no numbers in its first lines"),
+        ("a.json", "{\n}\n", "NPY and NPZ"),
+    ],
+)
+def test_text_that_is_no_table(tmp_path, name, text, words):
     path = tmp_path / name
-    path.write_bytes(gzip.compress(data) if name.endswith("gz") else data)
-    assert problem(path) == f"{name} is empty: give a file with samples"
-
-
-def test_zero_bytes_called_gz(tmp_path):
-    path = tmp_path / "a.csv.gz"
-    path.touch()
-    assert problem(path) == "a.csv.gz is empty: give a file with samples"
-
-
-def test_comments_only(tmp_path):
-    path = tmp_path / "a.csv"
-    path.write_text("# a\n% b\n")
-    assert "holds only comments" in problem(path)
-
-
-def test_header_only(tmp_path):
-    path = tmp_path / "a.csv"
-    path.write_text(HEADER + "\n\n")
-    assert problem(path) == "a.csv has a header (line 1) but no data: add samples"
+    path.write_text(text)
+    assert words in problem(path)
 
 
 @pytest.mark.parametrize(
@@ -123,13 +121,25 @@ def test_text_without_header(write, samples):
     assert "line 81, column 2 (counted from 0): 'oops' is not a number" in problem(path)
 
 
-def test_text_in_the_first_line_is_no_header(damaged):
-    path = damaged(1, "1,2,oops,4,5,6")
-    assert "static.csv, line 1, column 2 (counted from 0): 'oops'" in problem(path)
-
-
-def test_comment_among_the_data(damaged):
-    assert "line 30: 1 fields where 6 were expected" in problem(damaged(30, "# pause"))
+@pytest.mark.parametrize(
+    ("number", "line", "words"),
+    [
+        (1, "1,2,oops,4,5,6", "static.csv, line 1, column 2 (counted from 0): 'oops'"),
+        (81, "1,2,oops,4,5,6", "line 81, column 'gyro_z': 'oops' is not a number"),
+        *((12, f"1,{cell},3,4,5,6", f"column 'gyro_y': '{cell}' is not a number")
+          for cell in ("nan(1)", "nan1", "missing", "-", "?", "1.#IND")),
+        (30, "# pause", "line 30: 1 fields where 6 were expected"),
+        (33, "1,2,3,4,5", "static.csv, line 33: 5 fields where 6 were expected: correct the line"),
+        (33, "1,2,3,4,5,6,7", "line 33: 7 fields where 6 were expected"),
+        (33, "1,2,3,4,5,6,,", "line 33: 8 fields where 6 were expected"),
+        (1, "gyro_x,gyro_y", "line 2 and after: 6 fields where the header (line 1) has 2"),
+        (1, f"{HEADER},temp", "line 2 and after: 6 fields where the header (line 1) has 7"),
+        (8, '1,2,"3,4,5,6', "line 8: quotes that do not match"),
+        (1, '"a,b,c,d,e,f', "line 1: quotes that do not match"),
+    ],
+)  # fmt: skip
+def test_a_line_that_cannot_be_used(damaged, number, line, words):
+    assert words in problem(damaged(number, line))
 
 
 @pytest.mark.parametrize("cell", ["inf", "-Infinity", "+INF", "1e999", "-1e200"])
@@ -140,10 +150,6 @@ def test_not_finite(damaged, cell):
     assert "empty the field if the sample is missing" in message
 
 
-def test_one_that_is_not_finite(damaged):
-    assert "more such" not in problem(damaged(12, "1,inf,3,4,nan,6"))
-
-
 def test_what_is_infinite_is_counted_over_all_blocks(damaged, monkeypatch):
     from gmwm.readers.text import csv_table
 
@@ -152,11 +158,7 @@ def test_what_is_infinite_is_counted_over_all_blocks(damaged, monkeypatch):
     path.write_text(path.read_text() + "1,2,,4,5,1e200\n" * 3)
     assert "line 12, column 'gyro_y'" in problem(path)
     assert "and 4 more such" in problem(path)
-
-
-@pytest.mark.parametrize("cell", ["nan(1)", "nan1", "missing", "-", "?", "1.#IND"])
-def test_words_that_are_not_known_for_missing_are_text(damaged, cell):
-    assert f"column 'gyro_y': '{cell}' is not a number" in problem(damaged(12, f"1,{cell},3,4,5,6"))
+    assert "more such" not in problem(damaged(12, "1,inf,3,4,nan,6"))
 
 
 def test_too_few_samples_are_there(write, samples):
@@ -164,14 +166,6 @@ def test_too_few_samples_are_there(write, samples):
     lines = path.read_text().split("\n")
     path.write_text("\n".join(lines[:64] + [",,,,,"] * 100))
     assert "static.csv has 63 samples of any channel where at least 64" in problem(path)
-
-
-@pytest.mark.parametrize(
-    ("line", "found"), [("1,2,3,4,5", 5), ("1,2,3,4,5,6,7", 7), ("1;2", 1), ("1,2,3,4,5,6,,", 8)]
-)
-def test_ragged(damaged, line, found):
-    message = problem(damaged(33, line))
-    assert f"static.csv, line 33: {found} fields where 6 were expected: correct the line" in message
 
 
 @pytest.mark.parametrize("line", ["1 2 3 4 5", "1\t2 3 4  5 6 7"])
@@ -185,17 +179,6 @@ def test_first_line_is_the_ragged_one(write, samples):
     path = write(samples)
     path.write_text("1,2,3\n" + path.read_text())
     assert "static.csv, line 1: 3 fields where 6 were expected" in problem(path)
-
-
-@pytest.mark.parametrize("header", ["gyro_x,gyro_y", HEADER + ",temp"])
-def test_header_of_another_width(write, samples, header):
-    message = problem(write(samples, header))
-    assert "line 2 and after: 6 fields where the header (line 1) has" in message
-
-
-def test_quotes_that_do_not_match(damaged):
-    assert "line 8: quotes that do not match" in problem(damaged(8, '1,2,"3,4,5,6'))
-    assert "line 1: quotes that do not match" in problem(damaged(1, '"a,b,c,d,e,f'))
 
 
 def test_too_few_samples(write, samples):
@@ -215,46 +198,45 @@ def test_unit_missing(write, samples, option, quantity):
     assert caught.value.code == f"{quantity}-unit-missing"
 
 
-def test_unit_of_another_name_missing(write, samples):
-    message = problem(write(samples), channels={"table": 0}, units={})
-    assert 'does not give the unit of table: give it, e.g. units={"table": "deg/s"}' in message
+@pytest.mark.parametrize(
+    ("header", "options", "words"),
+    [
+        (None, {"channels": {"table": 0}, "units": {}}, 'units={"table": "deg/s"}'),
+        *((HEADER, {"units": SI | {"gyro": unit}}, f"static.csv, channel gyro_x: un{kind}")
+          for unit, kind in {"furlong": "known unit 'furlong'", "": "", "deg/": "", "9 9": "",
+                             "LSB": "", "m": "it 'm' does not measure"}.items()),
+        (HEADER, {"units": SI | {"gyro": "g"}},
+         "channel gyro_x: unit 'g' does not measure the same as rad/s"),
+        (HEADER.replace("gyro_x", "gyro_x [g]"), {"units": {}},
+         "channel gyro_x: unit 'g' does not measure"),
+        (HEADER, {"units": SI | {"gyros": "deg/s"}},
+         "units has 'gyros', which is neither gyro nor accel nor a channel"),
+        (HEADER, {"rate": None}, "static.csv has no time column and no rate was given"),
+        (HEADER, {"rate": None}, "rate=100"),
+        *((HEADER, {"rate": rate}, "give a positive sampling rate in Hz")
+          for rate in (0, -5.0, float("nan"), float("inf"), 1e-320)),
+        ("a,b,c,d,e,f", {}, "its columns are 'a', 'b', 'c', 'd', 'e', 'f'"),
+        ("a,b,c,d,e,f", {}, "channels={"),
+        ("gx,gyro_x,gy,gz,ax,ay", {}, "columns 'gx' and 'gyro_x' may both be gyro_x"),
+        ("gx,gyro_x,gy,gz,ax,ay", {}, 'channels={"gyro_x": 0}'),
+        ("gx,gx,gy,gz,ax,ay", {"channels": {"gyro_x": "gx"}},
+         "2 columns 'gx': give the index of the one for gyro_x"),
+        *(("a,b,c,d,e,f", option, "static.csv has no column")
+          for column in ("gz", "", "-1", "6", 6, -1)
+          for option in ({"channels": {"gyro_x": column}}, {"time": column})),
+        *((None, {"channels": {"gyro_x": column}},
+           f"gyro_x = {column!r} is not a column: give its name or its index")
+          for column in (True, None, 1.0, ["a"])),
+        (None, {"channels": {}}, "channels names no channel"),
+        (None, {"time": True}, "time = True is not a column"),
+    ],
+)  # fmt: skip
+def test_names_and_options_that_cannot_be_used(write, samples, header, options, words):
+    assert words in problem(write(samples, header), **options)
 
 
-@pytest.mark.parametrize("unit", ["furlong", "", "deg/", "9 9", "LSB", "m"])
-def test_unit_unknown(write, samples, unit):
-    message = problem(write(samples, HEADER), units=SI | {"gyro": unit})
-    assert message.startswith("static.csv, channel gyro_x: un")
-    assert repr(unit) in message
-
-
-def test_unit_of_the_other_sensor(write, samples):
-    message = problem(write(samples, HEADER), units=SI | {"gyro": "g"})
-    assert "channel gyro_x: unit 'g' does not measure the same as rad/s" in message
-    message = problem(write(samples[:, :1], "gyro_x [g]"), units={})
-    assert "channel gyro_x: unit 'g' does not measure" in message
-
-
-def test_units_of_nothing(write, samples):
-    message = problem(write(samples, HEADER), units=SI | {"gyros": "deg/s"})
-    assert "units has 'gyros', which is neither gyro nor accel nor a channel" in message
-    assert "gyro_x, gyro_y" in message
-
-
-def test_rate_missing(write, samples):
-    message = problem(write(samples, HEADER), rate=None)
-    assert "static.csv has no time column and no rate was given" in message
-    assert "rate=100" in message
-
-
-@pytest.mark.parametrize("rate", [0, -5.0, float("nan"), float("inf"), 1e-320])
-def test_rate_not_positive(write, samples, rate):
-    assert "give a positive sampling rate in Hz" in problem(write(samples, HEADER), rate=rate)
-
-
-def test_names_that_mean_nothing(write, samples):
-    message = problem(write(samples, "a,b,c,d,e,f"))
-    assert "its columns are 'a', 'b', 'c', 'd', 'e', 'f'" in message
-    assert "channels={" in message
+def test_equal_names_that_nobody_asks_for_do_no_harm(write, samples):
+    assert len(read(write(samples, "t2,t2,gy,gz,ax,ay"), rate=1, units=SI)) == 4
 
 
 def test_many_names(write, samples):
@@ -263,51 +245,14 @@ def test_many_names(write, samples):
     assert "'c11' and 18 more" in message
 
 
-@pytest.mark.parametrize("width", [2, 5, 8])
-def test_number_of_columns_without_names(write, samples, width):
-    message = problem(write(np.tile(samples, 2)[:, :width]))
-    assert f"static.csv has {width} columns without names" in message
-    assert "channels={" in message
-
-
 @pytest.mark.parametrize("units", [{}, SI])
-@pytest.mark.parametrize("width", [1, 3, 4])
-def test_one_sensor_but_which(write, samples, width, units):
-    message = problem(write(samples[:, :width]), units=units)
-    assert "whether this is a gyro or an accelerometer" in message
+@pytest.mark.parametrize("width", [1, 2, 3, 4, 5, 8])
+def test_number_of_columns_without_names(write, samples, width, units):
+    message = problem(write(np.tile(samples, 2)[:, :width]), units=units)
+    one_sensor = "whether this is a gyro or an accelerometer"
+    many = f"static.csv has {width} columns without names"
+    assert (one_sensor if width in (1, 3, 4) else many) in message
     assert "channels={" in message
-
-
-def test_two_columns_of_one_meaning(write, samples):
-    message = problem(write(samples, "gx,gyro_x,gy,gz,ax,ay"))
-    assert "columns 'gx' and 'gyro_x' may both be gyro_x" in message
-    assert 'channels={"gyro_x": 0}' in message
-    message = problem(write(samples, "gx,gx,gy,gz,ax,ay"), channels={"gyro_x": "gx"})
-    assert "2 columns 'gx': give the index of the one for gyro_x" in message
-    # Where nobody asks for them, equal names do no harm.
-    assert len(read(write(samples, "t2,t2,gy,gz,ax,ay"), rate=1, units=SI)) == 4
-
-
-@pytest.mark.parametrize("reference", ["gz", "", "-1", "6", 6, -1])
-@pytest.mark.parametrize("option", ["channels", "time"])
-def test_no_such_column(write, samples, option, reference):
-    path = write(samples, "a,b,c,d,e,f")
-    value = {"gyro_x": reference} if option == "channels" else reference
-    assert "static.csv has no column" in problem(path, **{option: value})
-
-
-@pytest.mark.parametrize("reference", [True, None, 1.0, ["a"]])
-def test_no_column_at_all(write, samples, reference):
-    message = problem(write(samples), channels={"gyro_x": reference})
-    assert f"gyro_x = {reference!r} is not a column: give its name or its index" in message
-
-
-def test_no_channels(write, samples):
-    assert "channels names no channel" in problem(write(samples), channels={})
-
-
-def test_time_true(write, samples):
-    assert "time = True is not a column" in problem(write(samples), time=True)
 
 
 def test_not_gzip(write, samples):
@@ -372,15 +317,6 @@ def test_binary(tmp_path, name):
     message = problem(path)
     assert message.startswith(f"{name} is not a text file")
     assert "CSV and other delimited text (plain or .gz), NPY and NPZ" in message
-
-
-@pytest.mark.parametrize("name", ["a.py", "a.md", "a.json"])
-def test_text_that_is_no_table(tmp_path, name):
-    path = tmp_path / name
-    path.write_text("import this\n\nprint('hello')\n")
-    message = problem(path)
-    assert message.startswith(f"{name} holds no numbers in its first lines")
-    assert "NPY and NPZ" in message
 
 
 @pytest.mark.parametrize("encoding", ["utf-16", "utf-16-le", "utf-32"])

@@ -8,12 +8,7 @@ import pytest
 from gmwm.errors import InputError
 from gmwm.readers import read
 from gmwm.readers.grid import find_change
-
-
-def texts(recording):
-    """What the reader noticed."""
-    return tuple(map(str, recording.notices))
-
+from reading import texts
 
 UNITS = {"gyro": "rad/s"}
 
@@ -279,11 +274,10 @@ def test_line_counts_blank_lines_and_comments(timed):
 
 @pytest.mark.parametrize("step", [1e-310, 1e-200, 1e130])
 @pytest.mark.parametrize("name", ["time_ns", "time_s", "t"])
-@pytest.mark.parametrize("rate", [None, 100.0, 1e300])
-def test_absurd_steps(timed, step, name, rate):
-    with pytest.raises(InputError) as caught:
-        read(timed(step * np.arange(80), name), rate=rate, units=UNITS)
-    assert "static.csv, column" in str(caught.value)
+def test_absurd_steps(timed, step, name):
+    for rate in (None, 100.0, 1e300):
+        with pytest.raises(InputError, match=r"static\.csv, column"):
+            read(timed(step * np.arange(80), name), rate=rate, units=UNITS)
 
 
 def test_time_by_name_index_or_not_at_all(write, samples):

@@ -11,9 +11,9 @@ from gmwm.errors import InputError
 from gmwm.readers import read
 from gmwm.readers.clock import is_time_of_day
 from gmwm.readers.names import CANONICAL
+from reading import SI
 
 N = 100
-SI = {"gyro": "rad/s", "accel": "m/s^2"}
 
 
 @pytest.fixture

@@ -13,14 +13,8 @@ from gmwm.readers import read
 from gmwm.readers.grid import find_jumps
 from gmwm.readers.names import CANONICAL
 from gmwm.readers.text import csv_table
+from reading import SI, texts
 
-
-def texts(recording):
-    """What the reader noticed."""
-    return tuple(map(str, recording.notices))
-
-
-SI = {"gyro": "rad/s", "accel": "m/s^2"}
 GYRO = {"gyro": "rad/s"}
 N = 400
 

@@ -24,82 +24,64 @@ NEITHER = """qx qw orientation.x mag_x x y z w a g flag index seq max
     ("sensor", "pattern"),
     [*(("gyro", p) for p in GYRO.split()), *(("accel", p) for p in ACCEL.split())],
 )
-@pytest.mark.parametrize("axis", ["x", "y", "z"])
-def test_channel(sensor, pattern, axis):
-    name = pattern.format(axis)
-    assert meaning(name).role == f"{sensor}_{axis}"
-    assert meaning(name.upper()).role == f"{sensor}_{axis}"
+def test_channel(sensor, pattern):
+    for axis in "xyz":
+        name = pattern.format(axis)
+        assert meaning(name).role == meaning(name.upper()).role == f"{sensor}_{axis}"
 
 
-@pytest.mark.parametrize("name", ["GyroX", "GyrX", "Gyroscope_X", "Gyro X", "AngularVelocityX"])
-def test_humps(name):
-    assert meaning(name).role == "gyro_x"
+def test_humps():
+    names = ("GyroX", "GyrX", "Gyroscope_X", "Gyro X", "AngularVelocityX")
+    assert {meaning(name).role for name in names} == {"gyro_x"}
 
 
-@pytest.mark.parametrize("index", [0, 1, 2])
-def test_px4(index):
-    assert meaning(f"gyro_rad[{index}]").role == f"gyro_{'xyz'[index]}"
-    assert meaning(f"gyro_rad[{index}]").unit == "rad/s"
-    assert meaning(f"accelerometer_m_s2[{index}]").role == f"accel_{'xyz'[index]}"
-    assert meaning(f"accelerometer_m_s2[{index}]").unit == "m/s^2"
+def test_px4():
+    for index, axis in enumerate("xyz"):
+        gyro, accel = meaning(f"gyro_rad[{index}]"), meaning(f"accelerometer_m_s2[{index}]")
+        assert (gyro.role, gyro.unit) == (f"gyro_{axis}", "rad/s")
+        assert (accel.role, accel.unit) == (f"accel_{axis}", "m/s^2")
 
 
-@pytest.mark.parametrize("name", [*NEITHER.split(), "", "second [g]", "t [m]", "é", "gyro [x]"])
-def test_anything_else(name):
-    assert meaning(name).role is None
+def test_anything_else():
+    names = [*NEITHER.split(), "", "second [g]", "t [m]", "é", "gyro [x]"]
+    assert [name for name in names if meaning(name).role is not None] == []
 
 
-@pytest.mark.parametrize(
-    ("name", "seconds"),
-    [
-        *[(name, None) for name in ("time", "t", "TIMESTAMP", "stamp", "time_stamp", "TimeStamp")],
-        *[(name, None) for name in ("header.stamp", "Time (UTC)", "%time", "unix time", "ts")],
-        *[(name, 1.0) for name in ("time_s", "sec", "time [s]", "t (sec)", "Time_Sec", "seconds")],
-        *[(name, 1e-3) for name in ("ms", "time_ms", "t [ms]", "millis", "timestamp_msec")],
-        *[(name, 1e-6) for name in ("TimeUS", "timestamp_us", "time [µs]", "time(μs)", "micros")],
-        *[(name, 1e-9) for name in ("#timestamp [ns]", "time_ns", "t_nsec", "timens")],
-        *[(name, 60.0) for name in ("time [min]", "time_minutes")],
-        *[(name, 3600.0) for name in ("time [h]", "time_hours")],
-        *[(name, 86400.0) for name in ("time [days]", "time_days")],
-        ("SampleTimeFine", 1e-4),
-        ("time_ms [s]", 1.0),
-    ],
-)
-def test_time(name, seconds):
-    assert meaning(name).role == "time"
-    assert meaning(name).seconds == seconds
+TIMES = {
+    None: ("time", "t", "TIMESTAMP", "stamp", "time_stamp", "TimeStamp", "header.stamp",
+           "Time (UTC)", "%time", "unix time", "ts"),
+    1.0: ("time_s", "sec", "time [s]", "t (sec)", "Time_Sec", "seconds", "time_ms [s]"),
+    1e-3: ("ms", "time_ms", "t [ms]", "millis", "timestamp_msec"),
+    1e-6: ("TimeUS", "timestamp_us", "time [µs]", "time(μs)", "micros"),
+    1e-9: ("#timestamp [ns]", "time_ns", "t_nsec", "timens"),
+    60.0: ("time [min]", "time_minutes"),
+    3600.0: ("time [h]", "time_hours"),
+    86400.0: ("time [days]", "time_days"),
+    1e-4: ("SampleTimeFine",),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("seconds", TIMES)
+def test_time(seconds):
+    for name in TIMES[seconds]:
+        assert (meaning(name).role, meaning(name).seconds) == ("time", seconds), name
+
+
+# A header is not a place for arithmetic.
+NO_UNITS = ("ax", "ax [counts]", "ax [LSB]", "ax [m]", "ax []", "ax [9**9**9]", "ax [s^9^9^9]",
+            "ax [s^3^3^3^3^3]", "ax [m/s^2 * 9999999]", "ax [" + "m/" * 500 + "s]")  # fmt: skip
 
 
 @pytest.mark.parametrize(
     ("name", "unit"),
     [
-        ("gyro_x [deg/s]", "deg/s"),
-        ("gyro_x (rad s^-1)", "rad s^-1"),
-        ("gyro_x (rad s-1)", "rad s^-1"),
-        ("gyro_x_dps", "deg/s"),
-        ("gyro_dps_x", "deg/s"),
-        ("gyro_x_dps [rad/s]", "rad/s"),
-        ("omega_x_deg_per_s", "deg/s"),
-        ("gx [°/s]", "deg/s"),
-        ("ax [G]", "g"),
-        ("ax [µg]", "ug"),
-        ("ax [m/s²]", "m/s^2"),
-        ("ax [m/s/s]", "m/s/s"),
-        ("ax [m·s^-2]", "m·s^-2"),
-        ("level [mg]", "mg"),
-        ("ax", None),
-        ("ax [counts]", None),
-        ("ax [LSB]", None),
-        ("ax [m]", None),
-        ("ax []", None),
-        # A header is not a place for arithmetic.
-        ("ax [9**9**9]", None),
-        ("ax [s^9^9^9]", None),
-        ("ax [s^3^3^3^3^3]", None),
-        ("ax [m/s^2 * 9999999]", None),
-        ("ax [" + "m/" * 500 + "s]", None),
+        ("gyro_x [deg/s]", "deg/s"), ("gyro_x (rad s^-1)", "rad s^-1"),
+        ("gyro_x (rad s-1)", "rad s^-1"), ("gyro_x_dps", "deg/s"), ("gyro_dps_x", "deg/s"),
+        ("gyro_x_dps [rad/s]", "rad/s"), ("omega_x_deg_per_s", "deg/s"), ("gx [°/s]", "deg/s"),
+        ("ax [G]", "g"), ("ax [µg]", "ug"), ("ax [m/s²]", "m/s^2"), ("ax [m/s/s]", "m/s/s"),
+        ("ax [m·s^-2]", "m·s^-2"), ("level [mg]", "mg"), *((name, None) for name in NO_UNITS),
     ],
-)
+)  # fmt: skip
 def test_unit(name, unit):
     assert meaning(name).unit == unit
 

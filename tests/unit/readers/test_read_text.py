@@ -15,87 +15,53 @@ from gmwm.readers import read
 from gmwm.readers.names import CANONICAL
 from gmwm.readers.text import csv_table
 from places import SHARED
+from reading import SI, assert_holds, texts
 
-
-def texts(recording):
-    """What the reader noticed."""
-    return tuple(map(str, recording.notices))
-
-
-SI = {"gyro": "rad/s", "accel": "m/s^2"}
 HEADER = ",".join(CANONICAL)
 
 
-def assert_holds(recording, samples, names=CANONICAL):
-    assert recording.names == tuple(names)
-    for channel, column in zip(recording.values(), samples.T, strict=True):
-        np.testing.assert_array_equal(channel.values, column)
+@pytest.mark.parametrize("with_header", [True, False])
+@pytest.mark.parametrize("delimiter", [",", ";", "\t", " ", "   ", " \t ", ", ", " ; "], ids=repr)
+def test_every_delimiter(write, samples, delimiter, with_header):
+    header = delimiter.join(CANONICAL) if with_header else None
+    for name in ("a.csv", "a.txt", "a.dat", "a.csv.gz", "a"):
+        recording = read(write(samples, header, name=name, delimiter=delimiter), rate=50, units=SI)
+        assert_holds(recording, samples)
+        assert recording.rate == pytest.approx(50)
+        assert recording.source == name
+        assert texts(recording) == ()
 
 
-@pytest.mark.parametrize("name", ["a.csv", "a.txt", "a.dat", "a.csv.gz", "a"])
+LINE_ENDS = [
+    {"end": end, "last": last, "after": after}
+    for end in ("\n", "\r\n", "\r") for last in ("", ",")
+    for after in ("", "\n\n", "\r\n   \r\n\t\n")
+]  # fmt: skip
+
+
 @pytest.mark.parametrize("with_header", [True, False])
 @pytest.mark.parametrize(
-    "delimiter", [",", ";", "\t", " ", "   ", " \t ", ", ", " ; "], ids=lambda d: repr(d)
+    "form",
+    [
+        *({"delimiter": delimiter, "decimal": ","} for delimiter in (";", "\t", "  ")),
+        *LINE_ENDS,
+        {"end": "\n\n"},
+        {"before": "\ufeff"},
+        {"before": "# IMU 7, bench\n% 2024-05-01, 20 degrees\n\n#\n"},
+    ],
+    ids=repr,
 )
-def test_every_delimiter(write, samples, delimiter, with_header, name):
-    header = delimiter.join(CANONICAL) if with_header else None
-    path = write(samples, header, name=name, delimiter=delimiter)
-    recording = read(path, rate=50, units=SI)
-    assert_holds(recording, samples)
-    assert recording.rate == pytest.approx(50)
-    assert recording.source == name
-    assert texts(recording) == ()
+def test_every_form(write, samples, form, with_header):
+    header = form.get("delimiter", ",").join(CANONICAL) if with_header else None
+    assert_holds(read(write(samples, header, **form), rate=50, units=SI), samples)
 
 
-@pytest.mark.parametrize("delimiter", [";", "\t", "  "])
-@pytest.mark.parametrize("with_header", [True, False])
-def test_decimal_comma(write, samples, delimiter, with_header):
-    header = delimiter.join(CANONICAL) if with_header else None
-    path = write(samples, header, delimiter=delimiter, decimal=",")
-    assert_holds(read(path, rate=50, units=SI), samples)
-
-
-@pytest.mark.parametrize("with_header", [True, False])
-@pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])
 @pytest.mark.parametrize("last", ["", ","])
-@pytest.mark.parametrize("after", ["", "\n\n", "\r\n   \r\n\t\n"])
-def test_line_ends(write, samples, end, last, after, with_header):
-    path = write(samples, HEADER if with_header else None, end=end, last=last, after=after)
+def test_delimiter_at_the_end_of_some_lines(write, samples, last):
+    path = write(samples, f"{HEADER},", last=last)
     assert_holds(read(path, rate=50, units=SI), samples)
-
-
-@pytest.mark.parametrize(
-    "header", [HEADER, HEADER + ","], ids=["names only", "delimiter after the names too"]
-)
-@pytest.mark.parametrize("last", ["", ","])
-def test_delimiter_at_the_end_of_some_lines(write, samples, header, last):
-    path = write(samples, header, last=last)
-    assert_holds(read(path, rate=50, units=SI), samples)
-
-
-def test_last_line_may_lack_its_delimiter(write, samples):
-    path = write(samples, HEADER, last=",")
+    path = write(samples, HEADER, last=last)
     path.write_text(path.read_text().rstrip().rstrip(","))
-    assert_holds(read(path, rate=50, units=SI), samples)
-
-
-@pytest.mark.parametrize("mark", [b"", b"\xef\xbb\xbf"])
-@pytest.mark.parametrize("header", [HEADER, None])
-def test_byte_order_mark(write, samples, mark, header):
-    path = write(samples, header)
-    path.write_bytes(mark + path.read_bytes())
-    assert_holds(read(path, rate=50, units=SI), samples)
-
-
-@pytest.mark.parametrize("header", [HEADER, None])
-def test_comments_before_the_data(write, samples, header):
-    before = "# IMU 7, bench\n% 2024-05-01, 20 degrees\n\n#\n"
-    path = write(samples, header, before=before)
-    assert_holds(read(path, rate=50, units=SI), samples)
-
-
-def test_blank_lines_between(write, samples):
-    path = write(samples, HEADER, end="\n\n")
     assert_holds(read(path, rate=50, units=SI), samples)
 
 
@@ -295,11 +261,6 @@ def test_channels_choose_between_columns_of_one_meaning(write, samples):
     np.testing.assert_array_equal(recording["gyro_x"].values, samples[:, 1])
 
 
-def test_dead_channel_is_passed_on(write, samples):
-    samples[:, 4] = 0.0
-    assert read(write(samples, HEADER), rate=1, units=SI)["accel_y"].is_constant
-
-
 @pytest.mark.parametrize("odd", ["+1.5", '"1.5"', "1.5\x20"])
 def test_blocks_read_in_either_way_fit_together(write, monkeypatch, odd):
     monkeypatch.setattr(csv_table.blocks, "__defaults__", (0, 1, 1000, str))
@@ -317,11 +278,7 @@ def test_gzip_by_content_and_of_two_members(write, samples):
     path = write(samples, HEADER)
     data = path.read_bytes()
     path.write_bytes(gzip.compress(data[:500]) + gzip.compress(data[500:]))
-    assert_holds(read(path, rate=1, units=SI), samples)
-
-
-def test_path_may_be_a_string(write, samples):
-    assert_holds(read(str(write(samples, HEADER)), rate=1, units=SI), samples)
+    assert_holds(read(str(path), rate=1, units=SI), samples)
 
 
 @pytest.mark.skipif(not SHARED.is_dir(), reason="the shared data are not beside the repository")

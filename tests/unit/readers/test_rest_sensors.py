@@ -5,9 +5,9 @@ import pytest
 
 from gmwm import InputError, Recording
 from gmwm.readers.rest import rest_notices
+from reading import SI
 
 G, RATE, N = 9.80665, 100.0, 2000
-SI = {"gyro": "rad/s", "accel": "m/s^2"}
 
 
 def recorded(gyro=(1e-3, 0.0, 0.0), accel=(0.0, 0.0, -G), noise=(1e-4, 1e-2), n=N):

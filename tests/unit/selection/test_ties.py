@@ -218,7 +218,7 @@ class TestFlicker:
     def test_the_interval_over_rivals_has_the_truth(self):
         tau, missed = np.array([60.0, 600.0]), np.zeros(2)
         true = np.sqrt(2.0 * FLICKER.haar_variance(tau, 0.01))
-        for seed in range(8):
+        for seed in range(6):
             chosen = gmwm.select(FLICKER.simulate(360_000, 0.01, seed=26_100 + seed), 0.01)
             models = [fit.model for fit in chosen.rivals]
             _, low, high = chosen.fit.deviation_interval(tau, rivals=models)

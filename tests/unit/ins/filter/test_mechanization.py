@@ -69,7 +69,7 @@ def test_errors_fall_with_the_square_of_the_interval() -> None:
 
 
 @pytest.mark.filterwarnings("ignore:The copy keyword")  # of their pandas calls
-def test_positions_follow_pyins() -> None:
+def test_positions_follow_pyins(interpreted_pyins) -> None:
     strapdown = pytest.importorskip("pyins.strapdown")
     pandas = pytest.importorskip("pandas")
     true = helicopter_mapping(duration=120.0, start=(*SOUTH[:2], 0.0))

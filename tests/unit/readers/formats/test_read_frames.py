@@ -15,10 +15,11 @@ from scipy.io import savemat
 
 import gmwm
 from bags import START, at_rest
+from gmwm.readers.formats import hdf5
 from gmwm.readers.names import CANONICAL
+from reading import SI, refusal
 
 X = at_rest()
-SI = {"gyro": "rad/s", "accel": "m/s^2"}
 NAMES = [f"gyro_{a} [rad/s]" for a in "xyz"] + [f"accel_{a} [m/s^2]" for a in "xyz"]
 
 
@@ -27,13 +28,6 @@ def exact(recording, samples=X):
         np.array_equal(recording[name].values, column)
         for name, column in zip(CANONICAL, samples.T, strict=True)
     )
-
-
-def refusal(data, **arguments):
-    with pytest.raises(gmwm.InputError) as caught:
-        gmwm.read(data, **arguments)
-    assert "\n" not in str(caught.value)
-    return str(caught.value)
 
 
 @pytest.fixture(scope="module")
@@ -220,7 +214,7 @@ def test_missing_half_floats_of_any_pattern_are_missing():
     ("place", "size"),
     [("collection", 1 << 40), ("free space", 0)],
 )
-def test_a_damaged_heap_of_hdf5_is_refused_before_its_library_reads_it(place, size, tmp_path):
+def test_a_damaged_heap_of_hdf5_is_refused(place, size, tmp_path, monkeypatch):
     """It goes on without end where free space has no size, or where it ends before the heap does
     and zeros follow.
     """
@@ -238,6 +232,8 @@ def test_a_damaged_heap_of_hdf5_is_refused_before_its_library_reads_it(place, si
         where += 16 + -(-length // 8) * 8 if index else 0
     at = where + 8 if place == "free space" else start + 8
     data[at : at + 8] = size.to_bytes(8, "little")
+    begin = "from gmwm.readers.formats import hdf5; hdf5._SECONDS = 1; hdf5.answer()"
+    monkeypatch.setattr(hdf5, "_PROGRAM", begin)
     path.write_bytes(data)
     with pytest.raises(gmwm.InputError, match="damaged"):
         gmwm.read(path, rate=100.0)

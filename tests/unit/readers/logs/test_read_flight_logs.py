@@ -24,6 +24,7 @@ from flight_logs import (
 )
 from gmwm.readers.logs import ardupilot
 from gmwm.readers.names import CANONICAL
+from reading import refusal
 
 
 def exact(recording, samples=X):
@@ -31,13 +32,6 @@ def exact(recording, samples=X):
         np.array_equal(recording[name].values, column.astype(float))
         for name, column in zip(CANONICAL, samples.T, strict=True)
     )
-
-
-def refusal(path, **arguments):
-    with pytest.raises(gmwm.InputError) as caught:
-        gmwm.read(path, **arguments)
-    assert "\n" not in str(caught.value)
-    return str(caught.value)
 
 
 def kept(sensor, samples=X):

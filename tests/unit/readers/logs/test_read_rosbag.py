@@ -26,6 +26,7 @@ from bags import (
     write2,
 )
 from gmwm.readers.names import CANONICAL
+from reading import refusal
 
 X = at_rest()
 
@@ -35,14 +36,6 @@ def exact(recording, samples=X):
         np.array_equal(recording[name].values, column)
         for name, column in zip(CANONICAL, samples.T, strict=True)
     )
-
-
-def refusal(path, **arguments):
-    with pytest.raises(gmwm.InputError) as caught:
-        gmwm.read(path, **arguments)
-    message = str(caught.value)
-    assert "\n" not in message and ". " not in message
-    return message
 
 
 @pytest.fixture
