@@ -358,8 +358,8 @@ class Levels:
     def block_means(self) -> tuple[FloatArray, int]:
         """Means of blocks of what exists, and their size.
 
-        Those in gaps that the coarsest level contains are interpolated if less than half is there;
-        those with samples of longer gaps are NaN.
+        Those in gaps that the coarsest level contains are interpolated if less than half is there,
+        between means over as long a time beside the gap; those with samples of longer gaps are NaN.
         """
         n = self.runs.n
         edges = np.concatenate([[0], self.edges(self.averaging.size - 1).ravel(), [n]])
@@ -376,7 +376,24 @@ class Levels:
         known = there >= max(tuning.LEAST_OF_BLOCK * block, 1)
         if not np.any(known):
             return np.full(sums.size, np.nan), block
-        means = np.interp(place, place[known], sums[known] / there[known]) + line
+        means = _bridged(sums / np.maximum(there, 1), known) + line
         for start, stop in longer:
             means[start // block : (stop - 1) // block + 1] = np.nan
         return means, block
+
+
+def _bridged(means: FloatArray, known: BoolArray) -> FloatArray:
+    """Means with lines across those that are unknown, which add no noise of their own."""
+    means, place = means.copy(), np.arange(means.size)
+    edges = np.flatnonzero(np.diff(known, prepend=True, append=True))
+    for start, stop in edges.reshape(-1, 2).tolist():
+        reach = slice(max(2 * start - stop, 0), 2 * stop - start)
+        left, right = (known[reach] & side[reach] for side in (place < start, place >= stop))
+        ends = [
+            (place[reach][side].mean(), means[reach][side].mean())
+            for side in (left, right)
+            if side.any()
+        ]
+        if ends:
+            means[start:stop] = np.interp(place[start:stop], *zip(*ends, strict=True))
+    return means

@@ -6,7 +6,7 @@ import pytest
 import gmwm
 from gmwm import GaussMarkov, RandomWalk, WhiteNoise
 from gmwm.calibration import left_open
-from gmwm.calibration.summary import UNRESOLVED, unresolved_notice, with_largest_walk
+from gmwm.calibration.unresolved import UNRESOLVED, unresolved_notice, with_largest_walk
 
 N, RATE = 1e-4, 100.0
 

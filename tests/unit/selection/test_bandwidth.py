@@ -6,7 +6,7 @@ from scipy import signal
 
 import gmwm
 from gmwm import AveragedNoise, Channel, LowPassNoise, RandomWalk, WhiteNoise
-from gmwm.calibration import noise_density
+from gmwm.calibration import axis_numbers
 from gmwm.selection import tuning
 from gmwm.selection.bandwidth import sensor_bandwidth
 
@@ -40,7 +40,7 @@ def test_a_filtered_white_noise_is_valid_and_named(name):
     (named,) = (notice for notice in fit.notices if notice.code == "sensor-bandwidth")
     gain = 0.944 if name == "chebyshev 2" else 1.0  # its gain at zero frequency is the ripple's
     assert named.values["density"] == pytest.approx(gain * N, rel=0.03)
-    assert noise_density(fit).value == pytest.approx(gain * N, rel=0.03)
+    assert axis_numbers(fit).N.value == pytest.approx(gain * N, rel=0.03)
 
 
 def test_the_walk_beside_a_filtered_noise_is_found():

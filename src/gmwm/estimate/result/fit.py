@@ -304,7 +304,8 @@ class Fit(Document, Printed):
         curve = scales.curve(self.model)
         spread = 0.5 * self.logarithmic_error(lambda model: scales.curve(model).ravel())
         value = np.sqrt(2.0 * curve)
-        ratio = np.exp(norm.ppf(0.5 + 0.5 * level) * spread.reshape(tau.shape))
+        with np.errstate(over="ignore"):  # an end that nothing limits is infinite
+            ratio = np.exp(norm.ppf(0.5 + 0.5 * level) * spread.reshape(tau.shape))
         all_ = np.array([value, *(np.sqrt(2.0 * scales.curve(each)) for each in rivals)])
         return value, np.min(all_, axis=0) / ratio, np.max(all_, axis=0) * ratio
 
@@ -322,7 +323,7 @@ class Fit(Document, Printed):
         here = value(self.model)
         gradient = np.zeros((len(self.keys), here.size))
         for i, key in enumerate(self.keys):
-            step = 1e-3 * min(errors[i], abs(self.params[key]) or errors[i])
+            step = 1e-3 * min(errors[i], abs(self.params[key]))
             if step == 0.0:
                 continue  # at a limit, where it is not estimated
             up, down = (

@@ -1,5 +1,7 @@
 """Sensor numbers: N, B and K of known models, their intervals, and how they are shown."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -12,11 +14,12 @@ from gmwm import (
     Process,
     QuantizationNoise,
     RandomWalk,
+    RateRamp,
     Resonance,
     Sinusoid,
     WhiteNoise,
 )
-from gmwm.calibration import PLATEAU, axis_numbers
+from gmwm.calibration import PLATEAU, axis_numbers, fast_density, upper_limit
 from gmwm.readers import Channel
 
 DT, N = 0.01, 200_000
@@ -136,3 +139,39 @@ def test_an_error_has_the_digits_that_are_known(value, lower, upper, text):
     from gmwm._core.text import with_error
 
     assert with_error(value, lower, upper) == text
+
+
+@pytest.mark.parametrize("dt", [0.001, 0.01, 1.0, 10.0])
+def test_density_of_white_noise_whatever_the_sampling_interval(dt):
+    assert fast_density(Model((WhiteNoise(3e-4),)), dt) == pytest.approx(9e-8, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    "slow", [RandomWalk(1.0), RateRamp(1.0), GaussMarkov(1.0, 1e4), BiasInstability(1.0)]
+)
+def test_slow_terms_have_no_density(slow):
+    assert fast_density(Model((slow,)), DT) == 0.0
+
+
+def test_no_B_lies_below_the_data():
+    """A model without the walk that the data have: its deviation goes on falling."""
+    x = (WhiteNoise(1e-3) + RandomWalk(1e-4)).simulate(50_000, 0.1, 1)
+    fit = gmwm.fit(WhiteNoise() + RandomWalk(), Channel("gyro_x", x, 0.1, "gyro", "rad/s"))
+    white = Model((WhiteNoise(1e-3),))
+    blind = dataclasses.replace(fit, model=white, keys=(), covariance=np.zeros((0, 0)))
+    numbers = axis_numbers(blind)
+    at = int(np.searchsorted(fit.wv.tau, numbers.tau))
+    lowest = numbers.B.upper * PLATEAU
+    assert lowest > 5.0 * np.sqrt(2.0 * blind.implied[-1])
+    assert lowest >= np.sqrt(2.0 * fit.wv.lower[at]) * (1.0 - 1e-12)
+
+
+def test_the_limit_of_K_holds_and_is_a_number():
+    """24 records with a K = 0.001 too small to be seen: 21 or more with a probability of 0.97."""
+    truth = WhiteNoise(1.0) + RandomWalk(0.001)
+    limits = [
+        upper_limit(gmwm.fit(WhiteNoise(), truth.simulate(4000, 1.0, seed), dt=1.0), "K")
+        for seed in range(24)
+    ]
+    assert sum(limit >= 0.001 for limit in limits) >= 21
+    assert np.all(np.isfinite(limits))
