@@ -38,7 +38,7 @@ def test_levels(results):
 
 
 def test_parameters(results):
-    table = results["fit"].to_frame().set_index("key")
+    table = results["fit"].to_frame(units="si").set_index("key")
     assert list(table.index) == ["N", "K"]
     assert table.loc["N", "value"] == results["fit"].params["N"]
     assert table.loc["N", "unit"] == "rad/s/sqrt(Hz)"
@@ -52,9 +52,18 @@ def test_candidates(results):
 
 
 def test_channels(results):
-    table = results["calibration"].to_frame()
+    table = results["calibration"].to_frame("terms")
     assert list(table["channel"]) == ["gyro_x", "gyro_y"]
     assert list(table["key"]) == ["N", "N"]
+
+
+def test_sensor_numbers(results):
+    calibration = results["calibration"]
+    table = calibration.to_frame()
+    assert list(table["number"]) == ["N", "B", "K"] * len(calibration)
+    si = calibration.to_frame(units="si").set_index(["channel", "number"])
+    assert si.loc[("gyro_x", "N"), "value"] == calibration.numbers["gyro_x"].N.value
+    assert si.loc[("gyro_x", "N"), "unit"] == "rad/s/sqrt(Hz)"
 
 
 def test_notices(results):

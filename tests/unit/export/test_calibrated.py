@@ -390,7 +390,7 @@ def test_a_slow_process_that_was_not_found_rises_as_the_largest_walk_does(calibr
     fit = calibration["accel_x"]
     axis = axis_of("accel_x", bound(fit, "N+GM", 60.0), 100.0, fit, tau)
     assert (axis.tau, axis.upper) == (tau or 60.0, {"sigma"})
-    walk = gmwm.calibration.random_walk(fit).value
+    walk = gmwm.calibration.upper_limit(fit, "K")
     high = np.array([1.0])
     ratio = GaussMarkov(axis.sigma, axis.tau).psd(high, 1e-6) / RandomWalk(walk).psd(high, 1e-6)
     assert ratio == pytest.approx(1.0, abs=1e-3)

@@ -77,7 +77,7 @@ def test_text_names_units_and_every_number():
     lines = WALK.text("si").splitlines()
     assert [line.split() for line in lines[1:4]] == [
         ["N", "0.0001", "rad/s/sqrt(Hz)"],
-        ["K", "5e-06", "rad/s/s/sqrt(Hz)"],
+        ["K", "5e-06", "rad/s^2/sqrt(Hz)"],
         ["initial_sd", "3e-05", "rad/s"],
     ]
     assert "after 600 s without aiding: NEES 0.75" in str(WALK)
@@ -86,7 +86,7 @@ def test_text_names_units_and_every_number():
     assert "static.csv: N+K for 60 s, bound" in text
     for part in ("deg/sqrt(h)", "ug/sqrt(Hz)", "sigma_2", "NEES 600 s", "0.91", "gyro_x: "):
         assert part in text
-    assert "rad/s/s/sqrt(Hz)" in SENSOR.text("si")
+    assert "rad/s^2/sqrt(Hz)" in SENSOR.text("si")
     for numbers in (WALK, SENSOR):
         with pytest.raises(InputError, match="units = 'SI': known are field, si"):
             numbers.text("SI")

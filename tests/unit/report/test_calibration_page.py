@@ -271,7 +271,7 @@ def test_parameters_in_si_and_in_the_units_of_the_field(parsed, calibration):
         (gyro["N"], "rad/s/sqrt(Hz)"),
         (gyro["N"] * degrees * 60.0, "deg/sqrt(h)"),
         (gyro["N"] * degrees * 3600.0, "deg/h/sqrt(Hz)"),
-        (gyro["K"], "rad/s/s/sqrt(Hz)"),
+        (gyro["K"], "rad/s^2/sqrt(Hz)"),
         (gyro["K"] * degrees * 3600.0 * 60.0, "deg/h/sqrt(h)"),
         (accel["N"], "m/s^2/sqrt(Hz)"),
         (accel["N"] / 9.80665e-6, "ug/sqrt(Hz)"),
