@@ -225,8 +225,8 @@ BAD = {
     "outages: beyond": ({"outages": [[18, 60]]}, "goes beyond the end"),
     "outages: negative": ({"outages": [[18, -1]]}, "give seconds above zero"),
     "outages: early": ({"outages": [[-1, 5]]}, "seconds since the first epoch"),
-    "outages: overlap": ({"outages": [[10, 9], [18, 6]]}, "write them as one, or apart"),
-    "outages: same": ({"outages": [[18, 6], [18, 6]]}, "write them as one, or apart"),
+    "outages: overlap": ({"outages": [[10, 9], [18, 6]]}, "join or separate them"),
+    "outages: same": ({"outages": [[18, 6], [18, 6]]}, "join or separate them"),
     "outages: unit": ({"outages": [["1 m", 6]]}, "same as s"),
     "outages: between": ({"outages": [[18, 6.01]]}, "between two epochs"),
     "outages: no fix": ({"outages": [[18.1, 0.4]]}, "no fix falls into that"),
@@ -347,7 +347,7 @@ def test_real_errors_of_another_rate_are_refused_before_any_run(run):
     written(truth=truth, filters=filters, outages=None)
     code, printed, _ = run("study.yaml", "--jobs", 1, "--runs", 9)
     assert code == 0
-    assert "6 runs in place of 9" in " ".join(printed.split())
+    assert "6 runs instead of 9" in " ".join(printed.split())
 
 
 class _References(HTMLParser):

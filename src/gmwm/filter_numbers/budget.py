@@ -155,7 +155,7 @@ class ErrorBudget:
 
     def __str__(self) -> str:
         lines = [
-            "Error (1 sigma) after free inertial coasting, level and not manoeuvring, from",
+            "Error (1 sigma) after an outage, level and not manoeuvring, from",
             f"exact attitude, velocity and position; {STARTS[self.calibrated]}.",
         ]
         for quantity in QUANTITIES:
@@ -225,7 +225,7 @@ class ErrorBudget:
         known = self.quantities(of)
         if quantity not in known:
             raise InputError(
-                f"{of} has no part in the {quantity!r} error: choose among {', '.join(known)}"
+                f"{of} does not affect the {quantity!r} error: choose from {', '.join(known)}"
             )
         parts: dict[str, list[tuple[float, ...]]] = {}
         for row in self._rows(of, quantity):
@@ -331,7 +331,7 @@ def error_budget(
     chosen = given_times("times", times)
     if chosen[0] < longest * (1.0 - 1e-6):
         raise InputError(
-            f"a coasting time of {chosen[0]:g} s is shorter than the sampling interval of "
+            f"an outage of {chosen[0]:g} s is shorter than the sampling interval of "
             f"{longest:g} s: give longer times"
         )
     first = chosen[0] if len(chosen) > 1 else max(0.01 * chosen[0], min(longest, chosen[0]))

@@ -52,7 +52,7 @@ CASES = [
     ("calibration", WV + "dt", 0.0, "dt = 0.0"),
     ("calibration", WV + "n", 10**6, "levels where 1,000,000 samples have 19"),
     ("calibration", WV + "variance.0", -1.0, "a variance is negative"),
-    ("calibration", WV + "mean", [0.0], "mean is no list of"),
+    ("calibration", WV + "mean", [0.0], "mean is not a list of"),
     ("calibration", WV + "tau.1", 0.5, "not octaves"),
     ("calibration", WV + "efficiency", 2.0, "efficiency = 2.0"),
     ("calibration", WV + "block", 10**6, "blocks hold more samples"),
@@ -72,7 +72,7 @@ CASES = [
     ("selection", "ranking.0.n_parameters", 0, "ranking.0.n_parameters = 0"),
     ("selection", "ranking.0.dof", None, "ranking.0.dof = None"),
     ("bootstrap", "draws", [[1.0], [2.0]], "draws are not one value a key"),
-    ("bound", "keys", ["N", "X"], "keys are not those of the model"),
+    ("bound", "keys", ["N", "X"], "keys do not match the model"),
 ]
 
 

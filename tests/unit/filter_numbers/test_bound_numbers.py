@@ -611,8 +611,8 @@ class Drawn(Process):
 @pytest.mark.parametrize(
     ("source", "options", "message"),
     [
-        (ONE, {"form": "N"}, r"form = 'N': known are N\+K, N\+GM, N\+K\+GM"),
-        (ONE, {"form": "N+2GM"}, "known are"),
+        (ONE, {"form": "N"}, r"form = 'N': choose from N\+K, N\+GM, N\+K\+GM"),
+        (ONE, {"form": "N+2GM"}, "choose from"),
         (ONE, {"horizon": 0.0}, "horizon = 0.0"),
         (ONE, {"horizon": 0.015}, "two sampling intervals"),
         (ONE, {"horizon": "60"}, "horizon = '60'"),

@@ -272,7 +272,7 @@ REFUSED = {
     "no horizontal": (lambda: error_budget({"gyro_z": GYRO}, dt=DT).total(), "no total"),
     "heading in metres": (
         lambda: error_budget(IMU, dt=DT).plot(of="gyro_z", quantity="position"),
-        "gyro_z has no part in the 'position' error",
+        "gyro_z does not affect the 'position' error",
     ),
 }
 

@@ -187,7 +187,7 @@ def test_a_drift_needs_a_state_and_a_ramp():
         em(WhiteNoise() + RandomWalk() + RateRamp(0.1), x, drift="state")
     with pytest.raises(InputError, match="RandomWalk or GaussMarkov"):
         em(WhiteNoise() + RateRamp(), x, drift="state")
-    with pytest.raises(InputError, match="known are ramp, state"):
+    with pytest.raises(InputError, match="choose from ramp, state"):
         em(WhiteNoise() + RandomWalk() + RateRamp(), x, drift="signal")
 
 

@@ -194,7 +194,7 @@ def test_white_noise_alone_can_be_reduced():
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"form": "N"}, r"form = 'N': known are N\+K, N\+GM"),
+        ({"form": "N"}, r"form = 'N': choose from N\+K, N\+GM"),
         ({"outages": ()}, "outages: give one length at least"),
         ({"outages": (10.0, 0.0)}, r"outage length = 0\.0"),
         ({"outages": (-5.0,)}, r"outage length = -5\.0"),

@@ -59,7 +59,7 @@ def test_a_log_that_is_cut_off(log, share):
     log.write_bytes(whole[: int(share * len(whole)) - 1])
     seconds = re.search(
         r"a\.log is cut off or damaged ([0-9.]+) s after its first sample, inside a message: "
-        r"get a whole copy, or use what is left of it, damaged=True$",
+        r"get a whole copy, or read the rest with damaged=True$",
         refusal(log),
     )[1]
     found = gmwm.read(log, damaged=True)
