@@ -213,7 +213,7 @@ class ErrorBudget:
         ax.plot(self.grid, total, color=SUM_COLOUR, linewidth=2.6, label="total")
         ax.set_xscale("log")
         ax.set_yscale("log" if np.any(total > 0.0) else "linear")
-        ax.set_xlabel("coasting time [s]")
+        ax.set_xlabel("outage [s]")
         ax.set_ylabel(f"{quantity} error, 1 sigma [{FIELD_UNITS[quantity]}]")
         ax.set_title(f"{of}, {STARTS[self.calibrated]}")
         ax.grid(True, which="major", color="#cccccc", linewidth=0.6)
