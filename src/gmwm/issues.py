@@ -326,7 +326,7 @@ _DIAGNOSIS = (
     Issue("abrupt-end", "the distribution of the samples is cut off at {ends}: they were "
         "rectified, wrapped round or sorted out", "look for what wraps, cuts or takes absolute "
         "values between the sensor and the file", severity="warning", topic="samples",
-        lacks="within_range", reason="samples that end abruptly", spoils=("channel",),
+        lacks="within_range", reason="distribution cut off", spoils=("channel",),
         user_only=True),
     Issue("clean", "nothing found that spoils the estimates", severity="good"),
     Issue("clock", "time-stamp intervals vary by {jitter:.2g%} rms", "harmless if only the stamps "
@@ -368,7 +368,7 @@ _DIAGNOSIS = (
     Issue("held", "{share:.2g%} of the samples repeat the previous one ({chance:.2g%} by chance): "
         "the last sample was written again for lost packets", "set these samples to NaN",
         severity="warning", topic="samples", lacks="samples_measured",
-        reason="samples that repeat the one before", spoils=("channel",), masks=True,
+        reason="held samples", spoils=("channel",), masks=True,
         user_only=True),
     Issue("infinite", "{count:,} infinite samples", "correct them, or set them to NaN",
         severity="bad", topic="samples", repeats="reader"),
@@ -467,7 +467,7 @@ _CALIBRATION = (
     Issue("constant", "constant at {value:.6g} {unit}", severity="bad"),
     Issue("departures-many", "{removed} departures were subtracted: a bias that changes so often "
         "is sensor noise", "fit a slow term instead, such as a Gauss-Markov process",
-        severity="bad", lacks="stationary", reason="the bias steps to and fro"),
+        severity="bad", lacks="stationary", reason="the bias keeps changing"),
     Issue("departures-removed", "with the subtracted departures the deviation at tau = {tau:.3g} s "
         "would be {times} times as large: the model is wrong if they recur", "find the cause, or "
         "add a slow term to the model instead of subtracting", severity="warning"),
@@ -486,7 +486,7 @@ _CALIBRATION = (
     Issue("not-estimable", "{text}", severity="bad"),
     Issue("slow-period", "a period of {when} with an amplitude of {height}{also}",
         "find the cause, such as the temperature{back}", severity="bad", topic="departure",
-        lacks="stationary", reason="a slow period stands out"),
+        lacks="stationary", reason="a slow period"),
     Issue("step", "a step of {height} at {when}{also}", "calibrate only the part before or after "
         "the step{back}", severity="bad", topic="departure", lacks="stationary",
         reason="the bias stepped"),
@@ -498,7 +498,7 @@ _CALIBRATION = (
     Issue("unsteady", "the slow noise changes during the recording: {quiet_part} it has {less} "
         "times the deviation of the whole record, {loud_part} {more} times; the model is an "
         "average", "calibrate the part that matches how the sensor is used", severity="bad",
-        lacks="noise_steady", reason="slow noise changes its size"),
+        lacks="noise_steady", reason="slow noise changes"),
 )  # fmt: skip
 
 _ESTIMATE = (
@@ -508,7 +508,7 @@ _ESTIMATE = (
         "of {correlation:.5f})", "fix one of them", lacks="parameters_separable",
         reason="terms cannot be separated"),
     _fit("drift-in-state", "a drift that enters the {term} state is not a ramp of the signal",
-        lacks="drift_is_ramp", reason="the drift is no ramp"),
+        lacks="drift_is_ramp", reason="the drift is not a ramp"),
     _fit("indistinct-terms", "two {kind} terms do not differ significantly ({first} = {one:.3g} s, "
         "{second} = {other:.3g} s)", "use one fewer", lacks="terms_distinct",
         reason="two terms look alike"),
@@ -519,9 +519,9 @@ _ESTIMATE = (
         "": "predictions over {tau:.3g} s are too {scale}: there the data lie {share} {side} the "
         "model's Allan deviation, by {errors} standard errors",
         "chance": "at tau = {tau:.3g} s the data lie {share} {side} the model's Allan deviation, "
-        "which may be chance: {chance:.0f} % of right models are missed as clearly",
-        "slight": "describes the Allan deviation to {share} (least well at tau = {tau:.3g} s)",
-        "allowed": "describes the Allan deviation to {share} (least well at tau = {tau:.3g} s), "
+        "which may be chance: {chance:.0f} % of correct models miss by as much",
+        "slight": "within {share} of the Allan deviation (largest misfit at tau = {tau:.3g} s)",
+        "allowed": "within {share} of the Allan deviation (largest misfit at tau = {tau:.3g} s), "
         "which the intervals allow for",
         "lines": "the sum of the lines misses the Allan deviation by {share} at tau = {tau:.3g} s"},
         lacks="describes_data", reason="the model misses the data"),
@@ -529,8 +529,8 @@ _ESTIMATE = (
         lacks="converged", reason="the search did not converge"),
     _fit("no-region", "the Allan plot has no region of slope {named}, so it is not estimated",
         lacks="regions_found", reason="no straight region found"),
-    _fit("no-test", "the fit is not tested: the gaps leave no wavelet variance, straight lines "
-        "bridge them", severity="note"),
+    _fit("no-test", "the fit is not tested: with these gaps there is no wavelet variance, and "
+        "straight lines bridge them", severity="note"),
     _fit("not-converged", {
         "": "the maximum of the likelihood was not reached",
         "em": "EM did not converge in {iterations} iterations",
