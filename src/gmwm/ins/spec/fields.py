@@ -179,7 +179,7 @@ def read_document(path: Path) -> dict[str, Any]:
     except InputError:
         raise
     except Exception as error:  # PyYAML raises KeyError, AttributeError, ... for odd tags
-        raise InputError(f"{path}: invalid YAML ({_reason(error)}): correct that line") from None
+        raise InputError(f"{path}: invalid YAML ({_reason(error)}): correct the file") from None
     if content is None:
         raise InputError(f"{path} is empty: write trajectory:, truth:, filters: into it")
     if not isinstance(content, Mapping):
