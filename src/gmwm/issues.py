@@ -682,12 +682,12 @@ _INS = (
     _navigation("too-large", {
         "": "The filter's model does not fit: innovations are {sizes} as expected; the sensors are "
         "worse than their models, or the fixes worse than their standard deviations.",
-        "assumed": "The standard deviations assumed for the fixes are too small: innovations are "
+        "assumed": "Only the standard deviations assumed for the fixes do not fit: innovations are "
         "{sizes} as expected."}, severity="bad"),
     _navigation("too-small", {
         "": "The filter's model does not fit: innovations are {sizes} as expected; the sensors are "
         "better than their models, or the fixes better than their standard deviations.",
-        "assumed": "The standard deviations assumed for the fixes are too large: innovations are "
+        "assumed": "Only the standard deviations assumed for the fixes do not fit: innovations are "
         "{sizes} as expected."}, severity="bad"),
 )  # fmt: skip
 

@@ -94,9 +94,7 @@ def reproduce(
                 paths = [write_text(folder / f"{experiment}.txt", text)]
         except KeyboardInterrupt:
             if "resume" in known:
-                click.echo(
-                    f"finished runs are in {folder}: add --resume to continue", err=True
-                )
+                click.echo(f"finished runs are in {folder}: add --resume to continue", err=True)
             raise
     print_result(text, *paths)
 

@@ -259,7 +259,7 @@ def perform(
             break
     n = math.floor((elapsed if duration is None else limit) / dt + 1e-6)
     if not 1 <= n <= _LONGEST:
-        raise InputError(f"a trajectory of {n:,} steps of {dt:g} s: give 1 to {_LONGEST:,}")
+        raise InputError(f"a trajectory of {n:,} steps of {dt:g} s: give 1 to {_LONGEST:,} steps")
     course = _course(plans, 0.5 * dt * np.arange(2 * n + 1, dtype=float), speed, heading)
     lla = np.empty((n + 1, 3))
     _walk(course.speed, course.heading, course.climb, dt, origin, lla)

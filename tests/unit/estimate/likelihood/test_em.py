@@ -289,7 +289,7 @@ def test_expected_moments_are_those_of_draws_from_the_posterior(drift):
     ids=repr,
 )
 def test_processes_without_a_closed_form_are_refused_with_the_way_out(process):
-    with pytest.raises(InputError, match=r'does not know .*takes WhiteNoise.*"mle" takes'):
+    with pytest.raises(InputError, match=r'does not support .*takes WhiteNoise.*"mle" supports'):
         em(WhiteNoise() + process, WhiteNoise(1.0).simulate(100, 1.0, 1))
 
 
