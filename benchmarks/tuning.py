@@ -5,8 +5,8 @@ none of those that set a constant, the paper's and the demo's. Integers are roun
 probabilities and fractions at most 0.99.
 
 Columns: the fraction of fits of the right model that are valid, and of a wrong one that are
-rejected; the fraction of selections that choose the terms of the truth; and how far the estimates of
-the right model move, in standard errors (root mean square).
+rejected; the fraction of selections that choose the terms of the truth; and how far the estimates
+of the right model move, in standard errors (root mean square).
 """
 
 from __future__ import annotations
