@@ -181,7 +181,7 @@ def given_times(name: str, times: Sequence[float]) -> tuple[float, ...]:
     hint = "give positive numbers of seconds, e.g. (1, 60)"
     rising = sorted({checks.positive(name, each, hint) for each in np.ravel(times).tolist()})
     if not rising:
-        raise InputError(f"{name} is empty: give at least one time in seconds")
+        raise InputError(f"{name} is empty: give at least one outage length in seconds")
     return tuple(rising)
 
 

@@ -192,7 +192,7 @@ def test_a_turn_on_bias_is_part_of_the_start():
     ("options", "message"),
     [
         ({"form": "N"}, r"form = 'N': choose from N\+K, N\+GM, N\+K\+GM, N\+2GM"),
-        ({"outages": ()}, "outages: give one length at least"),
+        ({"outages": ()}, "outages is empty: give at least one"),
         ({"outages": (10.0, -1.0)}, r"outages = -1\.0"),
         ({"outages": (10.0, 0.001)}, "outages = 0.001 s: give two sampling intervals or more"),
         ({"tau": 60.0}, r"tau needs a form with one Gauss-Markov process, not N\+K"),
