@@ -270,7 +270,7 @@ def test_infinite_blocks_change_nothing():
         (lambda: streamed(np.full(100, np.nan)).result(), "0 samples"),
         (
             lambda: streamed(np.array([1.0, np.nan, 2.0, np.nan] * 9)).result(),
-            "no two consecutive samples",
+            "no two consecutive",
         ),
         (lambda: gmwm.StreamingVariance.load(__file__), "write it with save"),
     ],
