@@ -5,8 +5,8 @@ none of those that set a constant, the paper's and the demo's. Integers are roun
 probabilities and fractions at most 0.99.
 
 Columns: the fraction of fits of the right model that are valid, and of a wrong one that are
-refused; the fraction of selections that choose the terms of the truth; and how far the estimates of
-the right model move, in standard errors (root mean square).
+rejected; the fraction of selections that choose the terms of the truth; and how far the estimates
+of the right model move, in standard errors (root mean square).
 """
 
 from __future__ import annotations
@@ -67,7 +67,7 @@ class Outcome:
     """What came of all fits under one setting."""
 
     valid: float
-    refused: float
+    rejected: float
     chosen: float
     estimates: np.ndarray
     errors: np.ndarray
@@ -94,7 +94,7 @@ def outcome(changes: dict[tuple[str, str], float]) -> Outcome:
 
 
 def _outcome() -> Outcome:
-    valid, refused, chosen = [], [], []
+    valid, rejected, chosen = [], [], []
     estimates: list[float] = []
     errors: list[float] = []
     for name, (truth, wrong) in TRUTHS.items():
@@ -104,7 +104,7 @@ def _outcome() -> Outcome:
             wv = gmwm.wavelet_variance(x, DT)
             fits = [gmwm.fit(right, wv)]
             chosen.append(_kinds(gmwm.select(wv).model) == _kinds(right))
-            refused.append(not gmwm.fit(wrong, wv).valid)
+            rejected.append(not gmwm.fit(wrong, wv).valid)
             if seed == 0 and name in BY_LIKELIHOOD:
                 fits += [gmwm.fit(right, x[:SHORT], DT, method=each) for each in LIKELIHOODS]
             valid.append(fits[0].valid)
@@ -116,7 +116,7 @@ def _outcome() -> Outcome:
     estimates += [lines.params.get(key, np.nan) for key in ("N", "K")]
     errors += [lines.stderr.get(key, np.nan) for key in ("N", "K")]
     return Outcome(
-        float(np.mean(valid)), float(np.mean(refused)), float(np.mean(chosen)),
+        float(np.mean(valid)), float(np.mean(rejected)), float(np.mean(chosen)),
         np.array(estimates), np.array(errors),
     )  # fmt: skip
 
@@ -149,8 +149,8 @@ def main() -> None:
     tasks = [{}] + [{(room, name): changed(value, f)} for room, name, value, f in settings]
     usual, *others = Parallel(n_jobs=2)(delayed(outcome)(task) for task in tasks)
     print(f"{len(TRUTHS)} truths, {len(SEEDS)} seeds each; as they are: valid {usual.valid:.0%}, "
-          f"refused {usual.refused:.0%}, chosen {usual.chosen:.0%}\n")  # fmt: skip
-    head = "| constant | value | valid | refused | chosen | moved |"
+          f"rejected {usual.rejected:.0%}, chosen {usual.chosen:.0%}\n")  # fmt: skip
+    head = "| constant | value | valid | rejected | chosen | moved |"
     print(head, "| --- | --- | --- | --- | --- | --- |", sep="\n")
     rows: dict[tuple[str, str, float], list[Outcome]] = {}
     for (room, name, value, _), found in zip(settings, others, strict=True):
@@ -162,7 +162,7 @@ def main() -> None:
             continue
         cells = [
             ", ".join(f"{100 * getattr(each, part):.0f} %" for each in pair)
-            for part in ("valid", "refused", "chosen")
+            for part in ("valid", "rejected", "chosen")
         ]
         moved = ", ".join(f"{each.moved_from(usual):.2g}" for each in pair)
         print(f"| `{room}.{name}` | {value:g} | {' | '.join(cells)} | {moved} |")
@@ -171,7 +171,7 @@ def main() -> None:
 
 def _weight(pair: list[Outcome], usual: Outcome) -> float:
     """How much a constant matters: the largest change of anything."""
-    parts = ("valid", "refused", "chosen")
+    parts = ("valid", "rejected", "chosen")
     fractions = [abs(getattr(o, part) - getattr(usual, part)) for o in pair for part in parts]
     return max([*fractions, *(each.moved_from(usual) for each in pair)])
 

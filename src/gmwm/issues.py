@@ -232,37 +232,34 @@ _READERS = (
     _reading("clock-jumps", {
         "": "the clock jumps by {longest:.12g} s, {time:.12g} s after the start: {missing:,.0f} "
         "sample{missing:s?} missing",
-        "many": "the clock jumps {count:,} times, farthest by {longest:.12g} s, {time:.12g} s "
-        "after the start: in all {missing:,.0f} samples missing"}, topic="clock"),
-    _reading("clock-off-grid", "{which} not near a whole number of sampling intervals: the samples "
-        "after it were placed at the nearest", topic="clock"),
-    _reading("clock-wraps", "the counter of the time stamps overflowed: they were continued"),
+        "many": "the clock jumps {count:,} times, at most by {longest:.12g} s, {time:.12g} s after "
+        "the start: {missing:,.0f} samples missing in all"}, topic="clock"),
+    _reading("clock-off-grid", "{which} not a whole number of sampling intervals: the samples "
+        "after it were moved to the nearest interval", topic="clock"),
+    _reading("clock-wraps", "the time-stamp counter overflowed: the stamps were continued"),
     _reading("column-numbers", "line {line} was read as column numbers and left out"),
     _reading("columns-auxiliary", "auxiliary channels: {listed}"),
     _reading("columns-not-used", "column{count:s?} not used: {listed}"),
     _reading("columns-unreadable", "{what} left out"),
-    _reading("counts", "{listed}: every sample is a whole number, with a noise of {noise:.3g}: "
-        "counts of the converter, not {unit}",
-        "multiply them by the size of a count from the data sheet", severity="bad",
-        topic="recording", lacks="units_agree", reason="counts, not in the unit given",
-        spoils=("gyro", "accel")),
+    _reading("counts", "{listed}: every sample is a whole number, with a noise of {noise:.3g}: raw "
+        "counts of the converter, not {unit}", "multiply them by the value of one count from the "
+        "data sheet", severity="bad", topic="recording", lacks="units_agree",
+        reason="raw counts, not the unit given", spoils=("gyro", "accel")),
     _reading("damaged", "the file {what}; the rest is used", severity="warning", topic="recording"),
     _reading("dates", {
         "": "column {column!r} holds dates: they count as seconds since 1970-01-01",
         "fixes": "dates ({scale}) are counted in seconds since 1970-01-01, without leap seconds"},
         topic="recording"),
     _reading("gravity", {
-        "unit": "the mean of the accelerometer is {in_file:.4g} {unit} long, which is gravity in "
-        "{likely}",
+        "unit": "the mean specific force is {in_file:.4g} {unit}, which is gravity in {likely}",
         "increments": "the accelerometer reads {usual:.4g} m/s^2, gravity over one sampling "
-        "interval: increments of velocity, not accelerations",
-        "scale": "the accelerometer reads {usual:.4g} m/s^2, {ratio:.3g} times gravity: neither "
-        "gravity nor an accelerometer without it"},
-        "check its scale and range, and that the numbers are not counts", severity="bad",
-        topic="recording", lacks="units_agree", reason="gravity contradicts the unit",
-        spoils=("gyro", "accel")),
-    _reading("gravity-absent", "Sensor Logger has subtracted gravity from these accelerations, by "
-        "what other sensors say", "use TotalAcceleration or AccelerometerUncalibrated",
+        "interval: velocity increments, not accelerations",
+        "scale": "the accelerometer reads {usual:.4g} m/s^2, {ratio:.3g} times gravity: a sensor "
+        "at rest reads 1 g, or 0 with gravity removed"}, "check its scale and range, and that the "
+        "numbers are not counts", severity="bad", topic="recording", lacks="units_agree",
+        reason="gravity contradicts the unit", spoils=("gyro", "accel")),
+    _reading("gravity-absent", "Sensor Logger has subtracted gravity from these accelerations, "
+        "using other sensors", "use TotalAcceleration or AccelerometerUncalibrated",
         severity="warning"),
     _reading("gyro-unit", {
         "noise": "white noise of {size:.3g} deg/s/sqrt(Hz) is more than gyros at rest have",
@@ -271,8 +268,8 @@ _READERS = (
     _reading("log-dropouts", "the logger dropped {count} stretches, {duration:.3g} s in all",
         topic="recording"),
     _reading("mean-rate", "a mean rate of {size:.3g} deg/s is more than the bias of most gyros: "
-        "the sensor turned all the time, or is a cheap gyro that was not calibrated",
-        "make sure that it was at rest", severity="warning", topic="recording"),
+        "the sensor kept turning, or is an uncalibrated low-cost gyro", "make sure that it was at "
+        "rest", severity="warning", topic="recording"),
     _reading("missing-samples", {
         "all": "{each}all {n:,} samples missing",
         "one": "{each}{missing:,} of {n:,} samples missing, in one gap",
@@ -280,190 +277,186 @@ _READERS = (
         "{longest:,} sample{longest:s?}"}, repeats="diagnosis"),
     _reading("part", "the part from {start:.6g} to {stop:.6g} s is used; times count from its "
         "start"),
-    _reading("partial-record", "the last record is cut off, {bytes} of its {size} bytes are there: "
-        "left out", severity="warning"),
+    _reading("partial-record", "the last record is incomplete ({bytes} of {size} bytes) and left "
+        "out", severity="warning"),
     _reading("preamble", "the lines before the header (line {line}) were left out"),
-    _reading("rate-changes", "the sampling rate goes from {before:.4g} to {after:.4g} Hz at about "
-        "{time:.4g} s, and {rate:.6g} Hz is taken for all of it",
-        "use the part before or after ({row})", severity="bad", topic="clock",
-        lacks="rate_constant", reason="the sampling rate changed", spoils=("gyro", "accel")),
-    _reading("rate-stated", "the rate stated, {rate:g} Hz, is used"),
-    _reading("rate-unlikely", "inertial sensors hardly have a rate of {rate:.6g} Hz",
+    _reading("rate-changes", "the sampling rate changes from {before:.4g} to {after:.4g} Hz at "
+        "about {time:.4g} s; {rate:.6g} Hz is used throughout", "use the part before or after "
+        "({row})", severity="bad", topic="clock", lacks="rate_constant",
+        reason="the sampling rate changed", spoils=("gyro", "accel")),
+    _reading("rate-stated", "the given rate of {rate:g} Hz is used"),
+    _reading("rate-unlikely", "{rate:.6g} Hz is an unlikely rate of an inertial sensor",
         "check the unit of the time column", severity="warning"),
     _reading("rows-repeated", {
-        "": "{count:,} row repeats a row before",
-        "many": "{count:,} rows repeat rows before"}, "left out", topic="clock"),
-    _reading("sentinel", "{samples} {value:.10g}{alike}, {meaning}, first at {place}: taken as "
-        "missing", "look at the recorder", severity="warning", masks=True),
+        "": "{count:,} row repeats an earlier one",
+        "many": "{count:,} rows repeat earlier ones"}, "left out", topic="clock"),
+    _reading("sentinel", "{samples} {value:.10g}{alike}, {meaning}, first at {place}: treated as "
+        "missing", "check the recorder", severity="warning", masks=True),
     _reading("stamps-astray", "{stamps} far from the clock, at most by {largest:.3g} s ({place}): "
         "the samples were taken as evenly spaced", topic="clock"),
-    _reading("stamps-in-bursts", "{rows} rows come with one stamp, usually: it is taken as that of "
-        "the last of them, and the others are one sampling interval apart",
-        "if the rows are of several sensors, keep those of one"),
+    _reading("stamps-in-bursts", "usually {rows} rows share one time stamp: it is given to the "
+        "last of them, and the others are spaced at the sampling interval", "if the rows are of "
+        "several sensors, keep one sensor"),
     _reading("swapped", "{contradiction}", "check which column is which channel", severity="bad",
         topic="recording", lacks="units_agree", reason="gyro and accelerometer swapped",
         spoils=("gyro", "accel")),
     _reading("temperature-interpolated", "{listed}: {count:,} values, interpolated to the samples "
         "of {first}"),
-    _reading("time-column", "time is column {used}; time= selects {others}"),
+    _reading("time-column", "time stamps are read from column {used}; use time= to choose "
+        "{others}"),
     _reading("time-of-day", "times of day (hhmmss) count as seconds since midnight",
         topic="recording"),
     _reading("time-stamps", "time stamps ({column}, {units}) give {rate:.6g} Hz{steps}"),
     _reading("topic", {
-        "": "{sensors} of topic {topic}",
+        "": "{sensors} read from topic {topic}",
         "others": "read from {topic}; there are also {listed}"}),
-    _reading("topics-joined", "{count} topics at {listed}: the {duration:.6g} s that they share "
-        "are used"),
+    _reading("topics-joined", "{count} topics at {listed} are joined over the {duration:.6g} s "
+        "that they share"),
     _reading("units-contradicted", "the units given contradict {origin}: {listed}",
         severity="warning"),
     _reading("units-from-names", "units from {origin}: {listed}"),
 )  # fmt: skip
 
 _VARIANCE = (
-    Issue("curve-shortened", "missing samples shorten the curve: it ends at tau = {tau:.3g} s, a "
-        "complete record at {complete:.3g} s", severity="warning", topic="samples"),
+    Issue("curve-shortened", "missing samples shorten the curve to tau = {tau:.3g} s; a complete "
+        "record would give {complete:.3g} s", severity="warning", topic="samples"),
 )  # fmt: skip
 
 _DIAGNOSIS = (
-    Issue("abrupt-end", "samples end abruptly at {ends}, where noise would thin out: rectified, "
-        "wrapped round or sorted out",
-        "look for what wraps, cuts or takes absolute values between the sensor and the file",
-        severity="warning", topic="samples", lacks="within_range",
-        reason="samples that end abruptly", spoils=("channel",), user_only=True),
+    Issue("abrupt-end", "the distribution of the samples is cut off at {ends}: they were "
+        "rectified, wrapped round or sorted out", "look for what wraps, cuts or takes absolute "
+        "values between the sensor and the file", severity="warning", topic="samples",
+        lacks="within_range", reason="distribution cut off", spoils=("channel",),
+        user_only=True),
     Issue("clean", "nothing found that spoils the estimates", severity="good"),
-    Issue("clock", "the steps of the time stamps vary by {jitter:.2g%} rms",
-        "harmless if only the stamps are late; else let the sensor's own clock trigger it",
-        severity="warning"),
-    Issue("crosstalk", "fast noise of {both} is correlated by {correlation:.2g}",
-        "each channel is modelled by itself; a filter may need their covariance",
-        severity="warning", topic="samples"),
+    Issue("clock", "time-stamp intervals vary by {jitter:.2g%} rms", "harmless if only the stamps "
+        "are delayed; otherwise sample on the sensor's own clock", severity="warning"),
+    Issue("crosstalk", "the fast noise of {both} has a correlation of {correlation:.2g}",
+        "each channel has its own model; a filter may need their covariance", severity="warning",
+        topic="samples"),
     Issue("dead", "every sample is {shown}: the channel is dead",
         "check sensor and columns; the calibration skips it", severity="bad", topic="samples",
         lacks="samples_change", spoils=("channel",), repeats="reader"),
     Issue("drift", {
-        "": "means of {length:.3g} s wander by {shown} rms, {times} times what the fast noise "
-        "leaves",
-        "ramp": "drifts by {shown[0]} over the record and wanders about that by {shown[1]} rms"},
-        "estimated as a random walk or a slow Gauss-Markov process", topic="samples"),
+        "": "means of {length:.3g} s wander by {shown} rms, {times} times as much as the fast "
+        "noise explains",
+        "ramp": "drifts by {shown[0]} over the record, with a scatter of {shown[1]} rms about the "
+        "drift"}, "estimated as a random walk or a slow Gauss-Markov process", topic="samples"),
     Issue("event", {
         "": "a spike or shock {shown} at {time:.6g} s, {duration:.2g} s long",
         "many": "{count:,.0f} spikes or shocks, the largest {shown} at {time:.6g} s, "
         "{duration:.2g} s long{others}",
-        "most": "{part:.2g%} of the samples differ from what is before them as spikes do: values "
-        "that are held, switched or made otherwise, not noise of a sensor"},
-        "gmwm calibrate leaves it out; in Python: Health.masked, or robust=True",
+        "most": "{part:.2g%} of the samples jump like spikes: held, switched or synthetic values, "
+        "not sensor noise"}, "masked by gmwm calibrate; in Python use Health.masked or robust=True",
         severity="warning", topic="samples", masks=True),
     Issue("events-left-out", "{samples:,} samples of {copies}spikes, shocks or lost packets left "
         "out", topic="samples", repeats="diagnosis"),
-    Issue("filled", "{share:.2g%} of the samples lie on straight lines between others: put there "
-        "for samples that were lost or sorted out", "make such samples missing (NaN)",
+    Issue("filled", "{share:.2g%} of the samples lie exactly on lines between their neighbours: "
+        "lost or removed samples were interpolated", "set the interpolated samples to NaN",
         severity="warning", topic="samples", lacks="samples_measured",
-        reason="samples put between others", spoils=("channel",), user_only=True),
+        reason="interpolated samples", spoils=("channel",), user_only=True),
     Issue("gap", {
         "": "{missing:,.0f} of {n:,} samples missing ({share:.2g%}) in {gaps:,.0f} gap{gaps:s?}, "
         "the longest {longest:.3g} s",
         "all": "all samples missing"}, severity="bad", topic="samples", repeats="reader"),
     Issue("heavy-tails", {
         "student": "the noise has heavy tails, like Student's t with {shape:.2g} degrees of "
-        "freedom: large samples belong to it",
-        "power": "the noise has heavy tails, like exp(-|x|^{shape:.2g}): large samples belong to "
+        "freedom: large samples are part of it",
+        "power": "the noise has heavy tails, like exp(-|x|^{shape:.2g}): large samples are part of "
         "it"}, "nothing is left out; the standard error of the white noise allows for it",
         topic="samples"),
-    Issue("held", "{share:.2g%} of the samples repeat the one before, where chance explains "
-        "{chance:.2g%}: lost packets, for which the last sample was written again",
-        "make such samples missing (NaN)", severity="warning", topic="samples",
-        lacks="samples_measured", reason="samples that repeat the one before", spoils=("channel",),
-        masks=True, user_only=True),
-    Issue("infinite", "{count:,} infinite samples", "repair them, or set them to NaN for missing",
+    Issue("held", "{share:.2g%} of the samples repeat the previous one ({chance:.2g%} by chance): "
+        "the last sample was written again for lost packets", "set these samples to NaN",
+        severity="warning", topic="samples", lacks="samples_measured",
+        reason="held samples", spoils=("channel",), masks=True,
+        user_only=True),
+    Issue("infinite", "{count:,} infinite samples", "correct them, or set them to NaN",
         severity="bad", topic="samples", repeats="reader"),
-    Issue("interpolated", "{share:.2g%} of the samples lie on straight lines between others: "
+    Issue("interpolated", "{share:.2g%} of the samples lie exactly on lines between others: "
         "interpolated from about {rate:.3g} Hz, so the noise is not the sensor's",
-        "record what the sensor gives, in a topic of its own or without the driver's interpolation "
-        "(RealSense: unite_imu_method 0); the calibration skips the channel", severity="bad",
-        topic="samples"),
+        "record the sensor's own samples: in a topic of its own, or without the driver's "
+        "interpolation (RealSense: unite_imu_method 0); the calibration skips the channel",
+        severity="bad", topic="samples"),
     Issue("length", {
         "": "{n:,} samples at {rate:g} Hz, {duration:.6g} s",
-        "short": "{n:,} samples at {rate:g} Hz, {duration:.6g} s, too short for slow errors of "
+        "short": "{n:,} samples at {rate:g} Hz, {duration:.6g} s: too short for slow errors of "
         "minutes and more",
-        "few": "fewer than {fewest} samples in a row, too few for any other check"},
-        "an hour or more shows them", severity="good"),
+        "few": "no run of {fewest} samples without a gap: too short for the other checks"},
+        "record an hour or more", severity="good"),
     Issue("line", {
-        "": "a periodic line at {frequency:.4g} Hz, amplitude {shown}, {times} times its "
-        "surroundings{also}",
+        "": "a periodic line at {frequency:.4g} Hz, amplitude {shown}, {times} times the noise "
+        "around it{also}",
         "weak": "{count:.0f} weaker periodic line{count:s?}, the strongest at {frequency:.4g} Hz, "
-        "amplitude {shown}"},
-        "gmwm calibrate adds a Sinusoid to the model; or find what turns or hums", topic="samples"),
+        "amplitude {shown}"}, "gmwm calibrate models it as a Sinusoid; or remove the source (fan, "
+        "motor, mains)", topic="samples"),
     Issue("not-static", "not static: {verb} {times}", severity="warning", lacks="recording_static",
         reason="the sensor moved", spoils=("gyro", "accel")),
     Issue("outliers", {
-        "": "{share:.2g%} of the samples are outliers spread over the record, beyond four standard "
-        "deviations, where noise has {usual:.2g%}",
+        "": "{share:.2g%} of the samples, spread over the record, are outliers beyond four "
+        "standard deviations (Gaussian noise: {usual:.2g%})",
         "fixes": "{fixes} ({share})",
-        "innovations": "The filter's model does not fit: innovations are {sizes} as it expects; "
-        "most are not, so that some fixes are outliers, or errors without fixes grow faster than "
-        "the sensor models predict."},
-        "gmwm calibrate leaves them out; in Python: Health.masked, or robust=True",
-        severity="warning", topic="samples", masks=True),
+        "innovations": "The filter's model does not fit: innovations are {sizes} as expected, most "
+        "of them not. Either some fixes are outliers, or errors between fixes grow faster than the "
+        "sensor models predict."}, "masked by gmwm calibrate; in Python use Health.masked or "
+        "robust=True", severity="warning", topic="samples", masks=True),
     Issue("repeated-samples", "each sample is written {times:.0f} times: the channel's own rate is "
-        "{rate:.6g} Hz", "one of each is used, at that rate", topic="samples"),
+        "{rate:.6g} Hz", "each is used once, at that rate", topic="samples"),
     Issue("resonance", "a resonance at {frequency:.3g} Hz, damping {damping:.2g}, {times} times "
-        "its surroundings, {shown} rms",
-        "gmwm calibrate adds a Resonance to the model where it is needed", topic="samples"),
+        "the noise around it, {shown} rms", "gmwm calibrate models it as a Resonance if needed",
+        topic="samples"),
     Issue("rounding", {
         "": "samples come in steps of {step}, {times} times the white noise of {shown}",
-        "coarse": "samples come in steps of {step}, more than three times the noise below them"},
+        "coarse": "samples come in steps of {step}, more than three times the noise"},
         severity="bad", topic="samples", lacks="resolution_fine",
         reason="steps coarser than the noise", spoils=("channel",)),
     Issue("rows-copied", {
-        "": "{samples:,.0f} rows repeat earlier ones in every channel, all from {start:.6g} s on, "
-        "as from {first:.6g} s on: noise does not repeat",
-        "several": "{samples:,.0f} rows repeat earlier ones in every channel, in {count:,.0f} "
-        "stretches, the longest {longest:.6g} s from {start:.6g} s on, as from {first:.6g} s on: "
-        "noise does not repeat"},
-        "look for files joined with an overlap and for buffers that are sent again",
-        severity="warning", topic="samples", masks=True),
+        "": "{samples:,.0f} rows from {start:.6g} s on are exact copies of the rows from "
+        "{first:.6g} s on",
+        "several": "{samples:,.0f} rows are exact copies of earlier rows, in {count:,.0f} "
+        "stretches; the longest is {longest:.6g} s at {start:.6g} s, a copy of {first:.6g} s"},
+        "look for files joined with an overlap and for buffers sent twice", severity="warning",
+        topic="samples", masks=True),
     Issue("saturation", "cut off at {ends}: {samples:,.0f} samples ({share:.2g%}) at the end of "
-        "the scale", "use a wider range; make such samples missing (NaN) if they are few",
+        "the range", "use a wider range; if they are few, set these samples to NaN",
         severity="warning", topic="samples", lacks="within_range",
         reason="samples cut off at range", spoils=("channel",), user_only=True),
-    Issue("size", "varies by {spread:.1g} {unit}, which no sensor gives", "check the unit",
+    Issue("size", "varies by {spread:.1g} {unit}, which is not sensor noise", "check the unit",
         severity="bad"),
-    Issue("still-stretches", "in motion or vibrating for a part of its {duration:.4g} s; at rest "
-        "from {listed} |{timeline}|: these {total:.4g} s are used, and no averaging time is longer "
-        "than the longest of them, {longest:.4g} s", "slower errors are not seen",
+    Issue("still-stretches", "in motion or vibrating for part of its {duration:.4g} s; at rest "
+        "from {listed} |{timeline}|: these {total:.4g} s are used; the longest stretch, "
+        "{longest:.4g} s, limits the averaging time", "for slower errors, record longer at rest",
         severity="warning"),
     Issue("stuck", {
-        "": "stuck at {shown} for {longest:,.0f} samples from {time:.6g} s on, where rounding "
-        "explains {chance:,}",
+        "": "stuck at {shown} for {longest:,.0f} samples from {time:.6g} s on (rounding explains "
+        "{chance:,})",
         "often": "stuck {count:,.0f} times, the longest at {shown} for {longest:,.0f} samples from "
-        "{time:.6g} s on, where rounding explains {chance:,}",
-        "log": "one value for {length:.4g} s from {start:.10g} s on: the sensor is stuck"},
-        "make such samples missing (NaN) before the fit", severity="warning", topic="samples",
-        lacks="samples_change", reason="values that stick", spoils=("channel",), user_only=True),
+        "{time:.6g} s on (rounding explains {chance:,})",
+        "log": "constant for {length:.4g} s from {start:.10g} s on: the sensor is stuck"},
+        "set these samples to NaN before the fit", severity="warning", topic="samples",
+        lacks="samples_change", reason="stuck values", spoils=("channel",), user_only=True),
     Issue("temperature", "follows {name} by {per} (correlation {correlation:.2g})",
-        "compensate for it first, or slow terms of the model will stand for it", severity="warning",
+        "compensate for it first; otherwise slow noise is too large", severity="warning",
         user_only=True),
     Issue("tilt", "tilted by {degrees:.2g} deg at {time:.4g} s{others}: gravity moves between the "
         "axes", severity="warning", lacks="attitude_kept", reason="the sensor tilted",
         spoils=("accel",)),
     Issue("value-repeated", {
-        "": "{samples:,.0f} samples ({share:.2g%}) are {shown}, which comes {times} times as often "
-        "as the values next to it",
-        "cut": "zero comes twice as often ({share:.2g%}) as the values around it explain: samples "
-        "were cut towards zero, not rounded"},
-        "if it stands for no answer or a dead band, make such samples missing (NaN)",
-        severity="warning", topic="samples", lacks="samples_measured",
-        reason="one value stands for many", spoils=("channel",)),
+        "": "{shown} occurs in {samples:,.0f} samples ({share:.2g%}), {times} times as often as "
+        "neighbouring values",
+        "cut": "zero occurs twice as often as neighbouring values explain ({share:.2g%}): samples "
+        "were truncated, not rounded"}, "if it marks a missing answer or a dead band, set these "
+        "samples to NaN", severity="warning", topic="samples", lacks="samples_measured",
+        reason="one value too frequent", spoils=("channel",)),
     Issue("variance", {
-        "": "{before}the noise is not steady: {low} in the quiet and {high} in the loud tenth of "
-        "parts of {part:.3g} s, so that its mean is {excess:.2g%} above that of the quiet quarter",
+        "": "{before}the noise is not steady: {low} in the quietest tenth of its parts of "
+        "{part:.3g} s, {high} in the loudest; its mean is {excess:.2g%} above the quietest quarter",
         "half": "the noise is {growth:.2g%} {word} in the second half than in the first",
         "tenth": "the noise is {growth:.2g%} larger than usual in the tenth of the record that "
-        "begins at {start:.4g} s"}, "use a recording, or a part, without what vibrates",
+        "begins at {start:.4g} s"}, "use a recording, or a part of one, without the vibration",
         severity="bad", topic="samples", lacks="noise_steady", reason="the noise comes and goes",
         spoils=("channel",), user_only=True),
-    Issue("vibration", "it vibrates for {total:.4g} s: samples scatter up to {times} times more "
-        "than at rest from {listed}", "use what is at rest: gmwm.find_still has the stretches",
+    Issue("vibration", "vibration for {total:.4g} s, from {listed}: samples scatter up to {times} "
+        "times as much as at rest", "use the stretches at rest (gmwm.find_still)",
         severity="warning"),
 )  # fmt: skip
 
@@ -472,13 +465,12 @@ _CALIBRATION = (
     Issue("ambiguity", "{models} models fit equally well: {titles}{also}", "the first is used",
         topic="selection"),
     Issue("constant", "constant at {value:.6g} {unit}", severity="bad"),
-    Issue("departures-many", "{removed} departures were subtracted: a level that changes so often "
-        "is noise of the sensor",
-        "fit a slow term in place of it, such as a Gauss-Markov process", severity="bad",
-        lacks="stationary", reason="the bias steps to and fro"),
-    Issue("departures-removed", "what was subtracted makes the deviation {times} times as large at "
-        "tau = {tau:.3g} s: the model holds where nothing like it comes again",
-        "find its cause, or let a slow term of the model describe it", severity="warning"),
+    Issue("departures-many", "{removed} departures were subtracted: a bias that changes so often "
+        "is sensor noise", "fit a slow term instead, such as a Gauss-Markov process",
+        severity="bad", lacks="stationary", reason="the bias keeps changing"),
+    Issue("departures-removed", "with the subtracted departures the deviation at tau = {tau:.3g} s "
+        "would be {times} times as large: the model is wrong if they recur", "find the cause, or "
+        "add a slow term to the model instead of subtracting", severity="warning"),
     Issue("drift-at-start", "a drift by {height} from the start that ends at {when}{also}",
         "leave it out{back}", severity="bad", topic="departure", lacks="stationary",
         reason="drift after switching on"),
@@ -493,21 +485,20 @@ _CALIBRATION = (
         severity="bad"),
     Issue("not-estimable", "{text}", severity="bad"),
     Issue("slow-period", "a period of {when} with an amplitude of {height}{also}",
-        "find what varies so, such as the temperature{back}", severity="bad", topic="departure",
-        lacks="stationary", reason="a slow period stands out"),
-    Issue("step", "a step of {height} at {when}{also}",
-        "calibrate the part before it or after it{back}", severity="bad", topic="departure",
-        lacks="stationary", reason="the bias stepped"),
+        "find the cause, such as the temperature{back}", severity="bad", topic="departure",
+        lacks="stationary", reason="a slow period"),
+    Issue("step", "a step of {height} at {when}{also}", "calibrate only the part before or after "
+        "the step{back}", severity="bad", topic="departure", lacks="stationary",
+        reason="the bias stepped"),
     Issue("transient", "a transient of {height} at the start with a time constant of {when}{also}",
         "leave out the first three time constants{back}", severity="bad", topic="departure",
         lacks="stationary", reason="a transient at the start"),
-    Issue("unresolved-walk", "the record leaves open a random walk of up to K = {shown} (95 %): "
-        "with it the deviation at {tau:.4g} s is {times} times that of the model",
-        "only a longer record can tell"),
+    Issue("unresolved-walk", "a random walk of up to K = {shown} (95 %) is possible: with it the "
+        "deviation at {tau:.4g} s is {times} times the model's", "record longer to see it"),
     Issue("unsteady", "the slow noise changes during the recording: {quiet_part} it has {less} "
         "times the deviation of the whole record, {loud_part} {more} times; the model is an "
-        "average", "calibrate the part that is like the use", severity="bad", lacks="noise_steady",
-        reason="slow noise changes its size"),
+        "average", "calibrate the part that matches how the sensor is used", severity="bad",
+        lacks="noise_steady", reason="slow noise changes"),
 )  # fmt: skip
 
 _ESTIMATE = (
@@ -517,7 +508,7 @@ _ESTIMATE = (
         "of {correlation:.5f})", "fix one of them", lacks="parameters_separable",
         reason="terms cannot be separated"),
     _fit("drift-in-state", "a drift that enters the {term} state is not a ramp of the signal",
-        lacks="drift_is_ramp", reason="the drift is no ramp"),
+        lacks="drift_is_ramp", reason="the drift is not a ramp"),
     _fit("indistinct-terms", "two {kind} terms do not differ significantly ({first} = {one:.3g} s, "
         "{second} = {other:.3g} s)", "use one fewer", lacks="terms_distinct",
         reason="two terms look alike"),
@@ -528,9 +519,9 @@ _ESTIMATE = (
         "": "predictions over {tau:.3g} s are too {scale}: there the data lie {share} {side} the "
         "model's Allan deviation, by {errors} standard errors",
         "chance": "at tau = {tau:.3g} s the data lie {share} {side} the model's Allan deviation, "
-        "which may be chance: {chance:.0f} % of right models are missed as clearly",
-        "slight": "describes the Allan deviation to {share} (least well at tau = {tau:.3g} s)",
-        "allowed": "describes the Allan deviation to {share} (least well at tau = {tau:.3g} s), "
+        "which may be chance: {chance:.0f} % of correct models miss by as much",
+        "slight": "within {share} of the Allan deviation (largest misfit at tau = {tau:.3g} s)",
+        "allowed": "within {share} of the Allan deviation (largest misfit at tau = {tau:.3g} s), "
         "which the intervals allow for",
         "lines": "the sum of the lines misses the Allan deviation by {share} at tau = {tau:.3g} s"},
         lacks="describes_data", reason="the model misses the data"),
@@ -538,8 +529,8 @@ _ESTIMATE = (
         lacks="converged", reason="the search did not converge"),
     _fit("no-region", "the Allan plot has no region of slope {named}, so it is not estimated",
         lacks="regions_found", reason="no straight region found"),
-    _fit("no-test", "the fit is not tested: the gaps leave no wavelet variance, straight lines "
-        "bridge them", severity="note"),
+    _fit("no-test", "the fit is not tested: with these gaps there is no wavelet variance, and "
+        "straight lines bridge them", severity="note"),
     _fit("not-converged", {
         "": "the maximum of the likelihood was not reached",
         "em": "EM did not converge in {iterations} iterations",
@@ -559,29 +550,28 @@ _ESTIMATE = (
     _fit("sensor-bandwidth", "the sensor's {bandwidth:.3g} Hz low-pass shapes this noise ({term}, "
         "N = {size:.3g} {unit}); a filter needs no state for it", severity="note"),
     _fit("too-few-levels", "{levels} levels cannot determine {parameters} parameters",
-        "record longer or take a smaller model", lacks="enough_levels", reason="record too short"),
+        "record longer or use a smaller model", lacks="enough_levels", reason="record too short"),
     _fit("undetermined", "not determined by this record (standard error {stderr:.2g})",
         lacks="shapes_determined", reason="record too short for model"),
     _fit("wrong-slope", "from {first:.4g} to {last:.4g} s the Allan plot has the slope "
-        "{slope:+.2f}, not {named}", "give another region", lacks="slopes_agree",
+        "{slope:+.2f}, not {named}", "choose another region", lacks="slopes_agree",
         reason="slopes contradict the model"),
 )  # fmt: skip
 
 _SELECTION = (
-    Issue("ramp-or-walk", "a rate ramp of {ramp} or slow noise ({slow}): this record cannot tell "
-        "them apart, so the model has no ramp", topic="selection"),
+    Issue("ramp-or-walk", "this record cannot distinguish a rate ramp of {ramp} from slow noise "
+        "({slow}); the model leaves out the ramp", topic="selection"),
     Issue("tie", {
         "": "{text}",
-        "log": "A tie: errors of {names} are equal as far as this log shows{but}. {resolution}"},
+        "log": "Errors of {names} are equal within the resolution of this log{but}. {resolution}"},
         topic="selection"),
 )  # fmt: skip
 
 _FILTER_NUMBERS = (
-    _filter("bounded-error", "a {cause} moves the first integral by a bounded amount: its N, which "
-        "is enough at any time, is {factor:.2g} times too large after {horizon:g} s"),
-    _filter("estimate-it", "larger numbers are a poor substitute for {cause}: N times "
-        "{N_factor:.3g}, K times {K_factor:.3g}", "estimate it as a state, or calibrate it",
-        severity="warning"),
+    _filter("bounded-error", "the error of a {cause} stays bounded in the first integral: an N "
+        "that covers it at all times is {factor:.2g} times too large after {horizon:g} s"),
+    _filter("estimate-it", "to cover {cause}, N becomes {N_factor:.3g} times and K {K_factor:.3g} "
+        "times as large", "estimate it as a state, or calibrate it", severity="warning"),
     _filter("fast-peak-left-out", "only the low-frequency density{also} of the {label} counts: it "
         "lies above {fast:.3g} Hz and averages out"),
     _filter("less-white-noise", "N is {share:.3g} times that of the error model: use N and K as a "
@@ -610,12 +600,11 @@ _FILTER_NUMBERS = (
     _filter("other-units", "N in use is {factor:.3g} times that of the error model: it may be in "
         "other units", "give it in {unit}/sqrt(Hz)", severity="warning"),
     _filter("ramp-as-constant", "the {label} counts as a constant of standard deviation {size}: "
-        "|R| times the horizon", "a filter that lasts longer needs a state for it",
-        severity="warning"),
+        "|R| times the horizon", "for longer outages add a state for it", severity="warning"),
     _filter("turn-on-left-out", "the start bias leaves out the turn-on bias, which a recording at "
         "rest cannot show", "add its variance"),
     _filter("uncertainty-not-covered", {
-        "": "the uncertainty of the fitted parameters is not covered",
+        "": "parameter uncertainty is not included",
         "why": "{reason}"}),
 )  # fmt: skip
 
@@ -624,28 +613,28 @@ _INS = (
         "{yaw:.2f} deg, 1 sigma {tilt_deg:.2g} deg of tilt and {heading_deg:.2g} of heading"),
     _navigation("attitude-given", "roll, pitch and yaw as given: {degrees} deg, 1 sigma "
         "{sd_deg:.2g} deg"),
-    _navigation("axis-signs", "the sign of {wrong} is wrong{unseen}",
-        "bring gyros and accelerometers to the same axes forward, right, down: reverse {reverse}, "
-        "and check every gyro by hand, for a drive does not show them all: positive while the "
-        "right side goes down (x), the front goes up (y), it turns right (z)", severity="bad"),
+    _navigation("axis-signs", "the sign of {wrong} is wrong{unseen}", "use the same axes forward, "
+        "right, down for gyros and accelerometers: reverse {reverse}. Check every gyro by hand, "
+        "because a drive does not show them all: it is positive while the right side goes down "
+        "(x), the front goes up (y), it turns right (z)", severity="bad"),
     _navigation("axis-up", "its mean is positive: the axis points up, and roll is near 180 deg",
-        "if it is mounted upside down, fine; else reverse gyro_z and accel_z, and gyro_y and "
-        "accel_y too if y points left", severity="warning"),
+        "correct if the sensor is mounted upside down; otherwise reverse gyro_z and accel_z, and "
+        "also gyro_y and accel_y if y points left", severity="warning"),
     _navigation("barometer-set", "barometric heights are set to the first position fix, by "
         "{shift:.3g} m"),
-    _navigation("better", "Take {where}: its errors after the outages are smaller{but}.",
+    _navigation("better", "Use {where}: its errors after the outages are smaller{but}.",
         severity="good"),
     _navigation("biases-assumed", "turn-on biases, which a static calibration does not know, are "
         "assumed to be {sd} (1 sigma)"),
     _navigation("columns-unused", "columns not used: {columns}"),
     _navigation("consistent", "The innovations agree with the filter's model: they are as large as "
-        "it expects, and white.", severity="good"),
+        "expected, and white.", severity="good"),
     _navigation("diverged", {
-        "": "The filter diverged: the sensor models or the initial state are far off, or a fix is.",
-        "runs": "diverged in {diverged} of {runs} runs; figures are those of the other runs"},
+        "": "The filter diverged: check the sensor models, the initial state and the fixes.",
+        "runs": "diverged in {diverged} of {runs} runs; results are from the other runs"},
         severity="bad"),
-    _navigation("fewer-runs", "{runs} runs in place of {asked}: the recording has no more "
-        "stretches of this length that do not overlap", severity="warning"),
+    _navigation("fewer-runs", "{runs} runs instead of {asked}: the recording has no more separate "
+        "stretches of this length", severity="warning"),
     _navigation("fixes-left-out", "{count} fixes before or after the IMU's record are left out"),
     _navigation("fixes-rejected", "{count} of {of} are rejected; the farthest is {size:.3g} sigma "
         "off at {time:.10g} s", severity="warning"),
@@ -653,24 +642,22 @@ _INS = (
         "": "{source}: {degrees:.2f} deg, 1 sigma {sd_deg:.2g} deg",
         "wrong": "the heading that the filter started with is wrong by {by:.1f} deg (standard "
         "error {error_deg:.1g} deg): the IMU is mounted rotated, or drives backwards"}),
-    _navigation("judged-on-loiter", "judged on the loiter of a fixed-wing aircraft",
-        "give the motion that it is for, trajectory= or scenario="),
+    _navigation("judged-on-loiter", "tested on the loiter of a fixed-wing aircraft",
+        "give your own motion, trajectory= or scenario="),
     _navigation("levelled", "levelled on {length:.3g} s {how}, from {start:.6g} s on{bias}"),
     _navigation("lever-arm", "the antenna is off the lever arm by {parts}, standard errors in "
         "brackets", severity="bad"),
-    _navigation("lost", "The filter is lost: innovations are {times} times as large as it expects; "
-        "do not use the accuracy that it predicts. Look first at {first}the heading that it "
-        "started with, then at the units of the sensors and the clock of the fixes.",
-        severity="bad"),
-    _navigation("mixed-sizes", "The filter's model does not fit: innovations are {sizes} as it "
-        "expects; the standard deviations of the fixes do not fit each other.", severity="bad"),
-    _navigation("more-honest", "Take {where}: errors are as large, but it predicts them "
+    _navigation("lost", "The filter is lost: innovations are {times} times as large as expected; "
+        "do not use its predicted accuracy. Look first at {first}the initial heading, then at the "
+        "units of the sensors and the clock of the fixes.", severity="bad"),
+    _navigation("mixed-sizes", "The filter's model does not fit: innovations are {sizes} as "
+        "expected; the standard deviations of the fixes contradict each other.", severity="bad"),
+    _navigation("more-honest", "Use {where}: errors are as large, but it predicts them "
         "better{but}.", severity="good"),
     _navigation("no-time-stamps", "the IMU has no time stamps: fixes are timed from its first "
         "sample"),
-    _navigation("not-white", "The filter's model does not fit: innovations are as large as it "
-        "expects, but depend on those before; a slow error of the sensors is missing in their "
-        "models.", severity="bad"),
+    _navigation("not-white", "The filter's model does not fit: innovations are as large as "
+        "expected, but correlated in time; the sensor models lack a slow error.", severity="bad"),
     _navigation("outside-linearity", "at {time:g} s the attitude is off by {tilt_deg:.2g} deg in "
         "tilt and {heading_deg:.2g} deg in heading (1 sigma): products of errors count, and NEES "
         "and errors predicted there are too small", "check them by runs, as gmwm navigate does",
@@ -680,10 +667,10 @@ _INS = (
     _navigation("resolution", "this motion would show {shown}{missing}"),
     _navigation("samples-filled", "{count:,} missing sample{count:s?}, at most {longest} in a row, "
         "are interpolated", severity="warning"),
-    _navigation("sd-assumed", "the fixes have no standard deviations: {sd} to the north, east and "
-        "down are assumed", "give {where}_sd"),
-    _navigation("sd-not-used", "the fixes have standard deviations of their own: the given ones "
-        "are not used", severity="warning"),
+    _navigation("sd-assumed", "the fixes have no standard deviations; {sd} (north, east, down) is "
+        "assumed", "give {where}_sd"),
+    _navigation("sd-not-used", "the fixes have their own standard deviations: the given ones are "
+        "not used", severity="warning"),
     _navigation("standstills", "{count} standstill{count:s?} of {length:g} s are recognised"),
     _navigation("standstills-unknown", "no standstill can be recognised: the vehicle does not "
         "stand at the start", severity="warning"),
@@ -693,15 +680,15 @@ _INS = (
         "GPS time is ahead of them by the leap seconds, {seconds:g} s since 2017",
         "shift the fixes by as much", severity="warning"),
     _navigation("too-large", {
-        "": "The filter's model does not fit: innovations are {sizes} as it expects; the sensors "
-        "are worse than their models, or the fixes than their standard deviations.",
-        "assumed": "Only the standard deviations assumed for the fixes do not fit these data: "
-        "innovations are {sizes} as they allow."}, severity="bad"),
+        "": "The filter's model does not fit: innovations are {sizes} as expected; the sensors are "
+        "worse than their models, or the fixes worse than their standard deviations.",
+        "assumed": "Only the standard deviations assumed for the fixes do not fit: innovations are "
+        "{sizes} as expected."}, severity="bad"),
     _navigation("too-small", {
-        "": "The filter's model does not fit: innovations are {sizes} as it expects; the sensors "
-        "are better than their models, or the fixes than their standard deviations.",
-        "assumed": "Only the standard deviations assumed for the fixes do not fit these data: "
-        "innovations are {sizes} as they allow."}, severity="bad"),
+        "": "The filter's model does not fit: innovations are {sizes} as expected; the sensors are "
+        "better than their models, or the fixes better than their standard deviations.",
+        "assumed": "Only the standard deviations assumed for the fixes do not fit: innovations are "
+        "{sizes} as expected."}, severity="bad"),
 )  # fmt: skip
 
 _POPULATION = (
@@ -710,8 +697,8 @@ _POPULATION = (
     _population("channels-differ", "{have} no such channel: {names}"),
     _population("curves-close", "{sentence}", severity="note"),
     _population("curves-differ", "{sentence}"),
-    _population("few-recordings", "{recordings} recordings know the spread within factors of "
-        "{low:.2g} and {factor:.2g} (95 %)", severity="note"),
+    _population("few-recordings", "from {recordings} recordings the spread is known within factors "
+        "of {low:.2g} and {factor:.2g} (95 %)", severity="note"),
     _population("few-units", "{units} unit{units:s?}: a distribution-free limit needs {needed}",
         severity="note"),
     _population("left-over", "the folder also holds {units} calibration{units:s?} of other "
@@ -732,8 +719,8 @@ _POPULATION = (
 )  # fmt: skip
 
 _STUDY = (
-    _navigation("no-line", "{axes}: the Allan plot has neither a floor nor a slope of +1/2; its "
-        "lowest point gives a Gauss-Markov process"),
+    _navigation("no-line", "{axes}: the Allan plot has neither a flat part nor a slope of +1/2; "
+        "its lowest point gives a Gauss-Markov process"),
 )  # fmt: skip
 
 CATALOGUE: Mapping[str, Issue] = _catalogue(

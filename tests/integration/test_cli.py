@@ -356,12 +356,12 @@ BAD = {
     "ragged row": (with_line(70, "1,2,3"), ALL, ("f.csv, line 70", "3 fields where 2 were")),
     "too few samples": (good_lines()[:64], ALL, ("63 samples", "at least 64", "record longer")),
     "rate against the time stamps": (with_time(0.0), ("--rate", "200", *SI),
-        ("stamps give 100 Hz, not the 200 Hz stated", "leave out the rate")),
+        ("stamps give 100 Hz, not the given 200 Hz", "leave out the rate")),
     "time without a unit, nor have the channels": (MICROSECONDS, (),
         ("50 Hz if they are microseconds", "name the column 't [us]'",
          "e.g. --gyro-unit deg/s --accel-unit g --rate 50, or")),
     "a rate that time without a unit cannot have": (MICROSECONDS, ALL,
-        ("50 Hz if they are microseconds, not the 100 Hz stated", "e.g. --rate 50")),
+        ("50 Hz if they are microseconds, not the given 100 Hz", "e.g. --rate 50")),
     "a clock that stops": (with_time(0.0, 0.0), SI,
         ("f.csv, column 'time_s', line 123", "repeats the one before", "--rate 100 --time none")),
     "a clock that runs backwards": (with_time(0.0, -1.0), SI,
@@ -622,7 +622,7 @@ def test_stretches_at_rest_of_a_log_that_moves(run, turned_file, no_pages):
     assert (code, told) == (0, "")
     shown = " ".join(printed.split())
     assert "at rest from 0 to 29.75, 60.5 to 120 s |###" in shown
-    assert "no averaging time is longer than the longest of them" in shown
+    assert "limits the averaging time" in shown
     assert "8,925 samples a channel" in shown
     rows = np.loadtxt(turned_file, delimiter=",", skiprows=1)
     rows += 30.0 * np.sin(np.arange(len(rows)) / 70.0)[:, None] * [1, 1, 1, 0, 0, 0]
@@ -641,7 +641,7 @@ def test_exit_status_where_no_axis_is_valid(run, turned_file, no_pages):
     assert told == "gmwm: no channel has a valid model, see the report\n"
     shown = " ".join(printed.split())
     assert "not static: it turns at up to 60" in shown
-    assert "120 s, too short for slow errors of minutes and more" in shown
+    assert "120 s: too short for slow errors of minutes and more" in shown
     assert shown.count("not static") == 1
     assert max(map(len, printed.splitlines())) <= WIDTH
     assert Path("gmwm-out/calibration.json").exists()

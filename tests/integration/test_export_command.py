@@ -90,7 +90,7 @@ def test_calibrate_writes_the_same_file(run, tmp_path):
     [
         (("calibration.json",), "needs files and a program"),
         (("--to", "kalibr"), "needs files and a program"),
-        (("calibration.json", "--to", "rosbag"), "known are kalibr, openvins"),
+        (("calibration.json", "--to", "rosbag"), "choose from kalibr, openvins"),
         (("nowhere.json", "--to", "kalibr"), "cannot be read"),
         (("calibration.json", "--to", "kalibr", "--horizon", "0"), "give a positive time"),
         (("calibration.json", "--to", "kalibr", "--form", "N+GM"), r"holds N+K only"),

@@ -126,7 +126,7 @@ def test_a_rate_is_that_of_the_trajectory_and_units_need_an_imu(run, no_pages):
     assert code == 0
     assert printed.startswith("car: 30 s at 10 Hz")
     code, _, told = run("study.yaml", "--gyro-unit", "deg/s")
-    assert (code, "--gyro-unit is about your own data" in told) == (2, True)
+    assert (code, "--gyro-unit needs your own data" in told) == (2, True)
 
 
 def test_paths_in_the_file_are_relative_to_it_and_those_of_options_to_here(run, no_pages):
@@ -196,12 +196,12 @@ BAD = {
     "truth: unit": ({"truth": MODELS | {"gyro": {"N": "1 deg/h"}}}, "does not measure the same"),
     "truth: negative": ({"truth": MODELS | {"gyro": {"N": -1}}}, "truth, gyro, N"),
     "truth: NaN": ({"truth": MODELS | {"gyro": {"N": float("nan")}}}, "is not a number"),
-    "truth: huge": ({"truth": MODELS | {"gyro": {"N": "1e999"}}}, "is beyond what sensors"),
+    "truth: huge": ({"truth": MODELS | {"gyro": {"N": "1e999"}}}, "is outside the plausible range"),
     "truth: yes": ({"truth": MODELS | {"gyro": {"N": True}}}, "is not a number"),
     "truth: flat GM": ({"truth": MODELS | {"gyro": {"GM": [1, 2]}}}, "write [[sigma, tau], ...]"),
     "truth: tau unit": ({"truth": MODELS | {"gyro": {"GM": [[1, "3 m"]]}}}, "same as s"),
     "recordings: number": ({"truth": {"recordings": 5}}, "write [file, ...]"),
-    "recordings: none": ({"truth": {"recordings": []}}, "recordings: there is none"),
+    "recordings: none": ({"truth": {"recordings": []}}, "no recordings given"),
     "recordings: missing": ({"truth": {"recordings": "x.csv"}}, "x.csv does not exist"),
     "recordings: key": ({"truth": {"recordings": "x.csv", "unit": 1}}, "'unit' is unknown"),
     "recordings: units": ({"truth": {"recordings": "x.csv", "units": 5}}, "write {gyro: deg/s"),
@@ -225,11 +225,11 @@ BAD = {
     "outages: beyond": ({"outages": [[18, 60]]}, "goes beyond the end"),
     "outages: negative": ({"outages": [[18, -1]]}, "give seconds above zero"),
     "outages: early": ({"outages": [[-1, 5]]}, "seconds since the first epoch"),
-    "outages: overlap": ({"outages": [[10, 9], [18, 6]]}, "write them as one, or apart"),
-    "outages: same": ({"outages": [[18, 6], [18, 6]]}, "write them as one, or apart"),
+    "outages: overlap": ({"outages": [[10, 9], [18, 6]]}, "join or separate them"),
+    "outages: same": ({"outages": [[18, 6], [18, 6]]}, "join or separate them"),
     "outages: unit": ({"outages": [["1 m", 6]]}, "same as s"),
     "outages: between": ({"outages": [[18, 6.01]]}, "between two epochs"),
-    "outages: no fix": ({"outages": [[18.1, 0.4]]}, "no fix falls into that"),
+    "outages: no fix": ({"outages": [[18.1, 0.4]]}, "no fix falls between"),
     "gnss: number": ({"gnss": 5}, "gnss: 5: write KEY: VALUE"),
     "gnss: key": ({"gnss": {"sd": 1}}, "'sd' is unknown: there are interval"),
     "gnss: none": ({"gnss": {"position_sd": "none"}}, "there is no fix"),
@@ -273,15 +273,15 @@ def test_a_file_that_cannot_be_used_is_refused_in_one_sentence(run, case):
         ("", "is empty"),
         ("hello", "is not a mapping"),
         ("- 1\n- 2", "is not a mapping"),
-        ("a: [1", "is not YAML (line 1"),
+        ("a: [1", "invalid YAML (line 1"),
         ("a:\n\t- 1", "line 2, column 1"),
         ("a: *b", "undefined alias"),
-        ("a: !!python/object:os.system 1", "is not YAML"),
-        ("truth: x\ntrajectory: car\ntruth: y", "line 3: 'truth' is there twice"),
-        ("filters:\n  A: x\n  B: y\n  A: z", "line 4: 'A' is there twice"),
-        ("filters: {1: x, '1': y}", "'1' is there twice"),
-        ("a\0: 1", "is not YAML"),
-        ("\xff\xfe", "is not"),
+        ("a: !!python/object:os.system 1", "invalid YAML"),
+        ("truth: x\ntrajectory: car\ntruth: y", "line 3: 'truth' appears twice"),
+        ("filters:\n  A: x\n  B: y\n  A: z", "line 4: 'A' appears twice"),
+        ("filters: {1: x, '1': y}", "'1' appears twice"),
+        ("a\0: 1", "invalid YAML"),
+        ("\xff\xfe", "invalid YAML"),
     ],
 )  # fmt: skip
 def test_what_is_no_study_file(run, text, message):
@@ -347,7 +347,7 @@ def test_real_errors_of_another_rate_are_refused_before_any_run(run):
     written(truth=truth, filters=filters, outages=None)
     code, printed, _ = run("study.yaml", "--jobs", 1, "--runs", 9)
     assert code == 0
-    assert "6 runs in place of 9" in " ".join(printed.split())
+    assert "6 runs instead of 9" in " ".join(printed.split())
 
 
 class _References(HTMLParser):

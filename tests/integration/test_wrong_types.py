@@ -129,7 +129,7 @@ def test_start_of_a_fit():
 
 @pytest.mark.parametrize("method", [np.ones(3), ["gmwm"], 3, "GMWM", gmwm.GMWM])
 def test_no_method(method):
-    refused(lambda: gmwm.fit(MODEL, WV, method=method), "known are gmwm,")
+    refused(lambda: gmwm.fit(MODEL, WV, method=method), "give one of gmwm,")
 
 
 @pytest.mark.parametrize(
@@ -215,7 +215,7 @@ def test_a_channel_of_complex_numbers():
 
 def test_recordings_that_are_none():
     for entrance in (gmwm.select, lambda data: gmwm.fit(MODEL, data)):
-        refused(lambda e=entrance: e([]), "there is no recording: give one")
+        refused(lambda e=entrance: e([]), "no recordings given: give at least one")
         refused(lambda e=entrance: e((WV, "a")), "'a' stands among the recordings")
         refused(lambda e=entrance: e([WV, 2.0]), "2.0 stands among the recordings")
 

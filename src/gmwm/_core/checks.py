@@ -82,7 +82,7 @@ def share(name: str, value: Any, example: float) -> float:
 def choice(name: str, value: Any, known: Sequence[str]) -> str:
     """One of the words that are known."""
     if not isinstance(value, str) or value not in known:
-        raise _wrong(name, value, f"known are {', '.join(known)}")
+        raise _wrong(name, value, f"choose from {', '.join(known)}")
     return value
 
 

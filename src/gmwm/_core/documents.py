@@ -229,7 +229,7 @@ class Document:
         version = content.get("schema_version")
         if cls.SCHEMA and version != cls.SCHEMA_VERSION:
             raise InputError(
-                f"schema version {checks.shown(version)} is not known here (known is "
+                f"schema version {checks.shown(version)} is unknown (this version reads "
                 f"{cls.SCHEMA_VERSION}): make the {what} again or update gmwm",
                 "schema",
             )
@@ -334,7 +334,7 @@ def read_json(path: str | os.PathLike[str]) -> Any:
         raise InputError(f"{path}: cannot be read ({error.strerror}): check the path") from None
     if len(text) > _LARGEST:
         raise InputError(
-            f"{path}: has more than {_LARGEST >> 20} MB, which no result has: check the path"
+            f"{path}: has more than {_LARGEST >> 20} MB, too large for a result: check the path"
         )
     try:
         return from_json(text, allow_inf_nan=False)
@@ -352,7 +352,7 @@ def load_document(path: str | os.PathLike[str]) -> Any:
     kind = Document._kind_of(content)
     if kind is None:
         known = ", ".join(sorted(Document._kinds))
-        raise InputError(f"{path}: holds no result of gmwm (known are {known}): check the path")
+        raise InputError(f"{path}: is not a result of gmwm ({known}): check the path")
     with _named(path):
         return kind.from_dict(content)
 

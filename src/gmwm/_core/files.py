@@ -182,8 +182,7 @@ def one_writer(folder: Path) -> Iterator[None]:
         lock.acquire()
     except Timeout:
         raise InputError(
-            f"{folder} is in use by another run that is not at its end: wait for it, or give "
-            "another folder",
+            f"{folder} is in use by another run: wait until it ends, or give another folder",
             "runs-in-use",
         ) from None
     try:

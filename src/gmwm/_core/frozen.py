@@ -15,7 +15,7 @@ class FrozenDict(dict[K, V]):
     """A dictionary that does not change; `types.MappingProxyType` cannot be pickled."""
 
     def _refuse(self, *_: Any, **__: Any) -> NoReturn:
-        raise TypeError("a result does not change: make a dict of it first")
+        raise TypeError("results are read-only: copy it into a dict first")
 
     __setitem__ = __delitem__ = __ior__ = _refuse
     clear = pop = popitem = setdefault = update = _refuse

@@ -248,7 +248,7 @@ def _left_out(given: Recording, screened_one: Recording) -> dict[str, tuple[tupl
 
 def _check_together(recordings: Sequence[Recording]) -> None:
     if not recordings:
-        raise InputError("there is no recording: give one at least")
+        raise InputError("no recordings given: give at least one")
     for each in recordings:
         require_recording(each)
     first = recordings[0]

@@ -159,7 +159,7 @@ class Calibration(Mapping[str, Fit], Document):
 
         fits = [self[name] for name in (self if channels is None else channels)]
         if not fits:
-            raise InputError(f"channels names none: give some of {', '.join(self)}")
+            raise InputError(f"no channel was selected: choose from {', '.join(self)}")
         rows, columns = -(-len(fits) // 3), min(len(fits), 3)
         size = (5.0 * columns, 4.0 * rows)
         figure, axes = plt.subplots(

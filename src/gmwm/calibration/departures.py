@@ -347,7 +347,7 @@ def _departure_notice(
         part = f"up to {100.0 * found.share:.0f} %" if found.share < 1.0 else "all"
         also = f"; it accounts for {part} of the model's wavelet variance: slow noise is too large"
         hint = None
-    back = "" if stays else ", or take it off (remove_departures=True)"
+    back = "" if stays else ", or subtract it (remove_departures=True)"
     names = ("time", "time_lower", "time_upper", "size", "lower", "upper")
     values: dict[str, Any] = dict(zip(names, (*found.time, *found.size), strict=True))
     values |= {"phase": found.phase, "evidence": found.evidence, "share": found.share}

@@ -33,7 +33,7 @@ _IN_SI = {
     """
     --imu FILE  Numbers in use: a file of Kalibr, OpenVINS, VINS, ORB-SLAM3, FAST-LIO, LIO-SAM or
         their like, or of gmwm bound and gmwm reduce (.json).
-    -N GYRO,ACCEL  White noise in use, in place of --imu, rad/s/sqrt(Hz) and m/s^2/sqrt(Hz).
+    -N GYRO,ACCEL  White noise in use, instead of --imu, rad/s/sqrt(Hz) and m/s^2/sqrt(Hz).
     -K GYRO,ACCEL  Random walk in use, with -N, rad/s^2/sqrt(Hz) and m/s^3/sqrt(Hz).
     --outages T,T,...  Lengths of outages in seconds.
     --keyframe S  Interval of keyframes or scans in seconds.
@@ -79,7 +79,7 @@ def certify(
     calibration = Calibration.load(file)
     imperfections = Imperfections(**{name: given[name] * unit for name, unit in _IN_SI.items()})
     if imperfections.needs_motion and motion is None:
-        raise InputError("errors that come with motion do nothing at rest: add --motion drone")
+        raise InputError("these errors have no effect at rest: add --motion drone")
     found = run(
         calibration,
         _numbers(given["imu"], given["white"], given["walk"], calibration),

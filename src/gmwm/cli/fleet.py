@@ -64,7 +64,7 @@ def fleet(
             found = run(patterns, models or None, **work)
     except KeyboardInterrupt:
         if (output / "calibrations").is_dir():
-            click.echo(f"finished units are kept in {output}: add --resume to go on", err=True)
+            click.echo(f"finished units are kept in {output}: add --resume to continue", err=True)
         raise
     files = f"{output}/: calibrations, fleet.parquet, fleet.html, fleet.json"
     print_result(found, files, as_json=as_json, quiet=quiet)

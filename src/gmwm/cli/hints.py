@@ -16,7 +16,7 @@ HINTS = {
     "channel-unknown": "--channel gyro_x=COLUMN for each channel",
     "channels-swapped": "--channel accel_x=COLUMN for each channel",
     "clock": "--rate 100 --time none",
-    "damaged": "get a whole copy, or use what is left of it, --damaged",
+    "damaged": "get a whole copy, or read the rest with --damaged",
     "earlier-runs": "--resume, or -o FOLDER",
     "gyro-unit-missing": "--gyro-unit deg/s",
     "heading-unknown": "--heading DEG, or heading: in the file",
@@ -73,8 +73,8 @@ def with_option(notice: Notice) -> Notice:
         return replace(notice, hint=f"give --{notice.where}-sd")
     if notice.code == "axis-up":
         hint = (
-            "if it is mounted upside down, fine; else give --channel gyro_z=-NAME "
-            "--channel accel_z=-NAME, and the same of y if that points left"
+            "correct if the sensor is mounted upside down; otherwise give --channel gyro_z=-NAME "
+            "--channel accel_z=-NAME, and also y if it points left"
         )
         return replace(notice, hint=hint)
     if notice.code in ("not-static", "tilt") and "start" in values:

@@ -189,9 +189,7 @@ def navigate(
         for name, each in alone.items():
             if each not in (None, (), False):
                 flag = name.replace("_", "-")
-                raise InputError(
-                    f"--{flag} is about your own data: give --imu, --gnss and --sensors"
-                )
+                raise InputError(f"--{flag} needs your own data: give --imu, --gnss and --sensors")
     try:
         subject = _subject(content, Path() if file is None else file.parent, is_own)
     except InputError as error:

@@ -74,7 +74,7 @@ def bound(file: Path, **options: Any) -> None:
 @options(
     """
     --outages T,T,...  Lengths of outages in seconds.
-    --keyframe S  Interval of keyframes or scans, in place of outages, for relative poses.
+    --keyframe S  Interval of keyframes or scans instead of outages, for relative poses.
     """,
     outages={"default": "10,30,60"},
 )
@@ -100,7 +100,7 @@ def reduce(file: Path, outages: str, **options: Any) -> None:
 @click.argument("file", type=PATH)
 @options(
     """
-    --times T,T,...  Coasting times in seconds.
+    --times T,T,...  Outage lengths in seconds.
     --unknown-start  Nothing is known of the errors at the start; by default the initial values of
         the slow ones are, as after aiding.
     """,

@@ -160,8 +160,8 @@ _SHARED["part"] = _group(
 )
 _SHARED["estimating"] = _group(  # named as arguments of `gmwm.calibrate`
     """
-    --model [NAME=]MODEL  Fit this in place of selecting: terms {terms}, e.g. 'N + K + 2 GM'; or
-        'gyro=N + 2 GM' for a sensor or channel; repeat.
+    --model [NAME=]MODEL  Fit this model instead of selecting one: terms {terms}, e.g.
+        'N + K + 2 GM'; or 'gyro=N + 2 GM' for a sensor or channel; repeat.
     --leave WHAT  Leave events, lines, resonances, outliers or all as they are: samples of shocks
         are masked otherwise, lines and resonances are terms that a model may have, outliers all
         over it make the variances robust; repeat.

@@ -37,7 +37,7 @@ Found = tuple[str, Sequence[Path]]
     --method NAME  Only this method, e.g. GMWM; repeat. By default all of the table.
     --resume
     --cluster
-    --recording FILE  fig5 to fig9: a real static recording in place of a simulated one; the first
+    --recording FILE  fig5 to fig9: a real static recording instead of a simulated one; the first
         is calibrated, the others are navigated with; repeat.
     --rotate  fig8, fig9: calibrate every recording in turn and navigate with the others; further
         filters, intervals over recordings.
@@ -94,7 +94,7 @@ def reproduce(
                 paths = [write_text(folder / f"{experiment}.txt", text)]
         except KeyboardInterrupt:
             if "resume" in known:
-                click.echo(f"finished runs are kept in {folder}: add --resume to go on", err=True)
+                click.echo(f"finished runs are in {folder}: add --resume to continue", err=True)
             raise
     print_result(text, *paths)
 

@@ -125,7 +125,7 @@ def event(channel: Examined) -> Iterator[Notice]:
     numbers["variance_share"] = float(share)
     name, variant = channel.name, "many" if len(events) > 1 else ""
     if 2 * samples > known:
-        hint, part = "look at what is done to them between the sensor and the file", samples / known
+        hint, part = "check the processing between the sensor and the file", samples / known
         yield notice("event", name, numbers, severity="bad", variant="most", hint=hint, part=part)
         return
     others = ""

@@ -85,7 +85,7 @@ class CramerRao(Document):
 
     def check_content(self) -> None:
         if not {*self.keys} <= {*self.model.params}:
-            raise ValueError(f"keys are not those of the model {self.model!r}")
+            raise ValueError(f"keys do not match the model {self.model!r}")
         check_covariance(self.covariance.tolist(), len(self.keys))
         check_covariance(self.wavelet_covariance.tolist(), len(self.keys), "wavelet_covariance")
 

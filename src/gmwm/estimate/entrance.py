@@ -138,8 +138,8 @@ def _with_options(method: Any, weights: str | None, omega: str | None) -> Method
         method = METHODS[method]()
     if not isinstance(method, Method):
         raise InputError(
-            f"method = {checks.shown(method)}: known are {', '.join(METHODS)}, or an object with "
-            "their options such as gmwm.EM(tolerance=1e-8)"
+            f"method = {checks.shown(method)} is not known: give one of {', '.join(METHODS)}, or "
+            "an options object such as gmwm.EM(tolerance=1e-8)"
         )
     if weights is None:
         return method
@@ -153,7 +153,7 @@ def are_several(data: Data | Sequence[Data]) -> bool:
     if not isinstance(data, list | tuple):
         return False
     if not data:
-        raise InputError("there is no recording: give one wavelet variance at least")
+        raise InputError("no recordings given: give at least one wavelet variance")
     several = [isinstance(part, WaveletVariance | Channel | np.ndarray) for part in data]
     if any(several) and not all(several):
         odd = data[several.index(False)]

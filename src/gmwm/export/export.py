@@ -101,9 +101,7 @@ def read_numbers(
     keys = next((each for each in layouts if any(name in values for name in each.names)), None)
     if keys is None:
         known = "; ".join(", ".join(each.names[:2]) for each in layouts)
-        raise InputError(
-            f"{path}: has no noise parameters by names known here ({known}): give N and K"
-        )
+        raise InputError(f"{path}: has no noise parameters of a known name ({known}): give N and K")
     for name in keys.names:
         if name not in values:
             raise InputError(f"{path}: {name} is missing: add it")

@@ -52,8 +52,8 @@ def numbers_of(
         return find_numbers(given, form, usual if horizon is None else horizon, tau)
     if not isinstance(given, FilterNumbers):
         raise InputError(
-            f"{checks.shown(given)} has no numbers to export: give a calibration, or what "
-            "gmwm.bound or gmwm.reduce made of one"
+            f"{checks.shown(given)} has no numbers to export: give a calibration, or a "
+            "result of gmwm.bound or gmwm.reduce"
         )
     if given.form != form:
         raise InputError(
@@ -98,7 +98,7 @@ def imu_of(
     numbers = [numbers_of(each, form, horizon, usual) for each in given]
     names = Counter(name for each in numbers for name in each)
     if not names:
-        raise InputError("there are no numbers to export: give a calibration")
+        raise InputError("no numbers to export: give a calibration")
     twice = [name for name, count in names.items() if count > 1]
     if twice:
         raise InputError(f"{twice[0]} is given twice: give each sensor once")
@@ -160,8 +160,8 @@ def _triad(
         for key in ("N", "K" if "K" in form else "sigma"):
             if not getattr(axis, key) > 0.0:
                 raise InputError(
-                    f"{key} of {axis.name} is zero, by which filters divide: give numbers with "
-                    "one, or export the calibration, which knows an upper limit"
+                    f"{key} of {axis.name} is zero, and filters divide by it: give a number, "
+                    "or export the calibration, which has an upper limit"
                 )
     return Triad(quantity, own)
 

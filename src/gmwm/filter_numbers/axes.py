@@ -169,7 +169,7 @@ def given_tau(form: str, tau: float | str | None) -> float | str | None:
         return None
     if form not in ("N+GM", "N+K+GM"):
         raise InputError(
-            f"tau is that of one Gauss-Markov process, the form is {form}: leave tau out, or give "
+            f"tau needs a form with one Gauss-Markov process, not {form}: leave tau out, or give "
             "N+GM or N+K+GM"
         )
     hint = f"give a time in seconds, or {SHARED!r}"
@@ -181,7 +181,7 @@ def given_times(name: str, times: Sequence[float]) -> tuple[float, ...]:
     hint = "give positive numbers of seconds, e.g. (1, 60)"
     rising = sorted({checks.positive(name, each, hint) for each in np.ravel(times).tolist()})
     if not rising:
-        raise InputError(f"{name}: give one length at least, s")
+        raise InputError(f"{name} is empty: give at least one outage length in seconds")
     return tuple(rising)
 
 

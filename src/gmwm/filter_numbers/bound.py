@@ -98,7 +98,7 @@ def bound(
     if level is not None:
         level = checks.share("level", level, 0.95)
         if any(axis.fit is None for axis in axes.axes):
-            raise InputError("level is that of a fit: a model has no confidence region")
+            raise InputError("level needs a fit: a model has no confidence region")
     if isinstance(tau, str):
         problems = [_problem(group, horizon, level) for group in axes.sharing(shared)]
         tau = correlation_time(problems, form)

@@ -155,7 +155,7 @@ class ErrorBudget:
 
     def __str__(self) -> str:
         lines = [
-            "Error (1 sigma) after free inertial coasting, level and not manoeuvring, from",
+            "Error (1 sigma) after an outage, level and not manoeuvring, from",
             f"exact attitude, velocity and position; {STARTS[self.calibrated]}.",
         ]
         for quantity in QUANTITIES:
@@ -213,7 +213,7 @@ class ErrorBudget:
         ax.plot(self.grid, total, color=SUM_COLOUR, linewidth=2.6, label="total")
         ax.set_xscale("log")
         ax.set_yscale("log" if np.any(total > 0.0) else "linear")
-        ax.set_xlabel("coasting time [s]")
+        ax.set_xlabel("outage [s]")
         ax.set_ylabel(f"{quantity} error, 1 sigma [{FIELD_UNITS[quantity]}]")
         ax.set_title(f"{of}, {STARTS[self.calibrated]}")
         ax.grid(True, which="major", color="#cccccc", linewidth=0.6)
@@ -225,7 +225,7 @@ class ErrorBudget:
         known = self.quantities(of)
         if quantity not in known:
             raise InputError(
-                f"{of} has no part in the {quantity!r} error: choose among {', '.join(known)}"
+                f"{of} does not affect the {quantity!r} error: choose from {', '.join(known)}"
             )
         parts: dict[str, list[tuple[float, ...]]] = {}
         for row in self._rows(of, quantity):
@@ -331,7 +331,7 @@ def error_budget(
     chosen = given_times("times", times)
     if chosen[0] < longest * (1.0 - 1e-6):
         raise InputError(
-            f"a coasting time of {chosen[0]:g} s is shorter than the sampling interval of "
+            f"an outage of {chosen[0]:g} s is shorter than the sampling interval of "
             f"{longest:g} s: give longer times"
         )
     first = chosen[0] if len(chosen) > 1 else max(0.01 * chosen[0], min(longest, chosen[0]))

@@ -232,7 +232,7 @@ def certify(
     known = Imperfections() if imperfections is None else imperfections
     moved = None if motion is None else Motion.of(motion)
     if known.needs_motion and moved is None:
-        raise InputError("these imperfections do nothing at rest: give a motion too")
+        raise InputError("these imperfections have no effect at rest: give a motion too")
     horizon = times[-1]
     safe = axes.numbers(lambda group: bound_of(group, "N+K", horizon, None), shared=False)
     in_use = {a.name: _in_use(numbers, a, horizon, safe[a.name].initial_sd) for a in axes.axes}
@@ -267,8 +267,8 @@ def _in_use(given: Given, axis: AxisModel, horizon: float, start: float) -> Axis
         model = WhiteNoise(N) + RandomWalk(K)
     else:
         raise InputError(
-            f"{checks.shown(item)} is not what a filter believes: give N and K, a model, or what "
-            "gmwm.bound returns"
+            f"{checks.shown(item)} gives no filter numbers: give N and K, a model, or a result of "
+            "gmwm.bound"
         )
     kinds = [type(term).__name__ for term in model.terms]
     slow = {0: "", 1: "+GM", 2: "+2GM"}.get(kinds.count("GaussMarkov"), "+?")

@@ -62,7 +62,7 @@ def integral_rms(
         return np.minimum(known, unknown) if known_start else unknown
     if not process.has_spectrum():
         raise InputError(
-            f"{type(process).__name__} is known by simulation only and has no error budget: "
+            f"{type(process).__name__} can only be simulated and has no error budget: "
             "leave the term out, or simulate and integrate it"
         )
     try:

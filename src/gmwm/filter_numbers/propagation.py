@@ -193,7 +193,7 @@ def with_constant(model: Model, sd: float, dt: float) -> StateSpace:
     variance = sd**2
     for term in model.terms:
         if not term.has_spectrum():
-            raise InputError(f"{type(term).__name__} is known by simulation only")
+            raise InputError(f"{type(term).__name__} can only be simulated")
         form = term.state_space(dt)
         if term.is_walk and variance > 0.0:
             form = StateSpace.scalar("walk", 1.0, float(form.process_noise[0, 0]), variance)

@@ -135,8 +135,8 @@ def _calibration(source: Any) -> Calibration:
     if isinstance(source, Recording) or is_frame(source):
         return calibrate(source)
     raise InputError(
-        f"{checks.shown(source)} is neither a calibration nor a recording: give what "
-        "gmwm.calibrate returns, the path of a saved one, or what gmwm.read returns"
+        f"{checks.shown(source)} is neither a calibration nor a recording: give a "
+        "result of gmwm.calibrate or its path, or a recording from gmwm.read"
     )
 
 

@@ -199,11 +199,11 @@ def recordings(paths: Paths, folder: Path | None) -> list[Item]:
     for each in given:
         text = os.fspath(each) if isinstance(each, str | os.PathLike) else None
         if not isinstance(text, str) or "\0" in text:
-            raise InputError(f"{checks.shown(each)} is no path: give paths of recordings as text")
+            raise InputError(f"{checks.shown(each)} is not a path: give recording paths as strings")
         for path in _matching(text, folder):
             found.setdefault(os.path.realpath(path), path)
     if not found:
-        raise InputError("there is no recording: give one path at least")
+        raise InputError("no recordings given: give at least one path")
     kept = list(found.values())
     return [Item(path, name) for path, name in zip(kept, _names(kept), strict=True)]
 

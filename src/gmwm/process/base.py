@@ -239,7 +239,7 @@ class Process:
         name = type(self).__name__
         if type(self).draw is Process.draw:
             raise InputError(f"{name} gives neither psd nor draw: define one of them")
-        raise InputError(f'{name} is known by simulation only: fit it with method = "simulated"')
+        raise InputError(f'{name} can only be simulated: fit it with method = "simulated"')
 
     def lines(self) -> tuple[tuple[float, float], ...]:
         """Spectral lines as (frequency in Hz, amplitude in u)."""
@@ -325,7 +325,7 @@ class Process:
         InputError
             If none is known for this process.
         """
-        raise InputError(f"no closed-form autocovariance is known for {type(self).__name__}")
+        raise InputError(f"{type(self).__name__} has no autocovariance: define it in its class")
 
     def state_space(self, dt: float) -> StateSpace:
         """State-space form at sampling interval ``dt`` (s), with stationary initial covariance.
@@ -369,7 +369,7 @@ class Process:
         try:
             drawn: Any = self.draw(n, dt, checks.generator(seed))
         except MemoryError:
-            raise InputError(f"n = {n:,}: the memory does not hold so many, give less") from None
+            raise InputError(f"n = {n:,}: too many samples for the memory, give fewer") from None
         if drawn is None:
             raise InputError(f"{where} returns nothing: let it return {n:,} samples")
         series = checks.real_numbers(drawn, f"what {where} returns")

@@ -88,7 +88,7 @@ def timing_of(clock: Clock, expected: float | None = None) -> Timing:
     found = _grid(clock)
     jumps = found.jumps
     if not _SHORTEST_STEP < jumps.interval < 1.0 / _SHORTEST_STEP:
-        raise clock.error(None, f"steps of {jumps.interval:g} are not those of a clock")
+        raise clock.error(None, f"steps of {jumps.interval:g} are impossible for a clock")
     seconds, is_guess = _unit(clock, jumps.interval, expected)
     _check_jumps(clock, found, seconds)
     rate = 1.0 / (jumps.interval * seconds)
@@ -96,9 +96,9 @@ def timing_of(clock: Clock, expected: float | None = None) -> Timing:
         guessed = without_unit(clock.source, clock.column, jumps.interval, expected)
         raise (guessed if is_guess and guessed else None) or InputError(
             f"{clock.source}, {clock.column}: its stamps give {rate:.6g} Hz, not the "
-            f"{expected:.6g} Hz stated",
+            f"given {expected:.6g} Hz",
             "rate-contradicted",
-            "leave out the rate to use that of the stamps, or give time=False to ignore them",
+            "leave out the rate to use the stamps, or give time=False to ignore them",
         )
     notices = _notices(clock, found, seconds, is_guess=is_guess)
     is_told = expected is not None or not is_guess
@@ -240,7 +240,7 @@ def without_unit(
         key=lambda unit: abs(math.log(rates[unit]) - 0.5 * math.log(slowest * fastest)),
     )
     each = [f"{rates[unit]:.6g} Hz if they are {UNITS[unit]}" for unit in likely]
-    each += [] if expected is None else [f"not the {expected:.6g} Hz stated"]
+    each += [] if expected is None else [f"not the given {expected:.6g} Hz"]
     text = ", ".join([f"{source}, {column}: steps of {step:.6g} without a unit", *each])
     name = column[8:-1] if column.endswith(("'", '"')) else "time"
     rate, called = 100.0, "by its unit"

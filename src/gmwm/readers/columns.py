@@ -32,7 +32,7 @@ class Given:
     def __post_init__(self) -> None:
         units = self.units
         if not (isinstance(units, Mapping) and all(isinstance(u, str) for u in units.values())):
-            hint = 'give that of each sensor, e.g. units={"gyro": "deg/s", "accel": "g"}'
+            hint = 'give a unit for each sensor, e.g. units={"gyro": "deg/s", "accel": "g"}'
             raise InputError(f"units = {checks.shown(units)}: {hint}")
 
 

@@ -58,7 +58,7 @@ def shares(
             known.update(own)
     for name in wanted:
         if name not in known:
-            raise InputError(f"{source} has no channel {name!r} in what is read", "channel-unknown")
+            raise InputError(f"{source} has no channel {name!r} to read", "channel-unknown")
     return found
 
 

@@ -196,7 +196,7 @@ def _stated_rate(table: Table, rate: float | None) -> float | None:
         raise InputError(f"rate = {rate!r}: give a positive sampling rate in Hz", "rate")
     if table.rate is not None and not clocks.agree(rate, table.rate):
         text = f"{table.source} states a rate of {table.rate:.6g} Hz, not {rate:.6g} Hz"
-        raise InputError(f"{text}: leave out the rate to use that of the file")
+        raise InputError(f"{text}: leave out the rate to use the file's")
     return rate
 
 
@@ -214,7 +214,7 @@ def _check_one_sensor(table: Table, roles: Roles) -> None:
         turns = np.count_nonzero(np.diff(numbers))
         if 1 < several <= tuning.MOST_SENSORS and turns > tuning.IN_TURNS * numbers.size:
             text = f"{table.source}, {table.column(index)}: rows of {several} sensors come in turns"
-            raise InputError(f"{text}: keep those of one", "several-sensors")
+            raise InputError(f"{text}: keep one sensor's rows", "several-sensors")
 
 
 def _unknown_rate(table: Table, time: int | None, stated: float | None) -> InputError | None:

@@ -166,7 +166,7 @@ def _scale(recording: Recording, force: _Sensor, *, must_show: bool) -> tuple[No
         hint = 'give the layout of this file, or units={"accel": "m/s^2"} if there is no gravity'
         raise InputError(f"{recording.source}: {text}: the file has another layout", "layout", hint)
     if _is_gravity(force.size * recording.rate, tuning.GRAVITY_SURE):
-        hint = "divide the increments, and those of the gyro, by the sampling interval"
+        hint = "divide the increments, also of the gyro, by the sampling interval"
         return (notice("gravity", "", values, variant="increments", hint=hint, usual=usual),)
     is_absent = usual < tuning.NO_GRAVITY or force.scatter > tuning.NOISE_OF_GRAVITY * usual
     if is_absent or abs(ratio - 1.0) < tuning.SCALE_AGREES:

@@ -125,7 +125,7 @@ def damage_notice(source: str, what: str, is_taken: bool | None) -> Notice:
     if is_taken is None:
         raise InputError(f"{source} {what}: get a whole copy")
     if not is_taken:
-        hint = "get a whole copy, or use what is left of it, damaged=True"
+        hint = "get a whole copy, or read the rest with damaged=True"
         raise InputError(f"{source} {what}", "damaged", hint)
     return notice("damaged", what=what)
 

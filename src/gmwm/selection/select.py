@@ -178,7 +178,7 @@ class Selection(Document, Printed):
             lines.append("= these fit equally well: the simplest is preferred")
         if any(item.compared_only for item in self.ranking):
             lines += wrapped(
-                "flicker noise is compared only: extra=[BiasInstability()] makes it a choice",
+                "flicker noise is compared but not chosen: extra=[BiasInstability()] allows it",
                 first="~ ",
                 indent=2,
             )

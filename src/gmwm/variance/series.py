@@ -185,8 +185,8 @@ def checked_samples(channel: Channel) -> tuple[FloatArray, Runs, float]:
     runs = Runs.of(values) if missing else Runs((0,), (values.size,), values.size)
     if runs.longest < MIN_SAMPLES:
         raise InputError(
-            f"{where} has no {MIN_SAMPLES} samples without a missing one between them: nothing "
-            "can be determined of its noise"
+            f"{where} has no {MIN_SAMPLES} consecutive samples, so its noise cannot be estimated: "
+            "record without gaps"
         )
     check_varies(replace(channel, values=np.array([low, high])))
     return values, runs, total / runs.present
@@ -258,7 +258,7 @@ def covariance_of_data(
     Raises InputError if ``window`` is unknown.
     """
     if window not in WINDOWS:
-        raise InputError(f"window = {window!r}: known are {', '.join(WINDOWS)}")
+        raise InputError(f"window = {window!r}: choose from {', '.join(WINDOWS)}")
     size = fft.next_fast_len(longest, real=True)
     # The mean is not removed, frequency zero not left out: at coarse levels that would take most of
     # the power, and a level of no variance would have all the weight.

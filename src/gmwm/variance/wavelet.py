@@ -293,7 +293,7 @@ class WaveletVariance(Printed, Document):
         for name in ("tau", "variance", "mean", "driftless"):
             values = getattr(self, name)
             if values is not None and not (values.shape == (size,) and np.all(np.isfinite(values))):
-                raise ValueError(f"{name} is no list of {size} numbers")
+                raise ValueError(f"{name} is not a list of {size} numbers")
         if not np.all((self.variance >= 0.0) & (self.variance <= tuning.LARGEST_VARIANCE)):
             raise ValueError("a variance is negative or too large")
         if not np.allclose(self.tau, self.dt * 2.0 ** np.arange(size), rtol=_DYADIC, atol=0.0):
@@ -349,7 +349,7 @@ class PooledVariance(WaveletVariance):
         Raises InputError if there are none, or they do not belong together.
         """
         if not parts:
-            raise InputError("there is no recording: give one wavelet variance at least")
+            raise InputError("no recordings given: give at least one wavelet variance")
         longest = max(parts, key=lambda part: part.tau.size)
         for part in parts:
             for name in ("dt", "unit", "wavelet", "efficiency"):

@@ -52,7 +52,7 @@ CASES = [
     ("calibration", WV + "dt", 0.0, "dt = 0.0"),
     ("calibration", WV + "n", 10**6, "levels where 1,000,000 samples have 19"),
     ("calibration", WV + "variance.0", -1.0, "a variance is negative"),
-    ("calibration", WV + "mean", [0.0], "mean is no list of"),
+    ("calibration", WV + "mean", [0.0], "mean is not a list of"),
     ("calibration", WV + "tau.1", 0.5, "not octaves"),
     ("calibration", WV + "efficiency", 2.0, "efficiency = 2.0"),
     ("calibration", WV + "block", 10**6, "blocks hold more samples"),
@@ -72,7 +72,7 @@ CASES = [
     ("selection", "ranking.0.n_parameters", 0, "ranking.0.n_parameters = 0"),
     ("selection", "ranking.0.dof", None, "ranking.0.dof = None"),
     ("bootstrap", "draws", [[1.0], [2.0]], "draws are not one value a key"),
-    ("bound", "keys", ["N", "X"], "keys are not those of the model"),
+    ("bound", "keys", ["N", "X"], "keys do not match the model"),
 ]
 
 
@@ -133,7 +133,7 @@ def test_what_is_nested_deeply_is_refused(tmp_path, depth):
 def test_a_file_that_no_result_has_is_not_read(stored, tmp_path, monkeypatch):
     monkeypatch.setattr(documents, "_LARGEST", 1000)
     path = stored["calibration"].save(tmp_path / "stored.json")
-    assert "which no result has" in refusal(path)
+    assert "too large for a result" in refusal(path)
 
 
 def test_a_long_value_is_not_quoted_whole(stored, tmp_path):

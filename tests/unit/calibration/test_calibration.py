@@ -184,7 +184,7 @@ def test_channels_are_drawn_with_their_models(calibration):
     plt.close("all")
     with pytest.raises(InputError, match="no model of channel 'mag_x'"):
         calibration.plot(["mag_x"])
-    with pytest.raises(InputError, match="channels names none: give some of gyro_x"):
+    with pytest.raises(InputError, match="no channel was selected: choose from gyro_x"):
         calibration.plot([])
 
 
@@ -399,9 +399,9 @@ def test_missing_file_and_folder(tmp_path):
         (b"time,gyro_x\n0,1\n", "is not JSON"),
         (b'{"schema": "gmwm.calibration", "schema_ver', "is not JSON"),
         (b"\xff\xfe\x00\x93NUMPY", "is not JSON"),
-        (b"[1, 2, 3]", "holds no result of gmwm"),
-        (b"null", "holds no result of gmwm"),
-        (b'{"type": "FeatureCollection"}', "holds no result of gmwm"),
+        (b"[1, 2, 3]", "is not a result of gmwm"),
+        (b"null", "is not a result of gmwm"),
+        (b'{"type": "FeatureCollection"}', "is not a result of gmwm"),
         (b'{"schema": "gmwm.calibration"}', "schema version None"),
     ],
 )

@@ -137,11 +137,11 @@ def test_units_of_imperfections(run, calibration):
         (("certify", "CAL", "-N", "1,1", "-K", "1,1", "--scale-error", "1"), "add --motion drone"),
         (("certify", "CAL", "-N", "1,1", "-K", "1,1", "--scale-error", "-1"), "scale_error = -0"),
         (("bound", "none.json"), "none.json: cannot be read"),
-        (("bound", "CAL", "--form", "N"), "form = 'N': known are"),
+        (("bound", "CAL", "--form", "N"), "form = 'N': choose from"),
         (("bound", "CAL", "--horizon", "-1"), "horizon = -1"),
         (("bound", "CAL", "--level", "2"), "level = 2"),
         (("reduce", "CAL", "--outages", "10,x"), "--outages 10,x: write seconds"),
-        (("reduce", "CAL", "--form", "K"), "form = 'K': known are"),
+        (("reduce", "CAL", "--form", "K"), "form = 'K': choose from"),
     ],
 )
 def test_bad_input_is_one_sentence(run, calibration, arguments, message):

@@ -73,7 +73,7 @@ def test_a_file_comes_back_and_one_of_an_older_version_is_refused(sick, tmp_path
     assert again.to_dict() == found.to_dict()
     assert again.events("gyro_x") == found.events("gyro_x")
     assert str(again) == str(found)
-    with pytest.raises(InputError, match="schema version 1 is not known here"):
+    with pytest.raises(InputError, match="schema version 1 is unknown"):
         Health.from_dict(found.to_dict() | {"schema_version": 1})
 
 

@@ -170,4 +170,4 @@ def test_most_of_a_record_is_no_shock(record):
         values[i] = shown
     (event,) = gmwm.health(record(gyro_x=values)).of(code="event")
     assert event.severity == "bad"
-    assert "not noise of a sensor" in event.text
+    assert "not sensor noise" in event.text

@@ -60,5 +60,5 @@ def test_slow_processes_of_several_times_are_bounded_at_the_middle_one():
 def test_numbers_by_which_a_filter_divides_are_there(target, form, model, key):
     given = numbers(form)
     lacking = replace(given["gyro_y"], model=as_model(model))
-    with pytest.raises(InputError, match=f": {key} of gyro_y is zero, by which filters divide"):
+    with pytest.raises(InputError, match=f": {key} of gyro_y is zero, and filters divide by it"):
         gmwm.export(FilterNumbers({**given, "gyro_y": lacking}, rate=RATE), target)

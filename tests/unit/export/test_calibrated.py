@@ -297,9 +297,9 @@ def test_consistency_that_saved_numbers_do_not_know(slow, form, target):
 @pytest.mark.parametrize(
     ("given", "target", "options", "message"),
     [
-        (None, "ros", {}, "target = 'ros': known are kalibr, openvins"),
+        (None, "ros", {}, "target = 'ros': choose from kalibr, openvins"),
         (None, "kalibr", {"form": "N+GM"}, r"form N\+GM: Kalibr holds N\+K only"),
-        (None, "kalibr", {"form": "N"}, "form = 'N': known are"),
+        (None, "kalibr", {"form": "N"}, "form = 'N': choose from"),
         (None, "kalibr", {"horizon": 0.0}, "horizon = 0.0: give a positive time"),
         (None, "kalibr", {"horizon": 1.0}, "the numbers are for 60 s: leave the horizon out"),
         (None, "gazebo", {}, r"the numbers have the form N\+K, the file holds N\+GM"),

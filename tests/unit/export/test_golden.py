@@ -74,7 +74,7 @@ def test_numbers_come_back_from_the_file(name):
 
 @pytest.mark.parametrize("name", sorted(set(TARGETS) - set(READ)))
 def test_files_without_both_numbers_or_without_names_of_their_own_are_refused(name):
-    with pytest.raises(InputError, match="has no noise parameters by names known here"):
+    with pytest.raises(InputError, match="has no noise parameters of a known name"):
         read_numbers(path_of(name), RATE)
 
 

@@ -20,7 +20,7 @@ def test_numbers_that_depend_on_the_rate_need_one(tmp_path, text):
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        ("imu: none\n", "no noise parameters by names known here"),
+        ("imu: none\n", "no noise parameters of a known name"),
         ("gyroscope_noise_density: 1e-4\n", "gyroscope_random_walk is missing"),
         ("gyr_n: 0.1\ngyr_w: 0.1\nacc_n: 0.0\nacc_w: 0.1\n", "acc_n = 0"),
     ],

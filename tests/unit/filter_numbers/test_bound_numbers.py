@@ -611,8 +611,8 @@ class Drawn(Process):
 @pytest.mark.parametrize(
     ("source", "options", "message"),
     [
-        (ONE, {"form": "N"}, r"form = 'N': known are N\+K, N\+GM, N\+K\+GM"),
-        (ONE, {"form": "N+2GM"}, "known are"),
+        (ONE, {"form": "N"}, r"form = 'N': choose from N\+K, N\+GM, N\+K\+GM"),
+        (ONE, {"form": "N+2GM"}, "choose from"),
         (ONE, {"horizon": 0.0}, "horizon = 0.0"),
         (ONE, {"horizon": 0.015}, "two sampling intervals"),
         (ONE, {"horizon": "60"}, "horizon = '60'"),
@@ -620,8 +620,8 @@ class Drawn(Process):
         (ONE, {"bias_sd": -1.0}, "bias_sd = -1.0"),
         (ONE, {"dt": -1.0}, "dt = -1.0"),
         (WhiteNoise(), {}, r"free parameters \(N\)"),
-        (Model((QuantizationNoise(1e-3),)), {}, "nothing that white noise"),
-        (Drawn(), {}, "known by simulation only"),
+        (Model((QuantizationNoise(1e-3),)), {}, "no term that white noise"),
+        (Drawn(), {}, "only be simulated"),
         (ARIMA(d=2, sigma2=1.0), {}, "no form dominates it"),
         (TRUTHS["walk"], {"form": "N+GM"}, "with a random walk"),
         (TRUTHS["flicker"], {"form": "N+GM"}, "with a random walk"),

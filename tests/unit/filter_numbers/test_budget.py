@@ -263,7 +263,7 @@ REFUSED = {
     "a model alone": (lambda: error_budget(GYRO, dt=DT), "a gyro or an accelerometer"),
     "no model": (lambda: error_budget({"gyro_x": 3}, dt=DT), "is not an error model"),
     "interval of NaN": (lambda: error_budget({"gyro_x": GYRO}, dt=np.nan), "dt = nan"),
-    "no times": (lambda: error_budget(IMU, [], dt=DT), "give one length at least"),
+    "no times": (lambda: error_budget(IMU, [], dt=DT), "give at least one outage length"),
     "no numbers": (lambda: error_budget(IMU, ["soon"], dt=DT), "positive numbers of seconds"),
     "infinite time": (lambda: error_budget(IMU, [1, np.inf], dt=DT), "positive numbers of seconds"),
     "negative time": (lambda: error_budget(IMU, [-1.0], dt=DT), "times = -1.0"),
@@ -272,7 +272,7 @@ REFUSED = {
     "no horizontal": (lambda: error_budget({"gyro_z": GYRO}, dt=DT).total(), "no total"),
     "heading in metres": (
         lambda: error_budget(IMU, dt=DT).plot(of="gyro_z", quantity="position"),
-        "gyro_z has no part in the 'position' error",
+        "gyro_z does not affect the 'position' error",
     ),
 }
 

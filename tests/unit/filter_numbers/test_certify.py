@@ -254,12 +254,12 @@ def test_terms_of_imperfections():
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"outages": ()}, "outages: give one length at least"),
+        ({"outages": ()}, "outages is empty: give at least one"),
         ({"outages": (0.0,)}, "outages = 0.0"),
         ({"keyframe": 0.01}, "two sampling intervals"),
         ({"motion": "boat"}, "motion 'boat' is not known: write handheld, drone, car, fixed-wing"),
-        ({"imperfections": Imperfections(scale_error=0.01)}, "do nothing at rest"),
-        ({"source": QuantizationNoise(1e-3)}, "nothing that white noise"),
+        ({"imperfections": Imperfections(scale_error=0.01)}, "have no effect at rest"),
+        ({"source": QuantizationNoise(1e-3)}, "no term that white noise"),
     ],
 )
 def test_what_cannot_be_used(options, message):
@@ -289,7 +289,7 @@ def test_numbers_by_axis_or_kind():
     [
         ({"accel": (1e-4, 1e-6)}, "no numbers for gyro_x: give them by axis, or for gyro"),
         ({"gyro": (1e-4, -1e-6)}, "N and K of gyro_x = -1e-06"),
-        ({"gyro": 1e-4}, "not what a filter believes"),
+        ({"gyro": 1e-4}, "gives no filter numbers"),
         ({"gyro": WhiteNoise(1e-4) + QuantizationNoise(1e-4)}, "form = 'N'"),
     ],
 )

@@ -256,7 +256,7 @@ def test_simulation_alone_is_not_enough():
         def draw(self, n, dt, rng):
             return self.lsb * np.rint(rng.standard_normal(n))
 
-    with pytest.raises(InputError, match=r"Rounded is known by simulation only"):
+    with pytest.raises(InputError, match=r"Rounded can only be simulated"):
         rms(Rounded(1.0), 10.0, 0.1)
 
 

@@ -157,5 +157,5 @@ def test_a_process_known_by_simulation_only_is_refused():
         def draw(self, n, dt, rng):
             return rng.standard_normal(n)
 
-    with pytest.raises(InputError, match="simulation only"):
+    with pytest.raises(InputError, match="only be simulated"):
         free(1).errors(WhiteNoise(1.0) + Drawn(), TINY, DT, (1.0,))

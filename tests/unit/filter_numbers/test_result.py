@@ -88,7 +88,7 @@ def test_text_names_units_and_every_number():
         assert part in text
     assert "rad/s^2/sqrt(Hz)" in SENSOR.text("si")
     for numbers in (WALK, SENSOR):
-        with pytest.raises(InputError, match="units = 'SI': known are field, si"):
+        with pytest.raises(InputError, match="units = 'SI': choose from field, si"):
             numbers.text("SI")
     assert "<pre>" in SENSOR._repr_html_()
     assert repr(SENSOR) == "<FilterNumbers of static.csv: N+K for 60 s, gyro_x, accel_x>"

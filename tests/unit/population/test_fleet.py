@@ -379,7 +379,7 @@ def test_models_are_given_by_channel_or_sensor(lot):
         ({"still": "yes"}, "still = 'yes'"),
         ({"horizon": -1.0}, "horizon = -1.0"),
         ({"jobs": 0}, "jobs = 0"),
-        ({"unit": {"gyro": "rad/s"}}, "argument = 'unit': known are rate"),
+        ({"unit": {"gyro": "rad/s"}}, "argument = 'unit': choose from rate"),
         ({"start": "a"}, "start = 'a'"),
         ({"stop": "a"}, "stop = 'a'"),
     ],

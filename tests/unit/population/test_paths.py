@@ -76,16 +76,16 @@ def test_outputs_are_no_recordings(folder):
 @pytest.mark.parametrize(
     ("given", "words"),
     [
-        ((), "there is no recording"),
+        ((), "no recordings given"),
         (("nothing-*.csv",), "no file matches 'nothing-*.csv'"),
-        ((b"x.csv",), "give paths of recordings"),
-        ((3,), "3 is no path"),
-        (("a\0b",), "give paths of recordings"),
+        ((b"x.csv",), "give recording paths as strings"),
+        ((3,), "3 is not a path"),
+        (("a\0b",), "give recording paths as strings"),
     ],
 )
 def test_no_path_is_refused(folder, given, words):
     with pytest.raises(InputError) as caught:
         recordings(given, None)
     assert words in str(caught.value)
-    with pytest.raises(InputError, match="5 is no path"):
+    with pytest.raises(InputError, match="5 is not a path"):
         recordings(5, None)

@@ -293,7 +293,7 @@ def test_text_that_is_cut_off_in_its_last_line(write, samples, cut, delimiter):
     path.write_text(text[:-cut])
     message = problem(path)
     assert message.startswith(f"static.csv is cut off in line {len(samples)}: ")
-    assert message.endswith("or use what is left of it, damaged=True")
+    assert message.endswith("or read the rest with damaged=True")
     found = read(path, rate=100, units=SI, damaged=True)
     assert found.n == len(samples) - 1
     assert [each.severity for each in found.notices if each.code == "damaged"] == ["warning"]

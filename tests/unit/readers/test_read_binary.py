@@ -68,7 +68,7 @@ def test_a_partial_last_record_is_reported(tmp_path):
 @pytest.mark.parametrize(
     ("layout", "words"),
     [
-        ("IXSEA", "are no seconds of a clock: give the layout"),
+        ("IXSEA", "are not seconds of a clock: give the layout"),
         ("LN300", "layout 'LN300' is unknown: give one of IMAR"),
         ("int8,1,1", "is unknown"),
         ("int32,1", "is unknown"),

@@ -101,14 +101,14 @@ def test_a_unit_of_time_is_asked_for_with_the_others_and_what_is_advised_helps(t
     message = str(caught.value)
     assert "steps of 20000 without a unit, 50 Hz if they are microseconds, and it does" in message
     assert 'e.g. rate=50, units={"gyro": "deg/s"' in message
-    assert "50 Hz if they are microseconds, not the 100 Hz stated" in problem(path, rate=100)
+    assert "50 Hz if they are microseconds, not the given 100 Hz" in problem(path, rate=100)
     assert read(path, rate=50, units=UNITS).rate == 50.0
 
 
 @pytest.mark.parametrize("units", ["deg/h", {"gyro": 3.0}, [("gyro", "deg/s")]])
 def test_units_are_those_of_sensors(timed, units):
     with pytest.raises(
-        InputError, match=r'^units = .*: give that of each sensor, e.g. units={"gyro"'
+        InputError, match=r'^units = .*: give a unit for each sensor, e.g. units={"gyro"'
     ):
         read(timed(0.01 * np.arange(80)), units=units)
 
@@ -197,12 +197,12 @@ def test_stated_rate_is_used_and_noted(timed):
     recording = read(timed(np.arange(80) / 100.4), rate=100, units=UNITS)
     assert recording.rate == 100.0
     assert "give 100.4 Hz" in texts(recording)[0]
-    assert texts(recording)[1] == "the rate stated, 100 Hz, is used"
+    assert texts(recording)[1] == "the given rate of 100 Hz is used"
 
 
 def test_stated_rate_disagrees(timed):
     message = problem(timed(np.arange(80) / 102.0), rate=100)
-    assert "its stamps give 102 Hz, not the 100 Hz stated: leave out the rate" in message
+    assert "its stamps give 102 Hz, not the given 100 Hz: leave out the rate" in message
     assert read(timed(np.arange(80) / 102.0), rate=100, units=UNITS, time=False).rate == 100.0
 
 
@@ -295,7 +295,7 @@ def test_several_time_columns(write, samples):
     path = write(np.column_stack([np.arange(80) / 10.0, np.zeros(80), samples[:, 0]]), "t,stamp,gx")
     recording = read(path, units=UNITS)
     assert recording.rate == pytest.approx(10)
-    assert "time is column 't'; time= selects 'stamp'" in texts(recording)
+    assert "time stamps are read from column 't'; use time= to choose 'stamp'" in texts(recording)
 
 
 def test_time_stamps_as_text(tmp_path):

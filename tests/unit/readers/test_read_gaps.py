@@ -145,8 +145,8 @@ def test_rows_go_to_their_places(recorded, start, name, unit):
     assert recording.rate == pytest.approx(100, rel=1e-6)
     np.testing.assert_array_equal(recording["gyro_x"].values, np.where(keep, values, np.nan))
     assert texts(recording)[-2:] == (
-        "the clock jumps 4 times, farthest by 0.5 s, 0.99 s after the start: in all 53 samples "
-        "missing",
+        "the clock jumps 4 times, at most by 0.5 s, 0.99 s after the start: 53 samples missing in "
+        "all",
         "gyro_x: 53 of 400 samples missing, in 4 gaps, the longest 50 samples",
     )
 
@@ -221,8 +221,10 @@ def test_off_the_grid(recorded, steps, missing):
     expected = np.insert(values, [50] * missing, np.nan)
     np.testing.assert_array_equal(recording["gyro_x"].values, expected)
     assert recording.rate == pytest.approx(100, rel=1e-9)
-    note = "the jump is not near a whole number of sampling intervals: the samples after it were "
-    assert note + "placed at the nearest" in texts(recording)
+    note = (
+        "the jump is not a whole number of sampling intervals: the samples after it were moved to "
+    )
+    assert note + "the nearest interval" in texts(recording)
 
 
 def test_near_the_grid_is_not_worth_a_note(recorded):
@@ -244,7 +246,7 @@ def test_with_a_stated_rate(recorded, stated):
 def test_the_rate_is_not_that_of_first_and_last_stamp(recorded):
     keep = without((100, 250))
     path, _ = recorded(keep, np.arange(N) / 100)
-    with pytest.raises(InputError, match=r"stamps give 100 Hz, not the 62\.5 Hz stated"):
+    with pytest.raises(InputError, match=r"stamps give 100 Hz, not the given 62\.5 Hz"):
         read(path, units=GYRO, rate=62.5)
 
 

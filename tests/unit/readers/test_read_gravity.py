@@ -51,7 +51,7 @@ def test_a_scale_that_no_unit_explains(write, samples, norm, unit):
     found = read(write(at_rest(samples, norm), HEADER.format(unit)), rate=100.0)
     (notice,) = [each for each in found.notices if each.code == "gravity"]
     assert notice.severity == "warning"
-    assert "neither gravity nor" in notice.text
+    assert "times gravity: a sensor at rest reads 1 g" in notice.text
 
 
 def test_samples_without_gravity_may_be_noisy(write, samples):

@@ -60,7 +60,7 @@ def test_a_scale_that_no_unit_explains(size, noise, said):
     assert bool(found) is said
     for notice in found:
         assert notice.severity == "warning"
-        assert "neither gravity nor an accelerometer without it" in notice.text
+        assert "a sensor at rest reads 1 g" in notice.text
 
 
 @pytest.mark.parametrize(

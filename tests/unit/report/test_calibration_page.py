@@ -377,7 +377,7 @@ def test_a_term_without_a_budget_is_told(calibration):
     fit = calibration["gyro_x"]
     odd = replace(fit, model=fit.model + OnlySimulated(1.0))
     content = navigation(replace(calibration, fits={"gyro_x": odd}))
-    assert content["problem"].startswith("OnlySimulated is known by simulation only")
+    assert content["problem"].startswith("OnlySimulated can only be simulated")
 
 
 class OnlySimulated(Process):
@@ -612,7 +612,9 @@ def issue(severity, text, where="gyro_x", **more):
 
 def test_a_step_that_spoils_a_fit_is_the_first_finding(calibration):
     values = {"evident": True, "removable": True, "time_lower": 283.6, "time_upper": 303.2}
-    hint = "calibrate the part before it or after it, or take it off (remove_departures=True)"
+    hint = (
+        "calibrate only the part before or after the step, or subtract it (remove_departures=True)"
+    )
     step = Notice("step", "bad", "", "a step of +2.7 mg at 293 s", values, hint)
     fits = {**calibration.fits, "accel_x": replace(calibration["accel_x"], notices=(step,))}
     crosstalk = issue("warning", "correlated noise", "")

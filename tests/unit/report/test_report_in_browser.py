@@ -325,7 +325,7 @@ def test_six_axes_with_much_to_say_take_eight_pages(tab, tmp_path):
     many = gmwm.Recording.from_arrays(samples, 100.0, units)
     found = gmwm.calibrate(many, model.with_params({"N": None}))
     text = (
-        "a periodic line at 0.4626 Hz, amplitude 0.145 mg, 23.6 times its surroundings, with "
+        "a periodic line at 0.4626 Hz, amplitude 0.145 mg, 23.6 times the noise around it, with "
         "harmonics at 1.69 and {} Hz"
     )
     done = "counted as additive noise, which is nearly true"

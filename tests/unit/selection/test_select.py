@@ -156,7 +156,7 @@ def test_merging_stops_where_it_must():
     slow = gmwm.simulate(GaussMarkov(1.0, 300.0), 50_000, 1.0, 2)
     kept = gmwm.select(slow, dt=1.0, rule="merge").model
     assert sum(isinstance(term, GaussMarkov) for term in kept.terms) == 1
-    with pytest.raises(gmwm.InputError, match="rule = 'magic': known are criterion, merge"):
+    with pytest.raises(gmwm.InputError, match="rule = 'magic': choose from criterion, merge"):
         gmwm.select(x, dt=1.0, rule="magic")
 
 

@@ -129,7 +129,7 @@ def test_data_weights_need_the_covariance():
     wv = gmwm.wavelet_variance(WhiteNoise(1.0).simulate(100, 1.0, 1), dt=1.0)
     with pytest.raises(gmwm.InputError, match="data_covariance"):
         gmwm.fit(WhiteNoise(), wv, omega="data")
-    with pytest.raises(gmwm.InputError, match="known are model, data, diagonal, identity"):
+    with pytest.raises(gmwm.InputError, match="choose from model, data, diagonal, identity"):
         gmwm.fit(WhiteNoise(), wv, omega="best")
 
 

@@ -261,14 +261,17 @@ def test_infinite_blocks_change_nothing():
     [
         (lambda: gmwm.StreamingVariance(0.0), "dt"),
         (lambda: gmwm.StreamingVariance(0.1, ("a", "a")), "name of its own"),
-        (lambda: gmwm.StreamingVariance(0.1, ()), "one at least"),
+        (lambda: gmwm.StreamingVariance(0.1, ()), "at least one"),
         (lambda: gmwm.StreamingVariance(0.1, {"a": "deg/s"}), "rad/s"),
         (lambda: gmwm.StreamingVariance(0.1).update(np.zeros((3, 2))), "shape"),
         (lambda: gmwm.StreamingVariance(0.1).update(["x"]), "not a number"),
         (lambda: streamed(np.zeros(7)).result(), "8 or more"),
         (lambda: streamed(np.full(100, 3.0)).result(), r"constant \(3\)"),
         (lambda: streamed(np.full(100, np.nan)).result(), "0 samples"),
-        (lambda: streamed(np.array([1.0, np.nan, 2.0, np.nan] * 9)).result(), "no two samples"),
+        (
+            lambda: streamed(np.array([1.0, np.nan, 2.0, np.nan] * 9)).result(),
+            "no two consecutive",
+        ),
         (lambda: gmwm.StreamingVariance.load(__file__), "write it with save"),
     ],
 )

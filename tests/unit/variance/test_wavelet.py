@@ -85,7 +85,7 @@ def test_intervals_cover(process):
     [
         (np.arange(7.0), 1.0, "8 samples or more"),
         (np.ones(100), 1.0, "constant"),
-        (np.arange(70.0) * np.tile([1.0] * 6 + [np.nan], 10), 1.0, "no 8 samples without"),
+        (np.arange(70.0) * np.tile([1.0] * 6 + [np.nan], 10), 1.0, "no 8 consecutive samples"),
         (np.array([1.0] * 50 + [np.inf] * 50), 1.0, "infinite"),
         (np.zeros((10, 10)), 1.0, "one series"),
         (["a"] * 100, 1.0, "not a number"),

@@ -99,8 +99,8 @@ class EM:
         for term in model.terms:
             if not (term.is_white or term.is_walk or term.is_exponential or term.is_drift):
                 raise InputError(
-                    f'method = "em" does not know {term!r}: it takes WhiteNoise, RandomWalk, '
-                    'RateRamp and GaussMarkov; "mle" takes the others, "gmwm" a Sinusoid too'
+                    f'method = "em" does not support {term!r}: it takes WhiteNoise, RandomWalk, '
+                    'RateRamp and GaussMarkov; "mle" supports the others, "gmwm" a Sinusoid too'
                 )
         series = Series.of(model, channel, self.start, gaps=True)
         iteration = Iteration(series, self.drift == "state")

@@ -304,7 +304,7 @@ class Series:
             if type(term).state_space is Process.state_space:
                 raise InputError(
                     f"{type(term).__name__} has no state-space form, which a likelihood needs: "
-                    'take method = "gmwm"'
+                    'use method = "gmwm"'
                 )
         values = np.asarray(channel.values, dtype=float)
         # The wavelet variance reports what is no series.
@@ -318,7 +318,7 @@ class Series:
             )
         if missing and not gaps:
             raise InputError(
-                f"the series misses {missing:,} samples, which a Fourier transform needs: take "
+                f"{missing:,} samples are missing, but a Fourier transform needs all: use "
                 'method = "mle" or "gmwm"'
             )
         bridged, is_bridged = channel, False

@@ -81,14 +81,14 @@ class MLE:
         """Fit the open parameters of a model to samples, some of which may be missing."""
         if any(term.is_line and term.is_open for term in model.terms):
             raise InputError(
-                'method = "mle" knows no open Sinusoid (its amplitude and frequency are not '
-                'parameters of a spectrum): give it values, or take method = "gmwm"'
+                'method = "mle" does not support an open Sinusoid (its amplitude and frequency are '
+                'not parameters of a spectrum): give it values, or use method = "gmwm"'
             )
         for term in model.terms:
             if term.is_band_limited:
                 raise InputError(
-                    f'method = "mle" knows no {type(term).__name__}, which has no exact '
-                    'state-space form: take method = "gmwm" or "whittle"'
+                    f'method = "mle" does not support {type(term).__name__}, which has no '
+                    'exact state-space form: use method = "gmwm" or "whittle"'
                 )
         series = Series.of(model, channel, self.start, gaps=True)
         columns = series.columns
@@ -120,7 +120,7 @@ class Whittle(MLE):
     def estimate(self, model: Model, channel: Channel) -> Fit:
         """Fit the open parameters of a model to samples, all of which must exist."""
         if any(term.is_line for term in model.terms):
-            raise InputError('method = "whittle" knows no Sinusoid: take method = "gmwm"')
+            raise InputError('method = "whittle" does not support a Sinusoid: use method = "gmwm"')
         series = Series.of(model, channel, self.start, gaps=False)
 
         def climb(coordinates: Coordinates, first: tuple[Process, ...]) -> Top:

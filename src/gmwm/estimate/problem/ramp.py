@@ -71,8 +71,8 @@ def gls_slope(wv: WaveletVariance, psd: PSD) -> Slope:
     information = float(x @ solved)
     if not information > 0.0:
         raise InputError(
-            f"{wv.name or 'the series'} has means over {x[0]:.3g} s that differ only by rounding, "
-            "which leaves no drift to estimate: take a model without RateRamp"
+            f"block means of {wv.name or 'the series'} over {x[0]:.3g} s differ only by rounding, "
+            "so no ramp can be estimated: fit a model without RateRamp"
         )
     return Slope(float(solved @ y) / information, _growth(wv) / information)
 
@@ -153,8 +153,8 @@ def _existing(wv: WaveletVariance) -> NDArray[np.intp]:
     index = np.flatnonzero(there[1:-1] & (there[:-2] | there[2:]))
     if index.size < tuning.FEWEST_BLOCKS:
         raise InputError(
-            f"{wv.name or 'the series'} has samples missing all over, which leaves no drift to "
-            "estimate: take a model without RateRamp"
+            f"{wv.name or 'the series'} has missing samples everywhere, so no ramp can be "
+            "estimated: fit a model without RateRamp"
         )
     return index
 

@@ -99,7 +99,7 @@ def fit_joint(
     """
     if any(term.is_drift for term in model.terms) and len(parts) > 1:
         raise InputError(
-            "a rate ramp belongs to one recording: take it out of the model, or fit the recordings "
+            "a rate ramp belongs to one recording: remove it from the model, or fit the recordings "
             "one by one"
         )
     whole = whole or estimate(model, PooledVariance.of(parts))

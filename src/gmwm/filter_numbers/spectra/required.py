@@ -45,7 +45,7 @@ class RequiredSpectrum:
     def of(cls, model: Model, dt: float, horizon: float, unit: str = "u") -> RequiredSpectrum:
         """Sort the terms of a model with given parameters; the unit is for notices.
 
-        Raises InputError if a term is known by simulation only, or nothing is left.
+        Raises InputError if a term can only be simulated, or nothing is left.
         """
         nyquist = 0.5 / dt
         passing = tuning.FAST / horizon
@@ -60,7 +60,7 @@ class RequiredSpectrum:
         for label, term in zip(model.term_labels(), model.terms, strict=True):
             if not term.has_spectrum():
                 raise InputError(
-                    f"{label} is known by simulation only: give it a spectrum, or leave it out"
+                    f"{label} can only be simulated: give it a spectrum, or leave it out"
                 )
             if term.is_drift:
                 constant = abs(term.drift_rate()) * horizon
@@ -86,12 +86,12 @@ class RequiredSpectrum:
         if slope > tuning.STEEPEST:
             raise InputError(
                 f"the spectrum of {model!r} rises as f^-{slope:.2g} towards zero frequency, more "
-                "than that of a random walk: no form dominates it"
+                "than a random walk: no form dominates it"
             )
         if not kept:
             raise InputError(
-                f"{model!r} has nothing that white noise, a random walk or a Gauss-Markov process "
-                "stands for: add the white noise of the sensor"
+                f"{model!r} has no term that white noise, a random walk or a Gauss-Markov "
+                "process can cover: add the white noise of the sensor"
             )
         parts = (tuple(kept), tuple(weights), tuple(feet))
         return cls(*parts, constant, dt, horizon, lowest, floor, slope, tuple(notices))

@@ -162,7 +162,7 @@ def reduce(
     if scenario is None:
         scenario = loiter_with_outages(outages, dt, trajectory)
     if not scenario.outages:
-        raise InputError("outages: give one length at least, s")
+        raise InputError("outages is empty: give at least one outage length in seconds")
     course = Course.of(scenario)
     longest = max(outage.duration for outage in scenario.outages)
     start = read_off(truth, form, longest, scenario.trajectory.dt)

@@ -86,8 +86,8 @@ class Fixes:
         if np.any(back):
             late = int(np.argmax(back)) + 1
             raise InputError(
-                f"{name}: number {late} at {time[late]:g} s comes before the one ahead of it: sort "
-                "them by time"
+                f"{name}: number {late} at {time[late]:g} s is earlier than the one before it: "
+                "sort them by time"
             )
         if np.any(sd < 0.0):
             raise InputError(f"{name}: a standard deviation is negative: give 0 or more")

@@ -199,7 +199,7 @@ class Recorded:
         """
         given = [recordings] if isinstance(recordings, Recording) else list(recordings)
         if not given:
-            raise InputError("recordings: there is none: give one at least")
+            raise InputError("no recordings given: give at least one")
         checks.positive("duration", duration, "give seconds above zero")
         stretches: list[FloatArray] = []
         slow: list[FloatArray] = []

@@ -137,7 +137,7 @@ def _velocity(aiding: Aiding, fix: int, now: float, dt: float) -> tuple[FloatArr
     near = positions.part((since >= 0.0) & (since <= tuning.CHORD))
     way = velocities_between(near)
     if not way.time.size:
-        raise InputError("the first position fix has no other near it: begin where fixes are dense")
+        raise InputError("no other fix near the first position fix: start where fixes are frequent")
     # The vehicle may speed up by 1 m/s^2 on the way.
     faster = 0.5 * float(near.time[1] - near.time[0])
     return way.value[0], float(np.hypot(np.sqrt(np.mean(way.sd[0] ** 2)), faster))

@@ -31,7 +31,7 @@ def positions_of(aiding: Aiding) -> Fixes:
     """Position fixes; raises InputError if there are none."""
     found = aiding.of("position")
     if found is None:
-        raise InputError("there is no position fix: a filter starts at one")
+        raise InputError("there is no position fix: give at least one, where the filter starts")
     return found
 
 

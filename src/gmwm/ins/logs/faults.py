@@ -195,7 +195,7 @@ def _arm_words(fault: Fault) -> dict[str, Any]:
     # A part that the motion does not show stays as it was: an estimate of it is mostly error.
     unseen = [name for name in values if tuning.SEEN * errors[name] > tuning.UNSEEN["m"]]
     if len(unseen) == len(values):
-        hint = "measure it: this motion shows none of its parts well enough"
+        hint = "measure it: this motion does not show any of its parts well enough"
         return {"parts": parts, "hint": hint}
     arm = ",".join(
         f"{each - (values[name] if name in unseen else 0.0):.2f}"

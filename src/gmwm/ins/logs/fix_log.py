@@ -232,7 +232,7 @@ def _times(log: LogColumns, stamps: FloatArray) -> FloatArray:
     """Time stamps in s; rejects missing ones, and ones that do not rise."""
     bad = np.flatnonzero(np.isnan(stamps))
     if bad.size:
-        raise InputError(f"{log.place(TIME, int(bad[0]))}: no time: take the row out")
+        raise InputError(f"{log.place(TIME, int(bad[0]))}: no time: delete the row")
     if not stamps.size:
         raise InputError(f"{log.table.source} has no fixes: check the file")
     log.check_rising(stamps)

@@ -113,7 +113,7 @@ def read_imu_log(
         at, count = longest_run((rotation if axis < 3 else velocity)[:, axis % 3])
         if count > 1 and count * dt > tuning.LONGEST_HELD:
             values = {"start": first + at * dt, "length": count * dt}
-            hint = "leave that part of the log out, or check what is in the column"
+            hint = "leave out that part of the log, or check the column"
             notices.append(notice("stuck", name, values, variant="log", hint=hint))
     if mean[2] > 0.0:
         notices.append(notice("axis-up", "accel_z"))
@@ -154,9 +154,9 @@ def _fill(source: str, dt: float, *triads: FloatArray) -> list[Notice]:
             if end - begin > most or begin == 0 or end == n:
                 raise InputError(
                     f"{source}: sample {begin + 1:,} of {name}, {begin * dt:.6g} s after the "
-                    f"first, is missing, {end - begin:,} in a row: up to {most} between others are "
-                    "filled; use the part before or after, or take the step out of the times if a "
-                    "clock was set there"
+                    f"first, is missing, {end - begin:,} in a row: gaps of up to {most} are "
+                    "filled; use the part before or after, or remove the jump from the time stamps "
+                    "if a clock was set there"
                 )
             longest = max(longest, end - begin)
             samples[begin:end] = np.interp(gap, [begin - 1, end], samples[[begin - 1, end]])

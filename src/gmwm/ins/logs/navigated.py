@@ -92,7 +92,7 @@ class Navigated:
         replay = Replay.of(measured, alignment)
         positions = replay.aiding.of("position")
         if positions is None:
-            raise InputError("no position fix follows the first one: there is nothing to filter")
+            raise InputError("no position fix after the first: add fixes or cut the log earlier")
         ends = np.concatenate([[0.0], positions.time, [replay.imu.n * replay.imu.dt]])
         longest = int(np.argmax(np.diff(ends)))
         start, end = ends[longest : longest + 2].tolist()

@@ -246,7 +246,7 @@ def difference(
     checks.choice("quantity", quantity, list(QUANTITIES))
     a, b = first[quantity], second[quantity]
     if a.size != b.size:
-        raise InputError(f"{a.size} and {b.size} runs cannot be paired: give those of one study")
+        raise InputError(f"{a.size} and {b.size} runs cannot be paired: give runs of one study")
     alive = np.isfinite(a) & np.isfinite(b)
     if not np.any(alive):
         raise InputError("one or the other filter diverged in every run: check their sensor models")

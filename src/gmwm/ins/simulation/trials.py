@@ -174,7 +174,7 @@ class MonteCarlo:
 def pooled_sizes(study: MonteCarlo, name: str) -> dict[str, FloatArray]:
     """Root mean square over the outages of a run, of each error of `QUANTITIES`, (R,)."""
     if not study.outages:
-        raise InputError("the study has no outage: give one at least")
+        raise InputError("the study has no outage: give at least one")
     each = [sizes(study[name], outage.end) for outage in study.outages]
     return {
         quantity: np.sqrt(np.mean([part[quantity] ** 2 for part in each], axis=0))
@@ -223,7 +223,7 @@ def monte_carlo(
         ``progress(done, runs, "")``).
     """
     if not filters:
-        raise InputError("there is no filter: give one at least")
+        raise InputError("no filters given: give at least one")
     runs, seed = checks.whole("runs", runs, 1), checks.whole("seed", seed, 0)
     notices: tuple[Notice, ...] = ()
     if source.available is not None and source.available < runs:

@@ -241,7 +241,7 @@ class Validation:
             label = f"outage of {outage.duration:g} s at {outage.start:g} s"
             panels[label] = {name: _growth(self.study[name], outage) for name in self.reached}
         if not panels:
-            raise InputError("the experiment has no outage: there is nothing to draw")
+            raise InputError("the experiment has no outage to draw: add one")
         return plotting.growth(panels)
 
 

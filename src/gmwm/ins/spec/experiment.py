@@ -121,10 +121,10 @@ def _named(given: Any) -> dict[str, Any]:
         if not name.strip() or not name.isprintable() or len(name) > _LONGEST_NAME:
             raise ValueError(
                 f"{name[:_LONGEST_NAME]!r} cannot be a name: write 1 to {_LONGEST_NAME} "
-                "characters that can be printed"
+                "printable characters"
             )
         if name in found:
-            raise ValueError(f"{name!r} is there twice: give each a name of its own")
+            raise ValueError(f"{name!r} appears twice: give each a name of its own")
         found[name] = each
     return found
 
@@ -217,8 +217,8 @@ def _scenario(spec: ExperimentSpec, trajectory: Trajectory) -> Scenario:
     for first, second in pairwise(outages):
         if second.start < first.end - _SAME_TIME:
             raise InputError(
-                f"outages: that from {second.start:g} s begins before that from {first.start:g} s "
-                f"ends at {first.end:g} s: write them as one, or apart"
+                f"outages: the one from {second.start:g} s begins before the one from "
+                f"{first.start:g} s ends at {first.end:g} s: join or separate them"
             )
     aiding = _aiding(spec.gnss, trajectory)
     scenario = Scenario(trajectory, aiding, tuple(outages), InitialSd(**spec.initial_sd.given))
@@ -231,8 +231,8 @@ def _scenario(spec: ExperimentSpec, trajectory: Trajectory) -> Scenario:
     for outage in outages:
         if sum(each.time.size for each in aiding.without([outage]).fixes) == total:
             raise InputError(
-                f"outages: no fix falls into that from {outage.start:g} s to {outage.end:g} s: "
-                "make it longer than the interval of the fixes"
+                f"outages: no fix falls between {outage.start:g} s and {outage.end:g} s: "
+                "make the outage longer than the interval of the fixes"
             )
     return scenario
 
@@ -278,7 +278,7 @@ def _models(
     elif isinstance(source, Simulated):
         models = source.models
     elif reduced:
-        raise InputError(f"{where}: name what is reduced, as in of: calibration.json")
+        raise InputError(f"{where}: name the model to reduce, as in of: calibration.json")
     else:
         raise InputError(f"{where}: real errors have no true model: give a calibration")
     if isinstance(source, Recorded) and not reduced:

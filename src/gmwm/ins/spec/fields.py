@@ -123,7 +123,7 @@ def value(given: Any, si_unit: str) -> float:
         number, unit = match.groups()
         found = float(number) * (factor(unit, si_unit) if unit else 1.0)
     if found != 0.0 and not _LEAST < abs(found) < _LARGEST:
-        raise InputError(f"{checks.shown(given)} is beyond what sensors and drives have: check it")
+        raise InputError(f"{checks.shown(given)} is outside the plausible range: check it")
     return found
 
 
@@ -179,7 +179,7 @@ def read_document(path: Path) -> dict[str, Any]:
     except InputError:
         raise
     except Exception as error:  # PyYAML raises KeyError, AttributeError, ... for odd tags
-        raise InputError(f"{path}: is not YAML ({_reason(error)}): correct it") from None
+        raise InputError(f"{path}: invalid YAML ({_reason(error)}): correct the file") from None
     if content is None:
         raise InputError(f"{path} is empty: write trajectory:, truth:, filters: into it")
     if not isinstance(content, Mapping):
@@ -198,7 +198,7 @@ class _UniqueKeys(yaml.SafeLoader):  # type: ignore[misc]
         for key, _ in node.value:
             name = str(key.value)
             if key.tag != "tag:yaml.org,2002:merge" and name in seen:
-                raise ValueError(f"line {key.start_mark.line + 1}: {name!r} is there twice")
+                raise ValueError(f"line {key.start_mark.line + 1}: {name!r} appears twice")
             seen.add(name)
         return node
 
@@ -254,7 +254,7 @@ class Terms(Spec):
     @model_validator(mode="after")
     def _has_noise(self) -> Self:
         if not self.terms:
-            raise ValueError("there is no noise: give N at least")
+            raise ValueError("there is no noise: give at least N")
         Model(self.terms)
         return self
 

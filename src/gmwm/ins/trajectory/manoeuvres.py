@@ -259,9 +259,7 @@ def perform(
             break
     n = math.floor((elapsed if duration is None else limit) / dt + 1e-6)
     if not 1 <= n <= _LONGEST:
-        raise InputError(
-            f"a trajectory of {n:,} steps of {dt:g} s: let it have one to {_LONGEST:,} steps"
-        )
+        raise InputError(f"a trajectory of {n:,} steps of {dt:g} s: give 1 to {_LONGEST:,} steps")
     course = _course(plans, 0.5 * dt * np.arange(2 * n + 1, dtype=float), speed, heading)
     lla = np.empty((n + 1, 3))
     _walk(course.speed, course.heading, course.climb, dt, origin, lla)
@@ -402,12 +400,12 @@ def through(
     lengths = np.hypot(legs[:, 0], legs[:, 1])
     if np.any(lengths < _SHORTEST):
         i = int(np.argmin(lengths))
-        raise InputError(f"waypoints {i} and {i + 1} lie over each other: leave one out")
+        raise InputError(f"waypoints {i} and {i + 1} coincide: leave one out")
     headings = np.arctan2(legs[:, 1], legs[:, 0])
     turns = (np.diff(headings) + np.pi) % (2.0 * np.pi) - np.pi
     if np.any(np.abs(turns) > _HALF_TURN):
         i = int(np.argmax(np.abs(turns) > _HALF_TURN)) + 1
-        raise InputError(f"waypoint {i} asks to turn back: put two waypoints there, side by side")
+        raise InputError(f"path turns back at waypoint {i}: put two waypoints there, side by side")
     cuts = [0.0]  # how far before a waypoint a turn begins, and behind it ends, m
     for turn in map(float, turns):
         base = displacement(Pulse(turn, turn_rate, ramp), -0.5 * turn, speed)[0] if turn else 0.0

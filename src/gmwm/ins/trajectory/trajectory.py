@@ -143,7 +143,7 @@ class Trajectory:
                 )
             object.__setattr__(self, name, values)
         if len(self.lla) < 2:
-            raise InputError(f"a trajectory of {len(self.lla)} epochs: give two or more")
+            raise InputError(f"the trajectory has {len(self.lla)} epoch(s): give at least two")
 
     @classmethod
     def from_arrays(cls, dt: float, lla: FloatArray, rpy: FloatArray) -> Trajectory:

@@ -126,8 +126,8 @@ class LogColumns:
             row = int(bad[0]) + 1
             what = "repeats the one before" if steps[row - 1] == 0.0 else "goes back"
             raise InputError(
-                f"{self.place(TIME, row)}: time stamp {stamps[row]:.15g} {what}: take such rows "
-                "out or, if a clock was set there, the step"
+                f"{self.place(TIME, row)}: time stamp {stamps[row]:.15g} {what}: delete such "
+                "rows; if the clock was reset there, remove the jump from the later stamps"
             )
 
     def metres(self, quantity: str, values: FloatArray) -> FloatArray:
@@ -220,7 +220,7 @@ def _interval(log: LogColumns, stamps: FloatArray) -> float:
     """Sampling interval of evenly spaced time stamps, s."""
     n = stamps.size - 1
     if n < 1:
-        raise InputError(f"{log.table.source} has a single row: give two epochs or more")
+        raise InputError(f"{log.table.source} has a single row: give at least two epochs")
     log.check_rising(stamps)
     steps = np.diff(stamps)
     usual = float(np.median(steps))

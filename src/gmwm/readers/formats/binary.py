@@ -65,7 +65,7 @@ def layout_of(text: str) -> BinaryLayout:
     try:
         found = BinaryLayout(_KINDS[parts[0]], float(parts[1]), float(parts[2]))
     except ValueError:
-        problem = f"layout {text!r}: a scale is no number: write {_FORM}"
+        problem = f"layout {text!r}: a scale is not a number: write {_FORM}"
         raise InputError(problem, "layout") from None
     for word in parts[3:]:
         if word in _ORDERS:
@@ -112,7 +112,7 @@ class BinaryTable(Table):
         if not tuning.LEAST_STEP <= median < tuning.LARGEST_OF_BINARY:
             times = f"{path.name}: its first times, {first[0]:.6g} and {first[1]:.6g}"
             hint = "give the layout of this file"
-            raise InputError(f"{times}, are no seconds of a clock: {hint}", "layout")
+            raise InputError(f"{times}, are not seconds of a clock: {hint}", "layout")
         return table
 
     def expected_rows(self) -> float:
@@ -147,7 +147,7 @@ class BinaryTable(Table):
             usual = float(np.median(steps))
             near = steps[np.abs(steps / usual - 1.0) < 0.5]
         if not (near.size and usual > 0.0):
-            raise InputError(f"{self.source}: its times do not advance: check the layout", "layout")
+            raise InputError(f"{self.source}: stamps do not increase: check the layout", "layout")
         return float(np.mean(near))
 
     def where(self, row: int) -> str:

@@ -44,7 +44,7 @@ _OF_BATCH = ("accel", "gyro")  # IMU_SENSOR_TYPE_ACCEL, IMU_SENSOR_TYPE_GYRO
 _TIME = "time [us]"
 _SAMPLES = 32  # of a message of a batch
 _MARKS = b"\xa3\x95"
-_DAMAGE = "is no binary log of ArduPilot, or is damaged or cut off: get a whole copy"
+_DAMAGE = "is not a binary log of ArduPilot, or is damaged or cut off: get a whole copy"
 _REMAINS = 528  # bytes at the end that may be remains of a page: pymavlink passes over as many
 
 
@@ -301,7 +301,7 @@ def _contents(
     is_cut = bool(rest) and rest[:2] == _MARKS[: len(rest)]
     damage = topics.cut_off(seconds) if is_cut else ""
     if between := extent.between + (len(rest) if len(rest) == _REMAINS else 0):
-        damage = f"is damaged in places, where {between:,} bytes or more are no messages"
+        damage = f"is damaged in places, where {between:,} bytes or more are not messages"
     return {each: counts[each] for each in order}, sensors, _batches(headers, data), damage
 
 

@@ -66,7 +66,7 @@ def _chosen(source: str, topics: Sequence[Topic], wanted: Sequence[str]) -> tupl
             raise InputError(text, "topic-unknown")
     chosen = tuple(by_name[name.strip("/")] for name in dict.fromkeys(wanted))
     if len(chosen) > 1 and not _are_parts(chosen):
-        text = f"{source}: {' and '.join(map(str, chosen))} are no pair of gyros and accelerometers"
+        text = f"{source}: {' and '.join(map(str, chosen))} are not one gyro and one accelerometer"
         raise InputError(f"{text}: choose one, or two such", "topic")
     return chosen
 

@@ -36,7 +36,7 @@ _HEAD = 3  # bytes of a message before its content
 _PADDING = (b"\0" * _HEAD, b"\xff" * _HEAD)
 _HINT = "log sensor_combined, which the default SDLOG_PROFILE has, or the raw FIFO topics"
 _HINT += " (bits 8 and 9 of SDLOG_PROFILE)"
-_DAMAGE = "is no ULog, or is damaged or cut off: get a whole copy"
+_DAMAGE = "is not a ULog, or is damaged or cut off: get a whole copy"
 _Columns = dict[str, AnyArray]
 
 

@@ -54,7 +54,7 @@ def blocks(
             elif len(text) > _LONGEST_LINE:
                 raise InputError(
                     f"{path.name}, line {line}: longer than {_LONGEST_LINE >> 20} MB, so this is "
-                    "no table of numbers: check that it is the right file"
+                    "not a table of numbers: check that it is the right file"
                 )
         if damage:
             say(damage)

@@ -187,7 +187,7 @@ def test_a_drift_needs_a_state_and_a_ramp():
         em(WhiteNoise() + RandomWalk() + RateRamp(0.1), x, drift="state")
     with pytest.raises(InputError, match="RandomWalk or GaussMarkov"):
         em(WhiteNoise() + RateRamp(), x, drift="state")
-    with pytest.raises(InputError, match="known are ramp, state"):
+    with pytest.raises(InputError, match="choose from ramp, state"):
         em(WhiteNoise() + RandomWalk() + RateRamp(), x, drift="signal")
 
 
@@ -289,7 +289,7 @@ def test_expected_moments_are_those_of_draws_from_the_posterior(drift):
     ids=repr,
 )
 def test_processes_without_a_closed_form_are_refused_with_the_way_out(process):
-    with pytest.raises(InputError, match=r'does not know .*takes WhiteNoise.*"mle" takes'):
+    with pytest.raises(InputError, match=r'does not support .*takes WhiteNoise.*"mle" supports'):
         em(WhiteNoise() + process, WhiteNoise(1.0).simulate(100, 1.0, 1))
 
 

@@ -183,7 +183,7 @@ def test_the_worst_is_among_levels_that_are_known_well():
         ([0.0, 2.6], 0.11, True, "bad", "over 2 s are too small: there the data lie 11 %"),
         ([0.0, -2.6], -0.11, True, "bad", "too large: there the data lie 11 % below"),
         ([0.0, 3.5], 0.11, False, "bad", "by 3.5 standard errors"),
-        ([0.0, 2.6], 0.09, True, "note", "describes the Allan deviation to 9 %"),
+        ([0.0, 2.6], 0.09, True, "note", "within 9 % of the Allan deviation"),
     ],
 )
 def test_what_a_misfit_means(residual, misfit, failed, severity, words):

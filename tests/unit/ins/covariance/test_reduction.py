@@ -194,12 +194,12 @@ def test_white_noise_alone_can_be_reduced():
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"form": "N"}, r"form = 'N': known are N\+K, N\+GM"),
-        ({"outages": ()}, "outages: give one length at least"),
+        ({"form": "N"}, r"form = 'N': choose from N\+K, N\+GM"),
+        ({"outages": ()}, "outages is empty: give at least one"),
         ({"outages": (10.0, 0.0)}, r"outage length = 0\.0"),
         ({"outages": (-5.0,)}, r"outage length = -5\.0"),
         ({"outages": (10.03,)}, "between two epochs"),
-        ({"scenario": Scenario(TRUTH, gnss(TRUTH))}, "outages: give one length at least"),
+        ({"scenario": Scenario(TRUTH, gnss(TRUTH))}, "outages is empty: give at least one"),
     ],
 )
 def test_what_cannot_be_used(options, message):

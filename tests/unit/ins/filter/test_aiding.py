@@ -122,12 +122,15 @@ def test_events_come_in_order_of_time():
 @pytest.mark.parametrize(
     ("make", "words"),
     [
-        (lambda: fixes([2.0, 1.0]), "number 1 at 1 s comes before the one ahead of it: sort them"),
+        (lambda: fixes([2.0, 1.0]), "number 1 at 1 s is earlier than the one before it: sort them"),
         (lambda: fixes([1.0], sd=-1.0), "a standard deviation is negative"),
         (lambda: fixes([np.nan]), "number 0 is not finite"),
         (lambda: fixes([1.0], value=np.array([[np.inf, 0.0, 0.0]])), "number 0 is not finite"),
         (lambda: fixes([1.0], value=np.zeros((1, 2))), "give E times and E x 3 values"),
-        (lambda: fixes([1.0], kind="odometer"), "known are position, velocity, height, standstill"),
+        (
+            lambda: fixes([1.0], kind="odometer"),
+            "choose from position, velocity, height, standstill",
+        ),
         (lambda: Outage(-1.0, 5.0), "outage start -1.0"),
         (lambda: Outage(np.nan, 5.0), "outage start nan"),
         (lambda: Outage("10", 5.0), "outage start '10'"),

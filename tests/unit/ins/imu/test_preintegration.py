@@ -165,7 +165,7 @@ def _right_jacobian(r):
 def test_bad_input():
     with pytest.raises(InputError, match="start has shape"):
         preintegrate(still(2), WALKS, start=np.eye(2))
-    with pytest.raises(InputError, match="known are known, stationary"):
+    with pytest.raises(InputError, match="choose from known, stationary"):
         preintegrate(still(2), WALKS, start="unknown")
     with pytest.raises(InputError, match="accel_x has none"):
         preintegrate(still(2), {"gyro": WhiteNoise(1e-4)})

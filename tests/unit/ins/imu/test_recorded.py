@@ -108,7 +108,7 @@ def test_what_cannot_be_used():
         Recorded.of(recording(empty), 5.0)
     with pytest.raises(InputError, match=r"longest recording has 10 s, less than the 10\.1 s"):
         Recorded.of([good, recording(noise(50))], 10.1)
-    with pytest.raises(InputError, match="there is none"):
+    with pytest.raises(InputError, match="no recordings given"):
         Recorded.of([], 5.0)
     for duration in (0.0, -3.0, np.nan):
         with pytest.raises(InputError, match="duration"):

@@ -173,7 +173,7 @@ def test_a_lever_arm_left_out(vehicle, seed, rate):
     ("down", "advice"),
     [(0.3, "give the lever arm 1.50,0.30,-2.80"),
      (2.0, "give the lever arm 1.50,0.30,-1.00, and measure it down, which"),
-     (None, "measure it: this motion shows none")],
+     (None, "measure it: this motion does not show any")],
 )  # fmt: skip
 def test_only_what_the_motion_shows_of_a_lever_arm_is_advised(down, advice):
     log, _ = emulated_log(1, duration=DURATION, rate=10.0)
@@ -240,7 +240,7 @@ def test_axes_that_point_the_other_way_are_no_noise(kind, signs, shown):
     assert tuple(fault.values[axis] for axis in "xyz") == shown
     assert navigated.faults.explained
     assert ("reverse gyro_z" if kind == "gyro" else "y, accel_z") in fault.hint
-    assert "check every gyro by hand" in fault.hint
+    assert "Check every gyro by hand" in fault.hint
 
 
 @pytest.mark.parametrize(

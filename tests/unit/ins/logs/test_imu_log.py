@@ -68,7 +68,10 @@ def test_gaps_are_filled_along_a_line(tmp_path):
 @pytest.mark.parametrize(
     ("rows", "words"),
     [
-        (slice(30, 31 + MOST), f"sample 31 of gyro_z, 0.6 s .* {MOST + 1} in a row: up to {MOST}"),
+        (
+            slice(30, 31 + MOST),
+            f"sample 31 of gyro_z, 0.6 s .* {MOST + 1} in a row: gaps of up to {MOST}",
+        ),
         ([0], "sample 1 of gyro_z, 0 s"),
         ([99], "sample 100 of gyro_z, 1.98 s"),
     ],

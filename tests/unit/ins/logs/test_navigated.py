@@ -227,7 +227,7 @@ def test_the_command_without_a_file(run, no_pages):
     assert by_options[0] == 0
     assert "heading as given: 57.30 deg" in by_options[1]
     assert "have no standard deviations" not in by_options[1]
-    assert "position: the fixes have standard deviations of their own" in by_options[1]
+    assert "position: the fixes have their own standard deviations" in by_options[1]
     assert run("run.yaml", "--velocity-sd", "0.1,1")[2].startswith(
         "gmwm: --velocity-sd 0.1,1: write one number, or NORTH,EAST,DOWN"
     )
@@ -246,7 +246,7 @@ def test_models_that_are_not_valid_are_named_wherever_they_are_used(run):
     told = "gyro_x, accel_z: the fits are not valid: do not use these numbers in a filter"
     printed = " ".join(run("run.yaml", "-o", "out")[1].split())
     assert told in printed
-    assert "to the north, east and down are assumed (give --velocity-sd)" in printed
+    assert "(north, east, down) is assumed (give --velocity-sd)" in printed
     assert told in Path("out/report.html").read_text()
     compared = content(compare={"bad": "cal.json", "good": SENSORS})
     del compared["sensors"]

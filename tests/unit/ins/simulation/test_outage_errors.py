@@ -93,7 +93,7 @@ def test_runs_in_which_either_filter_diverged_are_left_out():
         difference({"vertical": a[:1]}, {"vertical": b[:1]}, "vertical")
     with pytest.raises(InputError, match="8 and 3 runs cannot be paired"):
         difference({"vertical": a}, {"vertical": b[:3]}, "vertical")
-    with pytest.raises(InputError, match="known are horizontal"):
+    with pytest.raises(InputError, match="choose from horizontal"):
         difference({"vertical": a}, {"vertical": b}, "height")
 
 

@@ -162,7 +162,7 @@ def test_fewer_stretches_than_runs_are_noted():
     assert found["good"].runs == 3
     (notice,) = found.notices
     assert notice.code == "fewer-runs"
-    assert notice.text.startswith("3 runs in place of 9")
+    assert notice.text.startswith("3 runs instead of 9")
     assert study(2, source=recorded(3)).notices == ()
     # True sensor errors are not known.
     assert np.all(np.isnan(found["good"].sensor_nees))

@@ -115,7 +115,7 @@ def test_a_random_walk_in_real_errors_starts_anywhere(tmp_path: Path) -> None:
     assert walks.bias_sd["gyro_x"] > 0.0
     assert walks.bias_sd["accel_x"] == 0.0
     assert found.filters["told"].bias_sd["gyro_x"] == 0.5
-    with pytest.raises(InputError, match="name what is reduced"):
+    with pytest.raises(InputError, match="name the model to reduce"):
         experiment_from(LEAST | {"truth": truth, "filters": {"A": {"reduce": "N+K"}}}, tmp_path)
 
 
@@ -132,7 +132,7 @@ def test_no_experiment() -> None:
     no_mapping: Any = 5
     with pytest.raises(InputError, match="write KEY: VALUE"):
         experiment_from(no_mapping)
-    with pytest.raises(InputError, match="is there twice"):
+    with pytest.raises(InputError, match="appears twice"):
         experiment_from(LEAST | {"filters": {1: "truth", "1": "truth"}})
 
 
@@ -150,7 +150,7 @@ def test_every_key_is_documented() -> None:
 def test_a_key_that_is_there_twice_is_named_with_its_line(tmp_path: Path) -> None:
     path = tmp_path / "a.yaml"
     path.write_text("trajectory: car\nrate: 100\nrate: 200\n", "utf-8")
-    with pytest.raises(InputError, match="line 3: 'rate' is there twice"):
+    with pytest.raises(InputError, match="line 3: 'rate' appears twice"):
         read_document(path)
 
 

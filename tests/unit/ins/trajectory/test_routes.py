@@ -56,8 +56,8 @@ def test_heights_change_between_corners() -> None:
     ("corners", "message"),
     [
         ([[0, 0, 0]], r"waypoints has shape \(1, 3\)"),
-        ([[0, 0, 0], [500, 0, 0], [500, 0, 9]], "waypoints 1 and 2 lie over each other"),
-        ([[0, 0, 0], [5000, 0, 0], [0, 0, 0]], "waypoint 1 asks to turn back"),
+        ([[0, 0, 0], [500, 0, 0], [500, 0, 9]], "waypoints 1 and 2 coincide"),
+        ([[0, 0, 0], [5000, 0, 0], [0, 0, 0]], "path turns back at waypoint 1"),
         ([[0, 0, 0], [200, 0, 0], [200, 900, 0]], "waypoints 0 and 1 are 200 m apart where"),
         ([[0, 0, 0], [90, 0, -20]], "waypoints 0 and 1 leave 3 s to climb 20 m"),
     ],

@@ -59,7 +59,7 @@ def test_a_log_that_is_cut_off(log, share):
     log.write_bytes(whole[: int(share * len(whole)) - 1])
     seconds = re.search(
         r"a\.log is cut off or damaged ([0-9.]+) s after its first sample, inside a message: "
-        r"get a whole copy, or use what is left of it, damaged=True$",
+        r"get a whole copy, or read the rest with damaged=True$",
         refusal(log),
     )[1]
     found = gmwm.read(log, damaged=True)
@@ -72,7 +72,7 @@ def test_a_log_that_is_cut_off(log, share):
 def test_in_the_words_of_the_command_line(log, run):
     log.write_bytes(log.read_bytes()[:-1])
     status, _, said = run("health", str(log))
-    assert status == 2 and said.strip().endswith("or use what is left of it, --damaged")
+    assert status == 2 and said.strip().endswith("or read the rest with --damaged")
     status, found, _ = run("health", str(log), "--damaged", "--json")
     assert status == 0 and json.loads(found)
 

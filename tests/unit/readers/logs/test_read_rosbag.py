@@ -127,7 +127,7 @@ def test_several_imus_ask_for_a_topic(tmp_path):
     assert [n.values["topic"] for n in found.notices if n.code == "topic"] == ["/imu1"]
     assert exact(gmwm.read(path, topic="imu0"))
     assert "no topic '/imu3'" in refusal(path, topic="/imu3")
-    assert "no pair" in refusal(path, topic=["/imu0", "/imu1"])
+    assert "not one gyro" in refusal(path, topic=["/imu0", "/imu1"])
 
 
 @pytest.fixture(scope="module")

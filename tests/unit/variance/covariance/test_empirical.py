@@ -58,5 +58,5 @@ def test_it_is_positive_semidefinite(window, n):
 
 
 def test_an_unknown_window_is_refused():
-    with pytest.raises(gmwm.InputError, match="known are none, octave"):
+    with pytest.raises(gmwm.InputError, match="choose from none, octave"):
         gmwm.wavelet_variance(np.arange(100.0) ** 2, dt=1.0, data_covariance="parzen")
