@@ -18,7 +18,7 @@ from scipy import signal
 
 import gmwm
 from gmwm import GaussMarkov, Process, RandomWalk, WhiteNoise
-from gmwm.calibration import noise_density
+from gmwm.calibration import axis_numbers
 
 DT, DENSITY = 0.005, 1e-3
 RATIOS = (0.02, 0.05, 0.08, 0.15, 0.25, 0.4)
@@ -69,7 +69,7 @@ def main() -> None:
                 total += 1
                 valid += fit.valid
                 named += "sensor-bandwidth" in codes
-                density.append(noise_density(fit).value / DENSITY)
+                density.append(axis_numbers(fit).N.value / DENSITY)
                 if not fit.valid:
                     wrong.append(f"{name} at {ratio:g}")
         low, high = np.quantile(density, [0.05, 0.95])

@@ -32,8 +32,6 @@ from real_data_recording import (
 
 import gmwm
 from gmwm import Calibration, Fit, JointFit
-from gmwm._core.units import field_units
-from gmwm.calibration.summary import floor, white_density
 
 SHAKEN = 4  # the recording with the shock
 FEWEST_DOF = 30.0  # of a level whose misfit counts
@@ -68,7 +66,7 @@ def main() -> None:
         given.output / "calibration_joint.json", lambda: gmwm.calibrate([r.raw for r in recorded])
     )
     for table in (
-        model_table(own, together), parameter_table(together), density_table(together),
+        model_table(own, together), parameter_table(together), numbers_table(together),
         misfit_table(own), validity_table(own), validity_table(removed, "departures removed: "),
         joint_table(together), budget_table(own, together),
     ):  # fmt: skip
@@ -182,20 +180,9 @@ def parameter_table(together: Calibration) -> str:
     return "\n".join([*lines, ""])
 
 
-def density_table(together: Calibration) -> str:
-    """Noise density and lowest Allan deviation of the joint models, in field units."""
-    lines = [
-        "Joint models: density of the fast noise at 1 s and more, lowest Allan deviation and where",
-    ]
-    for name in CHANNELS:
-        fit = together[name]
-        density, lowest = white_density(fit), floor(fit)
-        cells = []
-        for value, parameter_unit in ((density, "u/sqrt(Hz)"), (lowest.deviation, "u")):
-            field = field_units(parameter_unit, fit.wv.quantity)[0]
-            cells.append(f"{value * field.per_si:>8.3g} {field.unit:12}")
-        lines.append(f"{name:9}{''.join(cells)} at {lowest.tau:.4g} s")
-    return "\n".join([*lines, ""])
+def numbers_table(together: Calibration) -> str:
+    """Sensor numbers of the joint models."""
+    return f"Joint models: sensor numbers\n{together.numbers}\n"
 
 
 def misfit_table(own: Sequence[Calibration]) -> str:
