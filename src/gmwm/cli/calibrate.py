@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from gmwm._core.files import folder_to_fill, moved_together, replaceable
-from gmwm.cli.console import command_line, new_console, new_table, progress_bar
+from gmwm.cli.console import command_line, progress_bar
 from gmwm.cli.hints import in_options
 from gmwm.cli.options import PATH, folder_to_write, options, read_recording
 from gmwm.errors import InputError
@@ -160,15 +160,16 @@ def _start_workers(files: Sequence[Path], jobs: int, memory: float | None) -> No
 
 def _show_timings(watch: Stopwatch, jobs: int) -> None:
     """On the stream of errors: the output of --json stays JSON."""
-    table = new_table("stage", ">seconds", ">of the processor")
-    rows = [*watch.elapsed.items(), ("all stages", sum(watch.elapsed.values()))]
-    worked = {**watch.worked, "all stages": sum(watch.worked.values())}
-    for name, elapsed in rows:
-        table.add_row(name, f"{elapsed:.2f}", f"{worked[name]:.2f}")
-    console = new_console(to_errors=True)
-    console.print(table)
+    from gmwm._core.tables import plain_table
+
+    rows = [
+        (name, f"{took:.2f}", f"{watch.worked[name]:.2f}") for name, took in watch.elapsed.items()
+    ]
+    totals = [sum(each.values()) for each in (watch.elapsed, watch.worked)]
+    rows.append(("all stages", *(f"{each:.2f}" for each in totals)))
+    click.echo(plain_table(("stage", "seconds", "of the processor"), rows), err=True)
     if jobs > 1:
-        console.print("stages of channels run side by side: their seconds are added up")
+        click.echo("stages of channels run side by side: their seconds are added up", err=True)
 
 
 def show(result: Calibration, files: Iterable[str] = (), *, verbose: bool = False) -> None:

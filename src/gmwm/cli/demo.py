@@ -9,7 +9,7 @@ import click
 
 from gmwm._core.files import folder_to_fill, moved_together
 from gmwm.cli.calibrate import folder_of_results, show, write_files
-from gmwm.cli.console import new_console, new_table, print_whole, progress_bar
+from gmwm.cli.console import progress_bar
 from gmwm.cli.options import options
 
 if TYPE_CHECKING:
@@ -97,36 +97,23 @@ def write_files_to_try(output: Path, hours: float, seed: int) -> None:
 
 def show_truth(fitted: Calibration, truth: dict[str, Model]) -> None:
     """One table of truth beside estimate."""
+    from gmwm._core.tables import plain_table
+    from gmwm._core.text import wrapped
     from gmwm.study import compare
 
-    table = new_table("channel", "param.", ">truth", ">estimate", "95 % interval", "unit")
-    determined = covered = total = 0
-    for name, fit in fitted.fits.items():
-        rows = compare(fit, truth[name])
-        for i, row in enumerate(rows):
-            total += 1
-            determined += row.determined
-            covered += row.determined and row.covered
-            cells = [f"{row.estimate:.4g}", f"{row.lower:.4g} .. {row.upper:.4g}"]
-            if not row.determined:
-                cells = ["-", "too short to tell"]
-            elif row.lower == 0.0:
-                cells = [f"{row.estimate:.3g}", f"below {row.upper:.4g}"]
-            if not row.covered:
-                cells[1] += " *"
-            first = name if i == 0 else ""
-            table.add_row(
-                first,
-                row.what,
-                f"{row.truth:.4g}",
-                *cells,
-                row.unit,
-                end_section=i == len(rows) - 1,
-            )
-    console = new_console()
-    print_whole(console, table)
-    console.print(
-        f"{determined} of {total} parameters are determined by this record; {covered} of these "
-        f"{determined} intervals hold the truth (* does not).",
-        highlight=False,
+    table, shown = [], [row for name, fit in fitted.items() for row in compare(fit, truth[name])]
+    for row in shown:
+        cells = [f"{row.estimate:.4g}", f"{row.lower:.4g} .. {row.upper:.4g}"]
+        if not row.determined:
+            cells = ["-", "too short to tell"]
+        elif row.lower == 0.0:
+            cells[1] = f"<= {row.upper:.4g}"
+        cells[1] += "" if row.covered else " *"
+        table.append((row.channel, row.what, f"{row.truth:.4g}", *cells, row.unit))
+    click.echo(
+        plain_table(("channel", "parameter", "truth", "estimate", "95 % interval", "unit"), table)
     )
+    determined = [row.covered for row in shown if row.determined]
+    text = f"{len(determined)} of {len(shown)} parameters are determined by this record; "
+    text += f"{sum(determined)} of these {len(determined)} intervals hold the truth (* does not)."
+    click.echo("\n".join(wrapped(text)))
