@@ -300,5 +300,6 @@ def write_files(
         written.append(f"{path} ({target})")
     path = shlex.quote(str(document))
     after = f"gmwm export {path} --to openvins" if has_imu else f"gmwm bound {path}"
+    after = after if result.valid else f"1. above, then {after}"
     last = "+-: 95 % interval, <=: 95 % upper limit; error model and all notices: -v"
     return [*wrapped(f"wrote {', '.join(written)}", indent=2), *lines, f"next: {after}", last]

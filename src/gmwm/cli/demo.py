@@ -53,7 +53,7 @@ def demo(output: Path, hours: float, seed: int, verbose: bool, files: bool) -> N
         with progress_bar("calibrating", "channels") as bar:
             result = run(recording, progress=bar)
         written = write_files(result, folder, recording)
-    show(result, [_truth_line(truth), *written], verbose=verbose)
+    show(result, [*_truth_lines(truth), *written], verbose=verbose)
     if verbose:
         forms = {name: model.opened() for name, model in truth.items()}
         with progress_bar("fitting", "channels") as bar:
@@ -62,8 +62,9 @@ def demo(output: Path, hours: float, seed: int, verbose: bool, files: bool) -> N
         show_truth(fitted, truth)
 
 
-def _truth_line(truth: dict[str, Model]) -> str:
+def _truth_lines(truth: dict[str, Model]) -> list[str]:
     """The truth of the simulation, of one axis of each sensor."""
+    from gmwm._core.text import wrapped
     from gmwm._core.units import SI_UNIT, customary_unit
 
     parts = []
@@ -74,7 +75,7 @@ def _truth_line(truth: dict[str, Model]) -> str:
             name, per_si = customary_unit(item.parameter.unit, quantity, unit)
             values.append(f"{item.key} {(item.value or 0.0) * per_si:.4g} {name}")
         parts += [f"{quantity} {', '.join(values)}"] if values else []
-    return f"truth: {'; '.join(parts)}"
+    return wrapped(f"truth: {'; '.join(parts)}", indent=2)
 
 
 def write_files_to_try(output: Path, hours: float, seed: int) -> None:

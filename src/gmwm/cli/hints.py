@@ -90,7 +90,9 @@ def with_option(notice: Notice, span: tuple[float, float] | None = None) -> Noti
             "--channel accel_z=-NAME, and also y if it points left"
         )
         return replace(notice, hint=hint)
-    if notice.code in ("not-static", "tilt") and "start" in values:
+    if notice.code == "vibration":
+        return replace(notice, hint="leave it out with --start and --stop, or record again")
+    if notice.code in ("not-static", "tilt") and "start" in values and not notice.source:
         return replace(notice, hint=_again(_cut(values["start"], values["stop"], span)))
     options = ["--remove-departures" * bool(values.get("removable"))]
     if notice.code == LONGEST_PART:
@@ -113,14 +115,13 @@ def with_option(notice: Notice, span: tuple[float, float] | None = None) -> Noti
 
 
 def _cut(start: float, stop: float, span: tuple[float, float] | None) -> str:
-    """The options that keep a part, rounded into it where that is long."""
+    """The options that keep a part, which begins and ends at whole seconds if it is long."""
     zero, end = span or (0.0, math.inf)
-    options = []
-    for name, time, rounded in (("start", start, math.ceil), ("stop", stop, math.floor)):
-        if (name == "start" and time > 0.0) or zero > 0.0 or (name == "stop" and zero + time < end):
-            whole = rounded(zero + time) if stop - start > _LONG else zero + time
-            options.append(f"--{name} {whole:.10g}")
-    return " ".join(options)
+    first, last = zero + start, zero + stop
+    if stop - start > _LONG:
+        first, last = float(math.ceil(first)), float(math.floor(last))
+    options = [f"--start {first:.10g}"] if start > 0.0 else []
+    return " ".join([*options, f"--stop {last:.10g}"] if zero + stop < end else options)
 
 
 def _again(*options: str) -> str:

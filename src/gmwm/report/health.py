@@ -158,8 +158,8 @@ def length_sentence(calibration: Calibration, horizon: float) -> str:
             f"would give +-{100.0 * _AIM:g} %"
         )
     return (
-        f"too short for {horizon:g} s outages: record {text} for +-{100.0 * _AIM:g} % "
-        f"(now +-{share}, {worst})"
+        f"too short for {horizon:g} s outages: record {text} to know {worst} "
+        f"to +-{100.0 * _AIM:g} % there (now +-{share})"
     )
 
 

@@ -170,16 +170,13 @@ def _of_sensor(quantity: str, fits: Mapping[str, Fit]) -> list[str]:
         text = f"{value:.2e}".replace("e-0", "e-") if value else "0"
         row += f" {key} {limit}{text} {si_parameter_unit(unit, quantity)} "
     lines = wrapped(row.rstrip(), indent=7)
-    covered = list(_covered(fits))
-    if covered:
-        label, name, letters = max(covered)[1:]
-        lines += wrapped(f"{letters} {label} ({name})", first=" " * 7, indent=7)[:1]
     invalid = [name for name, fit in fits.items() if not fit.valid]
     if invalid:
         verb = "are" if len(invalid) > 1 else "is"
         text = f"do not use yet: {_listed(invalid)} {verb} not valid"
-        lines += wrapped(text, first=" " * 7, indent=7)
-    return lines
+        return lines + wrapped(text, first=" " * 7, indent=7)
+    covered = sorted(_covered(fits))[-1:]
+    return lines + [f"{'':7}{letters} {term} ({name})" for _, term, name, letters in covered]
 
 
 def _covered(fits: Mapping[str, Fit]) -> Iterator[tuple[float, str, str, str]]:
