@@ -189,7 +189,7 @@ def show(result: Calibration, files: Iterable[str] = (), *, verbose: bool = Fals
 
 def _model_lines(name: str, fit: Fit) -> list[str]:
     """The terms of an axis; white noise and low-pass noise are one row."""
-    from gmwm._core.text import with_error, wrapped
+    from gmwm._core.text import brief, with_error, wrapped
 
     labels, terms = fit.model.term_labels(), fit.model.terms
     rows: dict[str, list[str]] = {}
@@ -199,7 +199,7 @@ def _model_lines(name: str, fit: Fit) -> list[str]:
         term, key, usual = items[one.key].term, items[one.key].parameter.name, one.usual
         text = with_error(usual.value, usual.lower, usual.upper)
         if one.kind != "estimated":
-            text = f"<= {usual.upper:.3g}" if one.kind == "bound" else f"{usual.value:.4g}"
+            text = f"<= {brief(usual.upper, 3)}" if one.kind == "bound" else f"{usual.value:.4g}"
         if key == "N" and term in white[:1] and len(white) > 1:
             text = _total(fit, white)
         elif term in white and key != "bandwidth" and (key != "N" or term != white[0]):
@@ -237,7 +237,7 @@ def _all_notices(result: Calibration) -> list[str]:
     found = [each for each in gathered(result.notices) if each.severity != "good"]
     for name, fit in result.items():
         own = [each for each in fit.notices if not each.issue.spoils]
-        found += [replace(n, where=" ".join(filter(None, (name, n.where)))) for n in own]
+        found += [replace(n, where=" ".join(dict.fromkeys((name, n.where))).strip()) for n in own]
     places: dict[str, list[str]] = {}
     for each in worst_first(found):
         places.setdefault(str(replace(each, where="")), []).append(each.where)
@@ -300,6 +300,7 @@ def write_files(
         written.append(f"{path} ({target})")
     path = shlex.quote(str(document))
     after = f"gmwm export {path} --to openvins" if has_imu else f"gmwm bound {path}"
-    after = after if result.valid else f"1. above, then {after}"
+    if not all(fit.valid for fit in result.values()):
+        after = f"1. above, then {after}"
     last = "+-: 95 % interval, <=: 95 % upper limit; error model and all notices: -v"
     return [*wrapped(f"wrote {', '.join(written)}", indent=2), *lines, f"next: {after}", last]

@@ -24,6 +24,7 @@ LINES = 30
 _ACTIONS = 3  # notices that matter most
 _FEWEST = 4  # lines of them
 _NAME, _SOURCE, _TEXT = 16, 40, 60  # characters; longer ones are shortened
+_LEAST = 0.01  # smallest number without an exponent
 _DEPARTURES = {
     "step": "bias steps",
     "transient": "a transient at the start",
@@ -56,12 +57,14 @@ def summary(calibration: Calibration, files: Iterable[str] = ()) -> str:
 def _verdict(calibration: Calibration) -> list[str]:
     joint = max((len(f.parts) for f in calibration.values() if isinstance(f, JointFit)), default=1)
     names = calibration.source.split(", ") if joint > 1 else [calibration.source]
-    more = f" and {len(set(names)) - 1} more" if len(set(names)) > 1 else ""
-    name = _shortened(PurePath(names[0]).name or "recording", _SOURCE)
+    files = list(dict.fromkeys(each.partition(" from ")[0] for each in names))
+    more = f" and {len(files) - 1} more" if len(files) > 1 else ""
+    name = _shortened(PurePath(files[0]).name or "recording", _SOURCE)
     intervals = [fit.wv.dt for fit in calibration.values()]
     most = "up to " if max(intervals) > 1.001 * min(intervals) else ""
     size = f"{duration_text(calibration.duration)} at {most}{calibration.rate:.6g} Hz"
-    size += f" in {joint} recordings" if joint > 1 else ""
+    word = "recordings" if len(files) > 1 else "parts at rest"
+    size += f" in {joint} {word}" if joint > 1 else ""
     axes = {name: fit.valid for name, fit in calibration.items()}
     axes |= dict.fromkeys(calibration.skipped, False)
     others = [name for name, valid in axes.items() if not valid]
@@ -96,7 +99,7 @@ def _sensor(calibration: Calibration, most: int) -> list[str]:
     for name, notice in calibration.skipped.items():
         reasons.setdefault(notice.text, []).append(name)
     skipped = [
-        f"{_listed(names)}: no model, {text}"[:WIDTH].rstrip() for text, names in reasons.items()
+        f"{_listed(names):<7}  no model: {text}"[:WIDTH].rstrip() for text, names in reasons.items()
     ]
     if len(skipped) > 2:
         skipped = [skipped[0], f"{len(calibration.skipped)} channels have no model"]
@@ -111,14 +114,14 @@ def _sensor(calibration: Calibration, most: int) -> list[str]:
 
 
 def _table(calibration: Calibration, names: Sequence[str]) -> list[str]:
-    short = {_shortened(name, _NAME): name for name in names}
-    if len(short) < len(names):
-        short = {name: name for name in names}
-    numbers = SensorNumbers({each: calibration.numbers[name] for each, name in short.items()})
-    lines = numbers.text().splitlines()
-    units = {(axis.quantity, axis.B.usual.unit) for axis in numbers.values()}
-    heads = len({quantity for quantity, _ in units})
-    if len(units) > heads or len(lines) > 2 * heads + len(numbers):  # too wide
+    for short in ({n: n for n in names}, {_shortened(n, _NAME): n for n in names}):
+        numbers = SensorNumbers({each: calibration.numbers[name] for each, name in short.items()})
+        units = {(axis.quantity, axis.B.usual.unit) for axis in numbers.values()}
+        heads = len({quantity for quantity, _ in units})
+        lines = numbers.text().splitlines()
+        if len(units) == heads and len(lines) == 2 * heads + len(names):
+            break
+    else:  # too wide
         lines = []
         for name, axis in numbers.items():
             texts = (f"{n.key} {axis.text(n.key)} {n.usual.unit}" for n in axis)
@@ -134,10 +137,11 @@ def _table(calibration: Calibration, names: Sequence[str]) -> list[str]:
 def _reason(name: str, calibration: Calibration) -> str:
     """Why a fit is not valid, and where its steps are."""
     fit = calibration[name]
+    cause = next((n for n in fit.notices if n.severity == "bad" and n.issue.spoils), None)
     steps = [n for n in fit.notices if n.code == "step" and n.severity in ("bad", "warning")]
-    if all(n.severity != "bad" for n in steps):
-        return trust(name, fit, calibration)[1]
-    times = [f"{time:.4g} s" for time in sorted(n.values["time"] for n in steps)]
+    if cause is not None or all(n.severity != "bad" for n in steps):
+        return cause.issue.reason if cause else trust(name, fit, calibration)[1]
+    times = [f"{time:.4g} s" for time in sorted(n.values.get("time", 0.0) for n in steps)]
     return f"bias step{'s' if times[1:] else ''} at {_listed(times)}"
 
 
@@ -167,7 +171,7 @@ def _of_sensor(quantity: str, fits: Mapping[str, Fit]) -> list[str]:
     values = {"N": ("u/sqrt(Hz)", triad.N), "K": ("u/s/sqrt(Hz)", triad.K)}
     for key, (unit, value) in (values | {"start": ("u", triad.initial_sd)}).items():
         limit = "<= " if key in values and triad.is_upper(key) else ""
-        text = f"{value:.2e}".replace("e-0", "e-") if value else "0"
+        text = f"{value:.2e}".replace("e-0", "e-") if 0.0 < value < _LEAST else f"{value:.3g}"
         row += f" {key} {limit}{text} {si_parameter_unit(unit, quantity)} "
     lines = wrapped(row.rstrip(), indent=7)
     invalid = [name for name, fit in fits.items() if not fit.valid]
@@ -206,7 +210,8 @@ def _covered(fits: Mapping[str, Fit]) -> Iterator[tuple[float, str, str, str]]:
 def _actions(calibration: Calibration) -> list[list[str]]:
     """Lines of the notices that matter most, those of one kind together, each with what to do."""
     groups: dict[str, list[Notice]] = {}
-    found = sorted(findings(calibration), key=lambda each: each.issue.topic != "departure")
+    found = findings(calibration)
+    found.sort(key=lambda n: (not n.issue.spoils, n.issue.topic != "departure"))
     for notice in worst_first(found):
         topic = notice.issue.topic
         if notice.code == "unsteady" and "departure" in groups:
@@ -252,9 +257,9 @@ def _action(group: Sequence[Notice], cut: str, calibration: Calibration) -> str:
     where = _places(said, calibration) or _shortened(first.where, _SOURCE)
     if first.issue.topic == "fit" and any(parameters):
         where = f"{', '.join(filter(None, parameters))} of {where}"
-    text, hint = first.text.partition(";")[0].partition(": ")[0], first.hint.partition(";")[0]
-    while len(text) > _TEXT and ", " in text:
-        text = text.rpartition(", ")[0]
+    text, hint = (each.partition("; ")[0] for each in (first.text, first.hint))
+    while len(text) > _TEXT and (", " in text or ": " in text):
+        text = text.rpartition(", " if ", " in text else ": ")[0]
     if first.issue.topic == "departure":
         kinds = dict.fromkeys(_DEPARTURES[each.code] for each in group)
         verb = "inflate" if len(kinds) > 1 or first.code == "step" else "inflates"

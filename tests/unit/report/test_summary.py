@@ -129,7 +129,7 @@ def test_all_places_show_the_same_digits(two):
             assert shown["unit"] == number.usual.unit
             assert two.to_dict()["numbers"][name][number.key]["upper"] == number.upper
             if number.kind == "bound":
-                assert cell.startswith("<= ") or cell.startswith("-")
+                assert cell.startswith(("<= ", "-"))
             else:
                 assert shown["value"] == pytest.approx(number.usual.value, rel=1e-12)
                 value = float(cell.split()[0].replace(",", ""))
