@@ -175,7 +175,7 @@ def _show_timings(watch: Stopwatch, jobs: int) -> None:
 def show(result: Calibration, files: Iterable[str] = (), *, verbose: bool = False) -> None:
     """Print the page, and with ``verbose`` the error models and all notices too."""
     from gmwm._core.text import bullets
-    from gmwm.report.summary import summary
+    from gmwm.report import summary
 
     advised = in_options(result)
     parts = [summary(advised, files)]

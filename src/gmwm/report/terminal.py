@@ -26,7 +26,7 @@ _FEWEST = 4  # lines of them
 _NAME, _SOURCE, _TEXT = 16, 40, 60  # characters; longer ones are shortened
 _LEAST = 0.01  # smallest number without an exponent
 _DEPARTURES = {
-    "step": "bias steps",
+    "step": "a bias step",
     "transient": "a transient at the start",
     "drift-at-start": "a drift at the start",
     "slow-period": "a slow period",
@@ -262,7 +262,9 @@ def _action(group: Sequence[Notice], cut: str, calibration: Calibration) -> str:
         text = text.rpartition(", " if ", " in text else ": ")[0]
     if first.issue.topic == "departure":
         kinds = dict.fromkeys(_DEPARTURES[each.code] for each in group)
-        verb = "inflate" if len(kinds) > 1 or first.code == "step" else "inflates"
+        if sum(each.code == "step" for each in group) > 1:
+            kinds = {kind.replace("a bias step", "bias steps"): None for kind in kinds}
+        verb = "inflates" if len(group) == 1 else "inflate"
         text, hint = f"{' and '.join(kinds)} {verb} B and K", cut or hint
     elif len({notice.text for notice in group}) > 1:
         text = first.issue.reason or (f"e.g. {text}" if len(said) > 1 else f"{text}, and more")
