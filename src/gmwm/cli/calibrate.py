@@ -175,10 +175,10 @@ def _show_timings(watch: Stopwatch, jobs: int) -> None:
 def show(result: Calibration, files: Iterable[str] = (), *, verbose: bool = False) -> None:
     """Print the page, and with ``verbose`` the error models and all notices too."""
     from gmwm._core.text import bullets
-    from gmwm.report import summary
+    from gmwm.report import summary_text
 
     advised = in_options(result)
-    parts = [summary(advised, files)]
+    parts = [summary_text(advised, files)]
     if verbose:
         models = [line for name, fit in result.items() for line in _model_lines(name, fit)]
         parts += ["\n".join(["Error model (+-: 95 % interval)", *models])]

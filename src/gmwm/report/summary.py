@@ -18,13 +18,11 @@ from gmwm.report.health import findings, length_sentence
 from gmwm.report.numbers import SHOWN
 from gmwm.report.page import duration_text
 
-LINES = 30
-"""Of the page, with those about files."""
-
+_LINES = 30  # of the page, with those about files
 _ACTIONS = 3  # notices that matter most
 _FEWEST = 4  # lines of them
 _NAME, _SOURCE, _TEXT = 16, 40, 60  # characters; longer ones are shortened
-_LEAST = 0.01  # smallest number without an exponent
+_LEAST = 0.1  # smallest number without an exponent
 _DEPARTURES = {
     "step": "a bias step",
     "transient": "a transient at the start",
@@ -32,10 +30,10 @@ _DEPARTURES = {
     "slow-period": "a slow period",
 }
 _DONE = frozenset({"event", "outliers", "rounding", "crosstalk", "held"})
-"""Codes of warnings that the calibration has allowed for: last of those that matter."""
+"""Codes of warnings that the calibration has allowed for: nothing is to be done."""
 
 
-def summary(calibration: Calibration, files: Iterable[str] = ()) -> str:
+def summary_text(calibration: Calibration, files: Iterable[str] = ()) -> str:
     """Verdict, sensor numbers, filter numbers, the worst notices with what to do, and the files.
 
     At most 30 lines of 80 columns, unless what is said of files is longer.
@@ -46,15 +44,17 @@ def summary(calibration: Calibration, files: Iterable[str] = ()) -> str:
     files : iterable of str, optional
         Lines about the files that were written.
     """
-    parts = [_verdict(calibration), [], _filter(calibration), [], list(files)]
-    left = LINES - sum(len(part) + 1 for part in (*parts[:1], *parts[2:3], *parts[4:]) if part)
-    actions = _actions(calibration)
-    parts[1] = _sensor(calibration, left - 1 - min(len(_fitting(actions, left)), _FEWEST + 1))
-    parts[3] = _fitting(actions, left - len(parts[1]) - 2)
+    parts = [wrapped(verdict_line(calibration)), [], _filter(calibration), [], list(files)]
+    left = _LINES - sum(len(part) + 1 for part in (parts[0], parts[2], parts[4]) if part)
+    texts = enumerate(actions(calibration), 1)
+    to_do = [wrapped(text, first=f"{place}. ", indent=3) for place, text in texts]
+    parts[1] = _sensor(calibration, left - 1 - min(len(_fitting(to_do, left)), _FEWEST + 1))
+    parts[3] = _fitting(to_do, left - len(parts[1]) - 2)
     return "\n\n".join("\n".join(part) for part in parts if part)
 
 
-def _verdict(calibration: Calibration) -> list[str]:
+def verdict_line(calibration: Calibration) -> str:
+    """The recording, its length, and how many axes are usable."""
     joint = max((len(f.parts) for f in calibration.values() if isinstance(f, JointFit)), default=1)
     names = calibration.source.split(", ") if joint > 1 else [calibration.source]
     files = list(dict.fromkeys(each.partition(" from ")[0] for each in names))
@@ -77,7 +77,7 @@ def _verdict(calibration: Calibration) -> list[str]:
     else:
         where = f"; {_listed(others)} {'are' if len(others) > 1 else 'is'} not"
     start = f"{name}{more}: {size}. {text}"
-    return wrapped(f"{start}{where if len(start + where) < WIDTH else ''}.")
+    return f"{start}{where if len(start + where) < WIDTH else ''}."
 
 
 def _shortened(text: str, most: int) -> str:
@@ -129,12 +129,12 @@ def _table(calibration: Calibration, names: Sequence[str]) -> list[str]:
     for place, line in enumerate(lines):
         name = short.get(line.partition(" ")[0], "")
         if name and not calibration[name].valid:
-            text = f"{line.partition('not valid')[0]}not valid: {_reason(name, calibration)}"
+            text = f"{line.partition('not valid')[0]}not valid: {reason(name, calibration)}"
             lines[place] = text[:WIDTH].rstrip()
     return [each for line in lines for each in wrapped(line, indent=2) or [""]]
 
 
-def _reason(name: str, calibration: Calibration) -> str:
+def reason(name: str, calibration: Calibration) -> str:
     """Why a fit is not valid, and where its steps are."""
     fit = calibration[name]
     cause = next((n for n in fit.notices if n.severity == "bad" and n.issue.spoils), None)
@@ -171,16 +171,27 @@ def _of_sensor(quantity: str, fits: Mapping[str, Fit]) -> list[str]:
     values = {"N": ("u/sqrt(Hz)", triad.N), "K": ("u/s/sqrt(Hz)", triad.K)}
     for key, (unit, value) in (values | {"start": ("u", triad.initial_sd)}).items():
         limit = "<= " if key in values and triad.is_upper(key) else ""
-        text = f"{value:.2e}".replace("e-0", "e-") if 0.0 < value < _LEAST else f"{value:.3g}"
-        row += f" {key} {limit}{text} {si_parameter_unit(unit, quantity)} "
-    lines = wrapped(row.rstrip(), indent=7)
+        row += f" {key} {limit}{short(value)} {si_parameter_unit(unit, quantity)} "
+    about = unusable(fits) or covers(fits)
+    return wrapped(row.rstrip(), indent=7) + wrapped(about, first=" " * 7, indent=7)
+
+
+def short(value: float) -> str:
+    """Three digits: ``8.10e-4``."""
+    return f"{value:.2e}".replace("e-0", "e-") if 0.0 < value < _LEAST else f"{value:.3g}"
+
+
+def unusable(fits: Mapping[str, Fit]) -> str:
+    """For which axes the numbers of a sensor are not to be used yet; empty if for none."""
     invalid = [name for name, fit in fits.items() if not fit.valid]
-    if invalid:
-        verb = "are" if len(invalid) > 1 else "is"
-        text = f"do not use yet: {_listed(invalid)} {verb} not valid"
-        return lines + wrapped(text, first=" " * 7, indent=7)
+    verb = "are" if len(invalid) > 1 else "is"
+    return f"do not use yet: {_listed(invalid)} {verb} not valid" if invalid else ""
+
+
+def covers(fits: Mapping[str, Fit]) -> str:
+    """The largest slow term that the numbers of a sensor cover; empty if there is none."""
     covered = sorted(_covered(fits))[-1:]
-    return lines + [f"{'':7}{letters} {term} ({name})" for _, term, name, letters in covered]
+    return "".join(f"{letters} {term} ({name})" for _, term, name, letters in covered)
 
 
 def _covered(fits: Mapping[str, Fit]) -> Iterator[tuple[float, str, str, str]]:
@@ -207,16 +218,15 @@ def _covered(fits: Mapping[str, Fit]) -> Iterator[tuple[float, str, str, str]]:
 # -- what to do ------------------------------------------------------------------------------------
 
 
-def _actions(calibration: Calibration) -> list[list[str]]:
-    """Lines of the notices that matter most, those of one kind together, each with what to do."""
+def actions(calibration: Calibration) -> list[str]:
+    """The notices that matter most, those of one kind together, each with what to do."""
     groups: dict[str, list[Notice]] = {}
-    found = findings(calibration)
+    found = [each for each in findings(calibration) if each.severity in ("bad", "warning")]
     found.sort(key=lambda n: (not n.issue.spoils, n.issue.topic != "departure"))
+    departed = any(each.issue.topic == "departure" for each in found)
     for notice in worst_first(found):
         topic = notice.issue.topic
-        if notice.code == "unsteady" and "departure" in groups:
-            continue  # these may be why
-        if notice.severity in ("bad", "warning") and notice.code not in _DONE:
+        if notice.code not in _DONE and not (departed and notice.code == "unsteady"):  # the cause
             groups.setdefault(topic if topic == "departure" else notice.code, []).append(notice)
     cut = next((each.hint for each in calibration.notices if each.code == LONGEST_PART), "")
     texts = [_action(group, cut, calibration) for group in groups.values()]
@@ -224,8 +234,7 @@ def _actions(calibration: Calibration) -> list[list[str]]:
     if length.startswith("too short"):
         severe = sum(group[0].severity == "bad" for group in groups.values())
         texts.insert(min(severe, _ACTIONS - 1), length)
-    shown = enumerate(texts[:_ACTIONS], 1)
-    return [wrapped(text, first=f"{place}. ", indent=3) for place, text in shown]
+    return texts[:_ACTIONS]
 
 
 def _fitting(actions: Sequence[Sequence[str]], most: int) -> list[str]:

@@ -12,7 +12,7 @@ import gmwm
 from gmwm import Channel, RandomWalk, Recording, WhiteNoise
 from gmwm.cli.calibrate import show
 from gmwm.issues import Notice
-from gmwm.report import summary
+from gmwm.report import summary_text
 from marks import slow
 
 DT, SAMPLES = 0.01, 8000
@@ -81,7 +81,7 @@ def with_defects(calibration):
 
 @pytest.mark.parametrize("change", [lambda found: found, with_defects])
 def test_a_page_has_thirty_lines_of_eighty_columns(calibrated, change):
-    text = summary(change(calibrated), FILES)
+    text = summary_text(change(calibrated), FILES)
     lines = text.splitlines()
     assert len(lines) <= 30
     assert max(map(len, lines)) <= 80
@@ -90,7 +90,7 @@ def test_a_page_has_thirty_lines_of_eighty_columns(calibrated, change):
 
 
 def test_every_sensor_has_filter_numbers(calibrated):
-    text = summary(calibrated)
+    text = summary_text(calibrated)
     for quantity in UNITS:
         axes = {name: fit for name, fit in calibrated.items() if fit.wv.quantity == quantity}
         row = re.search(rf"^{quantity} +N (<= )?(\S+) .* K (<= )?(\S+) ", text, re.MULTILINE)
@@ -140,18 +140,18 @@ def test_all_places_show_the_same_digits(two):
 
 
 def test_the_verdict_counts_the_axes(two):
-    assert summary(two).startswith("bench.csv: 80 s at 100 Hz. Both axes are usable.\n")
+    assert summary_text(two).startswith("bench.csv: 80 s at 100 Hz. Both axes are usable.\n")
     bad = with_defects(two)
-    assert "No axis is usable." in summary(bad)
+    assert "No axis is usable." in summary_text(bad)
     one = replace(two, fits={**two.fits, "accel_x": bad["accel_x"]})
-    assert "1 of 2 axes usable; accel_x is not." in summary(one)
+    assert "1 of 2 axes usable; accel_x is not." in summary_text(one)
     assert re.search(r"^accel_x +not valid: bias steps at 30 s, 31 s, 32 s and 2 more$",
-                     summary(one), re.MULTILINE)  # fmt: skip
-    assert "do not use yet: accel_x is not valid" in summary(one)
+                     summary_text(one), re.MULTILINE)  # fmt: skip
+    assert "do not use yet: accel_x is not valid" in summary_text(one)
 
 
 def test_departures_come_first_and_once(two):
-    lines = summary(with_defects(two)).partition("What to do\n")[2].splitlines()
+    lines = summary_text(with_defects(two)).partition("What to do\n")[2].splitlines()
     assert lines[0].startswith("1. all axes: " if len(two) > 2 else "1. gyro_z and accel_x: ")
     assert "bias steps inflate B and K" in lines[0]
     assert sum("bias step" in line for line in lines) == 1
