@@ -118,8 +118,8 @@ def _table(calibration: Calibration, names: Sequence[str]) -> list[str]:
         numbers = SensorNumbers({each: calibration.numbers[name] for each, name in short.items()})
         units = {(axis.quantity, axis.B.usual.unit) for axis in numbers.values()}
         heads = len({quantity for quantity, _ in units})
-        lines = numbers.text().splitlines()
-        if len(units) == heads and len(lines) == 2 * heads + len(names):
+        lines = (text := numbers.text()).splitlines()
+        if len(units) == heads and len(lines) == 2 * heads + len(names) and "…" not in text:
             break
     else:  # too wide
         lines = []
