@@ -162,11 +162,9 @@ def _show_timings(watch: Stopwatch, jobs: int) -> None:
     """On the stream of errors: the output of --json stays JSON."""
     from gmwm._core.tables import plain_table
 
-    rows = [
-        (name, f"{took:.2f}", f"{watch.worked[name]:.2f}") for name, took in watch.elapsed.items()
-    ]
-    totals = [sum(each.values()) for each in (watch.elapsed, watch.worked)]
-    rows.append(("all stages", *(f"{each:.2f}" for each in totals)))
+    took, worked = watch.elapsed, watch.worked
+    rows = [(name, f"{took[name]:.2f}", f"{worked[name]:.2f}") for name in took]
+    rows.append(("all stages", f"{sum(took.values()):.2f}", f"{sum(worked.values()):.2f}"))
     click.echo(plain_table(("stage", "seconds", "of the processor"), rows), err=True)
     if jobs > 1:
         click.echo("stages of channels run side by side: their seconds are added up", err=True)
@@ -222,8 +220,8 @@ def _total(fit: Fit, places: Sequence[int]) -> str:
     def density(model: Model) -> FloatArray:
         return np.array([sum((model.terms[k].values["N"] or 0.0) ** 2 for k in places)])
 
-    per_si = customary_unit("u/sqrt(Hz)", fit.wv.quantity, fit.wv.unit)[1]
-    value = float(density(fit.model)[0]) ** 0.5 * per_si
+    value = float(density(fit.model)[0]) ** 0.5
+    value *= customary_unit("u/sqrt(Hz)", fit.wv.quantity, fit.wv.unit)[1]
     spread = float(np.exp(0.98 * fit.logarithmic_error(density)[0]))
     return with_error(value, value / spread, value * spread)
 
@@ -298,8 +296,8 @@ def write_files(
         with stage("exports"):
             export(result, target, path=path)
         written.append(f"{path} ({target})")
-    path = shlex.quote(str(document))
-    after = f"gmwm export {path} --to openvins" if has_imu else f"gmwm bound {path}"
+    quoted = shlex.quote(str(document))
+    after = f"gmwm export {quoted} --to openvins" if has_imu else f"gmwm bound {quoted}"
     if not all(fit.valid for fit in result.values()):
         after = f"1. above, then {after}"
     last = "+-: 95 % interval, <=: 95 % upper limit; error model and all notices: -v"

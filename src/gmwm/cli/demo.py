@@ -69,12 +69,11 @@ def _truth_lines(truth: dict[str, Model]) -> list[str]:
 
     parts = []
     for quantity, unit in SI_UNIT.items():
-        model = next((each for name, each in truth.items() if name.startswith(quantity)), None)
         values = []
-        for item in model.parameters if model is not None else ():
+        for item in truth[f"{quantity}_x"].parameters:
             name, per_si = customary_unit(item.parameter.unit, quantity, unit)
             values.append(f"{item.key} {(item.value or 0.0) * per_si:.4g} {name}")
-        parts += [f"{quantity} {', '.join(values)}"] if values else []
+        parts.append(f"{quantity} {', '.join(values)}")
     return wrapped(f"truth: {'; '.join(parts)}", indent=2)
 
 

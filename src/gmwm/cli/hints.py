@@ -41,11 +41,8 @@ HINTS = {
 }
 
 
-_LEAST_KEPT = 0.2
-"""Share of a recording that is worth calibrating alone."""
-
-_LONG = 100.0
-"""s: parts from here on begin and end at whole seconds."""
+_LEAST_KEPT = 0.2  # share of a recording that is worth calibrating alone
+_LONG = 100.0  # s: longer parts begin and end at whole seconds
 
 
 def with_hint(error: InputError) -> str:
@@ -98,18 +95,18 @@ def with_option(notice: Notice, span: tuple[float, float] | None = None) -> Noti
     if notice.code == LONGEST_PART:
         return replace(notice, hint=_again(*options, _cut(values["start"], values["stop"], span)))
     if notice.code == "unsteady" and span is not None and not notice.source:
-        first, last = values["start"], values["stop"]
-        kept = max((0.0, first), (last, span[1] - span[0]), key=lambda part: part[1] - part[0])
-        return replace(notice, hint=f"{_again(_cut(*kept, span))} or record again")
+        first, last, length = values["start"], values["stop"], span[1] - span[0]
+        start, stop = (0.0, first) if first > length - last else (last, length)
+        return replace(notice, hint=f"{_again(_cut(start, stop, span))} or record again")
     if notice.severity == "note" or not values.get("evident") or values.get("together"):
         return notice
     if span is not None and not notice.source:
         length, last = span[1] - span[0], values["time_upper"]
         last *= 3.0 if notice.code == "transient" else 1.0
         first = values["time_lower"] if notice.code == "step" else 0.0
-        kept = (last, length) if length - last >= first else (0.0, first)
-        if notice.code != "slow-period" and kept[1] - kept[0] > _LEAST_KEPT * length:
-            options.append(_cut(*kept, span))
+        start, stop = (last, length) if length - last >= first else (0.0, first)
+        if notice.code != "slow-period" and stop - start > _LEAST_KEPT * length:
+            options.append(_cut(start, stop, span))
     cause = "find what varies so, such as the temperature" * (notice.code == "slow-period")
     return replace(notice, hint="; ".join(filter(None, [_again(*options), cause])) or notice.hint)
 
