@@ -239,11 +239,10 @@ def _all_notices(result: Calibration) -> list[str]:
     places: dict[str, list[str]] = {}
     for each in worst_first(found):
         places.setdefault(str(replace(each, where="")), []).append(each.where)
-    for name, why in result.skipped.items():
-        places.setdefault(f"no model, {why.text}", []).append(name)
-    for name, fit in result.items():
-        if isinstance(fit, JointFit):
-            places.setdefault(fit.agreement, []).append(name)
+    others = [(f"no model, {why.text}", name) for name, why in result.skipped.items()]
+    others += [(fit.agreement, name) for name, fit in result.items() if isinstance(fit, JointFit)]
+    for text, name in others:
+        places.setdefault(text, []).append(name)
     listed = {text: ", ".join(dict.fromkeys(filter(None, each))) for text, each in places.items()}
     return [f"{where}: {text}" if where else text for text, where in listed.items()]
 
@@ -298,7 +297,6 @@ def write_files(
         written.append(f"{path} ({target})")
     quoted = shlex.quote(str(document))
     after = f"gmwm export {quoted} --to openvins" if has_imu else f"gmwm bound {quoted}"
-    if not all(fit.valid for fit in result.values()):
-        after = f"1. above, then {after}"
+    after = after if all(fit.valid for fit in result.values()) else f"1. above, then {after}"
     last = "+-: 95 % interval, <=: 95 % upper limit; error model and all notices: -v"
     return [*wrapped(f"wrote {', '.join(written)}", indent=2), *lines, f"next: {after}", last]

@@ -226,12 +226,13 @@ def actions(calibration: Calibration) -> list[str]:
     departed = any(each.issue.topic == "departure" for each in found)
     for notice in worst_first(found):
         topic = notice.issue.topic
-        if notice.code not in _DONE and not (departed and notice.code == "unsteady"):  # the cause
+        done = notice.code in _DONE and notice.severity != "bad"
+        if not done and not (departed and notice.code == "unsteady"):  # that is the cause
             groups.setdefault(topic if topic == "departure" else notice.code, []).append(notice)
     cut = next((each.hint for each in calibration.notices if each.code == LONGEST_PART), "")
     texts = [_action(group, cut, calibration) for group in groups.values()]
     length = length_sentence(calibration, SHOWN)
-    if length.startswith("too short"):
+    if length.startswith("too short") and any(fit.valid for fit in calibration.values()):
         severe = sum(group[0].severity == "bad" for group in groups.values())
         texts.insert(min(severe, _ACTIONS - 1), length)
     return texts[:_ACTIONS]
@@ -266,7 +267,8 @@ def _action(group: Sequence[Notice], cut: str, calibration: Calibration) -> str:
     where = _places(said, calibration) or _shortened(first.where, _SOURCE)
     if first.issue.topic == "fit" and any(parameters):
         where = f"{', '.join(filter(None, parameters))} of {where}"
-    text, hint = (each.partition("; ")[0] for each in (first.text, first.hint))
+    text, hint = first.text.partition("; ")[0], first.hint
+    hint = hint if len(hint) < WIDTH else hint.partition("; ")[0]
     while len(text) > _TEXT and (", " in text or ": " in text):
         text = text.rpartition(", " if ", " in text else ": ")[0]
     if first.issue.topic == "departure":

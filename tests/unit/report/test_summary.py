@@ -86,6 +86,8 @@ def test_a_page_has_thirty_lines_of_eighty_columns(calibrated, change):
     assert len(lines) <= 30
     assert max(map(len, lines)) <= 80
     assert text.endswith("\n".join(FILES))
+    if not all(fit.valid for fit in change(calibrated).values()):  # which the last lines refer to
+        assert re.search(r"^1\. .*\w", text, re.MULTILINE)
     assert not re.search(r"\bnan\b|\binf\b|None|…|\n\n\n", text)
 
 
