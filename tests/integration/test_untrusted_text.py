@@ -76,7 +76,7 @@ def test_a_message_is_not_longer_than_people_read():
 
 def test_markup_in_a_header_is_shown_as_it_is(run, tmp_path):
     path = recording(tmp_path / "static.csv", extra="x [/degC][bold]:smile:")
-    done = run("calibrate", path.name, *OPTIONS, "-o", "out")
+    done = run("calibrate", path.name, *OPTIONS, "-o", "out", "-v")
     assert done.returncode == 0, done.stderr
     assert "x [/degC][bold]:smile:" in " ".join(done.stdout.decode().split())
 

@@ -79,7 +79,7 @@ class AxisNumbers:
         number: Estimate = getattr(self, letter)
         shown = number.in_units(units)
         if number.kind == "bound":
-            return f"<= {shown.upper:.3g}" if np.isfinite(shown.upper) else "-"
+            return f"<= {brief(shown.upper, 3)}" if np.isfinite(shown.upper) else "-"
         return with_error(shown.value, shown.lower, shown.upper)
 
 
@@ -87,15 +87,8 @@ class SensorNumbers(Mapping[str, AxisNumbers], Printed):
     """N, B and K of every axis of a sensor: channel -> `AxisNumbers`; see `Calibration.numbers`."""
 
     COLUMNS: ClassVar = (
-        "channel",
-        "number",
-        "kind",
-        "value",
-        "lower",
-        "upper",
-        "unit",
-        "tau",
-        "valid",
+        *("channel", "number", "kind", "value"),
+        *("lower", "upper", "unit", "tau", "valid"),
     )
 
     def __init__(self, axes: Mapping[str, AxisNumbers]) -> None:
@@ -103,8 +96,7 @@ class SensorNumbers(Mapping[str, AxisNumbers], Printed):
 
     def __getitem__(self, name: str) -> AxisNumbers:
         if name not in self._axes:
-            known = ", ".join(self._axes)
-            raise MissingNameError(f"there is no channel {name!r}: there are {known}")
+            raise MissingNameError(f"there is no channel {name!r}: there are {', '.join(self)}")
         return self._axes[name]
 
     def __iter__(self) -> Iterator[str]:
@@ -140,7 +132,10 @@ class SensorNumbers(Mapping[str, AxisNumbers], Printed):
                 b = f"{b} at {brief(axis.tau, 3)} s"
                 mark = "" if axis.valid else (invalid or {}).get(name, "not valid")
                 rows.append((name, mark or n, b if not mark else "", k if not mark else ""))
-        return plain_table(rows[0], rows[1:])
+        if len((table := plain_table(rows[0], rows[1:])).splitlines()) > len(rows):  # too wide
+            rows = [(name, n.replace("velocity ", ""), *others) for name, n, *others in rows]
+            table = plain_table(rows[0], rows[1:])
+        return table
 
     def rows(self, units: str = "field") -> list[dict[str, Any]]:
         """A row per channel and number, in data-sheet units or with "si" in SI."""

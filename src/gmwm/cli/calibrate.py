@@ -4,25 +4,25 @@ from __future__ import annotations
 
 import hashlib
 import json
+import shlex
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from gmwm._core.files import folder_to_fill, moved_together, replaceable
-from gmwm._core.text import wrapped
-from gmwm.cli.console import command_line, new_console, new_table, print_whole, progress_bar
-from gmwm.cli.hints import in_options, with_option
+from gmwm.cli.console import command_line, progress_bar
+from gmwm.cli.hints import in_options
 from gmwm.cli.options import PATH, folder_to_write, options, read_recording
 from gmwm.errors import InputError
 
 if TYPE_CHECKING:
-    from rich.table import Table
-
+    from gmwm._core.typing import FloatArray
     from gmwm.calibration import Calibration, Stopwatch
-    from gmwm.estimate.result import Estimate
-    from gmwm.issues import Notice
+    from gmwm.estimate import Fit
+    from gmwm.process import Model
     from gmwm.readers import Recording
 
 NONE_VALID = 1
@@ -56,6 +56,7 @@ def folder_of_results(default: str) -> dict[str, Any]:
     --export NAME  Also write the file of this program into the folder; see gmwm export --list.
     --datasheet
     --jobs N  Processes at most; short recordings take one.
+    -v --verbose  Print the error model of each axis and all notices too.
     --timings  Print where the time went, stage by stage.
     --memory
     --json
@@ -71,6 +72,7 @@ def calibrate(
     models: dict[str, Any],
     target: str | None,
     datasheet: Path | None,
+    verbose: bool,
     timings: bool,
     memory: float | None,
     as_json: bool,
@@ -83,8 +85,9 @@ def calibrate(
     MAT, HDF5, Parquet or Feather; a bag of ROS 1 (.bag) or ROS 2 (folder, .mcap, .db3), or a log of
     PX4 (.ulg) or ArduPilot (.bin). Empty fields, NaN and rows that the time column jumps over are
     missing samples.
-    For each channel an error model is selected and estimated; the table shows it in the units of
-    the field, the files hold everything in SI units. Several recordings of one sensor have one
+    For each channel an error model is selected and estimated. The page printed has N, B and K of
+    each axis as data sheets do, N and K for a filter in SI units, and what to do; the files hold
+    everything. Several recordings of one sensor have one
     model, with a test whether they agree; so have the stretches at rest of a log that moves.
 
     Exit status: 0 if a channel has a valid model, 1 if none has (the files are written all the
@@ -129,8 +132,7 @@ def calibrate(
     if as_json:
         click.echo(json.dumps(result.to_dict(), allow_nan=False))
     elif not quiet:
-        show(result)
-        click.echo(written)
+        show(result, written, verbose=verbose)
     if timings:
         _show_timings(watch, work["jobs"])
     exit_unless(any(fit.valid for fit in result.values()), "channel")
@@ -158,87 +160,91 @@ def _start_workers(files: Sequence[Path], jobs: int, memory: float | None) -> No
 
 def _show_timings(watch: Stopwatch, jobs: int) -> None:
     """On the stream of errors: the output of --json stays JSON."""
-    table = new_table("stage", ">seconds", ">of the processor")
-    rows = [*watch.elapsed.items(), ("all stages", sum(watch.elapsed.values()))]
-    worked = {**watch.worked, "all stages": sum(watch.worked.values())}
-    for name, elapsed in rows:
-        table.add_row(name, f"{elapsed:.2f}", f"{worked[name]:.2f}")
-    console = new_console(to_errors=True)
-    console.print(table)
+    from gmwm._core.tables import plain_table
+
+    took, worked = watch.elapsed, watch.worked
+    rows = [(name, f"{took[name]:.2f}", f"{worked[name]:.2f}") for name in took]
+    rows.append(("all stages", f"{sum(took.values()):.2f}", f"{sum(worked.values()):.2f}"))
+    click.echo(plain_table(("stage", "seconds", "of the processor"), rows), err=True)
     if jobs > 1:
-        console.print("stages of channels run side by side: their seconds are added up")
+        click.echo("stages of channels run side by side: their seconds are added up", err=True)
 
 
-def show(result: Calibration) -> None:
-    from gmwm.calibration import LONGEST_PART
-    from gmwm.diagnosis import gathered
-    from gmwm.estimate.result import JointFit
-    from gmwm.issues import worst_first
-    from gmwm.report import duration_text
+def show(result: Calibration, files: Iterable[str] = (), *, verbose: bool = False) -> None:
+    """Print the page, and with ``verbose`` the error models and all notices too."""
+    from gmwm._core.text import bullets
+    from gmwm.report import summary_text
 
-    size = f"{duration_text(result.duration)} at {result.rate:g} Hz, {result.n:,} samples a channel"
+    advised = in_options(result)
+    parts = [summary_text(advised, files)]
+    if verbose:
+        models = [line for name, fit in result.items() for line in _model_lines(name, fit)]
+        parts += ["\n".join(["Error model (+-: 95 % interval)", *models])]
+        parts += ["\n".join(["All notices", *bullets(_all_notices(advised))])]
     # `click.echo` takes a terminal of ASCII for one of UTF-8.
-    print("\n".join(wrapped(f"{result.source}: {size}", indent=2)))
-    print_whole(new_console(), _table(result))
-    reasons = [
-        (name, notice)
-        for name, fit in result.fits.items()
-        for notice in fit.notices
-        if notice.severity == "bad"
-    ]
-    said = {(name, notice.code) for name, notice in reasons}
-    shown = [each for each in result.notices if (each.where, each.code) not in said]
-    found = [each for each in worst_first(gathered(shown)) if _is_shown(each)]
-    counted = {each.where for each in found if each.code == "event"}  # with their samples
-    found = [e for e in found if e.code != "events-left-out" or e.where not in counted]
-    found = [*(each for each in shown if each.code == LONGEST_PART), *found]
-    remarks = [str(with_option(each)) for each in found]
-    remarks += [f"{name} skipped: {why.text}" for name, why in result.skipped.items()]
-    for name, fit in result.fits.items():
-        if isinstance(fit, JointFit):
-            remarks.append(f"{name}: {fit.agreement}")
-        of_fit = [each for each in fit.notices if not each.issue.spoils]
-        remarks += [f"{name}: {with_option(n)}" for n in of_fit if n.severity != "bad"]
-    invalid = [f"{name} is not valid: {with_option(notice)}" for name, notice in reasons]
-    for remark in (*invalid, *remarks):
-        print("\n".join(wrapped(remark, first="- ", indent=2)))
+    print("\n\n".join(parts))
 
 
-def _is_shown(notice: Notice) -> bool:
-    """How the file was read, and what may spoil the estimates; the report has the rest."""
-    if notice.issue.topic in ("reading", "clock") or notice.code == "events-left-out":
-        return True
-    if notice.code == "length":
-        return notice.severity != "good"
-    return notice.severity in ("warning", "bad") and notice.issue.repeats != "reader"
+def _model_lines(name: str, fit: Fit) -> list[str]:
+    """The terms of an axis; white noise and low-pass noise are one row."""
+    from gmwm._core.text import brief, with_error, wrapped
+
+    labels, terms = fit.model.term_labels(), fit.model.terms
+    rows: dict[str, list[str]] = {}
+    items = {each.key: each for each in fit.model.parameters}
+    white = [k for k, term in enumerate(terms) if term.is_white or term.is_band_limited]
+    for one in fit.estimates:
+        term, key, usual = items[one.key].term, items[one.key].parameter.name, one.usual
+        text = with_error(usual.value, usual.lower, usual.upper)
+        if one.kind != "estimated":
+            text = f"<= {brief(usual.upper, 3)}" if one.kind == "bound" else f"{usual.value:.4g}"
+        if key == "N" and term in white[:1] and len(white) > 1:
+            text = _total(fit, white)
+        elif term in white and key != "bandwidth" and (key != "N" or term != white[0]):
+            continue
+        row = rows.setdefault("white noise" if term in white else labels[term], [])
+        row.append(f"{key} {text} {usual.unit}".rstrip(" -"))
+    lines = [name if fit.valid else f"{name}, not valid"]
+    for label, shown in rows.items():
+        lines += wrapped(", ".join(shown), first=f"  {label:<19}", indent=21)
+    return lines
 
 
-def _table(result: Calibration) -> Table:
-    from gmwm.calibration import left_open
+def _total(fit: Fit, places: Sequence[int]) -> str:
+    """N of white noise and low-pass noise together, in its data-sheet unit."""
+    import numpy as np
 
-    walks = left_open(result)
-    table = new_table("channel", "parameter", ">estimate", "95 % interval", "unit")
-    for name, fit in result.fits.items():
-        rows = [_cells(row) for row in fit.estimates]
-        if name in walks:  # which the model lacks, and the filter's numbers have
-            value, unit = walks[name]
-            rows.append(("K", "0", f"below {value:.4g}", unit))
-        if not fit.valid and len(rows) == 1:
-            rows.append(("", "", "", ""))
-        firsts = {0: name, 1: "" if fit.valid else "not valid"}
-        for i, row in enumerate(rows):
-            table.add_row(firsts.get(i, ""), *row, end_section=i == len(rows) - 1)
-    return table
+    from gmwm._core.text import with_error
+    from gmwm._core.units import customary_unit
+
+    def density(model: Model) -> FloatArray:
+        return np.array([sum((model.terms[k].values["N"] or 0.0) ** 2 for k in places)])
+
+    value = float(density(fit.model)[0]) ** 0.5
+    value *= customary_unit("u/sqrt(Hz)", fit.wv.quantity, fit.wv.unit)[1]
+    spread = float(np.exp(0.98 * fit.logarithmic_error(density)[0]))
+    return with_error(value, value / spread, value * spread)
 
 
-def _cells(row: Estimate) -> tuple[str, str, str, str]:
-    usual = row.usual
-    interval: str = row.kind
-    if row.kind == "bound":
-        interval = f"below {usual.upper:.4g}"
-    elif row.kind == "estimated":
-        interval = f"{usual.lower:.4g} .. {usual.upper:.4g}"
-    return row.key, f"{usual.value:.4g}", interval, usual.unit
+def _all_notices(result: Calibration) -> list[str]:
+    """Each once, after the channels that it concerns."""
+    from gmwm.diagnosis import gathered
+    from gmwm.estimate import JointFit
+    from gmwm.issues import worst_first
+
+    found = [each for each in gathered(result.notices) if each.severity != "good"]
+    for name, fit in result.items():
+        own = [each for each in fit.notices if not each.issue.spoils]
+        found += [replace(n, where=" ".join(dict.fromkeys((name, n.where))).strip()) for n in own]
+    places: dict[str, list[str]] = {}
+    for each in worst_first(found):
+        places.setdefault(str(replace(each, where="")), []).append(each.where)
+    others = [(f"no model, {why.text}", name) for name, why in result.skipped.items()]
+    others += [(fit.agreement, name) for name, fit in result.items() if isinstance(fit, JointFit)]
+    for text, name in others:
+        places.setdefault(text, []).append(name)
+    listed = {text: ", ".join(dict.fromkeys(filter(None, each))) for text, each in places.items()}
+    return [f"{where}: {text}" if where else text for text, where in listed.items()]
 
 
 def _hashes(files: Iterable[Path]) -> dict[str, str]:
@@ -260,35 +266,37 @@ def write_files(
     datasheet: Path | None = None,
     origin: Mapping[str, str] | None = None,
     target: str | None = None,
-) -> str:
-    """Write the files, all or none, then that of another program; returns what to say of them."""
+) -> list[str]:
+    """Write the files, all or none, then that of another program; returns the last lines."""
+    from gmwm._core.text import wrapped
     from gmwm.calibration import stage
     from gmwm.export import TARGETS, export
 
-    names = [*_FILES[:2]]
-    quantities = {fit.wv.quantity for fit in result.fits.values()}
-    lines = []
+    document, page, kalibr = (folder / name for name in _FILES)
+    written, lines = [f"{page} (open this)", str(document)], []
+    shown = in_options(result)
     with moved_together(folder) as new:
         with stage("report"):
-            shown = in_options(result)
-            shown.report(new / names[1], recording, datasheet=datasheet, provenance=origin)
+            shown.report(new / page.name, recording, datasheet=datasheet, provenance=origin)
         with stage("exports"):
-            result.save(new / names[0])
-        if {"gyro", "accel"} <= quantities:
+            result.save(new / document.name)
+        if {"gyro", "accel"} <= {fit.wv.quantity for fit in result.values()}:
             try:
                 with stage("exports"):
-                    export(shown, "kalibr", path=new / "imu.yaml")
-                names.append("imu.yaml")
-                horizon = f"{TARGETS['kalibr'].horizon:g} s"
-                lines = [f"imu.yaml: N and K for outages up to {horizon}; others: gmwm export"]
-            except InputError as error:
-                lines = [f"no imu.yaml: {error}"]  # the other files are no worse for it
-    kalibr = folder / "imu.yaml"
-    if "imu.yaml" not in names and kalibr.exists():
+                    export(shown, "kalibr", path=new / kalibr.name)
+                written.insert(1, f"{kalibr} (Kalibr)")
+            except InputError as error:  # the other files are no worse for it
+                lines = wrapped(f"no {kalibr.name}: {error}")
+    has_imu = len(written) > 2
+    if not has_imu and kalibr.exists():
         lines.append(f"left {kalibr} of an earlier run: Kalibr needs gyro and accelerometer")
-    if target is not None and not (target == "kalibr" and "imu.yaml" in names):
+    if target is not None and not (target == "kalibr" and has_imu):
         path = folder / TARGETS[target].file_name
         with stage("exports"):
             export(result, target, path=path)
-        lines.append(f"wrote {path} for {target}")
-    return "\n".join([f"wrote {folder / name}" for name in names] + lines)
+        written.append(f"{path} ({target})")
+    quoted = shlex.quote(str(document))
+    after = f"gmwm export {quoted} --to openvins" if has_imu else f"gmwm bound {quoted}"
+    after = after if all(fit.valid for fit in result.values()) else f"1. above, then {after}"
+    last = "+-: 95 % interval, <=: 95 % upper limit; error model and all notices: -v"
+    return [*wrapped(f"wrote {', '.join(written)}", indent=2), *lines, f"next: {after}", last]

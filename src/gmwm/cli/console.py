@@ -1,4 +1,4 @@
-"""What the terminal shows: results, tables, a bar of progress."""
+"""What the terminal shows: results, and a bar of progress."""
 
 from __future__ import annotations
 
@@ -8,14 +8,11 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import click
 
 if TYPE_CHECKING:
-    from rich.console import Console
-    from rich.table import Table
-
     from gmwm._core.typing import Progress
 
 
@@ -37,36 +34,6 @@ def print_result(
 def command_line() -> str:
     """What was typed, for reports."""
     return shlex.join(["gmwm", *sys.argv[1:]])
-
-
-def new_console(width: int | None = None, *, to_errors: bool = False) -> Console:
-    from rich.console import Console
-
-    # Piped output is as wide as a terminal that people use, not as rich guesses. Names come from
-    # files: brackets and colons in them are no markup.
-    stream = sys.stderr if to_errors else sys.stdout
-    width = width or (None if stream.isatty() else 80)
-    return Console(width=width, markup=False, emoji=False, stderr=to_errors)
-
-
-def print_whole(console: Console, table: Table) -> None:
-    """Print a table at the width that it needs: a number that is cut off is a wrong number."""
-    from rich.measure import Measurement
-
-    needed = Measurement.get(console, console.options.update(width=10_000), table).maximum
-    new_console(max(console.width, needed)).print(table)
-
-
-def new_table(*columns: str) -> Table:
-    """A plain table; ``>`` before a title puts the column to the right."""
-    from rich import box
-    from rich.table import Table
-
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, show_edge=False, collapse_padding=True)
-    for title in columns:
-        justify: Literal["left", "right"] = "right" if title.startswith(">") else "left"
-        table.add_column(title.removeprefix(">"), justify=justify, no_wrap=True)
-    return table
 
 
 @contextmanager

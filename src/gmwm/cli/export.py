@@ -61,11 +61,11 @@ def export(
 
 
 def _list() -> None:
-    from gmwm.cli.console import new_console, new_table, print_whole
+    from gmwm._core.tables import plain_table
     from gmwm.export import TARGETS
 
-    table = new_table("name", "program", "form", ">horizon")
-    for target in TARGETS.values():
-        horizon = "" if target.form == "full model" else f"{target.horizon:g} s"
-        table.add_row(target.name, target.title, target.form, horizon)
-    print_whole(new_console(), table)
+    rows = [
+        (t.name, t.title, t.form, "" if t.form == "full model" else f"{t.horizon:g} s")
+        for t in TARGETS.values()
+    ]
+    click.echo(plain_table(("name", "program", "form", "horizon"), rows))

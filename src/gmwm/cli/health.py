@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -43,6 +44,7 @@ def health(
       gmwm health static.csv --rate 100 --gyro-unit deg/s --accel-unit g
     """
     from gmwm._core.memory import limited
+    from gmwm.cli.hints import with_option
     from gmwm.diagnosis import health as examine
 
     with limited(memory):
@@ -50,4 +52,6 @@ def health(
     found = examine(recording)
     if output is not None:  # first: who pipes the table into head must not lose it
         found.save(output)
-    print_result(found, output, as_json=as_json, quiet=quiet)
+    span = (reading["start"], reading["start"] + recording.duration)
+    shown = replace(found, notices=tuple(with_option(each, span) for each in found.notices))
+    print_result(found, output, text=str(shown), as_json=as_json, quiet=quiet)

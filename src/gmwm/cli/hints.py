@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -40,6 +41,10 @@ HINTS = {
 }
 
 
+_LEAST_KEPT = 0.2  # share of a recording that is worth calibrating alone
+_LONG = 100.0  # s: longer parts begin and end at whole seconds
+
+
 def with_hint(error: InputError) -> str:
     """The message of an error, its hint in the words of the command line."""
     hint = " ".join(HINTS[code] for code in error.code.split() if code in HINTS)
@@ -56,16 +61,21 @@ def with_hint(error: InputError) -> str:
 
 def in_options(calibration: Calibration) -> Calibration:
     """A calibration whose notices advise in options, for a report of the command line."""
+    part = next((n.values for n in calibration.notices if n.code == "part"), {"start": 0.0})
+    span = (part["start"], part["start"] + calibration.duration)
     fits = {
-        name: replace(fit, notices=tuple(map(with_option, fit.notices)))
+        name: replace(fit, notices=tuple(with_option(each, span) for each in fit.notices))
         for name, fit in calibration.items()
     }
-    notices = tuple(map(with_option, calibration.notices))
+    notices = tuple(with_option(each, span) for each in calibration.notices)
     return replace(calibration, fits=fits, notices=notices)
 
 
-def with_option(notice: Notice) -> Notice:
-    """A notice with the options that do what it advises."""
+def with_option(notice: Notice, span: tuple[float, float] | None = None) -> Notice:
+    """A notice with the options that do what it advises.
+
+    span: Of the file, s, where times of a calibration count from its start.
+    """
     from gmwm.calibration import LONGEST_PART
 
     values = notice.values
@@ -77,23 +87,40 @@ def with_option(notice: Notice) -> Notice:
             "--channel accel_z=-NAME, and also y if it points left"
         )
         return replace(notice, hint=hint)
-    if notice.code in ("not-static", "tilt") and "start" in values:
-        start, stop = values["start"], values["stop"]
-        return replace(notice, hint=f"{notice.hint}; --start {start:.6g} --stop {stop:.6g}")
+    if notice.code == "vibration":
+        return replace(notice, hint="leave it out with --start and --stop, or record again")
+    if notice.code in ("not-static", "tilt") and "start" in values and not notice.source:
+        return replace(notice, hint=_again(_cut(values["start"], values["stop"], span)))
+    options = ["--remove-departures" * bool(values.get("removable"))]
     if notice.code == LONGEST_PART:
-        ends = {"start": 0.0, "stop": values["of"]}
-        cut = " ".join(f"--{k} {values[k]:.6g}" for k, end in ends.items() if values[k] != end)
-        hint = cut + ", or --remove-departures, which subtracts them" * values["removable"]
-        return replace(notice, hint=hint)
+        return replace(notice, hint=_again(*options, _cut(values["start"], values["stop"], span)))
+    if notice.code == "unsteady" and span is not None and not notice.source:
+        first, last, length = values["start"], values["stop"], span[1] - span[0]
+        start, stop = (0.0, first) if first > length - last else (last, length)
+        return replace(notice, hint=f"{_again(_cut(start, stop, span))} or record again")
     if notice.severity == "note" or not values.get("evident") or values.get("together"):
         return notice
-    first, last = values["time_lower"], values["time_upper"]
-    cut = {
-        "step": f"--stop {first:.6g} or --start {last:.6g}",
-        "transient": f"--start {3.0 * last:.6g}",
-        "drift-at-start": f"--start {last:.6g}",
-        "slow-period": "",
-    }[notice.code]
-    options = [each for each in (cut, "--remove-departures" * values["removable"]) if each]
-    advice = ": ".join([notice.hint.partition(",")[0], *filter(None, [", or ".join(options)])])
-    return replace(notice, hint=advice)
+    if span is not None and not notice.source:
+        length, last = span[1] - span[0], values["time_upper"]
+        last *= 3.0 if notice.code == "transient" else 1.0
+        first = values["time_lower"] if notice.code == "step" else 0.0
+        start, stop = (last, length) if length - last >= first else (0.0, first)
+        if notice.code != "slow-period" and stop - start > _LEAST_KEPT * length:
+            options.append(_cut(start, stop, span))
+    cause = "find what varies so, such as the temperature" * (notice.code == "slow-period")
+    return replace(notice, hint="; ".join(filter(None, [_again(*options), cause])) or notice.hint)
+
+
+def _cut(start: float, stop: float, span: tuple[float, float] | None) -> str:
+    """The options that keep a part, which begins and ends at whole seconds if it is long."""
+    zero, end = span or (0.0, math.inf)
+    first, last = zero + start, zero + stop
+    if stop - start > _LONG:
+        first, last = float(math.ceil(first)), float(math.floor(last))
+    options = [f"--start {first:.10g}"] if start > 0.0 else []
+    return " ".join([*options, f"--stop {last:.10g}"] if zero + stop < end else options)
+
+
+def _again(*options: str) -> str:
+    given = " or ".join(filter(None, options))
+    return f"run again with {given}" if given else ""

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     import pandas
 
 _INDENT = 11
+_LOOK = "check the mounting and the power supply"
 
 Index = Annotated[int, Ge(0)]
 Share = Annotated[float, Ge(0.0), Le(1.0)]
@@ -244,10 +245,9 @@ def gathered(notices: Iterable[Notice]) -> list[Notice]:
         best = group[0]
         if len(group) > 1:
             best = max(group, key=lambda each: each.values["ratio"])
-            also = f"{len(group)} channels have it: look at the mounting and the power supply"
             where = ", ".join(each.where for each in group)
-            hints = "; ".join(dict.fromkeys(each.hint for each in group if each.hint))
-            text = f"{best.text} (in {best.where}); {also}"
+            hints = "; ".join([_LOOK, *dict.fromkeys(each.hint for each in group if each.hint)])
+            text = f"{best.text} (in {best.where}); {len(group)} channels have it"
             best = replace(best, where=where, text=text, hint=hints)
         found.append(best)
     return found

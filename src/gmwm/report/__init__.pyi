@@ -9,3 +9,4 @@ from .navigation import (
     write_validation_report as write_validation_report,
 )
 from .page import duration_text as duration_text
+from .summary import summary_text as summary_text

@@ -157,10 +157,8 @@ def length_sentence(calibration: Calibration, horizon: float) -> str:
             f"long enough for {horizon:g} s outages: {worst} is known to +-{share} there; {text} "
             f"would give +-{100.0 * _AIM:g} %"
         )
-    return (
-        f"too short for {horizon:g} s outages: record {text} for +-{100.0 * _AIM:g} % "
-        f"(now +-{share}, {worst})"
-    )
+    why = f" ({worst} is known to {share})" if error > _AIM else ""
+    return f"too short for {horizon:g} s outages: record {text}{why}"
 
 
 def parameters_sentence(calibration: Calibration) -> str:

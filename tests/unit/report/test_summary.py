@@ -1,0 +1,176 @@
+"""The page of text: its size on any recording, its digits, and what it says to do."""
+
+import io
+import re
+from contextlib import redirect_stdout
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import gmwm
+from gmwm import Channel, RandomWalk, Recording, WhiteNoise
+from gmwm.cli.calibrate import show
+from gmwm.issues import Notice
+from gmwm.report import summary_text
+from marks import slow
+
+DT, SAMPLES = 0.01, 8000
+WALK = WhiteNoise(4e-4) + RandomWalk(3e-4)
+UNITS = {"gyro": "rad/s", "accel": "m/s^2"}
+FILES = ["wrote out/report.html, out/imu.yaml, out/calibration.json", "next: one", "last"]
+
+
+def channel(name, quantity, seed, dt=DT, unit="V"):
+    values = WALK.simulate(round(SAMPLES * DT / dt), dt, seed)
+    return Channel(name, values, dt, quantity, UNITS.get(quantity, unit))
+
+
+def axes(pattern="{}_{}", seed=0, accel_dt=DT):
+    return [
+        channel(pattern.format(sensor, axis), sensor, seed + i, accel_dt if i > 2 else DT)
+        for i, (sensor, axis) in enumerate((s, a) for s in UNITS for a in "xyz")
+    ]
+
+
+def of(*channels, source="bench.csv"):
+    return Recording(tuple(channels), source=source)
+
+
+def dead(name):
+    return Channel(name, np.full(SAMPLES, 0.1), DT, "gyro", "rad/s")
+
+
+RECORDINGS = {
+    "six axes": lambda: of(*axes()),
+    "gyros alone": lambda: of(*axes()[:3]),
+    "one axis": lambda: of(axes()[4]),
+    "no quantity": lambda: of(channel("voltage", None, 1)),
+    "units of their own": lambda: of(*(channel(u, None, 1, unit=u) for u in ("V", "uT", "Pa"))),
+    "two rates": lambda: of(*axes(accel_dt=2 * DT)),
+    "nine axes": lambda: of(*axes(), *(channel(f"mag_{a}", None, 9, unit="uT") for a in "xyz")),
+    "twenty skipped": lambda: of(*axes()[:1], *(dead(f"gyro_{k}") for k in range(20))),
+    "several recordings": lambda: [of(*axes(seed=k)[:2], source=f"{k}.csv") for k in (0, 20, 40)],
+    "long names": lambda: of(*axes("{}_of_the_left_front_wheel_{}"), source="x" * 200 + ".csv"),
+    "thirty axes": lambda: of(
+        *(one for k in range(5) for one in axes(f"{{}}_of_the_imu_{k}_{{}}", seed=10 * k))
+    ),
+}
+
+
+@pytest.fixture(scope="module", params=[
+    "six axes", "gyros alone", "no quantity", "nine axes", "twenty skipped", "several recordings",
+    *map(slow, ("one axis", "units of their own", "two rates", "long names", "thirty axes")),
+])  # fmt: skip
+def calibrated(request):
+    return gmwm.calibrate(RECORDINGS[request.param](), {"": WALK.opened()})
+
+
+def with_defects(calibration):
+    """No axis valid, and more to say of each than a page holds."""
+    found = [
+        gmwm.issues.notice("step", "", {"time": 30.0 + k, "evident": True, "removable": True},
+                           height="+1 mg", when=f"{30 + k} s", also="", back="")
+        for k in range(5)
+    ]  # fmt: skip
+    text = "something long that is wrong " * 9
+    others = [Notice(f"own-{k}", "bad", "", text, {}, "do this about it") for k in range(5)]
+    fits = {n: replace(f, notices=(*f.notices, *found, *others)) for n, f in calibration.items()}
+    return replace(calibration, fits=fits)
+
+
+@pytest.mark.parametrize("change", [lambda found: found, with_defects])
+def test_a_page_has_thirty_lines_of_eighty_columns(calibrated, change):
+    text = summary_text(change(calibrated), FILES)
+    lines = text.splitlines()
+    assert len(lines) <= 30
+    assert max(map(len, lines)) <= 80
+    assert text.endswith("\n".join(FILES))
+    if not all(fit.valid for fit in change(calibrated).values()):  # which the last lines refer to
+        assert re.search(r"^1\. .*\w", text, re.MULTILINE)
+    assert not re.search(r"\bnan\b|\binf\b|None|…|\n\n\n", text)
+
+
+def test_every_sensor_has_filter_numbers(calibrated):
+    text = summary_text(calibrated)
+    for quantity in UNITS:
+        axes = {name: fit for name, fit in calibrated.items() if fit.wv.quantity == quantity}
+        row = re.search(rf"^{quantity} +N (<= )?(\S+) .* K (<= )?(\S+) ", text, re.MULTILINE)
+        assert (row is not None) == bool(axes)
+        if axes:
+            shared = next(iter(gmwm.bound(axes, horizon=60.0, shared=True).values()))
+            assert float(row[2]) == pytest.approx(shared.N, rel=5e-3)
+            assert bool(row[3]) or float(row[4]) == pytest.approx(shared.K, rel=5e-3)
+
+
+# -- the same digits everywhere --------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def two():
+    return gmwm.calibrate(of(*axes()[2:4]), {"": WALK.opened()})
+
+
+def printed(calibration):
+    with redirect_stdout(io.StringIO()) as stream:
+        show(calibration)
+    return stream.getvalue()
+
+
+def test_all_places_show_the_same_digits(two):
+    """The terminal, `print`, the table, the document and the page of N, B and K."""
+    frame = two.to_frame().set_index(["channel", "number"])
+    for name, axis in two.numbers.items():
+        (row,) = re.findall(rf"^{name} +(.*)$", printed(two), re.MULTILINE)
+        assert re.findall(rf"^{name} +(.*)$", str(two), re.MULTILINE) == [row]
+        cells = re.split(r"  +", row)
+        for cell, number in zip(cells, axis, strict=True):
+            assert cell.partition(" at ")[0] == axis.text(number.key)
+            shown = frame.loc[name, number.key]
+            assert shown["upper"] == pytest.approx(number.usual.upper, rel=1e-12)
+            assert shown["unit"] == number.usual.unit
+            assert two.to_dict()["numbers"][name][number.key]["upper"] == number.upper
+            if number.kind == "bound":
+                assert cell.startswith(("<= ", "-"))
+            else:
+                assert shown["value"] == pytest.approx(number.usual.value, rel=1e-12)
+                value = float(cell.split()[0].replace(",", ""))
+                assert value == pytest.approx(number.usual.value, abs=number.usual.upper / 10)
+
+
+# -- what it says ----------------------------------------------------------------------------------
+
+
+def test_the_verdict_counts_the_axes(two):
+    assert summary_text(two).startswith("bench.csv: 80 s at 100 Hz. Both axes are usable.\n")
+    bad = with_defects(two)
+    assert "No axis is usable." in summary_text(bad)
+    one = replace(two, fits={**two.fits, "accel_x": bad["accel_x"]})
+    assert "1 of 2 axes usable; accel_x is not." in summary_text(one)
+    assert re.search(r"^accel_x +not valid: bias steps at 30 s, 31 s, 32 s and 2 more$",
+                     summary_text(one), re.MULTILINE)  # fmt: skip
+    assert "do not use yet: accel_x is not valid" in summary_text(one)
+
+
+def test_departures_come_first_and_once(two):
+    lines = summary_text(with_defects(two)).partition("What to do\n")[2].splitlines()
+    assert lines[0].startswith("1. all axes: " if len(two) > 2 else "1. gyro_z and accel_x: ")
+    assert "bias steps inflate B and K" in lines[0]
+    assert sum("bias step" in line for line in lines) == 1
+
+
+def test_white_noise_behind_a_low_pass_is_one_row(capsys):
+    noise = WhiteNoise(2e-4) + gmwm.LowPassNoise(4e-4, bandwidth=10.0, order=2, damping=0.707)
+    x = noise.simulate(60_000, DT, seed=1)
+    rec = Recording.from_arrays({"gyro_x": x}, 1 / DT, UNITS, source="a.csv")
+    model = WhiteNoise() + gmwm.LowPassNoise(order=2, damping=0.707)
+    cal = gmwm.calibrate(rec, model)
+    show(cal, verbose=True)
+    text = capsys.readouterr().out
+    (row,) = re.findall(r"^  white noise +(.*)$", text, re.MULTILINE)
+    found = re.fullmatch(r"N (\S+) \+-(\S+) deg/sqrt\(h\), bandwidth (\S+) \+-\S+ Hz", row)
+    total = np.degrees(np.hypot(2e-4, 4e-4)) * 60.0
+    assert abs(float(found[1]) - total) < 3.0 * float(found[2])
+    assert f"N {cal.numbers['gyro_x'].text('N')} " in row
+    assert float(found[3]) == pytest.approx(10.0, rel=0.1)
+    assert "low-pass noise   " not in text and "All notices" in text
