@@ -15,18 +15,17 @@ import numpy as np
 
 from gmwm._core import checks
 from gmwm._core.distributions import chi2
-from gmwm._core.typing import FloatArray, Progress
-from gmwm.calibration import Calibration, calibrate, upper_limit
+from gmwm._core.typing import Progress
+from gmwm.calibration import Calibration, axis_numbers, calibrate, upper_limit
 from gmwm.errors import InputError, printable
 from gmwm.estimate import Fit, JointFit
-from gmwm.estimate.problem import Scales
 from gmwm.estimate.result import between
-from gmwm.filter_numbers import AxisFilterNumbers, bound
+from gmwm.filter_numbers import bound
 from gmwm.issues import Notice, notice
 from gmwm.population import tuning
 from gmwm.population.comparison import (
     AxisComparison,
-    AxisNumbers,
+    Covering,
     ParameterSpread,
     SensorComparison,
 )
@@ -48,8 +47,8 @@ def compare(
 
     Structures of models differ between recordings of one sensor far more than curves do. So curves
     are tested for equality, level by level with their covariances; one structure is selected for
-    all recordings, and its parameters are compared; and `gmwm.bound` gives N and K for a filter,
-    whatever the structure.
+    all recordings, and N, B and K from it are compared; and `gmwm.bound` gives N and K for a
+    filter, whatever the structure.
 
     Parameters
     ----------
@@ -256,7 +255,7 @@ def _axis(
     found = joint_fit(list(fits.values())) if len(fits) > 1 else None
     joint = found if isinstance(found, JointFit) else None
     notices = [found] if isinstance(found, Notice) else []
-    numbers, problems = axis_numbers(name, fits, joint, horizon)
+    numbers, problems = _covering(name, fits, horizon)
     notices += problems
     for label, fit in fits.items():
         codes = ", ".join(n.code for n in fit.notices if n.severity == "bad")
@@ -266,11 +265,8 @@ def _axis(
                 "fit-not-valid", name, values, variant="compared", severity="note", hint=hint
             )
             notices.append(replace(invalid, source=label))
-    inflation = float("nan")
-    if joint and test and test.tau.size:
-        inflation = curve_inflation(list(fits.values()), joint, float(test.tau[-1]))
     rows = parameter_spreads(joint) if joint else ()
-    axis = AxisComparison(name, fits, out, test, p_value, joint, rows, numbers, inflation)
+    axis = AxisComparison(name, fits, out, test, p_value, joint, rows, numbers)
     return axis, notices
 
 
@@ -310,12 +306,18 @@ def joint_fit(fits: Sequence[Fit]) -> JointFit | Notice:
 
 
 def parameter_spreads(joint: JointFit) -> tuple[ParameterSpread, ...]:
-    """The parameters of a joint fit, one by one."""
-    parts = [{each.key: each for each in part.estimates} for part in joint.parts]
+    """N, B and K by the joint model, and the parameters of its other terms."""
+    wholes = [{each.key: each for each in axis_numbers(fit)} for fit in (joint, *joint.parts)]
+    for fit, own in zip((joint, *joint.parts), wholes, strict=True):
+        owners = {item.key: fit.model.terms[item.term] for item in fit.model.parameters}
+        for each in fit.estimates:
+            term = owners[each.key]
+            if not (term.is_white or term.is_band_limited or term.is_walk or term.is_flicker):
+                own[each.key] = each
     found = []
-    for own in joint.estimates:
-        each = tuple(part.get(own.key) for part in parts)
-        known = [e for e in each if e is not None and e.kind == "estimated" and e.stderr]
+    for key, whole in wholes[0].items():
+        each_ = tuple(own.get(key) for own in wholes[1:])
+        known = [e for e in each_ if e is not None and e.kind == "estimated" and e.stderr]
         spread = p_value = float("nan")
         if len(known) > 1:
             values, errors = np.array([[e.value, e.stderr or np.nan] for e in known]).T
@@ -324,33 +326,32 @@ def parameter_spreads(joint: JointFit) -> tuple[ParameterSpread, ...]:
             else:
                 spread, p_value = between(values, errors**2.0)
                 spread /= abs(float(np.mean(values)) or 1.0)
-        found.append(ParameterSpread(own, each, spread, p_value))
+        found.append(ParameterSpread(whole, each_, spread, p_value))
     return tuple(found)
 
 
-def axis_numbers(
-    name: str, fits: Mapping[str, Fit], joint: Fit | None, horizon: float
-) -> tuple[AxisNumbers, tuple[Notice, ...]]:
-    """Filter numbers of a channel from its fits by recording, and what could not be found."""
-    each: dict[str, AxisFilterNumbers] = {}
+def _covering(
+    name: str, fits: Mapping[str, Fit], horizon: float
+) -> tuple[Covering, tuple[Notice, ...]]:
+    """Filter numbers for any of the recordings of a channel, and what could not be found."""
+    usable: dict[str, Fit] = {}
     notices = []
     for label, fit in fits.items():
         try:
-            each[label] = bound(fit, horizon=horizon)
+            bound(fit, horizon=horizon)
+            usable[label] = fit
         except InputError as error:
             notices.append(replace(notice("no-numbers", name, error=error), source=label))
-    if not each:
-        return AxisNumbers({}, None, None, {}, {}), tuple(notices)
-    whole = covering = None
-    nees: dict[str, float] = {}
+    if not usable:
+        return Covering(None, {}, {}), tuple(notices)
+    covering, nees = None, dict[str, float]()
     try:
-        whole = None if joint is None else bound(joint, horizon=horizon)
         # The end of a name tells `bound` whether a gyro turns the heading.
-        group = {f"{place} {name}": fits[label] for place, label in enumerate(each)}
+        group = {f"{place} {name}": fit for place, fit in enumerate(usable.values())}
         found = bound(group, horizon=horizon, shared=True)
         covering = next(iter(found.values()))
         own = (numbers.nees[horizon] for numbers in found.values())
-        nees = dict(zip(each, own, strict=True))
+        nees = dict(zip(usable, own, strict=True))
     except InputError as error:
         notices.append(notice("no-numbers", name, error=error))
     upper: dict[str, float] = {}
@@ -358,23 +359,4 @@ def axis_numbers(
         for fit in fits.values() if covering and getattr(covering, letter) == 0.0 else ():
             with suppress(InputError):  # this recording gives no limit
                 upper[letter] = max(upper_limit(fit, letter), upper.get(letter, 0.0))
-    return AxisNumbers(each, whole, covering, nees, upper), tuple(notices)
-
-
-def curve_inflation(fits: Sequence[Fit], joint: Fit, longest: float) -> float:
-    """Factor on the joint model's amplitudes that covers the curves of all recordings.
-
-    The largest ratio, at least one, of the Allan deviation of a recording's own model to that of
-    the joint model, from 0.1 s (or ten samples) to ``longest`` (s); NaN if there is no such time.
-    """
-    low = max(tuning.FINEST_TIME, tuning.FINEST_SAMPLES * joint.wv.dt)
-    tau = joint.wv.tau[(joint.wv.tau >= low) & (joint.wv.tau <= longest)]
-    if tau.size == 0:
-        return float("nan")
-
-    def variance(fit: Fit) -> FloatArray:
-        scales = replace(Scales.of(fit.wv), tau=tau)
-        return np.sum([scales.curve(t) for t in fit.model.terms if not t.is_drift], axis=0)
-
-    ratios = np.array([variance(fit) for fit in fits]) / variance(joint)
-    return float(max(1.0, np.sqrt(np.max(ratios))))
+    return Covering(covering, nees, upper), tuple(notices)

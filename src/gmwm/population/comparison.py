@@ -17,7 +17,7 @@ from pydantic_core import to_json
 from gmwm._core.frozen import freeze
 from gmwm._core.pages import make
 from gmwm._core.tables import frame
-from gmwm._core.text import Printed, brief, bullets, per_cent, wrapped
+from gmwm._core.text import Printed, brief, bullets, per_cent, with_error, wrapped
 from gmwm._core.units import customary_unit
 from gmwm.calibration import Calibration
 from gmwm.errors import MissingNameError
@@ -26,6 +26,7 @@ from gmwm.filter_numbers import AxisFilterNumbers
 from gmwm.issues import Notice, worst_first
 from gmwm.population import tuning
 from gmwm.population.curves import Difference, Equality
+from gmwm.population.unit import LETTERS
 
 if TYPE_CHECKING:
     import pandas
@@ -40,7 +41,7 @@ STATES: dict[State, str] = {
 }
 """Verdicts in words, the best first."""
 
-_UNITS = {"N": "u/sqrt(Hz)", "K": "u/s/sqrt(Hz)"}
+_UNITS = {letter: LETTERS[letter] for letter in "NK"}
 _NAMES = {"short": "short times", "R": "drift"}
 
 
@@ -51,7 +52,7 @@ def _percent(share: float) -> str:
 
 @dataclass(frozen=True)
 class ParameterSpread:
-    """One parameter of the joint model in all recordings.
+    """N, B, K or a parameter of the joint model in all recordings.
 
     joint: Estimate from all recordings together.
     each: Estimate of the same structure from each compared recording; ``None`` where it has none.
@@ -72,34 +73,23 @@ class ParameterSpread:
 
 
 @dataclass(frozen=True)
-class AxisNumbers:
+class Covering:
     """N and K of an axis for a filter, for outages up to the horizon.
 
-    each: Recording -> the bound of its own model.
-    joint: The bound of the joint model.
-    covering: One pair of numbers that bounds the models of all recordings.
-    nees: Recording -> normalised error squared that a filter with the covering numbers predicts
-        after the outage; 1 is right, below 1 conservative.
+    numbers: One pair of numbers that bounds the models of all recordings.
+    nees: Recording -> normalised error squared that a filter with these numbers predicts after the
+        outage; 1 is right, below 1 conservative.
     upper: Letters that no recording determines -> the largest of their 95 % upper limits.
     """
 
-    each: Mapping[str, AxisFilterNumbers]
-    joint: AxisFilterNumbers | None
-    covering: AxisFilterNumbers | None
+    numbers: AxisFilterNumbers | None
     nees: Mapping[str, float]
     upper: Mapping[str, float]
 
     def value(self, letter: str) -> float:
         """The covering N or K, or the upper limit where no recording determines it; else NaN."""
-        found = getattr(self.covering, letter) if self.covering is not None else float("nan")
+        found = getattr(self.numbers, letter) if self.numbers is not None else float("nan")
         return self.upper.get(letter, float("nan")) if found == 0.0 else float(found)
-
-    def inflation(self, letter: str) -> float:
-        """The covering number over that of the joint model; NaN where one is missing."""
-        if self.joint is None or self.covering is None:
-            return float("nan")
-        own = getattr(self.joint, letter)
-        return float(getattr(self.covering, letter) / own) if own > 0.0 else float("nan")
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,10 +101,8 @@ class AxisComparison:
     equality: Test of the curves; ``None`` where fewer than two recordings are compared.
     p_value: p-value of that test, adjusted for the number of channels (Holm); NaN without a test.
     joint: The model recommended for all of them.
-    parameters: Parameters of the joint model.
-    numbers: N and K for a filter.
-    curve_inflation: Factor on the amplitudes of the joint model with which its curve is nowhere
-        below the one of a recording's own model; NaN without a joint model.
+    parameters: N, B and K by the joint model, and the parameters of its other terms.
+    covering: N and K for a filter.
     """
 
     name: str
@@ -124,8 +112,7 @@ class AxisComparison:
     p_value: float
     joint: JointFit | None
     parameters: tuple[ParameterSpread, ...]
-    numbers: AxisNumbers
-    curve_inflation: float
+    covering: Covering
 
     def __post_init__(self) -> None:
         freeze(self, "fits", "left_out")
@@ -212,15 +199,11 @@ class AxisComparison:
                 | {"each": [None if e is None else e.to_dict() for e in p.each]}
                 for p in self.parameters
             ],
-            "numbers": {
-                "each": {label: each.row() for label, each in self.numbers.each.items()},
-                "joint": self.numbers.joint.row() if self.numbers.joint else None,
-                "covering": self.numbers.covering.row() if self.numbers.covering else None,
-                "nees": dict(self.numbers.nees),
-                "upper_bounds": dict(self.numbers.upper),
-                "inflation": {k: self.numbers.inflation(k) for k in _UNITS},
+            "filter_numbers": {
+                "covering": self.covering.numbers.row() if self.covering.numbers else None,
+                "nees": dict(self.covering.nees),
+                "upper_limits": dict(self.covering.upper),
             },
-            "curve_inflation": self.curve_inflation,
         }
         return dict(json.loads(to_json(content, inf_nan_mode="null")))
 
@@ -281,7 +264,7 @@ class SensorComparison(Mapping[str, AxisComparison], Printed):
         return f"<SensorComparison of {self.summary}>"
 
     def __str__(self) -> str:
-        """Verdicts, what was found, and the numbers for a filter; 80 columns."""
+        """Verdicts, N, B and K, the numbers for a filter and what was found; 80 columns."""
         lines = [self.summary]
         for place, (label, each) in enumerate(self.calibrations.items(), 1):
             size = f"{each.duration:,.6g} s at {each.rate:.6g} Hz"
@@ -290,24 +273,37 @@ class SensorComparison(Mapping[str, AxisComparison], Printed):
         lines.append("")
         for name, axis in self.items():
             lines += wrapped(axis.sentence, first=f"{name:<{width}}  ", indent=width + 2)
+        lines += ["", "Sensor numbers, all recordings together (spread between them):"]
+        for name, axis in self.items():
+            lines += wrapped(self._sensor(axis), first=f"{name:<{width}}  ", indent=width + 2)
         lines += ["", f"Filter numbers for outages up to {self.horizon:g} s that cover all:"]
         for name, axis in self.items():
-            lines += wrapped(self._numbers(axis), first=f"{name:<{width}}  ", indent=width + 2)
+            lines += wrapped(self._filter(axis), first=f"{name:<{width}}  ", indent=width + 2)
         lines += wrapped(self.promise)
         # The verdicts stand above.
         others = [each for each in self.notices if not each.code.startswith("curves-")]
         lines += bullets(worst_first(others))
         return "\n".join(lines)
 
-    def _numbers(self, axis: AxisComparison) -> str:
-        found, own = [], len(axis.numbers.each)
+    def _sensor(self, axis: AxisComparison) -> str:
+        found = []
+        for each in axis.parameters:
+            if each.key in LETTERS:
+                usual = each.joint.usual
+                text = f"<= {usual.upper:.3g}" if np.isfinite(usual.upper) else "not limited"
+                if each.joint.kind != "bound":
+                    text = with_error(usual.value, usual.lower, usual.upper)
+                apart = f" ({per_cent(each.spread)})" if np.isfinite(each.spread) else ""
+                found.append(f"{each.key} {text} {usual.unit}{apart}")
+        return ", ".join(found) or "none: fewer than two recordings can be used"
+
+    def _filter(self, axis: AxisComparison) -> str:
+        found, own = [], len(axis.covering.nees)
         for letter in _UNITS:
-            value, ratio = axis.numbers.value(letter), axis.numbers.inflation(letter)
+            value = axis.covering.value(letter)
             if np.isfinite(value):
-                sign = "<= " if letter in axis.numbers.upper else ""
-                times = f" ({ratio:.2f} x joint)" if np.isfinite(ratio) else ""
-                shown = " ".join(axis.number_text(letter, value))
-                found.append(f"{letter} {sign}{shown}{times}")
+                sign = "<= " if letter in axis.covering.upper else ""
+                found.append(f"{letter} {sign}{' '.join(axis.number_text(letter, value))}")
         few = f" (of {own} only)" if own < len(self.labels) else ""
         return ", ".join(found) + few if found else "none: no recording can be used"
 
@@ -346,11 +342,17 @@ class SensorComparison(Mapping[str, AxisComparison], Printed):
                 row |= {key: getattr(worst, key) for key in ("part", "extent", "sigma")}
             row["recordings"] = len(axis.fits)
             row["model"] = axis.joint.model.title() if axis.joint else ""
-            for letter in _UNITS:
-                row[letter] = axis.numbers.value(letter)
-                row[f"{letter}_inflation"] = axis.numbers.inflation(letter)
-            rows.append(row | {"curve_inflation": axis.curve_inflation})
-        return frame(rows, tuple(rows[0]))
+            for each in axis.parameters:
+                if each.key in LETTERS:
+                    is_limit = each.joint.kind == "bound"
+                    row[each.key] = np.nan if is_limit else each.joint.value
+                    row |= {
+                        f"{each.key}_upper": each.joint.upper,
+                        f"{each.key}_spread": each.spread,
+                    }
+            row |= {f"filter_{letter}": axis.covering.value(letter) for letter in _UNITS}
+            rows.append(row)
+        return frame(rows, tuple(dict.fromkeys(key for row in rows for key in row)))
 
     def report(
         self,

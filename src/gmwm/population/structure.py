@@ -1,0 +1,192 @@
+"""One model structure for an axis of all units of a lot, and the sensor numbers from it."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+
+import numpy as np
+
+from gmwm._core.documents import Text
+from gmwm._core.frozen import freeze
+from gmwm._core.jobs import one_blas_thread
+from gmwm.errors import InputError
+from gmwm.estimate import Fit, estimate
+from gmwm.estimate.problem import chi_square
+from gmwm.population import tuning
+from gmwm.population.unit import Number, numbers_of
+from gmwm.process import GaussMarkov, Model, Process, RandomWalk, WhiteNoise
+from gmwm.selection import penalty
+
+_SIMPLE = (
+    Model((WhiteNoise(),)),
+    WhiteNoise() + RandomWalk(),
+    WhiteNoise() + GaussMarkov(),
+    WhiteNoise() + RandomWalk() + GaussMarkov(),
+)
+"""Structures that are tried for every lot."""
+
+_ORDER = (WhiteNoise, RandomWalk, GaussMarkov)
+
+_SUPERFLUOUS = (
+    "amplitudes_above_zero",
+    "parameters_separable",
+    "shapes_determined",
+    "shapes_within_search",
+    "terms_distinct",
+    "terms_needed",
+)
+"""What a unit may lack: a term that the lot needs can be too small to see in one of its units."""
+
+
+@dataclass(frozen=True)
+class Structure:
+    """The model of an axis of a lot, and N, B and K of its units.
+
+    model: Title of the noise terms that all units are fitted with; empty without a valid unit.
+    counts: Title -> number of units for which these noise terms were selected, commonest first.
+    own: Units that reject the model: their numbers are those of their own.
+    invalid: Units whose own model is not valid; their numbers are not to be used.
+    numbers: Unit -> letter -> `Number`.
+    """
+
+    channel: Text
+    quantity: Text
+    model: Text
+    counts: Mapping[Text, int]
+    own: tuple[Text, ...]
+    invalid: tuple[Text, ...]
+    numbers: Mapping[Text, Mapping[Text, Number]]
+
+    def __post_init__(self) -> None:
+        freeze(self, "counts", "numbers")
+
+    def model_of(self, name: str) -> str:
+        """Title of the lot's model if the unit's numbers come from it, else empty."""
+        return "" if name in self.own or name in self.invalid else self.model
+
+
+@dataclass(frozen=True)
+class Choice:
+    """The choice of a structure as a function of the channel, which can be sent to workers.
+
+    fits: Channel -> unit -> its own fit.
+    is_given: Whether the models were given, so that there is nothing to choose.
+    """
+
+    fits: Mapping[str, Mapping[str, Fit]]
+    is_given: bool
+
+    @one_blas_thread()
+    def __call__(self, channel: str) -> Structure:
+        """Choose the structure of a channel and fit it to every unit."""
+        fits = self.fits[channel]
+        sound = {name: fit for name, fit in fits.items() if _is_usable(fit)}
+        titles = {name: _noise(fit.model) for name, fit in sound.items()}
+        counts = Counter(model.title() for model in titles.values())
+        usual = {model.title(): model for model in titles.values()}
+        chosen, common = "", sound
+        if sound and not self.is_given:
+            likely = [usual[title] for title, _ in counts.most_common(tuning.LIKELY)]
+            tried = {model.title(): model for model in (*likely, *_SIMPLE)}
+            chosen, common = _best({t: _fitted(sound, model) for t, model in tried.items()}, sound)
+        elif sound:
+            chosen = counts.most_common(1)[0][0]
+        own = [name for name, fit in sound.items() if self._rejects(common.get(name), fit)]
+        used = fits | common | {name: sound[name] for name in own}
+        return Structure(
+            channel=channel,
+            quantity=next(iter(fits.values())).wv.quantity or "",
+            model=chosen,
+            counts=dict(counts.most_common()),
+            own=tuple(own),
+            invalid=tuple(name for name in fits if name not in sound),
+            numbers={name: numbers_of(fit) for name, fit in used.items()},
+        )
+
+    def _rejects(self, common: Fit | None, own: Fit) -> bool:
+        """Whether a unit contradicts the structure: not valid, beyond chance in the whole lot."""
+        if common is None:
+            return True
+        tests = sum(map(len, self.fits.values()))
+        p_value = common.goodness.largest_p
+        return common is not own and not _is_usable(common) and p_value < tuning.REJECTED / tests
+
+
+def _is_usable(fit: Fit) -> bool:
+    return all(n.severity != "bad" or n.issue.lacks in _SUPERFLUOUS for n in fit.notices)
+
+
+def _is_common(term: Process) -> bool:
+    return term.is_candidate and not term.is_drift
+
+
+def _noise(model: Model) -> Model:
+    """The terms of a model that units have in common, open; N also stands for band-limited noise.
+
+    Lines, resonances, the sensor's bandwidth and drifts belong to the unit or its recording.
+    """
+    terms = [term for term in model.opened().terms if _is_common(term)]
+    if not any(term.is_white for term in terms):
+        terms.insert(0, WhiteNoise())
+
+    def place(term: Process) -> int:
+        kinds = [isinstance(term, kind) for kind in _ORDER]
+        return kinds.index(True) if any(kinds) else len(kinds)
+
+    return Model(tuple(sorted(terms, key=place)))
+
+
+def _fitted(fits: Mapping[str, Fit], noise: Model) -> dict[str, Fit]:
+    """A structure fitted to every unit that it can be fitted to, with the unit's own terms."""
+    found = {}
+    for name, fit in fits.items():
+        own = [term for term in fit.model.terms if not _is_common(term)]
+        opened = [
+            each.with_values(**{each.linear_parameter.name: None}) if each.linear_parameter
+            else Model((each,)).opened().terms[0]
+            for each in own
+        ]  # fmt: skip
+        # Behind the sensor's low-pass there need be no other white noise.
+        is_white = any(term.is_white for term in fit.model.terms)
+        behind = any(term.is_band_limited for term in own) and not is_white
+        terms = (*(term for term in noise.terms if not (behind and term.is_white)), *opened)
+        with suppress(InputError):  # too short for so many parameters
+            found[name] = estimate(Model(terms), fit.wv)
+    return found
+
+
+def _best(
+    tried: Mapping[str, Mapping[str, Fit]], fits: Mapping[str, Fit]
+) -> tuple[str, Mapping[str, Fit]]:
+    """The structure with the smallest sum of criteria over the units, and its fits."""
+    names = list(fits)
+    criteria = np.array([_criteria([own.get(name) for own in tried.values()]) for name in names])
+    excess = np.minimum(criteria - criteria.min(axis=1, keepdims=True), tuning.CONTRADICTION)
+    title = list(tried)[int(np.argmin(excess.sum(axis=0)))]
+    return title, tried[title]
+
+
+def _criteria(candidates: Sequence[Fit | None]) -> list[float]:
+    """Hannan and Quinn's criterion of each structure for one unit.
+
+    All with the discrepancy of the one that needs least.
+    """
+    least = min((fit.discrepancy for fit in candidates if fit is not None), default=0.0)
+    found = []
+    for fit in candidates:
+        if fit is None:
+            found.append(1e12)
+            continue
+        at = fit.moments
+        has = (at.implied > 0.0) & (np.diag(at.statistical) > 0.0)
+        implied, block = at.implied[has], np.ix_(has, has)
+        covariance = at.statistical[block] + np.diag((least * implied) ** 2)
+        target = np.maximum(at.target[has], 0.0)
+        free = sum(item.key in fit.stderr or item.key in fit.upper_bounds
+                   for item in fit.model.parameters)  # fmt: skip
+        statistic = chi_square(target, implied, covariance, implied)[1]
+        found.append(statistic + penalty(fit.wv.n) * free)
+    return found
