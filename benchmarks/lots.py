@@ -57,8 +57,9 @@ def row(title: str, lots: Sequence[Fleet], truths: Sequence[float], planted: str
     found = sum(planted in lot.findings for lot in lots)
     words = f"{found} of {len(lots)}" if planted else "-"
     models = sorted({lot.structures[0].model for lot in lots})
-    print(f"{title:<28} {100.0 * np.max(np.abs(errors)):7.2f} % "
-          f"{sum(map(bool, false)):6} of {len(lots)} {words:>9}  {'; '.join(models)}", flush=True)  # fmt: skip
+    counted = f"{sum(map(bool, false))} of {len(lots)}"
+    error = f"{100.0 * np.max(np.abs(errors)):.2f} %"
+    print(f"{title:<28} {error:>10} {counted:>10} {words:>10}  {'; '.join(models)}", flush=True)
 
 
 def main() -> None:
@@ -69,7 +70,7 @@ def main() -> None:
     arguments = parser.parse_args()
     names = [f"unit-{i:02d}" for i in range(arguments.units)]
     print(f"{arguments.lots} lots of {arguments.units} units, one axis, {SECONDS} s at {RATE:g} Hz")
-    print(f"{'':<28} {'error of N':>9} {'false':>10} {'planted':>12}  model")
+    print(f"{'':<28} {'error of N':>10} {'false':>10} {'planted':>10}  model")
 
     def lots(kind: int, truths: Sequence[Model]) -> list[dict[str, Fit]]:
         return [

@@ -1,15 +1,9 @@
 """Recordings or units of a sensor: `compare` sets few side by side, `fleet` sums up many."""
 
-from gmwm.population.compare import (
-    compare as compare,
-    labelled as labelled,
-    parameter_spreads as parameter_spreads,
-)
+from gmwm.population.compare import compare as compare, labelled as labelled
 from gmwm.population.comparison import (
     STATES as STATES,
     AxisComparison as AxisComparison,
-    Covering as Covering,
-    ParameterSpread as ParameterSpread,
     SensorComparison as SensorComparison,
 )
 from gmwm.population.curves import Difference as Difference, Equality as Equality

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import replace
 from itertools import chain, count
 from pathlib import PurePath
@@ -16,23 +15,16 @@ import numpy as np
 from gmwm._core import checks
 from gmwm._core.distributions import chi2
 from gmwm._core.typing import Progress
-from gmwm.calibration import Calibration, axis_numbers, calibrate, upper_limit
+from gmwm.calibration import Calibration, calibrate
 from gmwm.errors import InputError, printable
-from gmwm.estimate import Fit, JointFit
-from gmwm.estimate.result import between
-from gmwm.filter_numbers import bound
+from gmwm.estimate import Fit
+from gmwm.filter_numbers import AxisFilterNumbers, bound
 from gmwm.issues import Notice, notice
 from gmwm.population import tuning
-from gmwm.population.comparison import (
-    AxisComparison,
-    Covering,
-    ParameterSpread,
-    SensorComparison,
-)
+from gmwm.population.comparison import AxisComparison, SensorComparison
 from gmwm.population.curves import Equality
-from gmwm.process import Process
+from gmwm.population.structure import Choice
 from gmwm.readers import Recording, is_frame
-from gmwm.selection import select
 
 _LONGEST_LABEL = 28  # characters
 
@@ -46,8 +38,8 @@ def compare(
     """Compare calibrations of a sensor on several days, or of several units of a kind.
 
     Structures of models differ between recordings of one sensor far more than curves do. So curves
-    are tested for equality, level by level with their covariances; one structure is selected for
-    all recordings, and N, B and K from it are compared; and `gmwm.bound` gives N and K for a
+    are tested for equality, level by level with their covariances; N, B and K come from one
+    structure for all recordings, as in `gmwm.fleet`; and `gmwm.bound` gives N and K for a
     filter, whatever the structure.
 
     Parameters
@@ -252,11 +244,8 @@ def _axis(
 ) -> tuple[AxisComparison, list[Notice]]:
     """A channel: its fits, recordings left out, test and p-value, made into a comparison."""
     (fits, out), (test, p_value) = members, tested
-    found = joint_fit(list(fits.values())) if len(fits) > 1 else None
-    joint = found if isinstance(found, JointFit) else None
-    notices = [found] if isinstance(found, Notice) else []
-    numbers, problems = _covering(name, fits, horizon)
-    notices += problems
+    structure = Choice({name: fits}, is_given=False)(name)
+    covering, notices = _covering(name, fits, horizon)
     for label, fit in fits.items():
         codes = ", ".join(n.code for n in fit.notices if n.severity == "bad")
         if codes:
@@ -265,8 +254,7 @@ def _axis(
                 "fit-not-valid", name, values, variant="compared", severity="note", hint=hint
             )
             notices.append(replace(invalid, source=label))
-    rows = parameter_spreads(joint) if joint else ()
-    axis = AxisComparison(name, fits, out, test, p_value, joint, rows, numbers)
+    axis = AxisComparison(name, fits, out, test, p_value, structure, covering)
     return axis, notices
 
 
@@ -280,83 +268,21 @@ def _holm(p_values: Mapping[str, float]) -> dict[str, float]:
     return adjusted
 
 
-def joint_fit(fits: Sequence[Fit]) -> JointFit | Notice:
-    """The model selected for all recordings of a channel, or why there is none."""
-    dt = fits[0].wv.dt
-    # Rates may differ by as much as clocks do; averaging times are taken as those of the first.
-    curves = [
-        wv if wv.dt == dt else replace(wv, dt=dt, tau=wv.tau * (dt / wv.dt))
-        for wv in (fit.wv for fit in fits)
-    ]
-    # The largest line and the largest resonance, with a free amplitude.
-    largest: dict[str, tuple[float, Process]] = {}
-    for term in (term for fit in fits for term in fit.model.terms):
-        size = term.linear_parameter
-        if size is not None and "frequency" in term.values:
-            kind, amplitude = type(term).__name__, term.values[size.name] or 0.0
-            if kind not in largest or amplitude > largest[kind][0]:
-                largest[kind] = amplitude, term.with_values(**{size.name: None})
-    try:
-        extra = tuple(largest[kind][1] for kind in sorted(largest))
-        found = select(curves, extra=extra).fit
-    except InputError as error:
-        return notice("no-joint-model", fits[0].wv.name, error=error)
-    assert isinstance(found, JointFit)
-    return found
-
-
-def parameter_spreads(joint: JointFit) -> tuple[ParameterSpread, ...]:
-    """N, B and K by the joint model, and the parameters of its other terms."""
-    wholes = [{each.key: each for each in axis_numbers(fit)} for fit in (joint, *joint.parts)]
-    for fit, own in zip((joint, *joint.parts), wholes, strict=True):
-        owners = {item.key: fit.model.terms[item.term] for item in fit.model.parameters}
-        for each in fit.estimates:
-            term = owners[each.key]
-            if not (term.is_white or term.is_band_limited or term.is_walk or term.is_flicker):
-                own[each.key] = each
-    found = []
-    for key, whole in wholes[0].items():
-        each_ = tuple(own.get(key) for own in wholes[1:])
-        known = [e for e in each_ if e is not None and e.kind == "estimated" and e.stderr]
-        spread = p_value = float("nan")
-        if len(known) > 1:
-            values, errors = np.array([[e.value, e.stderr or np.nan] for e in known]).T
-            if np.all(values > 0.0):
-                spread, p_value = between(np.log(values), (errors / values) ** 2.0)
-            else:
-                spread, p_value = between(values, errors**2.0)
-                spread /= abs(float(np.mean(values)) or 1.0)
-        found.append(ParameterSpread(whole, each_, spread, p_value))
-    return tuple(found)
-
-
 def _covering(
     name: str, fits: Mapping[str, Fit], horizon: float
-) -> tuple[Covering, tuple[Notice, ...]]:
-    """Filter numbers for any of the recordings of a channel, and what could not be found."""
-    usable: dict[str, Fit] = {}
+) -> tuple[dict[str, AxisFilterNumbers], list[Notice]]:
+    """Filter numbers that cover all recordings of a channel, by recording, and what is missing."""
     notices = []
+    # The end of a name tells `bound` whether a gyro turns the heading.
+    group = {f"{label} {name}": fit for label, fit in fits.items()}
     for label, fit in fits.items():
         try:
             bound(fit, horizon=horizon)
-            usable[label] = fit
         except InputError as error:
+            del group[f"{label} {name}"]
             notices.append(replace(notice("no-numbers", name, error=error), source=label))
-    if not usable:
-        return Covering(None, {}, {}), tuple(notices)
-    covering, nees = None, dict[str, float]()
     try:
-        # The end of a name tells `bound` whether a gyro turns the heading.
-        group = {f"{place} {name}": fit for place, fit in enumerate(usable.values())}
-        found = bound(group, horizon=horizon, shared=True)
-        covering = next(iter(found.values()))
-        own = (numbers.nees[horizon] for numbers in found.values())
-        nees = dict(zip(usable, own, strict=True))
+        found = bound(group, horizon=horizon, shared=True) if group else {}
     except InputError as error:
-        notices.append(notice("no-numbers", name, error=error))
-    upper: dict[str, float] = {}
-    for letter in "NK":
-        for fit in fits.values() if covering and getattr(covering, letter) == 0.0 else ():
-            with suppress(InputError):  # this recording gives no limit
-                upper[letter] = max(upper_limit(fit, letter), upper.get(letter, 0.0))
-    return Covering(covering, nees, upper), tuple(notices)
+        return {}, [*notices, notice("no-numbers", name, error=error)]
+    return {label.removesuffix(f" {name}"): each for label, each in found.items()}, notices

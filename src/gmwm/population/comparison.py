@@ -7,7 +7,7 @@ import os
 import re
 from collections import Counter
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -17,15 +17,16 @@ from pydantic_core import to_json
 from gmwm._core.frozen import freeze
 from gmwm._core.pages import make
 from gmwm._core.tables import frame
-from gmwm._core.text import Printed, brief, bullets, per_cent, with_error, wrapped
+from gmwm._core.text import Printed, brief, bullets, per_cent, wrapped
 from gmwm._core.units import customary_unit
 from gmwm.calibration import Calibration
 from gmwm.errors import MissingNameError
-from gmwm.estimate import Estimate, Fit, JointFit
+from gmwm.estimate import Fit
 from gmwm.filter_numbers import AxisFilterNumbers
 from gmwm.issues import Notice, worst_first
 from gmwm.population import tuning
 from gmwm.population.curves import Difference, Equality
+from gmwm.population.structure import Structure
 from gmwm.population.unit import LETTERS
 
 if TYPE_CHECKING:
@@ -41,55 +42,12 @@ STATES: dict[State, str] = {
 }
 """Verdicts in words, the best first."""
 
-_UNITS = {letter: LETTERS[letter] for letter in "NK"}
 _NAMES = {"short": "short times", "R": "drift"}
 
 
 def _percent(share: float) -> str:
     """A relative difference; a factor from one on."""
     return per_cent(share) if share < 0.995 else f"a factor of {brief(1.0 + share)}"
-
-
-@dataclass(frozen=True)
-class ParameterSpread:
-    """N, B, K or a parameter of the joint model in all recordings.
-
-    joint: Estimate from all recordings together.
-    each: Estimate of the same structure from each compared recording; ``None`` where it has none.
-    spread: Relative standard deviation between recordings beyond their standard errors; NaN where
-        fewer than two determine it, or one has all the weight.
-    p_value: Of the test that it is the same in all of them; NaN likewise.
-    """
-
-    joint: Estimate
-    each: tuple[Estimate | None, ...]
-    spread: float
-    p_value: float
-
-    @property
-    def key(self) -> str:
-        """Name of the parameter."""
-        return self.joint.key
-
-
-@dataclass(frozen=True)
-class Covering:
-    """N and K of an axis for a filter, for outages up to the horizon.
-
-    numbers: One pair of numbers that bounds the models of all recordings.
-    nees: Recording -> normalised error squared that a filter with these numbers predicts after the
-        outage; 1 is right, below 1 conservative.
-    upper: Letters that no recording determines -> the largest of their 95 % upper limits.
-    """
-
-    numbers: AxisFilterNumbers | None
-    nees: Mapping[str, float]
-    upper: Mapping[str, float]
-
-    def value(self, letter: str) -> float:
-        """The covering N or K, or the upper limit where no recording determines it; else NaN."""
-        found = getattr(self.numbers, letter) if self.numbers is not None else float("nan")
-        return self.upper.get(letter, float("nan")) if found == 0.0 else float(found)
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,9 +58,9 @@ class AxisComparison:
     left_out: Recording that is not -> why.
     equality: Test of the curves; ``None`` where fewer than two recordings are compared.
     p_value: p-value of that test, adjusted for the number of channels (Holm); NaN without a test.
-    joint: The model recommended for all of them.
-    parameters: N, B and K by the joint model, and the parameters of its other terms.
-    covering: N and K for a filter.
+    structure: One model structure for all of them, and N, B and K of each from it.
+    covering: Recording -> one pair of N and K for a filter that bounds the models of all, with the
+        ``nees`` that a filter with it predicts there; 1 is right, below 1 conservative.
     """
 
     name: str
@@ -110,17 +68,16 @@ class AxisComparison:
     left_out: Mapping[str, Notice]
     equality: Equality | None
     p_value: float
-    joint: JointFit | None
-    parameters: tuple[ParameterSpread, ...]
-    covering: Covering
+    structure: Structure
+    covering: Mapping[str, AxisFilterNumbers]
 
     def __post_init__(self) -> None:
-        freeze(self, "fits", "left_out")
+        freeze(self, "fits", "left_out", "covering")
 
     @property
     def quantity(self) -> str:
         """The kind of sensor: gyro, accel, or nothing."""
-        return next(iter(self.fits.values())).wv.quantity or "" if self.fits else ""
+        return self.structure.quantity
 
     @property
     def differences(self) -> tuple[Difference, ...]:
@@ -172,11 +129,28 @@ class AxisComparison:
             text = f"{words} {', '.join(parts)}"
         return f"{text}; without {out}" if out else text
 
-    def number_text(self, letter: str, value: float) -> tuple[str, str]:
-        """An N or a K in the data-sheet unit, and that unit."""
-        unit, scale = customary_unit(_UNITS[letter], self.quantity, "u")
-        text = f"{value * scale:.3g}"
-        return (f"{float(text):,.0f}" if "e+" in text else text), unit
+    def for_filter(self, letter: str) -> tuple[float, bool]:
+        """N or K that covers all recordings, NaN without one, and whether it is an upper limit."""
+        found = next((getattr(each, letter) for each in self.covering.values()), float("nan"))
+        ends = [own[letter].upper for own in self.structure.usable.values()]
+        limit = max(filter(np.isfinite, ends), default=float("nan"))
+        return (float(found), False) if found != 0.0 else (limit, True)
+
+    def number_text(self, letter: str, *values: float) -> tuple[str, str]:
+        """N, B or K in the data-sheet unit, or their range, and that unit."""
+        unit, scale = customary_unit(LETTERS[letter], self.quantity, "u")
+        texts = [f"{value * scale:.3g}" for value in values]
+        texts = [f"{float(text):,.0f}" if "e+" in text else text for text in texts]
+        return " to ".join(dict.fromkeys(texts)), unit
+
+    def range_of(self, letter: str) -> tuple[str, str]:
+        """Smallest to largest N, B or K of the recordings, and the unit; else the largest limit."""
+        own = [each[letter] for each in self.structure.usable.values()]
+        if known := [each.value for each in own if each.value is not None]:
+            return self.number_text(letter, min(known), max(known))
+        largest = max((each.upper for each in own), default=np.inf)
+        text, unit = self.number_text(letter, largest)
+        return (f"<= {text}", unit) if np.isfinite(largest) else ("-", "")
 
     def to_dict(self) -> dict[str, Any]:
         """In JSON types, SI."""
@@ -192,18 +166,8 @@ class AxisComparison:
                 | {name: getattr(d, name).tolist() for name in ("ratios", "errors")}
                 for d in (equality.differences if equality else ())
             ],
-            "joint": None if self.joint is None else self.joint.to_dict(),
-            "equality_p": self.joint.equality_p if self.joint else None,
-            "parameters": [
-                {"key": p.key, "joint": p.joint.to_dict(), "spread": p.spread, "p_value": p.p_value}
-                | {"each": [None if e is None else e.to_dict() for e in p.each]}
-                for p in self.parameters
-            ],
-            "filter_numbers": {
-                "covering": self.covering.numbers.row() if self.covering.numbers else None,
-                "nees": dict(self.covering.nees),
-                "upper_limits": dict(self.covering.upper),
-            },
+            "structure": asdict(self.structure),
+            "filter_numbers": {label: each.row() for label, each in self.covering.items()},
         }
         return dict(json.loads(to_json(content, inf_nan_mode="null")))
 
@@ -273,39 +237,27 @@ class SensorComparison(Mapping[str, AxisComparison], Printed):
         lines.append("")
         for name, axis in self.items():
             lines += wrapped(axis.sentence, first=f"{name:<{width}}  ", indent=width + 2)
-        lines += ["", "Sensor numbers, all recordings together (spread between them):"]
+        lines += ["", "Sensor numbers, smallest to largest:"]
         for name, axis in self.items():
-            lines += wrapped(self._sensor(axis), first=f"{name:<{width}}  ", indent=width + 2)
+            text = ", ".join(f"{key} {' '.join(axis.range_of(key)).strip()}" for key in LETTERS)
+            lines += wrapped(text, first=f"{name:<{width}}  ", indent=width + 2)
         lines += ["", f"Filter numbers for outages up to {self.horizon:g} s that cover all:"]
         for name, axis in self.items():
-            lines += wrapped(self._filter(axis), first=f"{name:<{width}}  ", indent=width + 2)
+            found = []
+            for key in "NK":
+                value, is_limit = axis.for_filter(key)
+                if np.isfinite(value):
+                    shown = " ".join(axis.number_text(key, value))
+                    found.append(f"{key} {'<= ' * is_limit}{shown}")
+            own = len(axis.covering)
+            few = f" (of {own} only)" if own < len(self.labels) else ""
+            text = ", ".join(found) + few if found else "none: no recording can be used"
+            lines += wrapped(text, first=f"{name:<{width}}  ", indent=width + 2)
         lines += wrapped(self.promise)
         # The verdicts stand above.
         others = [each for each in self.notices if not each.code.startswith("curves-")]
         lines += bullets(worst_first(others))
         return "\n".join(lines)
-
-    def _sensor(self, axis: AxisComparison) -> str:
-        found = []
-        for each in axis.parameters:
-            if each.key in LETTERS:
-                usual = each.joint.usual
-                text = f"<= {usual.upper:.3g}" if np.isfinite(usual.upper) else "not limited"
-                if each.joint.kind != "bound":
-                    text = with_error(usual.value, usual.lower, usual.upper)
-                apart = f" ({per_cent(each.spread)})" if np.isfinite(each.spread) else ""
-                found.append(f"{each.key} {text} {usual.unit}{apart}")
-        return ", ".join(found) or "none: fewer than two recordings can be used"
-
-    def _filter(self, axis: AxisComparison) -> str:
-        found, own = [], len(axis.covering.nees)
-        for letter in _UNITS:
-            value = axis.covering.value(letter)
-            if np.isfinite(value):
-                sign = "<= " if letter in axis.covering.upper else ""
-                found.append(f"{letter} {sign}{' '.join(axis.number_text(letter, value))}")
-        few = f" (of {own} only)" if own < len(self.labels) else ""
-        return ", ".join(found) + few if found else "none: no recording can be used"
 
     @property
     def promise(self) -> str:
@@ -341,18 +293,14 @@ class SensorComparison(Mapping[str, AxisComparison], Printed):
             for worst in axis.main[:1]:
                 row |= {key: getattr(worst, key) for key in ("part", "extent", "sigma")}
             row["recordings"] = len(axis.fits)
-            row["model"] = axis.joint.model.title() if axis.joint else ""
-            for each in axis.parameters:
-                if each.key in LETTERS:
-                    is_limit = each.joint.kind == "bound"
-                    row[each.key] = np.nan if is_limit else each.joint.value
-                    row |= {
-                        f"{each.key}_upper": each.joint.upper,
-                        f"{each.key}_spread": each.spread,
-                    }
-            row |= {f"filter_{letter}": axis.covering.value(letter) for letter in _UNITS}
+            row["model"], usable = axis.structure.model, axis.structure.usable.values()
+            for letter in LETTERS:
+                known = [own[letter].value for own in usable if own[letter].value is not None]
+                row[f"{letter}_lowest"] = min(known, default=np.nan)
+                row[f"{letter}_highest"] = max(known, default=np.nan)
+            row |= {f"filter_{letter}": axis.for_filter(letter)[0] for letter in "NK"}
             rows.append(row)
-        return frame(rows, tuple(dict.fromkeys(key for row in rows for key in row)))
+        return frame(rows, tuple(rows[0]))
 
     def report(
         self,

@@ -94,7 +94,7 @@ class Fleet(Mapping[str, Calibration | Notice]):
 
     @cached_property
     def rows(self) -> tuple[Row, ...]:
-        """Rows of the table: one per unit, channel and number or parameter."""
+        """Rows of the table: one per unit, channel and number."""
         return tuple(rows_of(self.units.values(), self.structures))
 
     @cached_property
@@ -105,18 +105,17 @@ class Fleet(Mapping[str, Calibration | Notice]):
     @cached_property
     def findings(self) -> dict[str, str]:
         """Units that stand apart -> in what; at 5 % for all units, axes and numbers together."""
-        found: dict[str, list[str]] = {}
+        found: dict[str, list[str]] = {unit.name: [] for unit in self.units.values()}
         for each in self.spreads:
             for unit in each.outliers:
                 times = f"{'' if unit.found else 'at most '}{brief(unit.value / each.median, 3)}"
-                text = f"{each.parameter} of {each.channel} is {times} times the median"
-                found.setdefault(unit.device, []).append(text)
+                found[unit.device].append(
+                    f"{each.parameter} of {each.channel} is {times} times the median"
+                )
         for structure in self.structures:
             for name in structure.own:
-                text = f"{structure.channel} rejects the model of the others, own numbers used"
-                found.setdefault(name, []).append(text)
-        names = [unit.name for unit in self.units.values()]
-        return {name: "; ".join(found[name]) for name in names if name in found}
+                found[name].append(f"{structure.channel} rejects the model of the other units")
+        return {name: "; ".join(texts) for name, texts in found.items() if texts}
 
     @cached_property
     def grid(self) -> Grid:
@@ -126,9 +125,8 @@ class Fleet(Mapping[str, Calibration | Notice]):
     @property
     def meets_limits(self) -> bool:
         """Whether no limit is missed; one within an interval is not missed."""
-        verdicts = (each for row in self.grid.values() for own in row.values()
-                    for each in own.values())  # fmt: skip
-        return not {FAIL, NONE}.intersection(verdicts)
+        axes = (own for row in self.grid.values() for own in row.values())
+        return not any({FAIL, NONE} & {*own.values()} for own in axes)
 
     def __repr__(self) -> str:
         failed = f", {len(self.failed)} not" if self.failed else ""
@@ -170,14 +168,15 @@ class Fleet(Mapping[str, Calibration | Notice]):
         """Which units miss limits, as lines of a table; all of them stand on the page."""
         if not self.limits:
             return []
-        words = {name: {axis: in_words(own) for axis, own in row.items()}
-                 for name, row in self.grid.items()}  # fmt: skip
-        missed = {name: row for name, row in words.items() if {*row.values()} != {PASS}}
-        lines = ["", f"Limits: {len(words) - len(missed)} of {len(words)} units pass"]
+        missed: dict[str, dict[str, str]] = {}
+        for name, row in self.grid.items():
+            words = {axis: in_words(own) for axis, own in row.items()}
+            if {*words.values()} != {PASS}:
+                missed[name] = words
+        lines = ["", f"Limits: {len(self) - len(missed)} of {len(self)} units pass"]
         if missed:
-            axes = list(dict.fromkeys(axis for row in missed.values() for axis in row))
-            rows = [(name[:20], *(row.get(axis, "") for axis in axes))
-                    for name, row in missed.items()]  # fmt: skip
+            axes = list(next(iter(missed.values())))
+            rows = [(name[:20], *words.values()) for name, words in missed.items()]
             lines += ["", *plain_table(("unit", *axes), rows).splitlines(), ""]
             lines += wrapped("?: the 95 % interval contains the limit. none: no valid number.")
         return lines
@@ -245,8 +244,8 @@ class Fleet(Mapping[str, Calibration | Notice]):
                 lines = csv.DictWriter(stream, SCHEMA.names, lineterminator="\n")
                 lines.writeheader()
                 for row in self.rows:
-                    lines.writerow({k: ";".join(x) if isinstance(x, list) else x
-                                    for k, x in row.items()})  # fmt: skip
+                    codes = {key: ";".join(row[key] or ()) for key in ("reasons", "notices")}
+                    lines.writerow(row | codes)
             self.report(new / page)
             listed = tuple(
                 Listed(printable(path), unit.name, self.failed.get(path))

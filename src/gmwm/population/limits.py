@@ -22,34 +22,27 @@ Grid = Mapping[str, Mapping[str, Mapping[str, str]]]
 def checked(limits: Any) -> Limits:
     """Limits in SI by sensor or channel; raises InputError if they are something else."""
     hint = 'give them in SI as {"gyro": {"N": 6e-5}}'
-    if not isinstance(limits, Mapping):
-        raise InputError(f"limits = {checks.shown(limits)}: {hint}")
-    found = {}
-    for name, own in limits.items():
-        if not (isinstance(name, str) and isinstance(own, Mapping) and own):
+    found: dict[str, dict[str, float]] = {}
+    for name, own in limits.items() if isinstance(limits, Mapping) else [("", limits)]:
+        if not (
+            name and isinstance(name, str) and isinstance(own, Mapping) and {*own} <= {*LETTERS}
+        ):
             raise InputError(f"limits of {checks.shown(name)} = {checks.shown(own)}: {hint}")
-        for letter, value in own.items():
-            if letter not in LETTERS:
-                raise InputError(f"limit {checks.shown(letter)} of {name}: known are N, B and K")
-            checks.positive(f"limit {letter} of {name}", value, hint)
-        found[name] = {letter: float(own[letter]) for letter in LETTERS if letter in own}
+        found[name] = {k: checks.positive(f"limit {k} of {name}", v, hint) for k, v in own.items()}
     return MappingProxyType(found)
 
 
 def grid_of(limits: Limits, structures: Sequence[Structure], units: Sequence[Unit]) -> Grid:
     """The verdicts on every unit; a limit of an axis that no unit has is not met."""
-    wanted = {each.channel: limits.get(each.channel, limits.get(each.quantity, {}))
-              for each in structures}  # fmt: skip
-    named = {each.channel for each in structures} | {each.quantity for each in structures}
-    wanted |= {name: own for name, own in limits.items() if name not in named}
     by_channel = {each.channel: each for each in structures}
+    named = {*by_channel, *(each.quantity for each in structures)}
+    wanted = {k: limits.get(k, limits.get(each.quantity, {})) for k, each in by_channel.items()}
+    wanted |= {name: own for name, own in limits.items() if name not in named}
     grid: dict[str, dict[str, dict[str, str]]] = {unit.name: {} for unit in units}
-    for channel, own in wanted.items():
-        structure = by_channel.get(channel)
-        for name, row in grid.items():
-            known: Mapping[str, Number] = {}
-            if structure is not None and name not in structure.invalid:
-                known = structure.numbers.get(name, {})
+    for name, row in grid.items():
+        for channel, own in wanted.items():
+            structure = by_channel.get(channel)
+            known = structure.usable.get(name, {}) if structure is not None else {}
             if own:
                 row[channel] = {key: _verdict(known.get(key), end) for key, end in own.items()}
     return grid

@@ -8,7 +8,7 @@ from functools import cached_property, lru_cache
 from itertools import product
 
 import numpy as np
-from scipy.stats import binom, nct, norm, shapiro
+from scipy.stats import binom, nct, norm
 
 from gmwm._core.frozen import freeze
 from gmwm._core.typing import BoolArray, FloatArray
@@ -18,7 +18,6 @@ from gmwm.population.structure import Structure
 from gmwm.population.tuning import CONFIDENCE, CONTENT
 from gmwm.population.unit import LETTERS
 
-_MOST_TESTED = 5000  # values that the Shapiro-Wilk test is made for
 _SD_PER_MAD = 1.0 / norm.ppf(0.75)
 _ONE_SIDED = 1.645  # standard errors from an estimate of zero to its 95 % upper limit
 
@@ -108,18 +107,6 @@ class Spread:
         return None if rank is None else float(np.sort(self.values)[-rank])
 
     @cached_property
-    def normality(self) -> float:
-        """p-value of the Shapiro-Wilk test; NaN if it cannot be tested."""
-        if self.n < 3 or not np.ptp(self._logarithms) > 0.0:
-            return float("nan")
-        return float(shapiro(self._logarithms[:_MOST_TESTED]).pvalue)
-
-    @property
-    def is_normal(self) -> bool:
-        """Whether nothing contradicts normal theory."""
-        return not self.normality < tuning.CONTRADICTED
-
-    @cached_property
     def outliers(self) -> tuple[Outlier, ...]:
         """Units farther from the median than the farthest of as many normal ones would be.
 
@@ -163,7 +150,7 @@ def spreads_of(structures: Sequence[Structure]) -> tuple[Spread, ...]:
     sensors = dict.fromkeys(each.quantity for each in structures)
     for sensor, letter in product(sensors, LETTERS):
         for each in (own for own in structures if own.quantity == sensor):
-            valid = {k: own[letter] for k, own in each.numbers.items() if k not in each.invalid}
+            valid = {name: own[letter] for name, own in each.usable.items()}
             ends = {k: x.upper if x.value is None else x.value for k, x in valid.items()}
             known = {k: end for k, end in ends.items() if 0.0 < end < np.inf}
             if known:

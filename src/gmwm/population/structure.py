@@ -63,6 +63,11 @@ class Structure:
     def __post_init__(self) -> None:
         freeze(self, "counts", "numbers")
 
+    @property
+    def usable(self) -> dict[str, Mapping[str, Number]]:
+        """The numbers of units with a valid model."""
+        return {name: own for name, own in self.numbers.items() if name not in self.invalid}
+
     def model_of(self, name: str) -> str:
         """Title of the lot's model if the unit's numbers come from it, else empty."""
         return "" if name in self.own or name in self.invalid else self.model
@@ -98,7 +103,7 @@ class Choice:
         used = fits | common | {name: sound[name] for name in own}
         return Structure(
             channel=channel,
-            quantity=next(iter(fits.values())).wv.quantity or "",
+            quantity=next((fit.wv.quantity or "" for fit in fits.values()), ""),
             model=chosen,
             counts=dict(counts.most_common()),
             own=tuple(own),
@@ -144,11 +149,11 @@ def _fitted(fits: Mapping[str, Fit], noise: Model) -> dict[str, Fit]:
     found = {}
     for name, fit in fits.items():
         own = [term for term in fit.model.terms if not _is_common(term)]
-        opened = [
-            each.with_values(**{each.linear_parameter.name: None}) if each.linear_parameter
-            else Model((each,)).opened().terms[0]
-            for each in own
-        ]  # fmt: skip
+        opened = []
+        for each in own:
+            size = each.linear_parameter  # a drift has none
+            names = [size] if size is not None else each.parameters
+            opened.append(each.with_values(**dict.fromkeys(item.name for item in names)))
         # Behind the sensor's low-pass there need be no other white noise.
         is_white = any(term.is_white for term in fit.model.terms)
         behind = any(term.is_band_limited for term in own) and not is_white
@@ -185,8 +190,7 @@ def _criteria(candidates: Sequence[Fit | None]) -> list[float]:
         implied, block = at.implied[has], np.ix_(has, has)
         covariance = at.statistical[block] + np.diag((least * implied) ** 2)
         target = np.maximum(at.target[has], 0.0)
-        free = sum(item.key in fit.stderr or item.key in fit.upper_bounds
-                   for item in fit.model.parameters)  # fmt: skip
+        free = len({*fit.keys, *fit.upper_bounds})
         statistic = chi_square(target, implied, covariance, implied)[1]
         found.append(statistic + penalty(fit.wv.n) * free)
     return found

@@ -26,14 +26,13 @@ LETTERS = {"N": "u/sqrt(Hz)", "B": "u", "K": "u/s/sqrt(Hz)"}
 _TYPES = dict.fromkeys(("value", "stderr", "lower", "upper"), pa.float64())
 _TYPES |= {"valid": pa.bool_()} | dict.fromkeys(("reasons", "notices"), pa.list_(pa.string()))
 _NAMES = (
-    "device path channel quantity of model parameter kind value stderr lower upper unit valid "
+    "device path channel quantity model number kind value stderr lower upper unit valid "
     "reasons notices"
 )
 SCHEMA = pa.schema([(name, _TYPES.get(name, pa.string())) for name in _NAMES.split()])
-"""Columns of the table; null where one does not apply. ``of`` is "sensor" for N, B and K, from the
-model that stands in ``model``, and "model" for a parameter of the unit's own model. ``kind`` is
-that of `gmwm.Estimate`; of an upper limit ("bound") ``value`` is null. ``reasons`` are the codes of
-why a fit, a channel or a unit is not valid."""
+"""Columns of the table; null where one does not apply. ``number`` is N, B or K; of an upper limit
+(``kind`` "bound") ``value`` is null. ``model`` is the one that it comes from. ``reasons`` are the
+codes of why a fit, a channel or a unit is not valid."""
 
 Row = dict[str, Any]
 
@@ -91,7 +90,7 @@ class Unit:
 
 
 def rows_of(units: Iterable[Unit], structures: Sequence[Structure]) -> Iterator[Row]:
-    """Rows of the table: N, B, K and the model's parameters of every channel of every unit.
+    """Rows of the table: N, B and K of every channel of every unit.
 
     A unit without a calibration, and a channel without a fit, has one row with the reason.
     """
@@ -119,24 +118,16 @@ def rows_of(units: Iterable[Unit], structures: Sequence[Structure]) -> Iterator[
 def _of_channel(unit: Unit, name: str, fit: Fit, structure: Structure) -> Iterator[Row]:
     """Rows of a channel, without the columns of the unit."""
     assert isinstance(unit.result, Calibration)
-    quantity = fit.wv.quantity or ""
     notices = [*fit.notices, *(n for n in unit.result.notices if n.where in ("", name))]
     own = {
         "channel": name,
-        "quantity": quantity,
-        "valid": fit.valid,
+        "quantity": fit.wv.quantity,
+        "model": structure.model_of(unit.name) or fit.model.title(),
+        "valid": unit.name not in structure.invalid,
         "reasons": [reason for reason, is_met in fit.reasons.items() if not is_met],
         "notices": list(dict.fromkeys(n.code for n in notices if n.severity != "good")),
     }
-    of_sensor = own | {"of": "sensor", "valid": unit.name not in structure.invalid}
-    of_sensor["model"] = structure.model_of(unit.name) or fit.model.title()
     for key, number in structure.numbers[unit.name].items():
         known = {each: getattr(number, each) for each in ("value", "stderr", "lower", "upper")}
-        known |= {"kind": "bound" if number.value is None else "estimated", "parameter": key}
-        yield {**of_sensor, **known, "unit": si_parameter_unit(LETTERS[key], quantity)}
-    for each in fit.estimates:
-        known = {key: getattr(each, key) for key in ("kind", "lower", "upper", "unit")}
-        if each.kind != "bound":
-            known |= {"value": each.value, "stderr": each.stderr}
-        own_model = {"of": "model", "model": fit.model.title(), "parameter": each.key}
-        yield {**own, **own_model, **known}
+        known |= {"kind": "bound" if number.value is None else "estimated", "number": key}
+        yield {**own, **known, "unit": si_parameter_unit(LETTERS[key], fit.wv.quantity)}

@@ -150,7 +150,6 @@ def _row(spread: Spread) -> dict[str, Any]:
         "spread": per_cent(spread.sd) if np.isfinite(spread.sd) and not spread.is_limit else "-",
         "limit": text(spread.normal_limit),
         "free": "" if spread.free_limit is None else text(spread.free_limit),
-        "doubtful": not spread.is_normal,
         "remark": "; ".join(remarks),
     }
 
