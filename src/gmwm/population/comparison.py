@@ -146,11 +146,11 @@ class AxisComparison:
     def range_of(self, letter: str) -> tuple[str, str]:
         """Smallest to largest N, B or K of the recordings, and the unit; else the largest limit."""
         own = [each[letter] for each in self.structure.usable.values()]
-        if known := [each.value for each in own if each.value is not None]:
+        if known := [value for each in own if (value := each.value) is not None]:
             return self.number_text(letter, min(known), max(known))
         largest = max((each.upper for each in own), default=np.inf)
         text, unit = self.number_text(letter, largest)
-        return (f"<= {text}", unit) if np.isfinite(largest) else ("-", "")
+        return (f"<= {text}", unit) if np.isfinite(largest) else ("not limited", "")
 
     def to_dict(self) -> dict[str, Any]:
         """In JSON types, SI."""
@@ -239,7 +239,8 @@ class SensorComparison(Mapping[str, AxisComparison], Printed):
             lines += wrapped(axis.sentence, first=f"{name:<{width}}  ", indent=width + 2)
         lines += ["", "Sensor numbers, smallest to largest:"]
         for name, axis in self.items():
-            text = ", ".join(f"{key} {' '.join(axis.range_of(key)).strip()}" for key in LETTERS)
+            known = [f"{key} {' '.join(axis.range_of(key))}" for key in LETTERS]
+            text = ", ".join(known) if axis.structure.usable else "none: no valid model"
             lines += wrapped(text, first=f"{name:<{width}}  ", indent=width + 2)
         lines += ["", f"Filter numbers for outages up to {self.horizon:g} s that cover all:"]
         for name, axis in self.items():
@@ -295,7 +296,7 @@ class SensorComparison(Mapping[str, AxisComparison], Printed):
             row["recordings"] = len(axis.fits)
             row["model"], usable = axis.structure.model, axis.structure.usable.values()
             for letter in LETTERS:
-                known = [own[letter].value for own in usable if own[letter].value is not None]
+                known = [value for own in usable if (value := own[letter].value) is not None]
                 row[f"{letter}_lowest"] = min(known, default=np.nan)
                 row[f"{letter}_highest"] = max(known, default=np.nan)
             row |= {f"filter_{letter}": axis.for_filter(letter)[0] for letter in "NK"}

@@ -153,15 +153,17 @@ class Fleet(Mapping[str, Calibration | Notice]):
             lines += ["", *plain_table(heads, rows).splitlines(), ""]
             lines += wrapped(
                 "Limit: 95 % of units are below this (95 % confidence, log-normal). Spread: "
-                "1 sigma, with estimation errors."
+                "1 sigma, estimation errors included."
             )
         for model in dict.fromkeys(each.model for each in self.structures if each.model):
             axes = ", ".join(each.channel for each in self.structures if each.model == model)
             lines += wrapped(f"Model of all units: {model} ({axes})")
         apart = [f"{name}: {text}" for name, text in self.findings.items()]
-        for each in self.structures:
-            if each.invalid:
-                apart.append(f"{each.channel}: not valid in {_some(each.invalid)}")
+        apart += [
+            f"{axis.channel}: not valid in {_some(axis.invalid)}"
+            for axis in self.structures
+            if axis.invalid
+        ]
         return "\n".join(lines + self._verdicts() + bullets([*apart, *self.notices]))
 
     def _verdicts(self) -> list[str]:

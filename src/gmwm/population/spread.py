@@ -112,7 +112,8 @@ class Spread:
 
         The standard deviation is 1.48 times the median absolute deviation (Hampel's identifier;
         Davies and Gather, J. Am. Stat. Assoc. 88, 1993), at least the usual estimation error, and
-        larger for a unit whose own error is larger. An upper limit counts only below the median.
+        larger for a unit whose own error is larger. An upper limit of K counts below the median of
+        estimates; that of B is of the fitted curve only.
         """
         if self.n < tuning.LEAST_FOR_OUTLIERS:
             return ()
@@ -126,11 +127,12 @@ class Spread:
         if not np.all(scale > 0.0):
             return ()
         distance = away / scale
-        is_apart = np.abs(distance) > outlier_distance(self.n, self.level)
+        counts = self.found | ((distance < 0.0) & (self.parameter == "K") & (not self.is_limit))
+        is_apart = counts & (np.abs(distance) > outlier_distance(self.n, self.level))
         return tuple(
             Outlier(self.devices[i], float(self.values[i]), bool(self.found[i]), float(distance[i]))
             for i in np.argsort(-np.abs(distance))
-            if is_apart[i] and (self.found[i] or distance[i] < 0.0)
+            if is_apart[i]
         )
 
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar
 
 from pydantic import StringConstraints
 
@@ -46,7 +46,7 @@ class Index(Document):
     SCHEMA: ClassVar[str] = "gmwm.fleet-index"
 
     options: Mapping[str, Any]
-    limits: Mapping[Text, Mapping[Literal["N", "B", "K"], Positive]]
+    limits: Mapping[Text, Mapping[Text, Positive]]
     structures: tuple[Structure, ...]
     units: tuple[Listed, ...]
     notices: tuple[Notice, ...]

@@ -30,15 +30,13 @@ _SIMPLE = (
 
 _ORDER = (WhiteNoise, RandomWalk, GaussMarkov)
 
-_SUPERFLUOUS = (
-    "amplitudes_above_zero",
-    "parameters_separable",
-    "shapes_determined",
-    "shapes_within_search",
-    "terms_distinct",
-    "terms_needed",
-)
-"""What a unit may lack: a term that the lot needs can be too small to see in one of its units."""
+_SUPERFLUOUS = {
+    *("amplitude-bound", "confounded", "indistinct-terms", "redundant-term", "search-limit"),
+    "undetermined",
+}
+"""Codes of what a unit may have: a term of the lot can be too small to see in one of its units."""
+
+_MISFITS = {"level-missed", "misfit"}
 
 
 @dataclass(frozen=True)
@@ -48,7 +46,7 @@ class Structure:
     model: Title of the noise terms that all units are fitted with; empty without a valid unit.
     counts: Title -> number of units for which these noise terms were selected, commonest first.
     own: Units that reject the model: their numbers are those of their own.
-    invalid: Units whose own model is not valid; their numbers are not to be used.
+    invalid: Units without a valid model; their numbers are not to be used.
     numbers: Unit -> letter -> `Number`.
     """
 
@@ -88,40 +86,45 @@ class Choice:
     def __call__(self, channel: str) -> Structure:
         """Choose the structure of a channel and fit it to every unit."""
         fits = self.fits[channel]
-        sound = {name: fit for name, fit in fits.items() if _is_usable(fit)}
+        sound = {name: fit for name, fit in fits.items() if self._is_usable(fit)}
         titles = {name: _noise(fit.model) for name, fit in sound.items()}
         counts = Counter(model.title() for model in titles.values())
         usual = {model.title(): model for model in titles.values()}
-        chosen, common = "", sound
+        chosen, common = next(iter(counts), ""), dict(sound)
         if sound and not self.is_given:
             likely = [usual[title] for title, _ in counts.most_common(tuning.LIKELY)]
             tried = {model.title(): model for model in (*likely, *_SIMPLE)}
-            chosen, common = _best({t: _fitted(sound, model) for t, model in tried.items()}, sound)
-        elif sound:
-            chosen = counts.most_common(1)[0][0]
+            chosen, common = _best({t: _fitted(sound, model) for t, model in tried.items()})
+            # The lot's model may fit where the one selected for the unit alone does not.
+            lost = {k: fit for k, fit in fits.items() if k not in sound and _is_noise(fit)}
+            again = _fitted(lost, tried[chosen]) if lost else {}
+            common |= {name: fit for name, fit in again.items() if self._is_usable(fit)}
         own = [name for name, fit in sound.items() if self._rejects(common.get(name), fit)]
-        used = fits | common | {name: sound[name] for name in own}
+        used = {**fits, **common} | {name: sound[name] for name in own}
         return Structure(
             channel=channel,
             quantity=next((fit.wv.quantity or "" for fit in fits.values()), ""),
             model=chosen,
             counts=dict(counts.most_common()),
             own=tuple(own),
-            invalid=tuple(name for name in fits if name not in sound),
+            invalid=tuple(name for name in fits if name not in {*common, *own}),
             numbers={name: numbers_of(fit) for name, fit in used.items()},
         )
 
+    def _is_usable(self, fit: Fit) -> bool:
+        """Whether a fit is valid but for small terms, and misfits that are chance in such a lot."""
+        fitting = tuning.REJECTED / sum(map(len, self.fits.values())) <= fit.goodness.largest_p
+        codes = {n.code for n in fit.notices if n.severity == "bad"} - _SUPERFLUOUS
+        return not (codes - _MISFITS if fitting else codes)
+
     def _rejects(self, common: Fit | None, own: Fit) -> bool:
-        """Whether a unit contradicts the structure: not valid, beyond chance in the whole lot."""
-        if common is None:
-            return True
-        tests = sum(map(len, self.fits.values()))
-        p_value = common.goodness.largest_p
-        return common is not own and not _is_usable(common) and p_value < tuning.REJECTED / tests
+        """Whether a unit contradicts the structure of the lot while its own model is valid."""
+        return common is None or not (common is own or self._is_usable(common))
 
 
-def _is_usable(fit: Fit) -> bool:
-    return all(n.severity != "bad" or n.issue.lacks in _SUPERFLUOUS for n in fit.notices)
+def _is_noise(fit: Fit) -> bool:
+    """Whether nothing but the model is wrong with a fit."""
+    return all(n.severity != "bad" or n.issue.topic == "fit" for n in fit.notices)
 
 
 def _is_common(term: Process) -> bool:
@@ -163,11 +166,9 @@ def _fitted(fits: Mapping[str, Fit], noise: Model) -> dict[str, Fit]:
     return found
 
 
-def _best(
-    tried: Mapping[str, Mapping[str, Fit]], fits: Mapping[str, Fit]
-) -> tuple[str, Mapping[str, Fit]]:
+def _best(tried: Mapping[str, dict[str, Fit]]) -> tuple[str, dict[str, Fit]]:
     """The structure with the smallest sum of criteria over the units, and its fits."""
-    names = list(fits)
+    names = {name for own in tried.values() for name in own}
     criteria = np.array([_criteria([own.get(name) for own in tried.values()]) for name in names])
     excess = np.minimum(criteria - criteria.min(axis=1, keepdims=True), tuning.CONTRADICTION)
     title = list(tried)[int(np.argmin(excess.sum(axis=0)))]

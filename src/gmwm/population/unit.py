@@ -119,12 +119,14 @@ def _of_channel(unit: Unit, name: str, fit: Fit, structure: Structure) -> Iterat
     """Rows of a channel, without the columns of the unit."""
     assert isinstance(unit.result, Calibration)
     notices = [*fit.notices, *(n for n in unit.result.notices if n.where in ("", name))]
+    is_valid = unit.name not in structure.invalid
+    reasons = [] if is_valid else [reason for reason, is_met in fit.reasons.items() if not is_met]
     own = {
         "channel": name,
         "quantity": fit.wv.quantity,
         "model": structure.model_of(unit.name) or fit.model.title(),
-        "valid": unit.name not in structure.invalid,
-        "reasons": [reason for reason, is_met in fit.reasons.items() if not is_met],
+        "valid": is_valid,
+        "reasons": reasons,
         "notices": list(dict.fromkeys(n.code for n in notices if n.severity != "good")),
     }
     for key, number in structure.numbers[unit.name].items():

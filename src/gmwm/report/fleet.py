@@ -134,11 +134,7 @@ def _row(spread: Spread) -> dict[str, Any]:
         remark
         for is_said, remark in (
             (bounds, f"{bounds} of them upper limits"),
-            (not spread.is_normal, f"not normal, p = {spread.normality:.1g}"),
-            (
-                share > _MOSTLY,
-                f"{100.0 * min(share, 1.0):.0f} % is estimation error: record longer",
-            ),
+            (share > _MOSTLY, f"{min(share, 1.0):.0%} is estimation error: record longer"),
         )
         if is_said
     ]
