@@ -43,15 +43,13 @@ def fleet(
     are those of gmwm calibrate. N, B and K of an axis come from one model for all units.
     fleet.html shows how units differ, which stand apart and what a data sheet can promise;
     fleet.parquet and fleet.csv have every number; each unit has a calibration of its own. A file
-    that cannot be used is reported and costs the others nothing. Several recordings of one unit
-    are for gmwm calibrate.
+    that cannot be used is reported and costs the others nothing.
 
     Exit status: 0 if all files were used and no limit is missed, 1 otherwise or if no unit has a
     valid model (the files are written all the same), 2 if no file can be used.
 
     \b
     Examples:
-      gmwm fleet 'lot-7/*.csv' --gyro-unit deg/s --accel-unit g -o lot-7-out
       gmwm fleet 'lot-7/*.csv' --gyro-unit deg/s --accel-unit g -o lot-7-out \\
         --resume --limits limits.yaml
     """
@@ -77,5 +75,4 @@ def fleet(
         count = "1 file" if len(found.failed) == 1 else f"{len(found.failed)} files"
         click.echo(f"gmwm: {count} cannot be used; the first: {reason}", err=True)
     exit_unless(bool(found.valid), "unit")
-    if found.failed or not found.meets_limits:
-        click.get_current_context().exit(NONE_VALID)
+    click.get_current_context().exit(NONE_VALID if found.failed or not found.meets_limits else 0)

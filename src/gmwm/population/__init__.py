@@ -11,7 +11,6 @@ from gmwm.population.fleet import Fleet as Fleet, fleet as fleet
 from gmwm.population.limits import FAIL as FAIL, NONE as NONE, PASS as PASS, in_words as in_words
 from gmwm.population.spread import (
     Spread as Spread,
-    content_of_largest as content_of_largest,
     needed_units as needed_units,
     one_sided_factor as one_sided_factor,
     outlier_distance as outlier_distance,

@@ -115,9 +115,6 @@ def compare(
     return SensorComparison(calibrations, axes, horizon, tuple(notices))
 
 
-# -- what is compared -----------------------------------------------------------------------------
-
-
 def _calibration(source: Any) -> Calibration:
     if isinstance(source, Calibration):
         return source
@@ -231,9 +228,6 @@ def _unlike(fits: Mapping[str, Fit]) -> dict[str, Notice]:
         words["others"] = most[0] if len(most) == 1 else "the others"
         found[label] = notice(code, values=values, **words)
     return found
-
-
-# -- what is found --------------------------------------------------------------------------------
 
 
 def _axis(

@@ -355,9 +355,6 @@ def fleet(
     return made
 
 
-# -- notices --------------------------------------------------------------------------------------
-
-
 def _notices(units: Collection[Unit]) -> list[Notice]:
     """Which units failed, and what makes the others unlike each other."""
     notices = [unit.result for unit in units if isinstance(unit.result, Notice)]
@@ -398,11 +395,6 @@ def _differences(done: Mapping[str, Calibration]) -> list[Notice]:
         for names, missing in lacking.items()
         if names
     ]
-    lengths = {name: each.duration for name, each in done.items()}
-    name = min(lengths, key=lengths.__getitem__)
-    values = {"shortest": lengths[name], "longest": max(lengths.values())}
-    if values["longest"] > tuning.LENGTHS * values["shortest"]:
-        notices.append(notice("lengths-differ", values=values, name=name))
     if len(done) < needed_units():
         values = {"units": len(done), "needed": needed_units()}
         notices.append(notice("few-units", values=values))

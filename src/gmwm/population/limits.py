@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from types import MappingProxyType
 from typing import Any
 
 from gmwm._core import checks
@@ -29,7 +28,7 @@ def checked(limits: Any) -> Limits:
         ):
             raise InputError(f"limits of {checks.shown(name)} = {checks.shown(own)}: {hint}")
         found[name] = {k: checks.positive(f"limit {k} of {name}", v, hint) for k, v in own.items()}
-    return MappingProxyType(found)
+    return found
 
 
 def grid_of(limits: Limits, structures: Sequence[Structure], units: Sequence[Unit]) -> Grid:

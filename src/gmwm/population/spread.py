@@ -163,9 +163,6 @@ def spreads_of(structures: Sequence[Structure]) -> tuple[Spread, ...]:
     return tuple(Spread(*each, level) for each in found)
 
 
-# -- tolerance limits: what holds for most units when only some were measured ----------------------
-
-
 @lru_cache
 def one_sided_factor(n: int, content: float = CONTENT, confidence: float = CONFIDENCE) -> float:
     """Factor k of the upper limit ``mean + k * sd`` of normal units.
@@ -190,11 +187,6 @@ def rank_of_limit(n: int, content: float = CONTENT, confidence: float = CONFIDEN
     ranks = np.arange(1, n + 1)
     good = ranks[binom.cdf(n - ranks, n, content) >= confidence]
     return int(good[-1]) if good.size else None
-
-
-def content_of_largest(n: int, confidence: float = CONFIDENCE) -> float:
-    """Fraction of all units that the largest of ``n`` values is a limit for."""
-    return float((1.0 - confidence) ** (1.0 / n))
 
 
 def needed_units(content: float = CONTENT, confidence: float = CONFIDENCE) -> int:

@@ -66,10 +66,6 @@ class Structure:
         """The numbers of units with a valid model."""
         return {name: own for name, own in self.numbers.items() if name not in self.invalid}
 
-    def model_of(self, name: str) -> str:
-        """Title of the lot's model if the unit's numbers come from it, else empty."""
-        return "" if name in self.own or name in self.invalid else self.model
-
 
 @dataclass(frozen=True)
 class Choice:

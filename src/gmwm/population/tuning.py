@@ -27,7 +27,6 @@ LEAST_FOR_OUTLIERS = 5  # units; with fewer, half of them may be the odd ones
 # Fleets simulated for the distance of an outlier, whose level is then known to a fifth; and the
 # most numbers drawn, which takes 0.2 s.
 SIMULATED, MOST_SIMULATED = 40_000, 8_000_000
-LENGTHS = 2.0  # ratio of the longest to the shortest recording above which it is reported
 
 LIKELY = 4  # structures tried for a lot of those selected for its units, beside the simple ones
 # Of the criterion, from which a unit is taken to contradict a structure: it does not outvote three

@@ -119,12 +119,13 @@ def _of_channel(unit: Unit, name: str, fit: Fit, structure: Structure) -> Iterat
     """Rows of a channel, without the columns of the unit."""
     assert isinstance(unit.result, Calibration)
     notices = [*fit.notices, *(n for n in unit.result.notices if n.where in ("", name))]
-    is_valid = unit.name not in structure.invalid
+    is_valid = unit.name in structure.usable
+    is_common = is_valid and unit.name not in structure.own
     reasons = [] if is_valid else [reason for reason, is_met in fit.reasons.items() if not is_met]
     own = {
         "channel": name,
         "quantity": fit.wv.quantity,
-        "model": structure.model_of(unit.name) or fit.model.title(),
+        "model": structure.model if is_common else fit.model.title(),
         "valid": is_valid,
         "reasons": reasons,
         "notices": list(dict.fromkeys(n.code for n in notices if n.severity != "good")),

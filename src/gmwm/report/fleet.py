@@ -19,7 +19,6 @@ from gmwm.population import (
     LETTERS,
     Fleet,
     Spread,
-    content_of_largest,
     in_words,
     needed_units,
     outlier_distance,
@@ -49,7 +48,6 @@ def write_fleet_report(fleet: Fleet, path: str | os.PathLike[str]) -> Path:
         content=f"{100.0 * CONTENT:g} %",
         confidence=f"{100.0 * CONFIDENCE:g} %",
         needed=needed_units(),
-        largest=_largest(fleet),
         groups=_groups(fleet),
         outliers=sorted(
             ((each, spread) for spread in fleet.spreads for each in spread.outliers),
@@ -92,18 +90,6 @@ def _verdict(fleet: Fleet) -> dict[str, str]:
     elif valid < len(fleet) or apart or not fleet.meets_limits:
         state, word = "care", "With exceptions"
     return {"state": state, "word": word, "text": text}
-
-
-def _largest(fleet: Fleet) -> str:
-    """What the largest value promises, of so few units."""
-    n = len(fleet.done)
-    if n >= needed_units():
-        return ""
-    return (
-        f"A distribution-free limit needs {needed_units()} units. The largest of {n} values is "
-        f"such a limit for {100.0 * content_of_largest(n):.3g} % of all units with "
-        f"{100.0 * CONFIDENCE:g} % confidence."
-    )
 
 
 def _groups(fleet: Fleet) -> list[dict[str, Any]]:

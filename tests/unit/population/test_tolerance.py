@@ -5,7 +5,6 @@ import pytest
 from scipy.stats import beta, norm
 
 from gmwm.population import (
-    content_of_largest,
     needed_units,
     one_sided_factor,
     rank_of_limit,
@@ -43,7 +42,6 @@ def test_a_limit_of_any_distribution_takes_59_units():
     assert (needed_units(), needed_units(0.9, 0.9)) == (59, 22)
     assert (rank_of_limit(58), rank_of_limit(59)) == (None, 1)
     assert rank_of_limit(1) is None
-    assert content_of_largest(59) == pytest.approx(0.95, abs=1e-3)
 
 
 @pytest.mark.parametrize("n", [59, 92, 93, 181, 1000])
