@@ -153,7 +153,7 @@ class Fleet(Mapping[str, Calibration | Notice]):
             lines += ["", *plain_table(heads, rows).splitlines(), ""]
             lines += wrapped(
                 "Limit: 95 % of units are below this (95 % confidence, log-normal). Spread: "
-                "1 sigma, estimation errors included."
+                "1 sigma, estimation errors included. A unit is named in 5 % of lots of equal ones."
             )
         for model in dict.fromkeys(each.model for each in self.structures if each.model):
             axes = ", ".join(each.channel for each in self.structures if each.model == model)
