@@ -29,6 +29,7 @@ from gmwm.report.pictures import strip
 _TITLES = {"N": "N, random walk", "B": "B, bias instability", "K": "K, rate random walk"}
 _MARKS = {"pass": "good", "FAIL": "bad", "?": "care", "none": "bad"}
 _MOSTLY = 0.5  # of the variance between units, which longer recordings would make less
+_WIDE = 0.05  # spread from which that is worth it
 
 
 @page_of(Fleet)
@@ -116,11 +117,12 @@ def _row(spread: Spread) -> dict[str, Any]:
         return brief(value * scale, 3) if np.isfinite(value) else "-"
 
     bounds, share = int(np.count_nonzero(~spread.found)), spread.of_estimation
+    is_uncertain = share > _MOSTLY and spread.sd > _WIDE
     remarks = [
         remark
         for is_said, remark in (
             (bounds, f"{bounds} of them upper limits"),
-            (share > _MOSTLY, f"{min(share, 1.0):.0%} is estimation error: record longer"),
+            (is_uncertain, f"{100.0 * min(share, 1.0):.0f} % is estimation error: record longer"),
         )
         if is_said
     ]
