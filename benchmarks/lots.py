@@ -49,7 +49,7 @@ def row(title: str, lots: Sequence[Fleet], truths: Sequence[float], planted: str
     """Print what was found in some lots."""
     false = [{name for name in lot.findings if name != planted} for lot in lots]
     errors = [
-        numbers["N"].value / truth - 1.0
+        (numbers["N"].value or 0.0) / truth - 1.0
         for lot in lots
         for (name, numbers), truth in zip(lot.structures[0].numbers.items(), truths, strict=True)
         if name != planted
