@@ -32,7 +32,7 @@ from gmwm.population.spread import Spread, needed_units, spreads_of
 from gmwm.population.store import Index, Listed, Store, opened_store
 from gmwm.population.structure import Choice, Structure
 from gmwm.population.task import OUTPUTS, Paths, Task, recordings
-from gmwm.population.unit import SCHEMA, Row, Unit, rows_of
+from gmwm.population.unit import LETTERS, SCHEMA, Row, Unit, rows_of
 from gmwm.process import Model, Process
 
 if TYPE_CHECKING:
@@ -235,6 +235,11 @@ class Fleet(Mapping[str, Calibration | Notice]):
         index = Index.load(path)
         store = Store(path.parent, index.options)
         units = {each.path: store.load(each) for each in index.units}
+        stored = {each.channel: each.numbers for each in index.structures}
+        for unit in units.values():
+            for channel in unit.result if isinstance(unit.result, Calibration) else ():
+                if {*stored.get(channel, {}).get(unit.name, {})} != {*LETTERS}:
+                    raise InputError(f"{path}: lacks {channel} of {unit.name}: resume the fleet")
         return cls(units, index.structures, index.options, index.limits, index.notices)
 
     def _conclude(self, store: Store) -> None:

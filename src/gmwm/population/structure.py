@@ -28,7 +28,7 @@ _SIMPLE = (
 )
 """Structures that are tried for every lot."""
 
-_ORDER = (WhiteNoise, RandomWalk, GaussMarkov)
+_ORDER: dict[type[Process], int] = {WhiteNoise: 0, RandomWalk: 1, GaussMarkov: 2}
 
 _SUPERFLUOUS = {
     *("amplitude-bound", "confounded", "indistinct-terms", "redundant-term", "search-limit"),
@@ -135,12 +135,7 @@ def _noise(model: Model) -> Model:
     terms = [term for term in model.opened().terms if _is_common(term)]
     if not any(term.is_white for term in terms):
         terms.insert(0, WhiteNoise())
-
-    def place(term: Process) -> int:
-        kinds = [isinstance(term, kind) for kind in _ORDER]
-        return kinds.index(True) if any(kinds) else len(kinds)
-
-    return Model(tuple(sorted(terms, key=place)))
+    return Model(tuple(sorted(terms, key=lambda term: _ORDER.get(type(term), len(_ORDER)))))
 
 
 def _fitted(fits: Mapping[str, Fit], noise: Model) -> dict[str, Fit]:

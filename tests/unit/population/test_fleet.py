@@ -418,6 +418,7 @@ def test_a_fleet_is_loaded_from_its_folder(outputs, copied):
     text = (copied / "fleet.json").read_text()
     for old, new in (
         ('"limits": {}', '"limits": {"gyro": {"N": -1.0}}'),
+        ('"channel": "gyro_x"', '"channel": "gyro_z"'),
         ('"unit 0"', '"../unit 0"'),
         ("unit 0", "unit 7"),
         (text[300:], ""),
