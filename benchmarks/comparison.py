@@ -11,7 +11,7 @@ import numpy as np
 
 from gmwm import GaussMarkov, RandomWalk, Sinusoid, WhiteNoise
 from gmwm.estimate import estimate
-from gmwm.population import AxisComparison, AxisNumbers, Equality
+from gmwm.population import AxisComparison, Equality, Structure
 from gmwm.population.compare import _holm
 
 DT, N = 0.01, 30_000
@@ -39,9 +39,8 @@ def fitted(truth, seed, n=N, gaps=0.0):
 def axis(fits):
     test = Equality.of(fits)
     named = {str(place): fit for place, fit in enumerate(fits)}
-    numbers = AxisNumbers({}, None, None, {}, {})
-    nan = float("nan")
-    return AxisComparison("x", named, {}, test, test.p_value, None, (), numbers, nan)
+    structure = Structure("x", "", "", {}, (), (), {})
+    return AxisComparison("x", named, {}, test, test.p_value, structure, {})
 
 
 def agreement(runs):

@@ -703,9 +703,6 @@ _POPULATION = (
         severity="note"),
     _population("left-over", "the folder also holds {units} calibration{units:s?} of other "
         "recordings: {names}", severity="note"),
-    _population("lengths-differ", "recordings are from {shortest:.6g} s ({name}) to {longest:.6g} "
-        "s long: short ones scatter more", severity="note"),
-    _population("no-joint-model", "{error}"),
     _population("no-numbers", "{error}"),
     _population("not-noise", "{bad}", "not compared: the curve is not noise alone"),
     _population("rates-differ", {

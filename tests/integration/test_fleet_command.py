@@ -29,12 +29,17 @@ def lot(tmp_path):
 
 def test_a_fleet_is_calibrated_and_gone_on_with(run, lot, tmp_path):
     code, printed, reported = run("fleet", lot, *READING, "-o", "out")
-    assert code == 0
+    assert code == 1  # a file failed
     assert "3 units: 2 calibrated" in printed
     assert "- bad: bad.npz is not an NPZ file" in printed
     assert reported.startswith("gmwm: 1 file cannot be used; the first: bad.npz")
     names = [path.name for path in sorted((tmp_path / "out").iterdir())]
-    assert names == [".lock", "calibrations", "fleet.html", "fleet.json", "fleet.parquet"]
+    assert names == [
+        ".lock",
+        "calibrations",
+        "fleet.csv",
+        *(f"fleet.{each}" for each in ("html", "json", "parquet")),
+    ]
     table = pq.read_table(tmp_path / "out" / "fleet.parquet")
     assert set(table["device"].to_pylist()) == {"bad", "unit 0", "unit 1"}
 
@@ -42,15 +47,23 @@ def test_a_fleet_is_calibrated_and_gone_on_with(run, lot, tmp_path):
     assert (code, reported.count("\n")) == (2, 1)
     assert "--resume, or -o FOLDER" in reported
     code, printed, _ = run("fleet", lot, *READING, "-o", "out", "--resume", "--json")
-    assert code == 0
+    assert code == 1
     assert json.loads(printed)["schema"] == "gmwm.fleet"
-    code, printed, reported = run("fleet", lot, *READING, "-o", "out", "--horizon", 9, "--resume")
+    code, printed, reported = run("fleet", lot, *READING, "-o", "out", "--start", 9, "--resume")
     assert (code, printed) == (2, "")
-    assert "another fleet (other horizon)" in reported
+    assert "another fleet (other start)" in reported
 
     # A calibration of a fleet is one as any other.
     code, printed, _ = run("bound", tmp_path / "out" / "calibrations" / "unit 0.json")
     assert (code, "gyro_x" in printed) == (0, True)
+
+
+@pytest.mark.parametrize(("n", "status", "word"), [("0.003", 0, "1 of 1"), ("0.0001", 1, "FAIL N")])
+def test_limits_decide_the_status(run, lot, tmp_path, n, status, word):
+    (tmp_path / "limits.yaml").write_text(f"gyro: {{N: {n} rad/s/sqrt(Hz)}}")
+    chosen = ("lot 7/unit 0.npz", *READING, "-o", "out", "--limits", "limits.yaml")
+    code, printed, _ = run("fleet", *chosen)
+    assert (code, word in printed) == (status, True)
 
 
 def test_where_no_model_is_valid_it_says_so(run, tmp_path):
@@ -70,6 +83,7 @@ def test_where_no_model_is_valid_it_says_so(run, tmp_path):
         (("lot 7/unit*", "--jobs", "1"), "(on the command line: --rate 100 --gyro-unit deg/s)"),
         (("lot 7/*", *READING, "--cluster", "nonsense://x"), "no Dask scheduler answers"),
         (("lot 7/*", *READING[:-4], "--leave", "all", "--model", "X"), "--model X"),
+        (("lot 7/*", *READING, "--limits", "lot 7/bad.npz"), "holds no sensors"),
         ((), "Missing argument"),
     ],
 )

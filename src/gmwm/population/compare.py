@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import replace
 from itertools import chain, count
 from pathlib import PurePath
@@ -15,25 +14,17 @@ import numpy as np
 
 from gmwm._core import checks
 from gmwm._core.distributions import chi2
-from gmwm._core.typing import FloatArray, Progress
-from gmwm.calibration import Calibration, calibrate, upper_limit
+from gmwm._core.typing import Progress
+from gmwm.calibration import Calibration, calibrate
 from gmwm.errors import InputError, printable
-from gmwm.estimate import Fit, JointFit
-from gmwm.estimate.problem import Scales
-from gmwm.estimate.result import between
+from gmwm.estimate import Fit
 from gmwm.filter_numbers import AxisFilterNumbers, bound
 from gmwm.issues import Notice, notice
 from gmwm.population import tuning
-from gmwm.population.comparison import (
-    AxisComparison,
-    AxisNumbers,
-    ParameterSpread,
-    SensorComparison,
-)
+from gmwm.population.comparison import AxisComparison, SensorComparison
 from gmwm.population.curves import Equality
-from gmwm.process import Process
+from gmwm.population.structure import Choice
 from gmwm.readers import Recording, is_frame
-from gmwm.selection import select
 
 _LONGEST_LABEL = 28  # characters
 
@@ -47,9 +38,9 @@ def compare(
     """Compare calibrations of a sensor on several days, or of several units of a kind.
 
     Structures of models differ between recordings of one sensor far more than curves do. So curves
-    are tested for equality, level by level with their covariances; one structure is selected for
-    all recordings, and its parameters are compared; and `gmwm.bound` gives N and K for a filter,
-    whatever the structure.
+    are tested for equality, level by level with their covariances; N, B and K come from one
+    structure for all recordings, as in `gmwm.fleet`; and `gmwm.bound` gives N and K for a
+    filter, whatever the structure.
 
     Parameters
     ----------
@@ -122,9 +113,6 @@ def compare(
     spread = {"recordings": len(calibrations), "factor": high}
     notices.append(notice("few-recordings", values=spread, low=low))
     return SensorComparison(calibrations, axes, horizon, tuple(notices))
-
-
-# -- what is compared -----------------------------------------------------------------------------
 
 
 def _calibration(source: Any) -> Calibration:
@@ -242,9 +230,6 @@ def _unlike(fits: Mapping[str, Fit]) -> dict[str, Notice]:
     return found
 
 
-# -- what is found --------------------------------------------------------------------------------
-
-
 def _axis(
     name: str,
     members: tuple[dict[str, Fit], dict[str, Notice]],
@@ -253,11 +238,8 @@ def _axis(
 ) -> tuple[AxisComparison, list[Notice]]:
     """A channel: its fits, recordings left out, test and p-value, made into a comparison."""
     (fits, out), (test, p_value) = members, tested
-    found = joint_fit(list(fits.values())) if len(fits) > 1 else None
-    joint = found if isinstance(found, JointFit) else None
-    notices = [found] if isinstance(found, Notice) else []
-    numbers, problems = axis_numbers(name, fits, joint, horizon)
-    notices += problems
+    structure = Choice({name: fits}, is_given=False)(name)
+    covering, notices = _covering(name, fits, horizon)
     for label, fit in fits.items():
         codes = ", ".join(n.code for n in fit.notices if n.severity == "bad")
         if codes:
@@ -266,11 +248,7 @@ def _axis(
                 "fit-not-valid", name, values, variant="compared", severity="note", hint=hint
             )
             notices.append(replace(invalid, source=label))
-    inflation = float("nan")
-    if joint and test and test.tau.size:
-        inflation = curve_inflation(list(fits.values()), joint, float(test.tau[-1]))
-    rows = parameter_spreads(joint) if joint else ()
-    axis = AxisComparison(name, fits, out, test, p_value, joint, rows, numbers, inflation)
+    axis = AxisComparison(name, fits, out, test, p_value, structure, covering)
     return axis, notices
 
 
@@ -284,97 +262,21 @@ def _holm(p_values: Mapping[str, float]) -> dict[str, float]:
     return adjusted
 
 
-def joint_fit(fits: Sequence[Fit]) -> JointFit | Notice:
-    """The model selected for all recordings of a channel, or why there is none."""
-    dt = fits[0].wv.dt
-    # Rates may differ by as much as clocks do; averaging times are taken as those of the first.
-    curves = [
-        wv if wv.dt == dt else replace(wv, dt=dt, tau=wv.tau * (dt / wv.dt))
-        for wv in (fit.wv for fit in fits)
-    ]
-    # The largest line and the largest resonance, with a free amplitude.
-    largest: dict[str, tuple[float, Process]] = {}
-    for term in (term for fit in fits for term in fit.model.terms):
-        size = term.linear_parameter
-        if size is not None and "frequency" in term.values:
-            kind, amplitude = type(term).__name__, term.values[size.name] or 0.0
-            if kind not in largest or amplitude > largest[kind][0]:
-                largest[kind] = amplitude, term.with_values(**{size.name: None})
-    try:
-        extra = tuple(largest[kind][1] for kind in sorted(largest))
-        found = select(curves, extra=extra).fit
-    except InputError as error:
-        return notice("no-joint-model", fits[0].wv.name, error=error)
-    assert isinstance(found, JointFit)
-    return found
-
-
-def parameter_spreads(joint: JointFit) -> tuple[ParameterSpread, ...]:
-    """The parameters of a joint fit, one by one."""
-    parts = [{each.key: each for each in part.estimates} for part in joint.parts]
-    found = []
-    for own in joint.estimates:
-        each = tuple(part.get(own.key) for part in parts)
-        known = [e for e in each if e is not None and e.kind == "estimated" and e.stderr]
-        spread = p_value = float("nan")
-        if len(known) > 1:
-            values, errors = np.array([[e.value, e.stderr or np.nan] for e in known]).T
-            if np.all(values > 0.0):
-                spread, p_value = between(np.log(values), (errors / values) ** 2.0)
-            else:
-                spread, p_value = between(values, errors**2.0)
-                spread /= abs(float(np.mean(values)) or 1.0)
-        found.append(ParameterSpread(own, each, spread, p_value))
-    return tuple(found)
-
-
-def axis_numbers(
-    name: str, fits: Mapping[str, Fit], joint: Fit | None, horizon: float
-) -> tuple[AxisNumbers, tuple[Notice, ...]]:
-    """Filter numbers of a channel from its fits by recording, and what could not be found."""
-    each: dict[str, AxisFilterNumbers] = {}
+def _covering(
+    name: str, fits: Mapping[str, Fit], horizon: float
+) -> tuple[dict[str, AxisFilterNumbers], list[Notice]]:
+    """Filter numbers that cover all recordings of a channel, by recording, and what is missing."""
     notices = []
+    # The end of a name tells `bound` whether a gyro turns the heading.
+    group = {f"{label} {name}": fit for label, fit in fits.items()}
     for label, fit in fits.items():
         try:
-            each[label] = bound(fit, horizon=horizon)
+            bound(fit, horizon=horizon)
         except InputError as error:
+            del group[f"{label} {name}"]
             notices.append(replace(notice("no-numbers", name, error=error), source=label))
-    if not each:
-        return AxisNumbers({}, None, None, {}, {}), tuple(notices)
-    whole = covering = None
-    nees: dict[str, float] = {}
     try:
-        whole = None if joint is None else bound(joint, horizon=horizon)
-        # The end of a name tells `bound` whether a gyro turns the heading.
-        group = {f"{place} {name}": fits[label] for place, label in enumerate(each)}
-        found = bound(group, horizon=horizon, shared=True)
-        covering = next(iter(found.values()))
-        own = (numbers.nees[horizon] for numbers in found.values())
-        nees = dict(zip(each, own, strict=True))
+        found = bound(group, horizon=horizon, shared=True) if group else {}
     except InputError as error:
-        notices.append(notice("no-numbers", name, error=error))
-    upper: dict[str, float] = {}
-    for letter in "NK":
-        for fit in fits.values() if covering and getattr(covering, letter) == 0.0 else ():
-            with suppress(InputError):  # this recording gives no limit
-                upper[letter] = max(upper_limit(fit, letter), upper.get(letter, 0.0))
-    return AxisNumbers(each, whole, covering, nees, upper), tuple(notices)
-
-
-def curve_inflation(fits: Sequence[Fit], joint: Fit, longest: float) -> float:
-    """Factor on the joint model's amplitudes that covers the curves of all recordings.
-
-    The largest ratio, at least one, of the Allan deviation of a recording's own model to that of
-    the joint model, from 0.1 s (or ten samples) to ``longest`` (s); NaN if there is no such time.
-    """
-    low = max(tuning.FINEST_TIME, tuning.FINEST_SAMPLES * joint.wv.dt)
-    tau = joint.wv.tau[(joint.wv.tau >= low) & (joint.wv.tau <= longest)]
-    if tau.size == 0:
-        return float("nan")
-
-    def variance(fit: Fit) -> FloatArray:
-        scales = replace(Scales.of(fit.wv), tau=tau)
-        return np.sum([scales.curve(t) for t in fit.model.terms if not t.is_drift], axis=0)
-
-    ratios = np.array([variance(fit) for fit in fits]) / variance(joint)
-    return float(max(1.0, np.sqrt(np.max(ratios))))
+        return {}, [*notices, notice("no-numbers", name, error=error)]
+    return {label.removesuffix(f" {name}"): each for label, each in found.items()}, notices

@@ -7,7 +7,7 @@ import os
 import re
 from collections import Counter
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -21,11 +21,13 @@ from gmwm._core.text import Printed, brief, bullets, per_cent, wrapped
 from gmwm._core.units import customary_unit
 from gmwm.calibration import Calibration
 from gmwm.errors import MissingNameError
-from gmwm.estimate import Estimate, Fit, JointFit
+from gmwm.estimate import Fit
 from gmwm.filter_numbers import AxisFilterNumbers
 from gmwm.issues import Notice, worst_first
 from gmwm.population import tuning
 from gmwm.population.curves import Difference, Equality
+from gmwm.population.structure import Structure
+from gmwm.population.unit import LETTERS
 
 if TYPE_CHECKING:
     import pandas
@@ -40,66 +42,12 @@ STATES: dict[State, str] = {
 }
 """Verdicts in words, the best first."""
 
-_UNITS = {"N": "u/sqrt(Hz)", "K": "u/s/sqrt(Hz)"}
 _NAMES = {"short": "short times", "R": "drift"}
 
 
 def _percent(share: float) -> str:
     """A relative difference; a factor from one on."""
     return per_cent(share) if share < 0.995 else f"a factor of {brief(1.0 + share)}"
-
-
-@dataclass(frozen=True)
-class ParameterSpread:
-    """One parameter of the joint model in all recordings.
-
-    joint: Estimate from all recordings together.
-    each: Estimate of the same structure from each compared recording; ``None`` where it has none.
-    spread: Relative standard deviation between recordings beyond their standard errors; NaN where
-        fewer than two determine it, or one has all the weight.
-    p_value: Of the test that it is the same in all of them; NaN likewise.
-    """
-
-    joint: Estimate
-    each: tuple[Estimate | None, ...]
-    spread: float
-    p_value: float
-
-    @property
-    def key(self) -> str:
-        """Name of the parameter."""
-        return self.joint.key
-
-
-@dataclass(frozen=True)
-class AxisNumbers:
-    """N and K of an axis for a filter, for outages up to the horizon.
-
-    each: Recording -> the bound of its own model.
-    joint: The bound of the joint model.
-    covering: One pair of numbers that bounds the models of all recordings.
-    nees: Recording -> normalised error squared that a filter with the covering numbers predicts
-        after the outage; 1 is right, below 1 conservative.
-    upper: Letters that no recording determines -> the largest of their 95 % upper limits.
-    """
-
-    each: Mapping[str, AxisFilterNumbers]
-    joint: AxisFilterNumbers | None
-    covering: AxisFilterNumbers | None
-    nees: Mapping[str, float]
-    upper: Mapping[str, float]
-
-    def value(self, letter: str) -> float:
-        """The covering N or K, or the upper limit where no recording determines it; else NaN."""
-        found = getattr(self.covering, letter) if self.covering is not None else float("nan")
-        return self.upper.get(letter, float("nan")) if found == 0.0 else float(found)
-
-    def inflation(self, letter: str) -> float:
-        """The covering number over that of the joint model; NaN where one is missing."""
-        if self.joint is None or self.covering is None:
-            return float("nan")
-        own = getattr(self.joint, letter)
-        return float(getattr(self.covering, letter) / own) if own > 0.0 else float("nan")
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,11 +58,9 @@ class AxisComparison:
     left_out: Recording that is not -> why.
     equality: Test of the curves; ``None`` where fewer than two recordings are compared.
     p_value: p-value of that test, adjusted for the number of channels (Holm); NaN without a test.
-    joint: The model recommended for all of them.
-    parameters: Parameters of the joint model.
-    numbers: N and K for a filter.
-    curve_inflation: Factor on the amplitudes of the joint model with which its curve is nowhere
-        below the one of a recording's own model; NaN without a joint model.
+    structure: One model structure for all of them, and N, B and K of each from it.
+    covering: Recording -> one pair of N and K for a filter that bounds the models of all, with the
+        ``nees`` that a filter with it predicts there; 1 is right, below 1 conservative.
     """
 
     name: str
@@ -122,18 +68,16 @@ class AxisComparison:
     left_out: Mapping[str, Notice]
     equality: Equality | None
     p_value: float
-    joint: JointFit | None
-    parameters: tuple[ParameterSpread, ...]
-    numbers: AxisNumbers
-    curve_inflation: float
+    structure: Structure
+    covering: Mapping[str, AxisFilterNumbers]
 
     def __post_init__(self) -> None:
-        freeze(self, "fits", "left_out")
+        freeze(self, "fits", "left_out", "covering")
 
     @property
     def quantity(self) -> str:
         """The kind of sensor: gyro, accel, or nothing."""
-        return next(iter(self.fits.values())).wv.quantity or "" if self.fits else ""
+        return self.structure.quantity
 
     @property
     def differences(self) -> tuple[Difference, ...]:
@@ -185,11 +129,28 @@ class AxisComparison:
             text = f"{words} {', '.join(parts)}"
         return f"{text}; without {out}" if out else text
 
-    def number_text(self, letter: str, value: float) -> tuple[str, str]:
-        """An N or a K in the data-sheet unit, and that unit."""
-        unit, scale = customary_unit(_UNITS[letter], self.quantity, "u")
-        text = f"{value * scale:.3g}"
-        return (f"{float(text):,.0f}" if "e+" in text else text), unit
+    def for_filter(self, letter: str) -> tuple[float, bool]:
+        """N or K that covers all recordings, NaN without one, and whether it is an upper limit."""
+        found = next((getattr(each, letter) for each in self.covering.values()), float("nan"))
+        ends = [own[letter].upper for own in self.structure.usable.values()]
+        limit = max(filter(np.isfinite, ends), default=float("nan"))
+        return (float(found), False) if found != 0.0 else (limit, True)
+
+    def number_text(self, letter: str, *values: float) -> tuple[str, str]:
+        """N, B or K in the data-sheet unit, or their range, and that unit."""
+        unit, scale = customary_unit(LETTERS[letter], self.quantity, "u")
+        texts = [f"{value * scale:.3g}" for value in values]
+        texts = [f"{float(text):,.0f}" if "e+" in text else text for text in texts]
+        return " to ".join(dict.fromkeys(texts)), unit
+
+    def range_of(self, letter: str) -> tuple[str, str]:
+        """Smallest to largest N, B or K of the recordings, and the unit; else the largest limit."""
+        own = [each[letter] for each in self.structure.usable.values()]
+        if known := [value for each in own if (value := each.value) is not None]:
+            return self.number_text(letter, min(known), max(known))
+        largest = max((each.upper for each in own), default=np.inf)
+        text, unit = self.number_text(letter, largest)
+        return (f"<= {text}", unit) if np.isfinite(largest) else ("not limited", "")
 
     def to_dict(self) -> dict[str, Any]:
         """In JSON types, SI."""
@@ -205,22 +166,8 @@ class AxisComparison:
                 | {name: getattr(d, name).tolist() for name in ("ratios", "errors")}
                 for d in (equality.differences if equality else ())
             ],
-            "joint": None if self.joint is None else self.joint.to_dict(),
-            "equality_p": self.joint.equality_p if self.joint else None,
-            "parameters": [
-                {"key": p.key, "joint": p.joint.to_dict(), "spread": p.spread, "p_value": p.p_value}
-                | {"each": [None if e is None else e.to_dict() for e in p.each]}
-                for p in self.parameters
-            ],
-            "numbers": {
-                "each": {label: each.row() for label, each in self.numbers.each.items()},
-                "joint": self.numbers.joint.row() if self.numbers.joint else None,
-                "covering": self.numbers.covering.row() if self.numbers.covering else None,
-                "nees": dict(self.numbers.nees),
-                "upper_bounds": dict(self.numbers.upper),
-                "inflation": {k: self.numbers.inflation(k) for k in _UNITS},
-            },
-            "curve_inflation": self.curve_inflation,
+            "structure": asdict(self.structure),
+            "filter_numbers": {label: each.row() for label, each in self.covering.items()},
         }
         return dict(json.loads(to_json(content, inf_nan_mode="null")))
 
@@ -281,7 +228,7 @@ class SensorComparison(Mapping[str, AxisComparison], Printed):
         return f"<SensorComparison of {self.summary}>"
 
     def __str__(self) -> str:
-        """Verdicts, what was found, and the numbers for a filter; 80 columns."""
+        """Verdicts, N, B and K, the numbers for a filter and what was found; 80 columns."""
         lines = [self.summary]
         for place, (label, each) in enumerate(self.calibrations.items(), 1):
             size = f"{each.duration:,.6g} s at {each.rate:.6g} Hz"
@@ -290,26 +237,28 @@ class SensorComparison(Mapping[str, AxisComparison], Printed):
         lines.append("")
         for name, axis in self.items():
             lines += wrapped(axis.sentence, first=f"{name:<{width}}  ", indent=width + 2)
+        lines += ["", "Sensor numbers, smallest to largest:"]
+        for name, axis in self.items():
+            known = [f"{key} {' '.join(axis.range_of(key))}" for key in LETTERS]
+            text = ", ".join(known) if axis.structure.usable else "none: no valid model"
+            lines += wrapped(text, first=f"{name:<{width}}  ", indent=width + 2)
         lines += ["", f"Filter numbers for outages up to {self.horizon:g} s that cover all:"]
         for name, axis in self.items():
-            lines += wrapped(self._numbers(axis), first=f"{name:<{width}}  ", indent=width + 2)
+            found = []
+            for key in "NK":
+                value, is_limit = axis.for_filter(key)
+                if np.isfinite(value):
+                    shown = " ".join(axis.number_text(key, value))
+                    found.append(f"{key} {'<= ' * is_limit}{shown}")
+            own = len(axis.covering)
+            few = f" (of {own} only)" if own < len(self.labels) else ""
+            text = ", ".join(found) + few if found else "none: no recording can be used"
+            lines += wrapped(text, first=f"{name:<{width}}  ", indent=width + 2)
         lines += wrapped(self.promise)
         # The verdicts stand above.
         others = [each for each in self.notices if not each.code.startswith("curves-")]
         lines += bullets(worst_first(others))
         return "\n".join(lines)
-
-    def _numbers(self, axis: AxisComparison) -> str:
-        found, own = [], len(axis.numbers.each)
-        for letter in _UNITS:
-            value, ratio = axis.numbers.value(letter), axis.numbers.inflation(letter)
-            if np.isfinite(value):
-                sign = "<= " if letter in axis.numbers.upper else ""
-                times = f" ({ratio:.2f} x joint)" if np.isfinite(ratio) else ""
-                shown = " ".join(axis.number_text(letter, value))
-                found.append(f"{letter} {sign}{shown}{times}")
-        few = f" (of {own} only)" if own < len(self.labels) else ""
-        return ", ".join(found) + few if found else "none: no recording can be used"
 
     @property
     def promise(self) -> str:
@@ -345,11 +294,13 @@ class SensorComparison(Mapping[str, AxisComparison], Printed):
             for worst in axis.main[:1]:
                 row |= {key: getattr(worst, key) for key in ("part", "extent", "sigma")}
             row["recordings"] = len(axis.fits)
-            row["model"] = axis.joint.model.title() if axis.joint else ""
-            for letter in _UNITS:
-                row[letter] = axis.numbers.value(letter)
-                row[f"{letter}_inflation"] = axis.numbers.inflation(letter)
-            rows.append(row | {"curve_inflation": axis.curve_inflation})
+            row["model"], usable = axis.structure.model, axis.structure.usable.values()
+            for letter in LETTERS:
+                known = [value for own in usable if (value := own[letter].value) is not None]
+                row[f"{letter}_lowest"] = min(known, default=np.nan)
+                row[f"{letter}_highest"] = max(known, default=np.nan)
+            row |= {f"filter_{letter}": axis.for_filter(letter)[0] for letter in "NK"}
+            rows.append(row)
         return frame(rows, tuple(rows[0]))
 
     def report(

@@ -1,7 +1,8 @@
-"""`fleet`: many units of a sensor, each calibrated by itself, and what they have in common."""
+"""`fleet`: many units of a sensor, their sensor numbers, and which of them stand apart."""
 
 from __future__ import annotations
 
+import csv
 import os
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import closing, nullcontext
@@ -19,16 +20,19 @@ from gmwm._core.frozen import freeze
 from gmwm._core.jobs import results
 from gmwm._core.pages import make
 from gmwm._core.tables import cell, frame, plain_table
-from gmwm._core.text import bullets, per_cent, wrapped
+from gmwm._core.text import brief, bullets, per_cent, wrapped
 from gmwm._core.typing import Progress
 from gmwm.calibration import Calibration
 from gmwm.errors import InputError, MissingNameError, printable
+from gmwm.estimate import Fit
 from gmwm.issues import Notice, notice
 from gmwm.population import tuning
-from gmwm.population.spread import Spread, Structures, needed_units, spreads_of, structures_of
+from gmwm.population.limits import FAIL, NONE, PASS, Grid, Limits, checked, grid_of, in_words
+from gmwm.population.spread import Spread, needed_units, spreads_of
 from gmwm.population.store import Index, Listed, Store, opened_store
+from gmwm.population.structure import Choice, Structure
 from gmwm.population.task import OUTPUTS, Paths, Task, recordings
-from gmwm.population.unit import DERIVED, SCHEMA, Row, Unit, rows_of
+from gmwm.population.unit import LETTERS, SCHEMA, Row, Unit, rows_of
 from gmwm.process import Model, Process
 
 if TYPE_CHECKING:
@@ -43,21 +47,24 @@ class Fleet(Mapping[str, Calibration | Notice]):
     ----------
     units : dict
         Path -> `Unit`.
-    horizon : float
-        Longest outage that N and K of a filter are for, s.
+    structures : tuple of Structure
+        Of every axis: the model that was chosen for all units, and N, B and K of each from it.
     options : dict
         How every unit was calibrated.
+    limits : dict
+        Sensor or channel -> letter -> largest allowed N, B or K, SI.
     notices : tuple of Notice
         Which units have no calibration, and what makes units unlike each other.
     """
 
     units: Mapping[str, Unit]
-    horizon: float
+    structures: tuple[Structure, ...]
     options: Mapping[str, Any]
+    limits: Limits
     notices: tuple[Notice, ...] = ()
 
     def __post_init__(self) -> None:
-        freeze(self, "units", "options")
+        freeze(self, "units", "options", "limits")
 
     def __getitem__(self, path: str) -> Calibration | Notice:
         if path not in self.units:
@@ -87,18 +94,39 @@ class Fleet(Mapping[str, Calibration | Notice]):
 
     @cached_property
     def rows(self) -> tuple[Row, ...]:
-        """Rows of the table: one per unit, channel and parameter."""
-        return tuple(rows_of(self.units.values()))
+        """Rows of the table: one per unit, channel and number."""
+        return tuple(rows_of(self.units.values(), self.structures))
 
     @cached_property
     def spreads(self) -> tuple[Spread, ...]:
-        """How each parameter of each axis differs over the units."""
-        return spreads_of(self.rows)
+        """How N, B and K of each axis differ over the units."""
+        return spreads_of(self.structures)
 
     @cached_property
-    def structures(self) -> tuple[Structures, ...]:
-        """Which models were selected, axis by axis."""
-        return structures_of(self.rows)
+    def findings(self) -> dict[str, str]:
+        """Units that stand apart -> in what; at 5 % for all units, axes and numbers together."""
+        found: dict[str, list[str]] = {unit.name: [] for unit in self.units.values()}
+        for each in self.spreads:
+            for unit in each.outliers:
+                times = f"{'' if unit.found else 'at most '}{brief(unit.value / each.median, 3)}"
+                found[unit.device].append(
+                    f"{each.parameter} of {each.channel} is {times} times the median"
+                )
+        for structure in self.structures:
+            for name in structure.own:
+                found[name].append(f"{structure.channel} rejects the model of the other units")
+        return {name: "; ".join(texts) for name, texts in found.items() if texts}
+
+    @cached_property
+    def grid(self) -> Grid:
+        """Unit -> channel -> letter -> "pass", "FAIL", "?" (undecided) or "none" (no number)."""
+        return grid_of(self.limits, self.structures, tuple(self.units.values()))
+
+    @property
+    def meets_limits(self) -> bool:
+        """Whether no limit is missed; one within an interval is not missed."""
+        axes = (own for row in self.grid.values() for own in row.values())
+        return not any({FAIL, NONE} & {*own.values()} for own in axes)
 
     def __repr__(self) -> str:
         failed = f", {len(self.failed)} not" if self.failed else ""
@@ -112,38 +140,51 @@ class Fleet(Mapping[str, Calibration | Notice]):
         lines = [
             f"{len(self)} units: {len(self.done)} calibrated, {valid} of them with a valid model"
         ]
-        shown = [each for each in self.spreads if each.parameter in DERIVED]
-        if shown:
+        if self.spreads:
             heads = ("channel", "number", "units", "median", "spread", "limit", "unit")
             rows = []
-            for each in shown:
+            for each in self.spreads:
                 unit, scale = each.field_unit
                 median, limit = (cell(x, scale=scale) for x in (each.median, each.normal_limit))
                 sd = per_cent(each.sd, 3) if each.sd >= 0.0 else "-"
+                if each.is_limit:
+                    sd, median = "-", f"<= {median}"
                 rows.append((each.channel, each.parameter, str(each.n), median, sd, limit, unit))
             lines += ["", *plain_table(heads, rows).splitlines(), ""]
             lines += wrapped(
-                f"filter: for outages up to {self.horizon:g} s; floor: bias instability. Limit: "
-                "95 % of units are below this (95 % confidence, log-normal)."
+                "Limit: 95 % of units are below this (95 % confidence, log-normal). Spread: "
+                "1 sigma, estimation errors included. A unit is named in 5 % of lots of equal ones."
             )
-        apart: list[str] = []
-        for axis in self.structures:
-            if axis.different:
-                usual, units = next(iter(axis.counts)), sum(axis.counts.values())
-                text = f"{axis.counts[usual]} of {units} units are {usual}"
-                apart.append(f"{axis.channel}: {text}, {axis.different} have another structure")
-            if axis.invalid:
-                apart.append(f"{axis.channel}: not valid in {_some(axis.invalid)}")
+        for model in dict.fromkeys(each.model for each in self.structures if each.model):
+            axes = ", ".join(each.channel for each in self.structures if each.model == model)
+            lines += wrapped(f"Model of all units: {model} ({axes})")
+        apart = [f"{name}: {text}" for name, text in self.findings.items()]
         apart += [
-            f"{outlier.device} stands apart in {each.parameter} of {each.channel}: "
-            f"{outlier.value / each.median:.3g} times the median"
-            for each in self.spreads
-            for outlier in each.outliers
+            f"{axis.channel}: not valid in {_some(axis.invalid)}"
+            for axis in self.structures
+            if axis.invalid
         ]
-        return "\n".join(lines + bullets([*apart, *self.notices]))
+        return "\n".join(lines + self._verdicts() + bullets([*apart, *self.notices]))
+
+    def _verdicts(self) -> list[str]:
+        """Which units miss limits, as lines of a table; all of them stand on the page."""
+        if not self.limits:
+            return []
+        missed: dict[str, dict[str, str]] = {}
+        for name, row in self.grid.items():
+            words = {axis: in_words(own) for axis, own in row.items()}
+            if {*words.values()} != {PASS}:
+                missed[name] = words
+        lines = ["", f"Limits: {len(self) - len(missed)} of {len(self)} units pass"]
+        if missed:
+            axes = list(next(iter(missed.values())))
+            rows = [(name[:20], *words.values()) for name, words in missed.items()]
+            lines += ["", *plain_table(("unit", *axes), rows).splitlines(), ""]
+            lines += wrapped("?: the 95 % interval contains the limit. none: no valid number.")
+        return lines
 
     def to_frame(self) -> pandas.DataFrame:
-        """A row per unit, channel and parameter, in SI units; needs pandas."""
+        """The table in SI units, see `gmwm.population.SCHEMA`; needs pandas."""
         return frame(self.rows, SCHEMA.names)
 
     def to_dict(self) -> dict[str, Any]:
@@ -151,9 +192,11 @@ class Fleet(Mapping[str, Calibration | Notice]):
         return {
             "schema": "gmwm.fleet",
             "schema_version": 1,
-            "horizon_s": self.horizon,
             "options": dict(self.options),
+            "limits": {name: dict(own) for name, own in self.limits.items()},
             "rows": [dict(row) for row in self.rows],
+            "findings": self.findings,
+            "verdicts": self.grid,
             "notices": [notice.to_dict() for notice in self.notices],
         }
 
@@ -192,19 +235,31 @@ class Fleet(Mapping[str, Calibration | Notice]):
         index = Index.load(path)
         store = Store(path.parent, index.options)
         units = {each.path: store.load(each) for each in index.units}
-        return cls(units, index.horizon_s, index.options, index.notices)
+        stored = {each.channel: each.numbers for each in index.structures}
+        for unit in units.values():
+            for channel in unit.result if isinstance(unit.result, Calibration) else ():
+                if {*stored.get(channel, {}).get(unit.name, {})} != {*LETTERS}:
+                    raise InputError(f"{path}: lacks {channel} of {unit.name}: resume the fleet")
+        return cls(units, index.structures, index.options, index.limits, index.notices)
 
     def _conclude(self, store: Store) -> None:
         """Write the table, the report and the list of units, all or none."""
-        _, table, page, index = OUTPUTS
+        _, table, plain, page, index = OUTPUTS
         with moved_together(store.folder) as new:
             pq.write_table(pa.Table.from_pylist(list(self.rows), schema=SCHEMA), new / table)
+            with open(new / plain, "w", encoding="utf-8", newline="") as stream:
+                lines = csv.DictWriter(stream, SCHEMA.names, lineterminator="\n")
+                lines.writeheader()
+                for row in self.rows:
+                    codes = {key: ";".join(row[key] or ()) for key in ("reasons", "notices")}
+                    lines.writerow(row | codes)
             self.report(new / page)
             listed = tuple(
                 Listed(printable(path), unit.name, self.failed.get(path))
                 for path, unit in self.units.items()
             )
-            Index(self.horizon, self.options, listed, self.notices).save(new / index)
+            found = Index(self.options, self.limits, self.structures, listed, self.notices)
+            found.save(new / index)
 
 
 def _some(names: Sequence[str]) -> str:
@@ -216,7 +271,7 @@ def fleet(
     paths: Paths,
     model: Process | Model | Mapping[str, Process | Model] | None = None,
     *,
-    horizon: float = 60.0,
+    limits: Limits | None = None,
     folder: str | os.PathLike[str] | None = None,
     resume: bool = False,
     jobs: int = 1,
@@ -226,8 +281,9 @@ def fleet(
 ) -> Fleet:
     """Calibrate many units of a sensor, one recording of each.
 
-    A recording that cannot be used is reported and costs the others nothing. For several recordings
-    of one unit use `gmwm.calibrate`.
+    A recording that cannot be used is reported and costs the others nothing. N, B and K of an axis
+    come from one model structure for all units, chosen jointly. For several recordings of one unit
+    use `gmwm.calibrate`.
 
     Parameters
     ----------
@@ -235,11 +291,12 @@ def fleet(
         The recordings; a pattern is as in ``"lot-7/**/*.csv"``.
     model : Process, Model or mapping, optional
         Fitted to every channel, or by channel or sensor ("gyro", "accel"); selected by default.
-    horizon : float, optional
-        Longest outage that N and K of a filter are for, s; see `gmwm.bound`.
+    limits : mapping, optional
+        Sensor or channel -> letter -> largest allowed N, B or K, SI, as ``{"gyro": {"N": 6e-5}}``;
+        see `Fleet.grid`.
     folder : path, optional
-        Where each calibration is kept as soon as it is done, and the table (``fleet.parquet``) and
-        the report (``fleet.html``) at the end; see `Fleet.load`.
+        Where each calibration is kept as soon as it is done, and the table (``fleet.parquet``,
+        ``fleet.csv``) and the report (``fleet.html``) at the end; see `Fleet.load`.
     resume : bool, optional
         Go on with what the folder holds: recordings that have not changed are not calibrated again.
     jobs : int, optional
@@ -261,7 +318,7 @@ def fleet(
     """
     place = None if folder is None else Path(folder)
     items = recordings(paths, place)
-    task = Task.of(model, horizon, options)
+    task, allowed = Task.of(model, options), checked({} if limits is None else limits)
     jobs = jobs if jobs == -1 else checks.whole("jobs", jobs, 1)
     if place is not None:
         for name in OUTPUTS[1:]:
@@ -286,7 +343,14 @@ def fleet(
             names = {item.name for item in items}
             if others := [each.stem for each in store.calibrations if each.stem not in names]:
                 notices.append(_of_some("left-over", others))
-        made = Fleet(units, task.horizon, task.options, tuple(notices))
+        fits: dict[str, dict[str, Fit]] = {}
+        for unit in units.values():
+            for name, fit in unit.result.items() if isinstance(unit.result, Calibration) else ():
+                fits.setdefault(name, {})[unit.name] = fit
+        choice = Choice(fits, bool(task.models))
+        chosen = dict(results(choice, list(fits), jobs=jobs, cluster=cluster if fits else None))
+        structures = tuple(chosen[name] for name in fits)
+        made = Fleet(units, structures, task.options, allowed, tuple(notices))
         if not made.done:
             first, *rest = made.failed.values()
             text = f"none of {len(rest) + 1} recordings can be calibrated; the first: "
@@ -294,9 +358,6 @@ def fleet(
         if store is not None:
             made._conclude(store)
     return made
-
-
-# -- notices --------------------------------------------------------------------------------------
 
 
 def _notices(units: Collection[Unit]) -> list[Notice]:
@@ -339,11 +400,6 @@ def _differences(done: Mapping[str, Calibration]) -> list[Notice]:
         for names, missing in lacking.items()
         if names
     ]
-    lengths = {name: each.duration for name, each in done.items()}
-    name = min(lengths, key=lengths.__getitem__)
-    values = {"shortest": lengths[name], "longest": max(lengths.values())}
-    if values["longest"] > tuning.LENGTHS * values["shortest"]:
-        notices.append(notice("lengths-differ", values=values, name=name))
     if len(done) < needed_units():
         values = {"units": len(done), "needed": needed_units()}
         notices.append(notice("few-units", values=values))

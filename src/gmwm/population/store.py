@@ -16,8 +16,9 @@ from gmwm._core.files import folder_to_fill, one_writer, written
 from gmwm.calibration import Calibration
 from gmwm.errors import InputError, printable
 from gmwm.issues import Notice
+from gmwm.population.structure import Structure
 from gmwm.population.task import Item, digest_of
-from gmwm.population.unit import Number, Unit
+from gmwm.population.unit import Unit
 
 
 @dataclass(frozen=True)
@@ -27,7 +28,6 @@ class _Origin(Document):
     path: Text
     sha256: Annotated[str, StringConstraints(pattern="^[0-9a-f]{64}$")]
     options: Mapping[str, Any]
-    numbers: Mapping[str, Mapping[str, Number]]
 
 
 @dataclass(frozen=True)
@@ -45,8 +45,9 @@ class Index(Document):
 
     SCHEMA: ClassVar[str] = "gmwm.fleet-index"
 
-    horizon_s: Positive
     options: Mapping[str, Any]
+    limits: Mapping[Text, Mapping[Text, Positive]]
+    structures: tuple[Structure, ...]
     units: tuple[Listed, ...]
     notices: tuple[Notice, ...]
 
@@ -113,14 +114,14 @@ class Store:
         except (InputError, TypeError) as error:
             hint = "move it away, or give another folder"
             raise InputError(f"{path}: {error}: {hint}") from None
-        return origin, Unit(item.path, item.name, calibration, origin.numbers, origin.sha256)
+        return origin, Unit(item.path, item.name, calibration, origin.sha256)
 
     def save(self, unit: Unit) -> None:
         """Write the calibration of a unit; if it has none, remove that of an earlier run."""
         if not isinstance(unit.result, Calibration):
             self.path(unit.name).unlink(missing_ok=True)
             return
-        origin = _Origin(printable(unit.path), unit.digest, self.options, unit.numbers).content()
+        origin = _Origin(printable(unit.path), unit.digest, self.options).content()
         with written(self.path(unit.name)) as stream:
             json.dump(unit.result.to_dict() | {"fleet": origin}, stream, indent=1, allow_nan=False)
             stream.write("\n")

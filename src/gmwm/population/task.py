@@ -9,27 +9,24 @@ import os
 import re
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from inspect import signature
 from itertools import count
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from gmwm import filter_numbers
 from gmwm._core import checks
 from gmwm._core.files import opened
 from gmwm._core.jobs import ENDED
 from gmwm._core.memory import OUT_OF_MEMORY
-from gmwm.calibration import SCREENING, axis_numbers, calibrate, upper_limit
+from gmwm.calibration import SCREENING, calibrate
 from gmwm.errors import InputError, printable
-from gmwm.estimate import Fit
 from gmwm.issues import failure
-from gmwm.population.unit import Number, Unit
+from gmwm.population.unit import Unit
 from gmwm.process import Model, as_model
 from gmwm.readers import read
 
-OUTPUTS = ("calibrations", "fleet.parquet", "fleet.html", "fleet.json")
+OUTPUTS = ("calibrations", "fleet.parquet", "fleet.csv", "fleet.html", "fleet.json")
 """What a fleet writes into its folder."""
 
 _LONGEST_NAME = 100  # characters: file systems take more, with an ending
@@ -52,7 +49,6 @@ class Task:
     start, stop: Part of the recordings, s.
     models: Channel, sensor ("gyro", "accel") or "" for all -> fitted model; selected if empty.
     still: See `gmwm.calibrate`.
-    horizon: Longest outage that N and K of a filter are for, s.
     version: Version of gmwm that all numbers come from.
     """
 
@@ -62,11 +58,10 @@ class Task:
     models: Mapping[str, Model]
     screening: tuple[str, ...]
     still: bool
-    horizon: float
     version: str
 
     @classmethod
-    def of(cls, model: Any, horizon: float, options: Mapping[str, Any]) -> Task:
+    def of(cls, model: Any, options: Mapping[str, Any]) -> Task:
         """The task of `fleet`, with its options checked before any work."""
         from gmwm._core import __version__
 
@@ -91,7 +86,6 @@ class Task:
             models={str(name): as_model(each) for name, each in models.items()},
             screening=tuple(screening),
             still=checks.truth("still", still),
-            horizon=checks.positive("horizon", horizon, "give the longest outage in seconds"),
             version=__version__,
         )
 
@@ -105,7 +99,6 @@ class Task:
             "models": {k: [t.to_dict() for t in m.terms] for k, m in self.models.items()},
             "screening": sorted(self.screening),
             "still": self.still,
-            "horizon": self.horizon,
             "version": self.version,
         }
         return dict(json.loads(json.dumps(content)))
@@ -145,8 +138,7 @@ class Task:
                 f"{item.path}: changed while it was calibrated: calibrate it again with resume",
                 "recording-changed",
             )
-        numbers = {name: _numbers(fit, self.horizon) for name, fit in calibration.items()}
-        return Unit(item.path, item.name, calibration, numbers, digest)
+        return Unit(item.path, item.name, calibration, digest)
 
 
 def _failed(item: Item, code: str, text: str) -> Unit:
@@ -165,20 +157,6 @@ def digest_of(path: str) -> str:
         why = error.strerror if isinstance(error, OSError) else str(error)
         raise InputError(f"{path}: cannot be read ({why}): check the path") from None
     return hashlib.sha256("".join(parts).encode(errors="surrogateescape")).hexdigest()
-
-
-def _numbers(fit: Fit, horizon: float) -> dict[str, Number]:
-    """The numbers of `DERIVED` that a fit gives."""
-    found: dict[str, Number] = {}
-    with suppress(InputError):  # no white noise and random walk bound this model
-        bound = filter_numbers.bound(fit, horizon=horizon)
-        for letter, value in (("N", bound.N), ("K", bound.K)):
-            known = value > 0.0
-            value = value if known else upper_limit(fit, letter)
-            found[f"filter_{letter}"] = Number(value, bound.stderr.get(letter), known)
-    b = axis_numbers(fit).B
-    is_limit = b.kind == "bound"
-    return found | {"floor_B": Number(b.upper if is_limit else b.value, None, not is_limit)}
 
 
 # -- recordings ------------------------------------------------------------------------------------

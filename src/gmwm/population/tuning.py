@@ -20,10 +20,15 @@ SPREAD = 0.95  # level of the interval of a standard deviation between recording
 
 CONTENT = 0.95  # fraction of the units that a limit holds for
 CONFIDENCE = 0.95  # of a limit; both are the usual ones of ISO 16269-6
-OUTLIER_LEVEL = 0.01  # probability that a fleet without outliers has one named, by parameter
+# Probability that a lot of equal units has a finding: one in N, B or K of any axis, or a unit that
+# rejects the structure of the lot.
+FALSE_ALARMS, REJECTED = 0.04, 0.01
 LEAST_FOR_OUTLIERS = 5  # units; with fewer, half of them may be the odd ones
-# Fleets simulated for the distance of an outlier, whose level is then known to 7 %; and the most
-# numbers drawn, which takes 0.1 s.
-SIMULATED, MOST_SIMULATED = 20_000, 4_000_000
-CONTRADICTED = 0.01  # p-value of the Shapiro-Wilk test below which normal limits are doubtful
-LENGTHS = 2.0  # ratio of the longest to the shortest recording above which it is reported
+# Fleets simulated for the distance of an outlier, whose level is then known to a fifth; and the
+# most numbers drawn, which takes 0.2 s.
+SIMULATED, MOST_SIMULATED = 40_000, 8_000_000
+
+LIKELY = 4  # structures tried for a lot of those selected for its units, beside the simple ones
+# Of the criterion, from which a unit is taken to contradict a structure: it does not outvote three
+# units that do not need a term (5 to 8 a parameter).
+CONTRADICTION = 30.0

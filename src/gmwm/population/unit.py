@@ -1,47 +1,69 @@
-"""A unit of a fleet, and its rows in the table of the fleet."""
+"""A unit of a fleet, its sensor numbers, and its rows in the table of the fleet."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
 from math import isfinite
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import pyarrow as pa
 
-from gmwm._core.documents import NotNegative
-from gmwm._core.frozen import freeze
+from gmwm._core.documents import NotNegative, OrInfinity
 from gmwm._core.units import si_parameter_unit
-from gmwm.calibration import Calibration
+from gmwm.calibration import Calibration, axis_numbers
 from gmwm.errors import printable
 from gmwm.estimate import Fit
 from gmwm.issues import Notice
 
-DERIVED = {"filter_N": "u/sqrt(Hz)", "filter_K": "u/s/sqrt(Hz)", "floor_B": "u"}
-"""Numbers that units of any model structure have, and their units: the N and K of a filter for the
-horizon (`gmwm.bound`), and the bias instability B."""
+if TYPE_CHECKING:
+    from gmwm.population.structure import Structure
+
+LETTERS = {"N": "u/sqrt(Hz)", "B": "u", "K": "u/s/sqrt(Hz)"}
+"""Sensor numbers (see `gmwm.Calibration.numbers`) and their units."""
 
 _TYPES = dict.fromkeys(("value", "stderr", "lower", "upper"), pa.float64())
 _TYPES |= {"valid": pa.bool_()} | dict.fromkeys(("reasons", "notices"), pa.list_(pa.string()))
 _NAMES = (
-    "device path channel quantity model parameter kind value stderr lower upper unit valid reasons "
-    "notices"
+    "device path channel quantity model number kind value stderr lower upper unit valid "
+    "reasons notices"
 )
 SCHEMA = pa.schema([(name, _TYPES.get(name, pa.string())) for name in _NAMES.split()])
-"""Columns of the table; null where one does not apply. ``kind`` is that of `gmwm.Estimate`, or
-"derived" for the numbers of `DERIVED`; of an upper limit ("bound") ``value`` is null. ``reasons``
-are the codes of why a fit, a channel or a unit is not valid."""
+"""Columns of the table; null where one does not apply. ``number`` is N, B or K; of an upper limit
+(``kind`` "bound") ``value`` is null. ``model`` is the one that it comes from. ``reasons`` are the
+codes of why a fit, a channel or a unit is not valid."""
 
 Row = dict[str, Any]
 
 
 @dataclass(frozen=True)
 class Number:
-    """A number derived from a fit, SI; an upper limit if not ``found``."""
+    """A sensor number with its 95 % interval, SI; no ``value`` where only ``upper`` is known."""
 
-    value: NotNegative
+    value: NotNegative | None
     stderr: NotNegative | None
-    found: bool
+    lower: NotNegative
+    upper: OrInfinity
+
+    @property
+    def error(self) -> float:
+        """Standard error of the logarithm; NaN for an upper limit."""
+        if not self.value:
+            return float("nan")
+        if self.lower > 0.0 and isfinite(self.upper):
+            return float(np.log(self.upper / self.lower)) / 3.92
+        return (self.stderr or 0.0) / self.value
+
+
+def numbers_of(fit: Fit) -> dict[str, Number]:
+    """N, B and K of a fit."""
+    return {
+        each.key: Number(
+            None if each.kind == "bound" else each.value, each.stderr, each.lower, each.upper
+        )
+        for each in axis_numbers(fit)
+    }
 
 
 @dataclass(frozen=True)
@@ -51,18 +73,13 @@ class Unit:
     path: Path of its recording.
     name: Short name, unique in the fleet.
     result: The calibration, or why there is none.
-    numbers: Channel -> name in `DERIVED` -> `Number`.
     digest: SHA-256 of the recording; empty where it cannot be read.
     """
 
     path: str
     name: str
     result: Calibration | Notice
-    numbers: Mapping[str, Mapping[str, Number]] = field(default_factory=dict)
     digest: str = ""
-
-    def __post_init__(self) -> None:
-        freeze(self, "numbers")
 
     @property
     def valid(self) -> bool:
@@ -72,11 +89,12 @@ class Unit:
         )
 
 
-def rows_of(units: Iterable[Unit]) -> Iterator[Row]:
-    """Rows of the table: one per unit, channel and parameter.
+def rows_of(units: Iterable[Unit], structures: Sequence[Structure]) -> Iterator[Row]:
+    """Rows of the table: N, B and K of every channel of every unit.
 
     A unit without a calibration, and a channel without a fit, has one row with the reason.
     """
+    by_channel = {each.channel: each for each in structures}
     for unit in units:
         own = dict.fromkeys(SCHEMA.names) | {
             "device": unit.name,
@@ -87,7 +105,7 @@ def rows_of(units: Iterable[Unit]) -> Iterator[Row]:
             yield {**own, "reasons": [unit.result.code], "notices": [unit.result.code]}
             continue
         for name, fit in unit.result.items():
-            for each in _parameters(unit.result, name, fit, unit.numbers.get(name, {})):
+            for each in _of_channel(unit, name, fit, by_channel[name]):
                 row = own | each
                 yield {
                     key: None if isinstance(value, float) and not isfinite(value) else value
@@ -97,27 +115,22 @@ def rows_of(units: Iterable[Unit]) -> Iterator[Row]:
             yield {**own, "channel": name, "reasons": [why.code], "notices": [why.code]}
 
 
-def _parameters(
-    calibration: Calibration, name: str, fit: Fit, numbers: Mapping[str, Number]
-) -> Iterator[Row]:
+def _of_channel(unit: Unit, name: str, fit: Fit, structure: Structure) -> Iterator[Row]:
     """Rows of a channel, without the columns of the unit."""
-    quantity = fit.wv.quantity or ""
-    notices = [*fit.notices, *(n for n in calibration.notices if n.where in ("", name))]
+    assert isinstance(unit.result, Calibration)
+    notices = [*fit.notices, *(n for n in unit.result.notices if n.where in ("", name))]
+    is_valid = unit.name in structure.usable
+    is_common = is_valid and unit.name not in structure.own
+    reasons = [] if is_valid else [reason for reason, is_met in fit.reasons.items() if not is_met]
     own = {
         "channel": name,
-        "quantity": quantity,
-        "model": fit.model.title(),
-        "valid": fit.valid,
-        "reasons": [reason for reason, is_met in fit.reasons.items() if not is_met],
+        "quantity": fit.wv.quantity,
+        "model": structure.model if is_common else fit.model.title(),
+        "valid": is_valid,
+        "reasons": reasons,
         "notices": list(dict.fromkeys(n.code for n in notices if n.severity != "good")),
     }
-    for each in fit.estimates:
-        known = {key: getattr(each, key) for key in ("kind", "lower", "upper", "unit")}
-        if each.kind != "bound":
-            known |= {"value": each.value, "stderr": each.stderr}
-        yield {**own, "parameter": each.key, **known}
-    for key, number in numbers.items():
-        known = {"kind": "bound", "upper": number.value}
-        if number.found:
-            known = {"kind": "derived", "value": number.value, "stderr": number.stderr}
-        yield {**own, "parameter": key, **known, "unit": si_parameter_unit(DERIVED[key], quantity)}
+    for key, number in structure.numbers[unit.name].items():
+        known = {each: getattr(number, each) for each in ("value", "stderr", "lower", "upper")}
+        known |= {"kind": "bound" if number.value is None else "estimated", "number": key}
+        yield {**own, **known, "unit": si_parameter_unit(LETTERS[key], fit.wv.quantity)}

@@ -1,4 +1,4 @@
-"""The page of a comparison: verdicts, curves, parameters, and the numbers for a filter."""
+"""The page of a comparison: verdicts, sensor numbers, filter numbers and curves."""
 
 from __future__ import annotations
 
@@ -11,19 +11,16 @@ import numpy as np
 
 from gmwm._core.files import writable_file
 from gmwm._core.pages import page_of
-from gmwm._core.text import brief
-from gmwm.estimate import Estimate, Fit
+from gmwm._core.text import brief, with_error
+from gmwm._core.units import customary_unit
 from gmwm.issues import worst_first
-from gmwm.population import STATES, AxisComparison, ParameterSpread, SensorComparison
+from gmwm.population import LETTERS, STATES, AxisComparison, Number, SensorComparison
 from gmwm.report.datasheet import Datasheet, read_datasheet
 from gmwm.report.page import origin, write_page
 from gmwm.report.pictures import multiple
 
 _SIDE_BY_SIDE = 6
 """Recordings whose values stand in columns of their own; of more the range is shown."""
-
-_NARROW, _WIDE = 1.02, 1.5
-"""Ratios of the ends of an interval: four digits below the one, two above the other."""
 
 _ASIDE = ("not-noise", "channel-missing", "channel-skipped")
 """Codes of notices that the verdicts have in a word."""
@@ -32,7 +29,7 @@ _REPEATED = ("curves-differ", "curves-close")
 """Codes of those that the verdicts repeat."""
 
 _MARKS = {"agree": "good", "close": "good", "differ": "care", "untested": "bad"}
-_LETTERS = {"N": "u/sqrt(Hz)", "K": "u/s/sqrt(Hz)"}
+_LETTERS = ("N", "K")
 
 
 @page_of(SensorComparison)
@@ -93,79 +90,43 @@ def _axis(
         "state": _MARKS[axis.state],
         "word": STATES[axis.state],
         "figure": multiple(axis, labels, others, sheet) if axis.fits or others else None,
-        "codes": _codes(axis.joint),
-        "equality": _p(axis.joint.equality_p, "= ") if axis.joint else "",
-        "rows": [_row(p, axis, labels) for p in axis.parameters if p.joint.kind != "fixed"],
+        "rows": [_row(axis, letter, labels) for letter in LETTERS if axis.fits],
         "numbers": [_numbers(axis, letter, sheet) for letter in _LETTERS],
-        "nees": _nees(axis),
+        "nees": _nees(axis, comparison.horizon),
     }
 
 
-def _codes(fit: Fit | None) -> str:
-    bad = [n.code.replace("-", " ") for n in fit.notices if n.severity == "bad"] if fit else []
-    return ", ".join(dict.fromkeys(bad))
+def _row(axis: AxisComparison, letter: str, labels: tuple[str, ...]) -> dict[str, Any]:
+    """N, B or K in every recording."""
+    usable = axis.structure.usable
+    cells = [_cell(axis, letter, usable[x][letter]) if x in usable else "–" for x in labels]
+    text, unit = axis.range_of(letter)
+    return {"key": letter, "unit": unit, "cells": cells if len(labels) <= _SIDE_BY_SIDE else [text]}
 
 
-def _row(spread: ParameterSpread, axis: AxisComparison, labels: tuple[str, ...]) -> dict[str, Any]:
-    by_label = dict(zip(axis.fits, spread.each, strict=True))
-    cells = [_cell(by_label.get(label)) for label in labels]
-    if len(labels) > _SIDE_BY_SIDE:
-        known = [e.usual.value for e in spread.each if e is not None and e.kind == "estimated"]
-        text = f"{brief(min(known), 4)} to {brief(max(known), 4)}" if known else "none"
-        cells = [{"value": text, "interval": f"{len(known)} of {len(spread.each)}"}]
-    return {
-        "key": spread.key,
-        "unit": spread.joint.usual.unit,
-        "joint": _cell(spread.joint),
-        "cells": cells,
-        "spread": "–" if np.isnan(spread.spread) else _share(spread.spread),
-        "p": _p(spread.p_value) or "–",
-        "differs": spread.p_value < 0.01,
-    }
-
-
-def _cell(estimate: Estimate | None) -> dict[str, str]:
-    """A value and its interval, with the digits that this leaves."""
-    if estimate is None:
-        return {"value": "–", "interval": ""}
-    usual = estimate.usual
-    if estimate.kind == "bound":
-        return {"value": f"< {brief(usual.upper, 3)}", "interval": ""}
-    if estimate.kind != "estimated":
-        return {"value": brief(usual.value, 3), "interval": estimate.kind}
-    if not (np.isfinite(usual.upper) and usual.lower > 0.0):
-        return {"value": brief(usual.value, 3), "interval": "not determined"}
-    ratio = usual.upper / usual.lower
-    digits = 4 if ratio < _NARROW else 3
-    ends = [brief(end, digits if ratio < _WIDE else 2) for end in (usual.lower, usual.upper)]
-    return {"value": brief(usual.value, digits), "interval": "–".join(ends)}
-
-
-def _share(value: float) -> str:
-    return f"{100.0 * value:.1f} %" if value < 1.0 else f"{100.0 * value:.0f} %"
-
-
-def _p(value: float, sign: str = "") -> str:
-    return "" if np.isnan(value) else f"{sign}{value:.2g}" if value >= 1e-4 else "< 0.0001"
+def _cell(axis: AxisComparison, letter: str, number: Number) -> str:
+    scale = customary_unit(LETTERS[letter], axis.quantity, "u")[1]
+    if number.value is None:
+        return f"≤ {brief(number.upper * scale, 3)}" if np.isfinite(number.upper) else "–"
+    return with_error(number.value * scale, number.lower * scale, number.upper * scale)
 
 
 def _numbers(axis: AxisComparison, letter: str, sheet: Datasheet | None) -> dict[str, str]:
-    found = [n for each in axis.numbers.each.values() if (n := getattr(each, letter)) > 0.0]
-    ends = [axis.number_text(letter, end)[0] for end in found and (min(found), max(found))]
-    row = {"range": " to ".join(dict.fromkeys(ends)) or "none found"}
-    covering, ratio = axis.numbers.value(letter), axis.numbers.inflation(letter)
+    covering, is_limit = axis.for_filter(letter)
     if not np.isfinite(covering):
-        return row | {"covering": "none", "unit": "", "details": "", "stated": ""}
-    text, row["unit"] = axis.number_text(letter, covering)
-    row["covering"] = f"{'≤ ' if letter in axis.numbers.upper else ''}{text}"
-    times = f", {ratio:.2f} x joint" if np.isfinite(ratio) else ""
+        return {"covering": "none", "unit": "", "details": "", "stated": ""}
+    text, unit = axis.number_text(letter, covering)
     stated = sheet.of(axis.name, axis.quantity).get(letter) if sheet is not None else None
-    row["stated"] = f"{brief(covering / stated, 3)} times" if stated else ""
-    return row | {"details": f"{covering:.3e} SI{times}"}
+    return {
+        "covering": f"{'≤ ' if is_limit else ''}{text}",
+        "unit": unit,
+        "details": f"{covering:.3e} SI",
+        "stated": f"{brief(covering / stated, 3)} times" if stated else "",
+    }
 
 
-def _nees(axis: AxisComparison) -> str:
+def _nees(axis: AxisComparison, horizon: float) -> str:
     """Of the covering numbers, in the recordings."""
-    known = [value for value in axis.numbers.nees.values() if np.isfinite(value)]
+    known = [x for each in axis.covering.values() if np.isfinite(x := each.nees[horizon])]
     ends = [f"{each:.2g}" for each in known and (min(known), max(known))]
     return " to ".join(dict.fromkeys(ends))

@@ -1,4 +1,4 @@
-"""The report of a fleet: what its units have in common, and which of them stand apart."""
+"""The report of a fleet: its data sheet, which units stand apart, and which miss limits."""
 
 from __future__ import annotations
 
@@ -16,19 +16,20 @@ from gmwm._core.text import brief, per_cent
 from gmwm.population import (
     CONFIDENCE,
     CONTENT,
-    DERIVED,
-    OUTLIER_LEVEL,
+    LETTERS,
     Fleet,
     Spread,
-    content_of_largest,
+    in_words,
     needed_units,
     outlier_distance,
 )
 from gmwm.report.page import duration_text, origin, write_page
 from gmwm.report.pictures import strip
 
-_TITLES = {"filter_N": "filter N", "filter_K": "filter K", "floor_B": "bias instability B"}
+_TITLES = {"N": "N, random walk", "B": "B, bias instability", "K": "K, rate random walk"}
+_MARKS = {"pass": "good", "FAIL": "bad", "?": "care", "none": "bad"}
 _MOSTLY = 0.5  # of the variance between units, which longer recordings would make less
+_WIDE = 0.05  # spread from which that is worth it
 
 
 @page_of(Fleet)
@@ -45,19 +46,16 @@ def write_fleet_report(fleet: Fleet, path: str | os.PathLike[str]) -> Path:
         notices=[notice for notice in fleet.notices if notice not in fleet.failed.values()],
         about=_about(fleet),
         verdict=_verdict(fleet),
-        horizon=f"{fleet.horizon:g}",
         content=f"{100.0 * CONTENT:g} %",
         confidence=f"{100.0 * CONFIDENCE:g} %",
-        level=f"{100.0 * OUTLIER_LEVEL:g} %",
         needed=needed_units(),
-        largest=_largest(fleet),
         groups=_groups(fleet),
-        parameters=[_row(each) for each in fleet.spreads if each.parameter not in DERIVED],
         outliers=sorted(
             ((each, spread) for spread in fleet.spreads for each in spread.outliers),
             key=lambda pair: pair[0].device,
         ),
         farthest=outlier_distance,
+        limits=_limits(fleet),
         troubled=_troubled(fleet),
         provenance=origin(_options(fleet), "report of", None),
     )
@@ -79,42 +77,31 @@ def _about(fleet: Fleet) -> str:
 
 def _verdict(fleet: Fleet) -> dict[str, str]:
     valid = sum(each.valid for each in fleet.done.values())
-    apart = len({outlier.device for each in fleet.spreads for outlier in each.outliers})
+    apart = len(fleet.findings)
     text = f"{valid} of {len(fleet)} units have a valid model of every axis"
     if fleet.failed:
         text += f"; {len(fleet.failed)} could not be calibrated"
     if apart:
-        text += f"; {apart} outlier{'s' if apart > 1 else ''}"
+        text += f"; {apart} stand{'' if apart > 1 else 's'} apart"
+    if fleet.limits:
+        text += "; " + ("no limit is missed" if fleet.meets_limits else "limits are missed")
     state, word = "good", "Uniform"
     if not fleet.valid:
         state, word = "bad", "No valid model"
-    elif valid < len(fleet) or apart:
+    elif valid < len(fleet) or apart or not fleet.meets_limits:
         state, word = "care", "With exceptions"
     return {"state": state, "word": word, "text": text}
 
 
-def _largest(fleet: Fleet) -> str:
-    """What the largest value promises, of so few units."""
-    n = len(fleet.done)
-    if n >= needed_units():
-        return ""
-    return (
-        f"A distribution-free limit needs {needed_units()} units. The largest of {n} values is "
-        f"such a limit for {100.0 * content_of_largest(n):.3g} % of all units with "
-        f"{100.0 * CONFIDENCE:g} % confidence."
-    )
-
-
 def _groups(fleet: Fleet) -> list[dict[str, Any]]:
-    """What a data sheet could promise, by sensor and number."""
+    """The data sheet, by sensor and number."""
     groups = []
-    derived = [each for each in fleet.spreads if each.parameter in DERIVED]
-    for quantity in dict.fromkeys(each.quantity for each in derived):
+    for quantity in dict.fromkeys(each.quantity for each in fleet.spreads):
         numbers: list[dict[str, Any]] = []
-        for parameter in DERIVED:
-            own = [e for e in derived if (e.quantity, e.parameter) == (quantity, parameter)]
+        for letter in LETTERS:
+            own = [e for e in fleet.spreads if (e.quantity, e.parameter) == (quantity, letter)]
             if own:
-                head = {"title": _TITLES[parameter], "unit": own[0].field_unit[0]}
+                head = {"title": _TITLES[letter], "unit": own[0].field_unit[0]}
                 rows = [_row(each) for each in own]
                 numbers.append({**head, "picture": strip(own), "rows": rows})
         is_free = any(row["free"] for number in numbers for row in number["rows"])
@@ -124,41 +111,41 @@ def _groups(fleet: Fleet) -> list[dict[str, Any]]:
 
 
 def _row(spread: Spread) -> dict[str, Any]:
-    unit, scale = spread.field_unit
+    scale = spread.field_unit[1]
 
     def text(value: float) -> str:
         return brief(value * scale, 3) if np.isfinite(value) else "-"
 
-    bounds = int(np.count_nonzero(~spread.found))
-    share, free, both = spread.of_estimation, spread.free_limit, spread.free_limits
-    estimation = f"{100.0 * min(share, 1.0):.0f} %" if np.isfinite(share) else ""
-    text_of_sd = per_cent(spread.sd) if spread.is_logarithmic else text(spread.sd)
+    bounds, share = int(np.count_nonzero(~spread.found)), spread.of_estimation
+    is_uncertain = share > _MOSTLY and spread.sd > _WIDE
     remarks = [
         remark
         for is_said, remark in (
             (bounds, f"{bounds} of them upper limits"),
-            (spread.without, f"{spread.without} units without"),
-            (not spread.is_normal, f"not normal, p = {spread.normality:.1g}"),
-            (share > _MOSTLY, f"{estimation} is estimation error: record longer"),
+            (is_uncertain, f"{100.0 * min(share, 1.0):.0f} % is estimation error: record longer"),
         )
         if is_said
     ]
     return {
         "channel": spread.channel,
-        "parameter": f"{spread.parameter} of {spread.of}" if spread.of > 1 else spread.parameter,
-        "unit": unit,
         "n": spread.n,
-        "median": text(spread.median),
+        "median": f"{'≤ ' if spread.is_limit else ''}{text(spread.median)}",
         "range": f"{text(spread.values.min())} to {text(spread.values.max())}",
-        "spread": text_of_sd if np.isfinite(spread.sd) else "-",
-        "estimation": estimation,
+        "spread": per_cent(spread.sd) if np.isfinite(spread.sd) and not spread.is_limit else "-",
         "limit": text(spread.normal_limit),
-        "limits": " to ".join(map(text, spread.normal_limits)) if spread.n > 1 else "-",
-        "free": "" if free is None else text(free),
-        "free_both": "" if both is None else " to ".join(map(text, both)),
-        "doubtful": not spread.is_normal,
+        "free": "" if spread.free_limit is None else text(spread.free_limit),
         "remark": "; ".join(remarks),
     }
+
+
+def _limits(fleet: Fleet) -> dict[str, Any]:
+    """The grid of verdicts: axes, and a row a unit."""
+    axes = list(dict.fromkeys(axis for row in fleet.grid.values() for axis in row))
+    rows = []
+    for name, row in fleet.grid.items():
+        words = [in_words(row[axis]) if axis in row else "" for axis in axes]
+        rows.append((name, [(word, _MARKS.get(word.partition(" ")[0], "")) for word in words]))
+    return {"axes": axes, "rows": rows}
 
 
 def _troubled(fleet: Fleet) -> list[tuple[str, str, str]]:
@@ -175,7 +162,7 @@ def _troubled(fleet: Fleet) -> list[tuple[str, str, str]]:
 
 def _options(fleet: Fleet) -> dict[str, str]:
     """Those that say something, without those that the page has elsewhere."""
-    shown = {k: each for k, each in fleet.options.items() if k not in ("horizon", "version")}
+    shown = {k: each for k, each in fleet.options.items() if k != "version"}
     return {key: _in_words(each) for key, each in shown.items() if each or each is False}
 
 

@@ -12,8 +12,6 @@ from gmwm._core.text import brief
 from gmwm._core.typing import FloatArray
 from gmwm._core.units import shown_unit
 from gmwm.estimate import Fit
-from gmwm.estimate.result import dense_curves
-from gmwm.filter_numbers import root_sum
 from gmwm.population import AxisComparison, Spread
 from gmwm.report.datasheet import Datasheet
 
@@ -75,9 +73,6 @@ def multiple(
     x = Scale(ends[0] - 0.15, ends[1] + 0.15, _LEFT, _RIGHT)
     y = Scale(float(values.min()) - 0.25, float(values.max()) + 0.15, _MIDDLE, _TOP)
     curves = [("out", fit.wv.tau, decades(fit.wv.variance)) for fit in out]
-    if axis.joint is not None:
-        tau, parts = dense_curves(axis.joint)
-        curves.append(("joint", tau, np.log10(factor * root_sum(list(parts.values())))))
     stated = None
     if sheet is not None:
         stated = sheet.deviation(axis.name, first.quantity, first.tau, first.dt)

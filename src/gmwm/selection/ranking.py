@@ -84,7 +84,7 @@ class Choices:
 
     def seeing(self, wv: WaveletVariance) -> Choices:
         """The choices with the sensor's low-pass, if these wavelet variances show one."""
-        return replace(self, bandwidth=sensor_bandwidth(wv, self.extra, _penalty(wv.n)))
+        return replace(self, bandwidth=sensor_bandwidth(wv, self.extra, penalty(wv.n)))
 
     @property
     def given(self) -> tuple[Process, ...]:
@@ -100,7 +100,7 @@ class Choices:
         return replace(
             candidate,
             model=Model(tuple(terms)),
-            criterion=candidate.criterion + _penalty(n) * found.n_shapes,
+            criterion=candidate.criterion + penalty(n) * found.n_shapes,
             n_parameters=candidate.n_parameters + found.n_shapes,
             dof=candidate.dof - found.n_shapes,
         )
@@ -181,8 +181,8 @@ def rank(wv: WaveletVariance, choices: Choices) -> tuple[list[Candidate], Slope 
                 common = _CommonWeights.of(wv.variance, reference, allowed)
                 plain, flicker = _candidates(wv, common, choices), _flicker(wv, common, choices)
             drifting = _candidates(wv, _CommonWeights.of(target, drift_free, allowed), choices)
-            ramped = [_with_ramp(candidate, _penalty(wv.n)) for candidate, _ in drifting]
-        elif slope.value**2 / slope.variance > _penalty(wv.n) + tuning.RAMP_MARGIN:
+            ramped = [_with_ramp(candidate, penalty(wv.n)) for candidate, _ in drifting]
+        elif slope.value**2 / slope.variance > penalty(wv.n) + tuning.RAMP_MARGIN:
             ambiguous = slope  # a ramp would have won but for the walk
     ranking = sorted(_without_ramp(plain, wv, without) + ramped, key=rank_key)
     return _with_rival(ranking, _without_ramp(flicker, wv, without)), ambiguous
@@ -256,7 +256,7 @@ def candidate_of(fitted: Fit) -> Candidate:
     """
     p, dof = len(fitted.keys), fitted.dof
     statistic = fitted.chi_square_allowed if dof > 0 else 0.0
-    criterion = statistic + _penalty(fitted.wv.n) * p
+    criterion = statistic + penalty(fitted.wv.n) * p
     return Candidate(fitted.model.opened(), criterion, fitted.objective, statistic, p, dof)
 
 
@@ -265,7 +265,7 @@ def rank_key(candidate: Candidate) -> float:
     return candidate.criterion + (tuning.RAMP_MARGIN if ramped else 0.0)
 
 
-def _penalty(n: int) -> float:
+def penalty(n: int) -> float:
     """Price of a parameter: 2 c ln ln n."""
     return 2.0 * tuning.STRICTNESS * float(np.log(np.log(n)))
 
@@ -291,7 +291,7 @@ class _CommonWeights:
             statistic = chi_square(self.target, implied, self.covariance, self.basis)[1]
         return Candidate(
             model=design.model,
-            criterion=statistic + _penalty(design.scales.n) * design.n_free,
+            criterion=statistic + penalty(design.scales.n) * design.n_free,
             objective=point.objective,
             chi_square=statistic,
             n_parameters=design.n_free,

@@ -1,7 +1,9 @@
 """A fleet: every unit by itself, kept on disk, gone on with, never mixed up."""
 
+import csv
 import json
 import pickle
+import re
 import shutil
 from dataclasses import FrozenInstanceError, replace
 from functools import wraps
@@ -14,7 +16,7 @@ import gmwm
 from fleets import QUICK
 from gmwm import Calibration, Fleet, InputError, Model, RandomWalk, WhiteNoise
 from gmwm.issues import Notice
-from gmwm.population import DERIVED, SCHEMA, Item, Number, Task, task as tasks
+from gmwm.population import LETTERS, SCHEMA, Item, Task, task as tasks
 
 READING = ("rate", "units")
 
@@ -102,7 +104,7 @@ def test_a_fleet_is_a_mapping_of_paths_to_calibrations_or_why_not(lot, outputs):
     with pytest.raises(KeyError, match="the fleet has no recording 'x'"):
         found["x"]
     with pytest.raises(FrozenInstanceError):
-        found.horizon = 1.0
+        found.limits = {}
     assert repr(found) == "<Fleet of 4 units: 3 calibrated, 1 not>"
 
 
@@ -115,34 +117,52 @@ def test_a_fleet_prints_what_units_have_in_common(outputs):
     assert "&lt;b&gt;damaged" in outputs[1]._repr_html_()
 
 
-def test_the_table_has_a_row_per_unit_channel_and_parameter(lot, outputs):
+def test_the_table_has_a_row_per_unit_channel_and_number(lot, outputs):
     folder, found = outputs
     table = pq.read_table(folder / "fleet.parquet")
     assert table.schema.equals(SCHEMA)
     assert table.to_pylist() == [dict(row) for row in found.rows]
-    keys = [(row["device"], row["channel"], row["parameter"]) for row in found.rows]
-    assert len(set(keys)) == len(keys) == 5 * (1 + len(DERIVED)) + 1
+    keys = [(row["device"], row["channel"], row["number"]) for row in found.rows]
+    assert len(set(keys)) == len(keys) == 5 * len(LETTERS) + 1
     (row,) = [row for row in found.rows if row["device"] == "_b_damaged"]
     assert row["channel"] is None
     assert not row["valid"]
     assert row["reasons"] == row["notices"] == ["not-calibrated"]
-    first = found[lot[0]]["gyro_x"]
-    row = next(row for row in found.rows if row["parameter"] == "N")
-    assert (row["value"], row["stderr"], row["unit"]) == (
-        first.params["N"], first.stderr["N"], "rad/s/sqrt(Hz)",
-    )  # fmt: skip
+    own = found[lot[0]].numbers["gyro_x"]
+    for row in found.rows[:3]:
+        number = getattr(own, row["number"])
+        value = None if number.kind == "bound" else number.value
+        assert (row["kind"], row["value"], row["unit"]) == (number.kind, value, number.unit)
+        assert row["upper"] == pytest.approx(number.upper)
+    with open(folder / "fleet.csv", encoding="utf-8", newline="") as stream:
+        lines = list(csv.DictReader(stream))
+    assert [line["device"] for line in lines] == [row["device"] for row in found.rows]
+    assert float(lines[0]["value"]) == found.rows[0]["value"]
+    assert lines[-1]["reasons"] == "not-calibrated"
     assert len(found.to_frame()) == len(keys)
     json.dumps(found.to_dict(), allow_nan=False)
 
 
-def test_numbers_of_a_filter_are_those_of_bound(lot, outputs):
-    found = outputs[1]
-    expected = gmwm.bound(found[lot[0]]["gyro_x"], horizon=60.0)
-    number = found.units[lot[0]].numbers["gyro_x"]
-    assert number["filter_N"] == Number(expected.N, expected.stderr["N"], True)
-    # Without a walk in the model, K is an upper bound.
-    assert number["filter_K"].value > 0.0
-    assert not number["filter_K"].found
+def test_limits_give_a_verdict_on_every_unit_and_axis(lot, outputs, tmp_path):
+    limits = {"gyro": {"N": 1.5e-3, "K": 1.0}, "gyro_y": {"N": 1e-3}, "accel": {"N": 1.0}}
+    found = gmwm.fleet(lot, limits=limits, folder=tmp_path / "out", **QUICK)
+    assert found.grid["unit 0"]["gyro_x"] == {"N": "pass", "K": "pass"}
+    assert found.grid["unit 0"]["gyro_y"] == {"N": "?"}  # the truth is at the limit
+    assert found.grid["third"]["gyro_x"] == {"N": "FAIL", "K": "pass"}
+    assert found.grid["third"]["gyro_y"] == {"N": "none"}
+    assert found.grid["_b_damaged"]["gyro_x"] == {"N": "none", "K": "none"}
+    assert {row["accel"]["N"] for row in found.grid.values()} == {"none"}
+    assert not found.meets_limits
+    assert gmwm.fleet(lot[:1], limits={"gyro": {"N": 2e-3}}, **QUICK).meets_limits
+    text = str(found)
+    assert "Limits: 0 of 4 units pass" in text
+    assert re.search(r"third +FAIL N +none +none", text)
+    assert all(len(line) <= 80 for line in text.splitlines())
+    assert ">FAIL N<" in (tmp_path / "out" / "fleet.html").read_text()
+    again = Fleet.load(tmp_path / "out")
+    assert (str(again), again.grid) == (text, found.grid)
+    assert outputs[1].grid["unit 0"] == {}
+    assert outputs[1].meets_limits
 
 
 def test_a_report_is_self_contained_and_names_are_no_markup(outputs):
@@ -196,7 +216,7 @@ def test_a_recording_that_changed_is_done_again(lot, copied, worked, record, tmp
     [
         ({"model": RandomWalk()}, "models"),
         ({"rate": 2.0}, "reading"),
-        ({"horizon": 10.0, "stop": 100.0}, "horizon, stop"),
+        ({"start": 10.0, "stop": 100.0}, "start, stop"),
     ],
 )
 def test_units_of_other_options_are_not_mixed_in(lot, copied, worked, change, other):
@@ -214,15 +234,15 @@ def test_units_of_another_version_are_not_mixed_in(lot, copied, monkeypatch):
         gmwm.fleet(lot, folder=copied, resume=True, **QUICK)
 
 
-@pytest.mark.parametrize("damage", ["empty", "cut", "foreign", "plain", "numbers", "list", "null"])
+@pytest.mark.parametrize("damage", ["empty", "cut", "foreign", "plain", "origin", "list", "null"])
 def test_a_damaged_or_foreign_calibration_is_refused_in_one_sentence(
     lot, outputs, copied, worked, damage
 ):
     path = copied / "calibrations" / "unit 0.json"
     text = path.read_text()
     content = json.loads(text)
-    if damage == "numbers":
-        content["fleet"]["numbers"]["gyro_x"]["filter_N"]["value"] = "large"
+    if damage == "origin":
+        content["fleet"]["sha256"] = "large"
     if damage == "plain":
         del content["fleet"]
     path.write_text({
@@ -343,20 +363,17 @@ def test_units_of_another_kind_are_reported(record, tmp_path):
     assert codes(gmwm.fleet(alike, **options)) == {"same-recording", "few-units"}
     short = record(tmp_path / "short.csv", channels=("gyro_y",), n=100, dt=0.5)
     assert codes(gmwm.fleet([*alike, short], **options)) == {
-        "same-recording", "few-units", "rates-differ", "channels-differ", "lengths-differ",
+        "same-recording", "few-units", "rates-differ", "channels-differ",
     }  # fmt: skip
 
 
 def test_another_process_gives_the_same(lot, outputs):
     """What is sent to workers, and what they send back."""
     options = {k: QUICK[k] for k in READING}
-    task = Task(
-        options, 0.0, None, {"": Model((QUICK["model"],))}, (), True, 60.0, gmwm.__version__
-    )
+    task = Task(options, 0.0, None, {"": Model((QUICK["model"],))}, (), True, gmwm.__version__)
     item = Item(lot[0], "unit 0")
     unit = pickle.loads(pickle.dumps(pickle.loads(pickle.dumps(task))(item)))
     assert unit.result.to_dict() == outputs[1][lot[0]].to_dict()
-    assert unit.numbers == outputs[1].units[lot[0]].numbers
     assert task.lost(item).result.code == "worker-lost"
     old = pickle.loads(pickle.dumps(replace(task, version="0.0.0")))
     assert "the worker has gmwm" in old(item).result.text
@@ -377,7 +394,9 @@ def test_models_are_given_by_channel_or_sensor(lot):
         ({"model": "N"}, "'N'"),
         ({"screening": ("shocks",)}, "screening = 'shocks'"),
         ({"still": "yes"}, "still = 'yes'"),
-        ({"horizon": -1.0}, "horizon = -1.0"),
+        ({"limits": 3}, "limits of '' = 3: give them in SI"),
+        ({"limits": {"gyro": {"Q": 1.0}}}, "give them in SI"),
+        ({"limits": {"gyro": {"N": -1.0}}}, "limit N of gyro = -1.0"),
         ({"jobs": 0}, "jobs = 0"),
         ({"unit": {"gyro": "rad/s"}}, "argument = 'unit': choose from rate"),
         ({"start": "a"}, "start = 'a'"),
@@ -398,7 +417,8 @@ def test_a_fleet_is_loaded_from_its_folder(outputs, copied):
     assert found.failed == outputs[1].failed
     text = (copied / "fleet.json").read_text()
     for old, new in (
-        ('"horizon_s": 60.0', '"horizon_s": -1.0'),
+        ('"limits": {}', '"limits": {"gyro": {"N": -1.0}}'),
+        ('"channel": "gyro_x"', '"channel": "gyro_z"'),
         ('"unit 0"', '"../unit 0"'),
         ("unit 0", "unit 7"),
         (text[300:], ""),

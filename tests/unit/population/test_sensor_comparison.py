@@ -2,9 +2,7 @@
 
 import json
 import re
-import warnings
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,7 +11,7 @@ import gmwm
 from gmwm import Calibration, InputError, RandomWalk, WhiteNoise
 from gmwm.estimate import estimate
 from gmwm.issues import Notice
-from gmwm.population import labelled, parameter_spreads
+from gmwm.population import labelled
 
 ACCEL = WhiteNoise(1e-2) + RandomWalk(5e-3)
 N = 5000
@@ -87,29 +85,15 @@ def test_recordings_of_one_name_are_distinguished_by_their_paths(three, paths, l
     assert tuple(labelled([*alike, three[2]], [*paths, ""])) == (*labels, "day3")
 
 
-def test_one_structure_with_its_spread(compared):
-    gyro = compared["gyro_x"]
-    rows = {row.key: row for row in gyro.parameters}
-    assert len(rows["N"].each) == 3
-    assert rows["N"].p_value < 1e-3 < rows["K"].p_value
-    assert 0.05 < rows["N"].spread < 0.3
-    assert gyro.curve_inflation > 1.05
-
-
-def test_the_spread_beside_a_recording_of_all_the_weight_is_unknown(compared, tmp_path):
-    axis = compared["gyro_x"]
-    parts = [SimpleNamespace(estimates=list(fit.estimates)) for fit in axis.joint.parts]
-    parts[0].estimates[0] = replace(parts[0].estimates[0], stderr=1e-15)
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        rows = parameter_spreads(SimpleNamespace(estimates=axis.joint.estimates, parts=parts))
-    assert np.isnan([rows[0].spread, rows[0].p_value]).all()
-    assert rows[1].spread == axis.parameters[1].spread
-    one = replace(compared, axes={"gyro_x": replace(axis, parameters=rows)})
-    assert json.loads(json.dumps(one.to_dict(), allow_nan=False))
-    text = one.report(tmp_path / "c.html").read_text()
-    assert '<td class="num" data-label="spread">–</td><td class="num" data-label="p">–</td>' in text
-    assert ">nan" not in text
+def test_numbers_of_all_recordings_come_from_one_structure(compared):
+    structure = compared["gyro_x"].structure
+    assert structure.model == "white noise + random walk"
+    n = [own["N"].value for own in structure.numbers.values()]
+    assert n == pytest.approx([1e-3, 1e-3, 1.25e-3], rel=0.03)
+    text = str(compared)
+    low, high = (f"{x * 180.0 / np.pi * 60.0:.3g}" for x in (min(n), max(n)))
+    assert f"gyro_x   N {low} to {high} deg/sqrt(h)" in text
+    assert text.index("Sensor numbers") < text.index("Filter numbers")
 
 
 def test_covering_numbers_bound_every_recording(compared):
@@ -117,10 +101,9 @@ def test_covering_numbers_bound_every_recording(compared):
         for label, fit in axis.fits.items():
             own = gmwm.bound(fit, horizon=60.0)
             # Of white noise and a walk the bound is the model itself.
-            assert axis.numbers.value("N") >= own.N * (1.0 - 1e-6)
-            assert axis.numbers.value("K") >= own.K * (1.0 - 1e-6)
-            assert axis.numbers.nees[label] <= 1.05
-    assert compared["gyro_x"].numbers.inflation("N") > 1.05
+            assert axis.for_filter("N")[0] >= own.N * (1.0 - 1e-6)
+            assert axis.for_filter("K")[0] >= own.K * (1.0 - 1e-6)
+            assert axis.covering[label].nees[60.0] <= 1.05
 
 
 def test_the_reversed_order_gives_the_same_verdicts(three, compared):
@@ -128,7 +111,8 @@ def test_the_reversed_order_gives_the_same_verdicts(three, compared):
     for name, axis in compared.items():
         assert back[name].state == axis.state
         assert back[name].p_value == pytest.approx(axis.p_value, rel=1e-5, nan_ok=True)
-        assert back[name].numbers.value("N") == pytest.approx(axis.numbers.value("N"), rel=1e-3)
+        value, is_limit = axis.for_filter("N")
+        assert back[name].for_filter("N") == (pytest.approx(value, rel=1e-3), is_limit)
 
 
 def test_a_comparison_shows_itself(compared, tmp_path):
@@ -147,11 +131,11 @@ def test_a_comparison_shows_itself(compared, tmp_path):
 
 def test_a_number_that_is_not_known_is_null_in_json(compared):
     axis = compared["gyro_x"]
-    unknown = replace(axis.numbers.covering, predicted=())
-    with_nan = replace(axis, numbers=replace(axis.numbers, covering=unknown))
+    unknown = {label: replace(each, predicted=()) for label, each in axis.covering.items()}
+    with_nan = replace(axis, covering=unknown)
     content = json.loads(json.dumps(with_nan.to_dict(), allow_nan=False))
-    assert content["numbers"]["covering"]["nees"] is None
-    assert content["numbers"]["covering"]["N"] == unknown.N
+    assert content["filter_numbers"]["day1"]["nees"] is None
+    assert content["filter_numbers"]["day1"]["N"] == axis.for_filter("N")[0]
 
 
 def test_the_same_file_twice_is_one_recording(three, compared):
