@@ -163,9 +163,10 @@ class Calibration(Mapping[str, Fit], Document):
             raise InputError(f"no channel was selected: choose from {', '.join(self)}")
         rows, columns = -(-len(names) // 3), min(len(names), 3)
         figure, axes = plt.subplots(rows, columns, squeeze=False, layout="constrained")
-        figure.set_size_inches(5.0 * columns, 4.0 * rows)
+        figure.set_size_inches(max(7.0, 5.0 * columns), 5.5 * rows)
         for name, ax in zip(names, axes.flat, strict=False):
             straight_lines(self[name].plot(ax, units=units), self.numbers[name].lines(units))
+            ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=2, fontsize="small")
         for ax in axes.flat[len(names) :]:
             ax.remove()
         return figure

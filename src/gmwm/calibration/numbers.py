@@ -92,7 +92,7 @@ class AxisNumbers:
         number: Estimate = getattr(self, letter)
         shown = number.in_units(units)
         if number.kind == "bound":
-            return f"<= {shown.upper:.3g}" if np.isfinite(shown.upper) else "-"
+            return f"<= {brief(shown.upper, 3)}" if np.isfinite(shown.upper) else "-"
         return with_error(shown.value, shown.lower, shown.upper)
 
 
