@@ -194,8 +194,8 @@ def _error_model(fit: Fit) -> list[tuple[Estimate, str]]:
                 term.shape_parameters[0],
                 per_cent((term.values["N"] or 0.0) ** 2 / total),
             )
-            size = f"{shape.name} {brief(term.values[shape.name] or 0.0, 3)} {shape.unit}"
-            parts.append(f"{share} of its variance has {size}" if noise[1:] else f"{size}")
+            size = f"a {shape.name} of {brief(term.values[shape.name] or 0.0, 3)} {shape.unit}"
+            parts.append(f"{share} of its power has {size}" if noise[1:] else size)
         meaning = f"white noise: {', '.join(parts)}"
         rows = [replace(row, key="N, bandwidth", meaning=meaning), *rows]
         lengths[rows[0].key] = max((lengths[key] for key in merged & {*lengths}), default=np.inf)

@@ -114,7 +114,7 @@ def deviation_figure(
     toggles = [*range(1, band), *range(band, len(traces)), len(traces) + len(marks) - 1]
     traces += marks
     bottom, top = deviation_range(np.concatenate([factor * total, value]))
-    lowest = min([bottom, *(0.6 * y for y in marks[-1]["y"] if y > bottom / _BELOW)])
+    lowest = min([bottom, *(0.4 * y for y in marks[-1]["y"] if y > bottom / _BELOW)])
     units = _units("Allan deviation", "u", fitted)
     layout = {"xaxis": _times(wv.tau), "yaxis": _axis(units[0][0], lowest, top)}
     return _figure(traces, layout, units=units, toggles=toggles, **more)
@@ -144,26 +144,25 @@ def _terms(x: FloatArray, curves: Mapping[str, FloatArray]) -> list[Figure]:
 
 def _marks(numbers: AxisNumbers, fitted: Fit) -> list[Figure]:
     """N where its line passes 1 s, K where its line passes 3 s, 0.664 B at the lowest point."""
-    name, ends = "N, B, K of the sensor", fitted.wv.tau[[0, -1]]
-    lines, si = numbers.lines(), [each.replace("= ", "") for each in numbers.lines("si")]
+    name, lines = "N, B, K of the sensor", numbers.lines()
+    ends = fitted.wv.tau[[0, -1]] * [0.5, 2.0]
+    texts = [
+        [each.replace(" = ", " ").replace("<=", "≤").replace("+-", "±") for each in labels]
+        for labels in (lines, numbers.lines("si"))
+    ]
     traces, places = [], []
-    for (colour, _), (label, (slope, height, at, _)) in zip(
-        styles(lines), lines.items(), strict=True
-    ):
-        line = _line(
-            ends * [0.5, 2.0], height * (ends * [0.5, 2.0]) ** slope, label, colour, "dot", 1.0
-        )
-        traces.append({**line, "name": f"{label[0]} line", "legendgroup": name})
+    for (colour, _), (label, line) in zip(styles(lines), lines.items(), strict=True):
+        slope, height, at, _ = line
+        trace = _line(ends, height * ends**slope, f"{label[0]} line", colour, "dot", 1.0)
+        traces.append({**trace, "legendgroup": name})
         places.append((at, height * at**slope))
-    late = 0.1 * ends[-1]
     marks = _scatter(
-        np.array([at for at, _ in places]),
-        np.array([y for _, y in places]),
+        *np.array(places).reshape(-1, 2).T,
         name,
         mode="markers+text",
-        text=[_signed(label) for label in lines],
-        si=[_signed(label) for label in si],
-        textposition=["top left" if at > late else "top right" for at, _ in places],
+        text=texts[0],
+        si=texts[1],
+        textposition=["top right" if label[0] == "N" else "bottom center" for label in lines],
         textfont={"size": 13, "color": SUM_COLOUR},
         # Open, so that a point of the data beneath is seen.
         marker={"symbol": "diamond-open", "size": 11, "color": SUM_COLOUR, "line": {"width": 2}},
@@ -171,10 +170,6 @@ def _marks(numbers: AxisNumbers, fitted: Fit) -> list[Figure]:
         legendgroup=name,
     )
     return [*traces, marks]
-
-
-def _signed(label: str) -> str:
-    return label.replace("= ", "").replace("+-", "±").replace("<=", "≤")
 
 
 def residual_figure(fitted: Fit) -> Figure:
