@@ -24,9 +24,8 @@ def file(tmp_path_factory):
 
 
 @pytest.fixture
-def report(run, file, tmp_path, monkeypatch):
+def report(run, file, tmp_path):
     """A function of further options: the text of the report, and the page."""
-    monkeypatch.setattr("gmwm.report.numbers.HORIZONS", (1.0, 60.0))
 
     def _report(*options):
         code, _, told = run("calibrate", file, *READING, *options, "-o", "out")
@@ -40,10 +39,11 @@ def report(run, file, tmp_path, monkeypatch):
 
 def test_what_is_found_and_taken_off(report):
     text, _ = report()
-    assert "Usable axes gyro_y, accel_z ; not gyro_x : the bias stepped ." in text
+    assert "static.csv: 50 s at 100 Hz. 2 of 3 axes usable" in text
+    assert re.search(r"gyro_x not valid : bias step at 30\S* s", text)
     assert re.search(r"severe gyro_x A step of .*? --remove-departures", text)
     text, _ = report("--remove-departures")
-    assert "Healthy, with care : departures from noise subtracted (gyro_x)" in text
+    assert "static.csv: 50 s at 100 Hz. All 3 axes are usable." in text
     assert re.search(r"Notes .*?gyro_x A step of .*?subtracted", text)
     assert "not valid" not in text
     assert "calibrate static.csv" not in text  # the command has the path that was given
