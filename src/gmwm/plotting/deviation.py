@@ -181,8 +181,7 @@ def sensor_lines(
     plateau = (2.0 * np.log(2.0) / np.pi) ** 0.5
     reading = {"N": (-0.5, 1.0, 1.0), "B": (0.0, plateau, tau), "K": (0.5, 3.0**-0.5, 3.0)}
     found = {}
-    for letter, (label, value) in numbers.items():
-        slope, share, at = reading[letter]
+    for (label, value), (slope, share, at) in ((numbers[key], reading[key]) for key in numbers):
         if 0.0 < value < np.inf:
             found[label] = (slope, share * value, at, at)
     return found

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-
 from gmwm._core.pages import page_of
 from gmwm._core.text import brief, per_cent
 from gmwm.calibration import AMBIGUITY, Calibration
 from gmwm.diagnosis import gathered
 from gmwm.estimate import Fit
-from gmwm.issues import Notice
 from gmwm.report.health import counted, findings
 from gmwm.report.page import units_of
 
@@ -26,7 +23,7 @@ def verdict(calibration: Calibration) -> dict[str, str]:
             causes.setdefault(trust(name, fit, calibration)[1], []).append(name)
     parts = [f"{', '.join(names)} not valid: {cause}" for cause, names in causes.items()]
     parts += [f"{', '.join(calibration.skipped)} have no model"] if calibration.skipped else []
-    parts += [_counted(found, severity, calibration) for severity in ("bad", "warning")]
+    parts += [counted(found, severity) for severity in ("bad", "warning")]
     if removed:
         parts.append(f"departures from noise subtracted ({', '.join(removed)})")
     text = "; ".join(filter(None, parts))
@@ -39,15 +36,6 @@ def verdict(calibration: Calibration) -> dict[str, str]:
     if text:
         return {"state": "care", "word": "Healthy, with care", "text": text}
     return {"state": "good", "word": "Healthy", "text": "no defect found"}
-
-
-def _counted(notices: Sequence[Notice], severity: str, channels: Iterable[str]) -> str:
-    """Number of notices of a severity, and their channels."""
-    texts = ", ".join(each.where for each in notices if each.severity == severity).split(", ")
-    places = (next((c for c in channels if f"{text} ".startswith(f"{c} ")), text) for text in texts)
-    where = ", ".join(filter(None, dict.fromkeys(places)))
-    count = counted(notices, severity)
-    return f"{count} ({where})" if where else count
 
 
 def trust(name: str, fit: Fit, calibration: Calibration) -> tuple[bool, str]:
