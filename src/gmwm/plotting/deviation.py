@@ -164,7 +164,7 @@ def curves(
         ax.plot(tau, value, color=colour, linewidth=1.3, linestyle=dash, label=label, zorder=2)
     ax.plot(tau, total, color=SUM_COLOUR, linewidth=1.8, label="model", zorder=3)
     if band:
-        ax.fill_between(tau, *band, color="#808080", alpha=0.25, linewidth=0, label="95 % band")
+        ax.fill_between(tau, band[0], band[1], color="#808080", alpha=0.25, lw=0, label="95 % band")
     shown = total if data is None else np.concatenate([total, data])
     ax.set_ylim(*deviation_range(shown))
     ax.legend(fontsize="small", framealpha=0.9)

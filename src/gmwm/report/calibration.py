@@ -93,7 +93,6 @@ def page(
         "template.html",
         scripts=(get_plotlyjs(), resource("report.js")),
         calibration=calibration,
-        length=duration_text(calibration.duration),
         answer=first_screen(calibration, numbers, sheet),
         overview=[
             (f"{quantity or 'other channels'}", overview_figure(calibration, quantity))

@@ -157,7 +157,8 @@ def _marks(numbers: AxisNumbers, fitted: Fit) -> list[Figure]:
         traces.append({**trace, "legendgroup": name})
         places.append((at, height * at**slope))
     marks = _scatter(
-        *np.array(places).reshape(-1, 2).T,
+        np.array([at for at, _ in places]),
+        np.array([y for _, y in places]),
         name,
         mode="markers+text",
         text=texts[0],
