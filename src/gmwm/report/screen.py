@@ -61,7 +61,13 @@ def sensor_tables(calibration: Calibration, sheet: Datasheet | None = None) -> l
         for name in (each for each in (quantity, *names) if each in stated):
             fit = calibration[names[0]]
             texts = {n: quantity_text(v, UNITS[n], fit) for n, v in stated[name].items()}
-            cells = [texts.get(letter, {"field": "", "si": ""}) for letter in UNITS]
+            cells = [
+                {
+                    units: texts.get(n, {units: ""})[units].partition(" ")[0]
+                    for units in ("field", "si")
+                }
+                for n in UNITS
+            ]
             rows.append({"name": f"data sheet, {name}", "why": "", "cells": cells, "stated": True})
         heads = [
             (f"{key}, {title}", {"field": number.usual.unit, "si": number.unit})
