@@ -1,4 +1,4 @@
-"""The README's picture: four hours of a simulated MEMS gyro, its model selected and fitted.
+"""The README's picture: four hours of a simulated MEMS gyro with N, B and K, and its error model.
 
 Run with ``python examples/gyro_figure.py FILE.png``.
 """
@@ -14,8 +14,10 @@ from gmwm.study.demo import simulated_imu
 from gmwm.study.sensor_tables import TABLE_6
 
 recording, truth = simulated_imu(4 * 3600.0, seed=1, sensors=TABLE_6)
-fit = gmwm.select(recording["gyro_x"]).fit
-print(fit)
+found = gmwm.calibrate(gmwm.Recording((recording["gyro_x"],)))
+print(found)
+print()
+print(found["gyro_x"])
 print()
 print("truth:", truth["gyro_x"])
-fit.plot().figure.savefig(sys.argv[1], dpi=110)
+found.plot().savefig(sys.argv[1], dpi=110)

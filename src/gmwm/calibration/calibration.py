@@ -21,6 +21,7 @@ from gmwm.calibration.numbers import SensorNumbers, axis_numbers
 from gmwm.errors import InputError, MissingNameError
 from gmwm.estimate import Estimate, Fit
 from gmwm.issues import Notice
+from gmwm.plotting import straight_lines
 from gmwm.process import Model
 from gmwm.readers import Recording
 
@@ -142,7 +143,7 @@ class Calibration(Mapping[str, Fit], Document):
         return "\n".join(lines)
 
     def plot(self, channels: Iterable[str] | None = None, *, units: str = "field") -> Figure:
-        """Allan deviations with their models, three channels a row; see `Fit.plot`.
+        """Allan deviations with models, N, B and K, three channels a row; see `Fit.plot`.
 
         Parameters
         ----------
@@ -157,17 +158,16 @@ class Calibration(Mapping[str, Fit], Document):
         """
         import matplotlib.pyplot as plt
 
-        fits = [self[name] for name in (self if channels is None else channels)]
-        if not fits:
+        names = list(self if channels is None else channels)
+        if not names:
             raise InputError(f"no channel was selected: choose from {', '.join(self)}")
-        rows, columns = -(-len(fits) // 3), min(len(fits), 3)
-        size = (5.0 * columns, 4.0 * rows)
-        figure, axes = plt.subplots(
-            rows, columns, figsize=size, squeeze=False, layout="constrained"
-        )
-        for fit, ax in zip(fits, axes.flat, strict=False):
-            fit.plot(ax, units=units)
-        for ax in axes.flat[len(fits) :]:
+        rows, columns = -(-len(names) // 3), min(len(names), 3)
+        figure, axes = plt.subplots(rows, columns, squeeze=False, layout="constrained")
+        figure.set_size_inches(max(7.0, 5.0 * columns), 5.5 * rows)
+        for name, ax in zip(names, axes.flat, strict=False):
+            straight_lines(self[name].plot(ax, units=units), self.numbers[name].lines(units))
+            ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=2, fontsize="small")
+        for ax in axes.flat[len(names) :]:
             ax.remove()
         return figure
 

@@ -11,10 +11,12 @@ import numpy as np
 from gmwm._core.tables import frame, plain_table
 from gmwm._core.text import Printed, brief, with_error
 from gmwm._core.typing import FloatArray
+from gmwm._core.units import shown_unit
 from gmwm.calibration import tuning
 from gmwm.errors import InputError, MissingNameError
 from gmwm.estimate import Estimate, Fit, estimate
 from gmwm.estimate.result import confidence_interval
+from gmwm.plotting import sensor_lines
 from gmwm.process import BiasInstability, Model, Process, RandomWalk, WhiteNoise
 
 if TYPE_CHECKING:
@@ -26,7 +28,6 @@ PLATEAU = float(np.sqrt(2.0 * np.log(2.0) / np.pi))
 PROCESSES: Mapping[str, Process] = {"N": WhiteNoise(), "B": BiasInstability(), "K": RandomWalk()}
 """The process that has each sensor number as its parameter."""
 
-_WALKS = {"gyro": "angle random walk", "accel": "velocity random walk"}
 _TINY = np.finfo(float).tiny
 
 
@@ -68,13 +69,25 @@ class AxisNumbers:
     def __iter__(self) -> Iterator[Estimate]:
         return iter((self.N, self.B, self.K))
 
+    @property
+    def names(self) -> dict[str, str]:
+        """What N, B and K are called."""
+        kind = {"gyro": "angle ", "accel": "velocity "}.get(self.quantity, "")
+        return {"N": f"{kind}random walk", "B": "bias instability", "K": "rate random walk"}
+
+    def lines(self, units: str = "field") -> dict[str, tuple[float, float, float, float]]:
+        """Lines of N, B and K in an Allan plot; see `gmwm.plotting.straight_lines`."""
+        factor, found = shown_unit(self.quantity, "", units)[1], {}
+        for number in self:
+            value, equal = (number.upper, "") if number.kind == "bound" else (number.value, "= ")
+            text = f"{equal}{self.text(number.key, units=units)} {number.in_units(units).unit}"
+            found[number.key] = (f"{number.key} {text}", factor * value)
+        return sensor_lines(found, self.tau)
+
     def text(self, letter: str, *, units: str = "field") -> str:
         """``2.66 +-0.01``, or ``<= 41.9`` for an upper limit; without the unit.
 
-        Parameters
-        ----------
-        letter : {"N", "B", "K"}
-        units : {"field", "si"}, optional
+        letter: "N", "B" or "K"; units: "field" or "si".
         """
         number: Estimate = getattr(self, letter)
         shown = number.in_units(units)
@@ -114,19 +127,15 @@ class SensorNumbers(Mapping[str, AxisNumbers], Printed):
     def text(self, *, units: str = "field", invalid: Mapping[str, str] | None = None) -> str:
         """A table of the numbers with their 95 % intervals.
 
-        Parameters
-        ----------
-        units : {"field", "si"}, optional
-            Data-sheet units, or SI.
-        invalid : dict of str to str, optional
-            Channel -> what stands in place of numbers that are not valid; "not valid" by default.
+        units: Data-sheet units ("field"), or "si".
+        invalid: Channel -> what stands in place of numbers that are not valid.
         """
         rows: list[Sequence[str]] = []
         for quantity in dict.fromkeys(axis.quantity for axis in self.values()):
             own = {name: axis for name, axis in self.items() if axis.quantity == quantity}
-            walk = _WALKS.get(quantity, "random walk")
-            rows.append((quantity, f"N, {walk}", "B, bias instability", "K, rate random walk"))
-            rows.append(("", *(number.in_units(units).unit for number in next(iter(own.values())))))
+            first = next(iter(own.values()))
+            rows.append((quantity, *(f"{key}, {name}" for key, name in first.names.items())))
+            rows.append(("", *(number.in_units(units).unit for number in first)))
             for name, axis in own.items():
                 n, b, k = (axis.text(letter, units=units) for letter in "NBK")
                 b = f"{b} at {brief(axis.tau, 3)} s"
@@ -146,18 +155,16 @@ class SensorNumbers(Mapping[str, AxisNumbers], Printed):
                 found = number.kind != "bound"
                 values = (name, number.key, number.kind, shown.value if found else None)
                 limits = (shown.lower, shown.upper if np.isfinite(shown.upper) else None)
-                tau = axis.tau if number.key == "B" else None
-                row = (*values, *limits, shown.unit, tau, axis.valid)
-                rows.append(dict(zip(self.COLUMNS, row, strict=True)))
+                row = (*values, *limits, shown.unit, axis.tau if number.key == "B" else None)
+                rows.append(dict(zip(self.COLUMNS, (*row, axis.valid), strict=True)))
         return rows
 
     def to_dict(self) -> dict[str, Any]:
         """Channel -> letter -> value with its interval, SI, in JSON types."""
         found: dict[str, Any] = {name: {"valid": axis.valid} for name, axis in self.items()}
         for row in self.rows("si"):
-            keys = ("kind", "value", "lower", "upper", "unit", "tau")
-            known = {key: row[key] for key in keys if key != "tau" or row["number"] == "B"}
-            found[row["channel"]][row["number"]] = known
+            keys = ("kind", "value", "lower", "upper", "unit", "tau")[: 6 if row["tau"] else 5]
+            found[row["channel"]][row["number"]] = {key: row[key] for key in keys}
         return found
 
     def to_frame(self, *, units: str = "field") -> pandas.DataFrame:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
-from itertools import cycle
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -200,14 +199,14 @@ class ErrorBudget:
         """
         import matplotlib.pyplot as plt
 
-        from gmwm.plotting import COMPONENT_COLOURS, SUM_COLOUR
+        from gmwm.plotting import SUM_COLOUR, styles
 
         of = self.groups[-1] if of is None else of
         quantity = self.quantities(of)[-1] if quantity is None else quantity
         curves = self.curves(of, quantity)
         if ax is None:
             _, ax = plt.subplots(figsize=(7.0, 4.6), layout="constrained")
-        for colour, (label, curve) in zip(cycle(COMPONENT_COLOURS), curves.items(), strict=False):
+        for (colour, _), (label, curve) in zip(styles(curves), curves.items(), strict=True):
             ax.plot(self.grid, curve, color=colour, linewidth=1.3, linestyle="--", label=label)
         total = per_si(quantity) * root_sum([row.curve for row in self._rows(of, quantity)])
         ax.plot(self.grid, total, color=SUM_COLOUR, linewidth=2.6, label="total")

@@ -9,10 +9,12 @@ from gmwm.plotting.deviation import (
     deviation as deviation,
     deviation_range as deviation_range,
     deviations as deviations,
+    intervals as intervals,
     residuals as residuals,
+    sensor_lines as sensor_lines,
     straight_lines as straight_lines,
+    styles as styles,
 )
-from gmwm.plotting.intervals import intervals as intervals
 from gmwm.plotting.navigation import (
     errors as errors,
     growth as growth,

@@ -5,7 +5,9 @@ Every function draws into given axes or new ones and returns them; none knows wh
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from itertools import cycle
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,13 +18,25 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-COMPONENT_COLOURS = ("#0072b2", "#d55e00", "#009e73", "#c06a9a", "#b87a00", "#2f8fc8", "#8c5fa8")
+COMPONENT_COLOURS = (
+    *("#0072b2", "#d55e00", "#009e73", "#c06a9a", "#b87a00", "#2f8fc8", "#8c5fa8"),
+    *("#6e7f1e", "#a3674c", "#5f7f8c"),
+)
 """After Okabe & Ito, distinct to colour-blind people too, darkened to what thin lines need on white
 (3:1, WCAG 2.1, 1.4.11); black is the sum."""
+
+_KINDS = (
+    *("white noise", "Gauss-Markov", "random walk", "bias instability", "quantization noise"),
+    *("low-pass noise", "rate ramp", "resonance", "sinusoid"),
+)
+_LETTERS = "N-KBQ-R--"  # of their parameters
+_COLOURS = dict(zip((*_KINDS, *_LETTERS), 2 * COMPONENT_COLOURS[: len(_KINDS)], strict=True))
+_DASHES = ("--", ":", "-.", (0, (8, 3)))  # of the first, second ... term of a kind
 
 DATA_COLOUR = "#444444"
 SUM_COLOUR = "#000000"
 
+_WIDE_AXIS = 8.0  # last over first value of an axis of intervals with few marks
 _SPREAD_SHOWN = 8.0  # boxes up to this many times as wide as usual are kept in view
 _MARKERS = ("o", "^", "D", "s")
 _BESIDE = 1.07  # ratio of the averaging times at which bars of different kinds are drawn
@@ -52,13 +66,8 @@ def deviation(
     """
     ax = ax or _new_axes(4.6)
     bars = np.stack([np.maximum(value - lower, 0.0), np.maximum(upper - value, 0.0)])
-    style: dict[str, Any] = {
-        "color": DATA_COLOUR,
-        "markersize": 4.5,
-        "capsize": 2.5,
-        "elinewidth": 1.0,
-    }
-    ax.errorbar(tau, value, bars, fmt="o", label=f"data, {interval} interval", zorder=4, **style)
+    style: dict[str, Any] = {"color": DATA_COLOUR, "capsize": 2.5, "elinewidth": 1.0, "zorder": 4}
+    ax.errorbar(tau, value, bars, fmt="o", ms=4.5, label=f"data, {interval} interval", **style)
     _label(ax, f"Allan deviation [{unit}]", title)
     return ax
 
@@ -74,26 +83,18 @@ def deviations(
 ) -> Axes:
     """Several deviations with error bars against averaging time, log-log; returns the axes.
 
-    Parameters
-    ----------
-    kinds : mapping of str to (tau, value, lower, upper)
-        Label -> averaging times (s), deviations and the ends of their intervals, (J,) each.
-    unit : str
-    places : sequence of int, optional
-        Place of each in the palette, so that a kind keeps its colour; in turn by default.
-    interval : str, optional
-        What the bars are, for the legend.
-    title : str, optional
-    ax : matplotlib.axes.Axes, optional
-        That of `deviation` will do.
+    kinds: Label -> averaging times (s), deviations and the ends of their intervals, (J,) each.
+    places: Of each in the palette, so that a kind keeps its colour; in turn by default.
+    interval: What the bars are, for the legend.
+    ax: That of `deviation` will do.
     """
     ax = ax or _new_axes(4.6)
     shown = [np.asarray(line.get_ydata(), dtype=float) for line in ax.get_lines()]
     places = range(len(kinds)) if places is None else places
-    palette = _cycle(max(places) + 1)
     for i, (place, label) in enumerate(zip(places, kinds, strict=True)):
         tau, value, lower, upper = kinds[label]
-        colour, marker = palette[place], _MARKERS[place % len(_MARKERS)]
+        colour = COMPONENT_COLOURS[place % len(COMPONENT_COLOURS)]
+        marker = _MARKERS[place % len(_MARKERS)]
         # Kinds may coincide: open markers and lines, the later the smaller, leave all in view, and
         # bars stand side by side.
         behind = len(kinds) - 1 - i
@@ -104,8 +105,7 @@ def deviations(
         ax.vlines(beside, lower, upper, color=colour, linewidth=1.0, zorder=2)
         shown.append(value)
     every = np.concatenate(shown)
-    every = every[every > 0.0]
-    ax.set_ylim(np.min(every) / _MARGIN, np.max(every) * _MARGIN)
+    ax.set_ylim(np.min(every[every > 0.0]) / _MARGIN, np.max(every) * _MARGIN)
     _label(ax, f"deviation [{unit}]", title)
     ax.legend(fontsize="small", framealpha=0.9, title=f"bars: {interval} intervals")
     return ax
@@ -119,15 +119,28 @@ def _new_axes(height: float) -> Axes:
 
 def _label(ax: Axes, value: str, title: str) -> None:
     """Logarithmic axes over averaging times, with a grid behind what is drawn."""
-    ax.set_xscale("log")
-    ax.set_yscale("log")
-    ax.set_xlabel("averaging time [s]")
-    ax.set_ylabel(value)
-    if title:
-        ax.set_title(title)
+    ax.set(xscale="log", yscale="log", xlabel="averaging time [s]", ylabel=value, title=title)
     ax.grid(True, which="major", color="#cccccc", linewidth=0.6)
     ax.grid(True, which="minor", color="#eeeeee", linewidth=0.4)
     ax.set_axisbelow(True)
+
+
+def styles(labels: Iterable[str]) -> list[tuple[str, int]]:
+    """Colour of each label, and how many of its colour came before.
+
+    A kind of term has the same colour in every plot. Other labels take what is left, in turn.
+
+    labels: Titles of terms, numbered where a kind occurs twice, letters, or any names.
+    """
+    kinds = [re.sub(r"( \d+| [=<≤].*)$", "", label) for label in labels]
+    known = [_COLOURS[kind] for kind in kinds if kind in _COLOURS]
+    left = [colour for colour in COMPONENT_COLOURS if colour not in known]
+    others = cycle(left[::-1] if known else left)
+    found: list[tuple[str, int]] = []
+    for kind in kinds:
+        colour = _COLOURS.get(kind) or next(others)
+        found.append((colour, sum(colour == before for before, _ in found) if known else 0))
+    return found
 
 
 def curves(
@@ -136,39 +149,65 @@ def curves(
     total: FloatArray,
     components: Mapping[str, FloatArray],
     data: FloatArray | None = None,
+    band: Sequence[FloatArray] = (),
 ) -> None:
-    """Fitted curve and its components over the data of `deviation`.
+    """Fitted curve, its band and its components over the data of `deviation`.
 
     tau: (J,), averaging times, s.
     total: (J,), deviation of the sum.
     components: Deviations of the terms by label.
     data: (J,), deviations of the data, to keep in view.
+    band: Ends of the 95 % interval of the sum, (J,) each, if it is drawn.
     """
-    for colour, (label, value) in zip(_cycle(len(components)), components.items(), strict=True):
-        ax.plot(tau, value, color=colour, linewidth=1.3, linestyle="--", label=label, zorder=2)
+    for (colour, turn), (label, value) in zip(styles(components), components.items(), strict=True):
+        dash = _DASHES[turn % len(_DASHES)]
+        ax.plot(tau, value, color=colour, linewidth=1.3, linestyle=dash, label=label, zorder=2)
     ax.plot(tau, total, color=SUM_COLOUR, linewidth=1.8, label="model", zorder=3)
+    if band:
+        ax.fill_between(tau, band[0], band[1], color="#808080", alpha=0.25, lw=0, label="95 % band")
     shown = total if data is None else np.concatenate([total, data])
     ax.set_ylim(*deviation_range(shown))
     ax.legend(fontsize="small", framealpha=0.9)
 
 
+def sensor_lines(
+    numbers: Mapping[str, tuple[str, float]], tau: float
+) -> dict[str, tuple[float, float, float, float]]:
+    """Where N, B and K are read (IEEE Std 952), for `straight_lines`.
+
+    numbers: Letter -> label and value, in units of the deviation and s.
+    tau: Averaging time of the lowest deviation, s.
+    """
+    plateau = (2.0 * np.log(2.0) / np.pi) ** 0.5
+    reading = {"N": (-0.5, 1.0, 1.0), "B": (0.0, plateau, tau), "K": (0.5, 3.0**-0.5, 3.0)}
+    found = {}
+    for (label, value), (slope, share, at) in ((numbers[key], reading[key]) for key in numbers):
+        if 0.0 < value < np.inf:
+            found[label] = (slope, share * value, at, at)
+    return found
+
+
 def straight_lines(ax: Axes, lines: Mapping[str, tuple[float, float, float, float]]) -> None:
     """Straight lines across the log-log axes of `deviation`, thick over a region of each.
 
-    ax: With its limits set; they stay as they are.
-    lines: Label -> the line ``coefficient * tau^slope`` and the averaging times (s) of its region.
+    ax: With its limits set, which are widened only where a number is read beyond them.
+    lines: Label -> the line ``coefficient * tau^slope`` and the averaging times (s) of its region;
+        both the same where its number is read.
     """
-    ends = np.array(ax.get_xlim())
-    limits = ax.get_ylim()
-    for colour, (label, line) in zip(_cycle(len(lines)), lines.items(), strict=True):
+    ends, (low, high) = np.array(ax.get_xlim()), ax.get_ylim()
+    for (colour, _), (label, line) in zip(styles(lines), lines.items(), strict=True):
         slope, coefficient, first, last = line
-        region = np.array([first, last])
-        whole, thick = coefficient * ends**slope, coefficient * region**slope
-        ax.plot(ends, whole, "--", color=colour, linewidth=1.0, zorder=2)
-        (bar,) = ax.plot(region, thick, color=colour, linewidth=4.5, label=label, zorder=3.5)
+        region, dash = np.array([first, last]), ":" if first == last else "--"
+        height = coefficient * region**slope
+        ax.plot(ends, coefficient * ends**slope, dash, color=colour, linewidth=1.0, zorder=2)
+        (bar,) = ax.plot(region, height, color=colour, linewidth=4.5, label=label, zorder=3.5)
         bar.set(alpha=0.8, solid_capstyle="round")
+        if first == last:
+            bar.set(marker="D", markersize=7, linestyle="none", markerfacecolor="w", zorder=5)
+            ax.annotate(label[0], (first, height[0]), (6, 5), textcoords="offset points")
+            low, high = min(low, 0.6 * height[0]), max(high, 1.6 * height[0])
     ax.set_xlim(*ends)
-    ax.set_ylim(*limits)
+    ax.set_ylim(low, high)
     ax.legend(fontsize="small", framealpha=0.9)
 
 
@@ -198,16 +237,13 @@ def residuals(
             f"{100.0 * share:+.2g}", (time, height), (0.0, away), textcoords="offset points"
         )
         text.set(ha="center", va=side, fontsize="x-small", color=DATA_COLOUR)
-    largest = max(float(np.max(np.abs(residual[shown]), initial=0.0)), 2.5)
-    if largest > LINEAR_RESIDUAL:
+    reach = 1.25 * max(*np.abs(residual[shown]), 2.5, 2.5)
+    if reach > 1.25 * LINEAR_RESIDUAL:
         # Beside a residual of 50 at the finest level those at long times would be flat.
         ax.set_yscale("symlog", linthresh=LINEAR_RESIDUAL, linscale=2.0)
-        ax.set_ylim(-2.0 * largest, 2.0 * largest)
-    else:
-        ax.set_ylim(-1.25 * largest, 1.25 * largest)
-    ax.set_xscale("log")
-    ax.set_xlabel("averaging time [s]")
-    ax.set_ylabel("residual [standard errors]")
+        reach *= 1.6
+    ax.set(xscale="log", ylim=(-reach, reach))
+    ax.set(xlabel="averaging time [s]", ylabel="residual [standard errors]")
     heading = f"{title}: misfit of the deviation in %" if title else "misfit in %"
     ax.set_title(heading, fontsize="medium")
     return ax
@@ -215,14 +251,8 @@ def residuals(
 
 def deviation_range(shown: FloatArray) -> tuple[float, float]:
     """Limits of the deviation axis that show these and hide components far below them."""
-    shown = shown[shown > 0.0]
-    low, high = float(np.min(shown)), float(np.max(shown))
+    low, high = float(np.min(shown[shown > 0.0])), float(np.max(shown))
     return low / 10**_DECADES_SHOWN_BELOW, high * 10**0.4
-
-
-def _cycle(count: int) -> list[str]:
-    palette = COMPONENT_COLOURS
-    return [palette[i % len(palette)] for i in range(count)]
 
 
 def boxes(
@@ -230,21 +260,15 @@ def boxes(
 ) -> Figure:
     """Boxplots side by side: one panel a quantity, one box a method, the truth as a line.
 
-    The axis of a panel shows the boxes and whiskers of all methods but those whose spread would
-    flatten the others; what lies outside is counted at the edge.
-
-    panels: Quantity -> method -> estimates.
-    truths: Quantity -> true value.
+    Methods whose spread would flatten the others do not count for the axis of a panel; what lies
+    outside is counted at its edge.
     """
     import matplotlib.pyplot as plt
 
     columns = min(len(panels), 4) if len(panels) != 6 else 3
-    rows = -(-len(panels) // columns)
-    methods = len(next(iter(panels.values())))
-    width = columns * max(2.2, 0.62 * methods + 1.0)
-    figure, axes = plt.subplots(
-        rows, columns, figsize=(width, 3.1 * rows + 0.3), layout="constrained", squeeze=False
-    )
+    rows, methods = -(-len(panels) // columns), len(next(iter(panels.values())))
+    size = columns * max(2.2, 0.62 * methods + 1.0), 3.1 * rows + 0.3
+    figure, axes = plt.subplots(rows, columns, figsize=size, layout="constrained", squeeze=False)
     for ax in axes.ravel()[len(panels) :]:
         ax.set_visible(False)
     for ax, (name, samples) in zip(axes.ravel(), panels.items(), strict=False):
@@ -280,5 +304,45 @@ def _panel(ax: Axes, samples: Mapping[str, FloatArray], truth: float) -> None:
     ax.ticklabel_format(axis="y", style="sci", scilimits=(-2, 3), useMathText=True)
     ax.grid(True, axis="y", color="#dddddd", linewidth=0.6)
     ax.set_axisbelow(True)
-    if len(labels) > 3:
-        ax.tick_params(axis="x", labelsize="small")
+    ax.tick_params(axis="x", labelsize="small" if len(labels) > 3 else "medium")
+
+
+def intervals(
+    panels: Mapping[
+        str, Mapping[str, tuple[Sequence[float] | FloatArray, tuple[float, float, float]]]
+    ],
+) -> Figure:
+    """Values that are 1 where nothing is wrong, on a logarithmic axis.
+
+    panels: Title -> row -> single values, and the one over all of them with its interval.
+    """
+    import matplotlib.pyplot as plt
+    from matplotlib.ticker import FormatStrFormatter, LogLocator, NullFormatter
+
+    names = max((list(rows) for rows in panels.values()), key=len)
+    size = 4.4 * len(panels), 1.2 + 0.38 * len(names)
+    figure, axes = plt.subplots(
+        1, len(panels), figsize=size, layout="constrained", squeeze=False, sharey=True
+    )
+    axes[0, 0].set_yticks(range(len(names)), names)
+    axes[0, 0].set_ylim(len(names) - 0.5, -0.5)
+    for ax, (title, rows) in zip(axes[0], panels.items(), strict=True):
+        for name, (values, (value, lower, upper)) in rows.items():
+            place = names.index(name)
+            ax.plot([lower, upper], [place, place], color=COMPONENT_COLOURS[0], linewidth=2.0)
+            ax.plot(value, place, "o", color=COMPONENT_COLOURS[0], markersize=7)
+            ax.plot(values, [place] * len(values), "|", color=DATA_COLOUR, markersize=11)
+        ax.axvline(1.0, color=DATA_COLOUR, linewidth=0.8, linestyle=":")
+        ax.set_xscale("log")
+        first, last = ax.get_xlim()
+        marked = (
+            (1.0, 3.0) if last > _WIDE_AXIS * first else (1.0, 1.2, 1.5, 2.0, 3.0, 5.0, 7.0, 9.0)
+        )
+        ax.xaxis.set_major_locator(LogLocator(subs=marked))
+        ax.xaxis.set_major_formatter(FormatStrFormatter("%g"))
+        ax.xaxis.set_minor_formatter(NullFormatter())
+        ax.set_title(title, fontsize="medium")
+        ax.grid(True, axis="x", which="both", color="#dddddd", linewidth=0.6)
+        ax.set_axisbelow(True)
+        ax.tick_params(labelsize="small")
+    return figure

@@ -4,30 +4,28 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import partial
 from operator import call
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from gmwm._core.files import writable_file, written
 from gmwm._core.jobs import shared
 from gmwm._core.pages import page_of
 from gmwm._core.text import brief, per_cent
-from gmwm.calibration import Calibration, axis_numbers
-from gmwm.estimate import Fit
+from gmwm._core.typing import FloatArray
+from gmwm.calibration import AxisNumbers, Calibration
+from gmwm.estimate import Estimate, Fit
+from gmwm.estimate.result import confidence_interval
 from gmwm.issues import worst_first
+from gmwm.process import Model, WhiteNoise
 from gmwm.readers import Channel, Recording
-from gmwm.report.answer import (
-    answer,
-    bias_instability,
-    filter_sentence,
-    quantity_text,
-    slow_terms,
-    trust,
-    verdict,
-)
+from gmwm.report.answer import quantity_text, trust
 from gmwm.report.budget import navigation
-from gmwm.report.datasheet import Datasheet, read_datasheet
+from gmwm.report.datasheet import UNITS, Datasheet, read_datasheet
 from gmwm.report.figure import (
     Spans,
     density_figure,
@@ -36,9 +34,11 @@ from gmwm.report.figure import (
     residual_figure,
     series_figure,
 )
-from gmwm.report.health import ambiguity, health, length_sentence, parameters_sentence
+from gmwm.report.health import ambiguity, health
 from gmwm.report.numbers import SHOWN, Certified, certified
 from gmwm.report.page import duration_text, origin, rendered, resource, units_of
+from gmwm.report.screen import filter_table, first_screen, sensor_tables
+from gmwm.report.summary import verdict_line
 
 _AIM = 0.1  # relative standard error
 
@@ -93,16 +93,14 @@ def page(
         "template.html",
         scripts=(get_plotlyjs(), resource("report.js")),
         calibration=calibration,
-        length=duration_text(calibration.duration),
-        answer=answer(calibration, numbers),
+        answer=first_screen(calibration, numbers, sheet),
         overview=[
             (f"{quantity or 'other channels'}", overview_figure(calibration, quantity))
             for quantity in dict.fromkeys(fit.wv.quantity for fit in calibration.values())
         ],
         health=health(calibration),
         channels=[
-            _channel(name, calibration, numbers[SHOWN], sheet) | of_samples[name]
-            for name in calibration
+            _channel(name, calibration, numbers, sheet) | of_samples[name] for name in calibration
         ],
         navigation=navigation(calibration),
         provenance=origin(source | dict(provenance or {}), "report of", sheet),
@@ -111,34 +109,20 @@ def page(
 
 @page_of(Calibration, "fragment")
 def fragment(calibration: Calibration) -> str:
-    """The answer for a notebook: health, a filter's numbers, length, and the axes as a table."""
-    found = verdict(calibration)
-    believed = filter_sentence(calibration)
-    rows = []
-    for name, fit in calibration.items():
-        is_valid, why = trust(name, fit, calibration)
-        rows.append(
-            [
-                name,
-                fit.model.title(),
-                calibration.numbers[name].text("N"),
-                bias_instability(fit)["field"],
-                "; ".join(term["field"] for term in slow_terms(fit)) or "none found",
-                f"{'valid' if is_valid else 'not valid'}: {why}",
-            ]
-        )
-    title = (
-        f"{calibration.source or 'a recording'}: {duration_text(calibration.duration)} at "
-        f"{calibration.rate:g} Hz. {found['word']}: {found['text']}."
+    """The first screen for a notebook: the sensor table, and the filter numbers."""
+    return rendered(
+        "fragment.html",
+        verdict=verdict_line(calibration),
+        sensors=sensor_tables(calibration),
+        skipped=calibration.skipped,
+        filter=filter_table(calibration, certified(calibration)),
+        horizon=f"{SHOWN:g} s",
     )
-    lengths = [length_sentence(calibration, SHOWN), parameters_sentence(calibration)]
-    lines = [title, believed, "Length: " + ". ".join(filter(None, lengths)) + "."]
-    return rendered("fragment.html", lines=list(filter(None, lines)), rows=rows)
 
 
 def _side_by_side(
     calibration: Calibration, recording: Recording | None
-) -> tuple[dict[float, Certified], dict[str, dict[str, Any]]]:
+) -> tuple[Certified, dict[str, dict[str, Any]]]:
     """Filter numbers and figures of the samples, which take longest."""
     believed = partial(certified, calibration)
     samples = {} if recording is None else recording
@@ -165,11 +149,10 @@ def _channel(
     name: str, calibration: Calibration, numbers: Certified, sheet: Datasheet | None
 ) -> dict[str, Any]:
     fit = calibration[name]
-    lengths, duration = fit.needed_length(_AIM), fit.wv.n_all * fit.wv.dt
     own = numbers.axes.get(name)
-    believed = (own.N, own.K) if own is not None else None
+    pair = (own.N, own.K) if own is not None else None
     is_valid, why = trust(name, fit, calibration)
-    rivals = calibration.rivals.get(name, ())
+    rivals, sensor = calibration.rivals.get(name, ()), calibration.numbers[name]
     # A small misfit is in the line below the title already.
     shown = [n for n in fit.notices if (n.code, n.severity) != ("misfit", "note")]
     return {
@@ -178,28 +161,50 @@ def _channel(
         "model": fit.model.title(),
         "valid": is_valid,
         "why": why,
-        "noise": "" if own is None else _noise(fit, own.N),
         "ambiguity": ambiguity(calibration, name),
-        "stated": _stated(name, fit, sheet),
-        "rows": [(e, _needed(lengths.get(e.key), duration)) for e in fit.estimates],
-        "figure": deviation_figure(fit, filter_numbers=believed, rivals=rivals, sheet=sheet),
-        "sliders": _sliders(fit, believed),
+        "stated": _stated(name, sensor, fit, sheet),
+        "rows": _error_model(fit),
+        "figure": deviation_figure(fit, sensor, filter_numbers=pair, rivals=rivals, sheet=sheet),
+        "sliders": _sliders(fit, pair),
         "residuals": residual_figure(fit),
         "left_out": sum(stop - start for start, stop in calibration.left_out.get(name, ())),
         "fitness": _fitness(fit),
     }
 
 
-def _noise(fit: Fit, number: float) -> str:
-    """Which of the values of white noise is which, where they differ."""
-    density = axis_numbers(fit).N.value
-    if not abs(number - density) > 0.01 * density > 0.0:
-        return ""
-    text = quantity_text(number, "u/sqrt(Hz)", fit)["field"]
-    return (
-        f"Filter N for {SHOWN:g} s is {text}: it covers slower terms too. N in the table below "
-        "belongs to one term."
-    )
+def _error_model(fit: Fit) -> list[tuple[Estimate, str]]:
+    """The parameters, each with the length of record that it needs.
+
+    White noise is one row with what the sensor's low-pass lets through of it.
+    """
+    lengths, duration = fit.needed_length(_AIM), fit.wv.n_all * fit.wv.dt
+    terms = fit.model.terms
+    noise = [i for i, term in enumerate(terms) if term.is_white or term.is_band_limited]
+    total = _noise(fit.model)[0]
+    rows, merged = list(fit.estimates), set()
+    if total > 0.0 and any(terms[i].is_band_limited for i in noise):
+        merged = {item.key for item in fit.model.parameters if item.term in noise}
+        error = 0.5 * float(fit.logarithmic_error(_noise)[0]) * total**0.5
+        interval = confidence_interval(WhiteNoise.parameters[0], total**0.5, error, 0.95)
+        row = Estimate.of(WhiteNoise(), "estimated", total**0.5, error, interval, fit.wv)
+        parts = []
+        for term in (terms[i] for i in noise if terms[i].is_band_limited):
+            shape, share = (
+                term.shape_parameters[0],
+                per_cent((term.values["N"] or 0.0) ** 2 / total),
+            )
+            size = f"a {shape.name} of {brief(term.values[shape.name] or 0.0, 3)} {shape.unit}"
+            parts.append(f"{share} of its power has {size}" if noise[1:] else size)
+        meaning = f"white noise: {', '.join(parts)}"
+        rows = [replace(row, key="N, bandwidth", meaning=meaning), *rows]
+        lengths[rows[0].key] = max((lengths[key] for key in merged & {*lengths}), default=np.inf)
+    return [(e, _needed(lengths.get(e.key), duration)) for e in rows if e.key not in merged]
+
+
+def _noise(model: Model) -> FloatArray:
+    """Density of white noise and low-pass noise at low frequencies, u^2/Hz, (1,)."""
+    terms = (term for term in model.terms if term.is_white or term.is_band_limited)
+    return np.array([sum((term.values["N"] or 0.0) ** 2 for term in terms)])
 
 
 def _sliders(fit: Fit, numbers: tuple[float, float] | None) -> list[dict[str, str]]:
@@ -214,20 +219,16 @@ def _sliders(fit: Fit, numbers: tuple[float, float] | None) -> list[dict[str, st
     return shown
 
 
-def _stated(name: str, fit: Fit, sheet: Datasheet | None) -> str:
-    """The data sheet's numbers beside what was measured."""
+def _stated(name: str, sensor: AxisNumbers, fit: Fit, sheet: Datasheet | None) -> str:
+    """The data sheet's numbers beside the sensor numbers."""
     values = sheet.of(name, fit.wv.quantity) if sheet is not None else {}
-    if not values:
-        return ""
-    units = {"N": "u/sqrt(Hz)", "B": "u", "K": "u/s/sqrt(Hz)"}
-    measured = {number.key: number.value for number in axis_numbers(fit)}
     parts = []
-    for key, value in values.items():
-        text = f"{key} {quantity_text(value, units[key], fit)['field']}"
-        if measured[key] > 0.0:
-            text += f" (measured: {brief(measured[key] / value, 3)} times)"
-        parts.append(text)
-    return f"Data sheet: {', '.join(parts)}."
+    for number in sensor:
+        if (value := values.get(number.key)) is not None:
+            sign, own = ("≤ ", number.upper) if number.kind == "bound" else ("", number.value)
+            text = quantity_text(value, UNITS[number.key], fit)["field"]
+            parts.append(f"{number.key} {text} (measured: {sign}{brief(own / value, 3)} times)")
+    return f"Data sheet: {', '.join(parts)}." if parts else ""
 
 
 def _fitness(fit: Fit) -> str:

@@ -16,11 +16,10 @@ from gmwm._core.units import SI_UNIT, factor, si_parameter_unit
 from gmwm.errors import InputError
 from gmwm.process import BiasInstability, Process, RandomWalk, WhiteNoise
 
-_TERMS: dict[str, tuple[str, type[Process]]] = {
-    "N": ("u/sqrt(Hz)", WhiteNoise),
-    "B": ("u", BiasInstability),
-    "K": ("u/s/sqrt(Hz)", RandomWalk),
-}
+UNITS = {"N": "u/sqrt(Hz)", "B": "u", "K": "u/s/sqrt(Hz)"}
+"""Of the numbers that a data sheet states."""
+
+_TERMS: dict[str, type[Process]] = {"N": WhiteNoise, "B": BiasInstability, "K": RandomWalk}
 _VALUE = re.compile(r"\s*([-+.\deE]+)\s+(\S.*?)\s*")
 _HINT = "write it like 'N: 0.15 deg/sqrt(h)', 'B: 7 deg/h'"
 
@@ -47,7 +46,7 @@ class Datasheet:
         values = self.of(channel, quantity)
         if not values:
             return None
-        curves = [_TERMS[key][1](value).haar_variance(tau, dt) for key, value in values.items()]
+        curves = [_TERMS[key](value).haar_variance(tau, dt) for key, value in values.items()]
         return np.asarray(np.sqrt(2.0 * np.sum(curves, axis=0)), dtype=float)
 
 
@@ -92,8 +91,8 @@ def read_datasheet(
 
 
 def _value(where: str, key: Any, value: Any, quantity: str) -> float:
-    if key not in _TERMS:
-        raise InputError(f"{where}: {str(key)[:40]!r} is not one of {', '.join(_TERMS)}: {_HINT}")
+    if key not in UNITS:
+        raise InputError(f"{where}: {str(key)[:40]!r} is not one of {', '.join(UNITS)}: {_HINT}")
     found = _VALUE.fullmatch(value) if isinstance(value, str) else None
     try:
         if found is None:
@@ -103,7 +102,7 @@ def _value(where: str, key: Any, value: Any, quantity: str) -> float:
         raise InputError(
             f"{where}: {key} = {str(value)[:40]!r} is not a number with a unit: {_HINT}"
         ) from None
-    unit = si_parameter_unit(_TERMS[key][0], quantity)
+    unit = si_parameter_unit(UNITS[key], quantity)
     si = number * factor(found[2], unit)
     if not (np.isfinite(si) and si > 0.0):
         raise InputError(f"{where}: {key} = {value[:40]} is not positive: give a positive number")

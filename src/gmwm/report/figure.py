@@ -7,18 +7,18 @@ hide; and ``whatif``: N and K of the curve that sliders move, with the sampling 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from gmwm._core.typing import FloatArray
-from gmwm.calibration import PLATEAU, Calibration, axis_numbers
+from gmwm.calibration import AxisNumbers, Calibration
 from gmwm.diagnosis import spectrum
 from gmwm.estimate import Fit
 from gmwm.estimate.result import dense_curves
 from gmwm.filter_numbers import FIELD_UNITS, ErrorBudget, root_sum
-from gmwm.plotting import COMPONENT_COLOURS, DATA_COLOUR, SUM_COLOUR, deviation_range
+from gmwm.plotting import COMPONENT_COLOURS, DATA_COLOUR, SUM_COLOUR, deviation_range, styles
 from gmwm.process import Model
 from gmwm.readers import Channel
 from gmwm.report.datasheet import Datasheet
@@ -27,7 +27,7 @@ from gmwm.report.page import units_of
 Figure = dict[str, Any]
 Spans = Sequence[tuple[int, int]]
 
-WHATIF = "filter: N and K"
+WHATIF = "filter N and K"
 """Name of the curve that sliders move."""
 
 _GRID = "#dddddd"  # the page's style sheet gives it another shade on dark screens
@@ -36,6 +36,7 @@ _SHEET = "#9a5b00"
 _BELOW = 8.0  # how far below the curves a mark may lie that the axis is stretched for
 _SHARE = 100.0  # per cent: residuals beyond are drawn at the edge, with their size
 _FILTER = "#c2185b"
+_DASHES = ("dash", "dot", "dashdot", "longdash")  # of the first, second ... term of a kind
 _TICK = 0.93  # of the height: what was left out is marked above, and no sample is painted over
 _BINS = 400  # of the time series: as many as a figure has columns of pixels to show
 _PER_OCTAVE = 12
@@ -60,7 +61,7 @@ def overview_figure(calibration: Calibration, quantity: str | None) -> Figure:
     units = _units("Allan deviation", "u", first)
     factor = units_of("u", first.wv)[1]
     seen: list[FloatArray] = []
-    for (name, fit), colour in zip(fits.items(), _colours(len(fits)), strict=True):
+    for (colour, _), (name, fit) in zip(styles(fits), fits.items(), strict=True):
         tau, components = dense_curves(fit)
         total = factor * root_sum(list(components.values()))
         value = factor * fit.wv.allan_deviation
@@ -77,28 +78,23 @@ def overview_figure(calibration: Calibration, quantity: str | None) -> Figure:
 
 def deviation_figure(
     fitted: Fit,
+    numbers: AxisNumbers,
     *,
     filter_numbers: tuple[float, float] | None = None,
     rivals: Sequence[Model] = (),
     sheet: Datasheet | None = None,
 ) -> Figure:
-    """Allan deviation of the data with intervals, model, terms, and the filter numbers.
+    """Allan deviation of the data with intervals, model with its band, terms, and N, B, K.
 
-    filter_numbers: (float, float), n and K of the curve that the sliders move, SI.
-    rivals: That describe the data as well: drawn faintly.
+    filter_numbers: (float, float), N and K of the curve that the sliders move, SI.
+    rivals: That describe the data as well: the band covers them.
     """
     wv, factor = fitted.wv, units_of("u", fitted.wv)[1]
     tau, components = dense_curves(fitted)
     total = root_sum(list(components.values()))
-    traces = []
-    for rival in rivals:
-        at, parts = dense_curves(fitted, rival)
-        curve, name = factor * root_sum(list(parts.values())), "models that fit equally well"
-        faint = _line(at, curve, name, "#777777", "solid", 1.0)
-        traces.append({**faint, "opacity": 0.85, "legendgroup": "ties"})
-    for (label, curve), colour in zip(components.items(), _colours(len(components)), strict=True):
-        if np.any(curve > 0.0):
-            traces.append(_line(tau, factor * curve, label, colour, "dash", 1.5))
+    traces = _band(fitted, tau, factor, rivals)
+    band = len(traces)
+    traces += _terms(tau, {label: factor * curve for label, curve in components.items()})
     stated = sheet.deviation(wv.name, wv.quantity, tau, wv.dt) if sheet else None
     if stated is not None:
         traces.append(_line(tau, factor * stated, "data sheet", _SHEET, "longdashdot", 2.0))
@@ -111,40 +107,70 @@ def deviation_figure(
     if filter_numbers is not None:
         more["whatif"] = {"curve": WHATIF, "factor": factor}
         N, K = filter_numbers
-        believed = factor * np.sqrt(N**2 / tau + K**2 * tau / 3.0)
-        traces.append(_line(tau, believed, WHATIF, _FILTER, "dot", 2.4))
-    toggles = [0, *range(max(len(rivals), 1), len(traces))]  # one for all rivals
-    traces.append(_marks(fitted, filter_numbers, factor))
+        curve = factor * np.sqrt(N**2 / tau + K**2 * tau / 3.0)
+        traces.append({**_line(tau, curve, WHATIF, _FILTER, "dot", 2.4), "visible": False})
+    marks = _marks(numbers, fitted)
+    # One box for both ends of the band, and one for the lines and marks of N, B and K.
+    toggles = [*range(1, band), *range(band, len(traces)), len(traces) + len(marks) - 1]
+    traces += marks
     bottom, top = deviation_range(np.concatenate([factor * total, value]))
-    marks = [0.7 * y for y in traces[-1]["y"] if y > bottom / _BELOW]
+    lowest = min([bottom, *(0.4 * y for y in marks[-1]["y"] if y > bottom / _BELOW)])
     units = _units("Allan deviation", "u", fitted)
-    deviations = _axis(units[0][0], min([bottom, *marks]), top)
-    layout = {"xaxis": _times(wv.tau), "yaxis": deviations}
+    layout = {"xaxis": _times(wv.tau), "yaxis": _axis(units[0][0], lowest, top)}
     return _figure(traces, layout, units=units, toggles=toggles, **more)
 
 
-def _marks(fitted: Fit, numbers: tuple[float, float] | None, factor: float) -> Figure:
+def _band(fitted: Fit, tau: FloatArray, factor: float, rivals: Sequence[Model]) -> list[Figure]:
+    """The 95 % band of the fitted curve; nothing where it is not known."""
+    with np.errstate(all="ignore"):
+        _, *ends = fitted.deviation_interval(tau, rivals=rivals)
+    if not fitted.keys or not np.all(np.isfinite(ends)):
+        return []
+    name = "95 % band of the models that fit equally well" if rivals else "95 % band of the model"
+    low, high = (_line(tau, factor * each, name, "#8a8a8a", "solid", 0.0) for each in ends)
+    low |= {"name": f"{name}, lower end", "legendgroup": name, "hoverinfo": "skip"}
+    return [low, {**high, "fill": "tonexty", "fillcolor": "rgba(130,130,130,0.28)"}]
+
+
+def _terms(x: FloatArray, curves: Mapping[str, FloatArray]) -> list[Figure]:
+    """Dashed curves of what a sum is made of, in the colours of their kinds."""
+    shown = zip(styles(curves), curves.items(), strict=True)
+    return [
+        _line(x, curve, label, colour, _DASHES[turn % len(_DASHES)], 1.5)
+        for (colour, turn), (label, curve) in shown
+        if np.any(curve > 0.0)
+    ]
+
+
+def _marks(numbers: AxisNumbers, fitted: Fit) -> list[Figure]:
     """N where its line passes 1 s, K where its line passes 3 s, 0.664 B at the lowest point."""
-    own = axis_numbers(fitted)
-    bias = own.B.upper if own.B.kind == "bound" else own.B.value
-    places = [("0.664 B", own.tau, PLATEAU * bias)]
-    if numbers is not None:
-        places += [("N at 1 s", 1.0, numbers[0]), ("K at 3 s", 3.0, numbers[1])]
-    shown = [each for each in places if each[2] > 0.0]
-    late = 0.1 * fitted.wv.tau[-1]
-    left = [label[0] == "K" or tau > late for label, tau, _ in shown]
-    return _scatter(
-        np.array([tau for _, tau, _ in shown]),
-        factor * np.array([y for *_, y in shown]),
-        "N at 1 s, 0.664 B at the lowest point, K at 3 s",
+    name, lines = "N, B, K of the sensor", numbers.lines()
+    ends = fitted.wv.tau[[0, -1]] * [0.5, 2.0]
+    texts = [
+        [each.replace(" = ", " ").replace("<=", "≤").replace("+-", "±") for each in labels]
+        for labels in (lines, numbers.lines("si"))
+    ]
+    traces, places = [], []
+    for (colour, _), (label, line) in zip(styles(lines), lines.items(), strict=True):
+        slope, height, at, _ = line
+        trace = _line(ends, height * ends**slope, f"{label[0]} line", colour, "dot", 1.0)
+        traces.append({**trace, "legendgroup": name})
+        places.append((at, height * at**slope))
+    marks = _scatter(
+        np.array([at for at, _ in places]),
+        np.array([y for _, y in places]),
+        name,
         mode="markers+text",
-        text=[label for label, *_ in shown],
-        textposition=["top left" if is_left else "top right" for is_left in left],
-        textfont={"size": 14, "color": SUM_COLOUR},
+        text=texts[0],
+        si=texts[1],
+        textposition=["top right" if label[0] == "N" else "bottom center" for label in lines],
+        textfont={"size": 13, "color": SUM_COLOUR},
         # Open, so that a point of the data beneath is seen.
-        marker={"symbol": "diamond-open", "size": 12, "color": _FILTER, "line": {"width": 2}},
-        hovertemplate="%{text}: %{y:.4g} at %{x:.4g} s<extra></extra>",
+        marker={"symbol": "diamond-open", "size": 11, "color": SUM_COLOUR, "line": {"width": 2}},
+        hovertemplate="%{text}<br>%{y:.4g} at %{x:.4g} s<extra></extra>",
+        legendgroup=name,
     )
+    return [*traces, marks]
 
 
 def residual_figure(fitted: Fit) -> Figure:
@@ -187,16 +213,13 @@ def density_figure(fitted: Fit, channel: Channel, spans: Spans) -> Figure:
     frequency, root = _density(channel, spans)
     traces = [_line(frequency, factor * root, "data", "#7f8c99", "solid", 1.2)]
     grid = np.geomspace(frequency[0], frequency[-1], 160)
-    terms, curves = fitted.model.terms, []
-    for label, term, colour in zip(
-        fitted.model.term_labels(), terms, _colours(len(terms)), strict=True
-    ):
+    curves: dict[str, FloatArray] = {}
+    for label, term in zip(fitted.model.term_labels(), fitted.model.terms, strict=True):
         if term.has_spectrum() and not term.is_line and not term.is_drift:
-            curves.append(np.sqrt(np.maximum(term.psd(grid, channel.dt), 0.0)))
-            if np.any(curves[-1] > 0.0):
-                traces.append(_line(grid, factor * curves[-1], label, colour, "dash", 1.3))
+            curves[label] = factor * np.sqrt(np.maximum(term.psd(grid, channel.dt), 0.0))
     if curves:
-        traces.append(_line(grid, factor * root_sum(curves), "model", SUM_COLOUR, "solid", 2.0))
+        total = root_sum(list(curves.values()))
+        traces += [*_terms(grid, curves), _line(grid, total, "model", SUM_COLOUR, "solid", 2.0)]
     units = _units("density", "u/sqrt(Hz)", fitted)
     known = root[root > 0.0]
     densities = _axis(units[0][0], 0.4 * factor * known.min(), 2.5 * factor * known.max())
@@ -235,10 +258,7 @@ def growth_figure(known: ErrorBudget, unknown: ErrorBudget, of: str, quantity: s
     """Growth of an error in an outage: parts, total, and total for unknown slow errors."""
     unit, times = FIELD_UNITS[quantity], np.array(known.grid)
     curves = known.curves(of, quantity)
-    traces = [
-        _line(times, curve, label, colour, "dash", 1.5)
-        for (label, curve), colour in zip(curves.items(), _colours(len(curves)), strict=True)
-    ]
+    traces = _terms(times, curves)
     for budget, label, dash, width in (
         (known, "total, slow errors known", "solid", 3.0),
         (unknown, "total, nothing known", "dot", 2.0),
@@ -318,10 +338,6 @@ def _axis(title: str, low: float | None = None, high: float = 1.0) -> Figure:
 def _linear(title: str) -> Figure:
     frame = {"gridcolor": _GRID, "linecolor": "#888888", "mirror": True, "zeroline": False}
     return {"title": {"text": title, "standoff": 6}, **frame}
-
-
-def _colours(count: int) -> list[str]:
-    return [COMPONENT_COLOURS[i % len(COMPONENT_COLOURS)] for i in range(count)]
 
 
 # -- samples ---------------------------------------------------------------------------------------

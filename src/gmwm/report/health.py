@@ -38,6 +38,7 @@ def health(calibration: Calibration) -> dict[str, Any]:
         ],
         "unexamined": () if examined else list(map(str, notices)),
         "summary": _summary(found),
+        "length": length_sentence(calibration, SHOWN),
         "severe": any(notice.severity == "bad" for notice in found),
         # Of equal ones, those of the whole recording before those of a channel.
         "rows": worst_first(sorted(found, key=lambda notice: bool(notice.where))),
@@ -159,26 +160,6 @@ def length_sentence(calibration: Calibration, horizon: float) -> str:
         )
     why = f" ({worst} is known to {share})" if error > _AIM else ""
     return f"too short for {horizon:g} s outages: record {text}{why}"
-
-
-def parameters_sentence(calibration: Calibration) -> str:
-    """The length at which every parameter is well known; a filter's numbers need less."""
-    lengths = [
-        (seconds, f"{key} of {name}")
-        for name, fit in calibration.items()
-        for key, seconds in fit.needed_length(_AIM).items()
-    ]
-    finite = [each for each in lengths if np.isfinite(each[0])]
-    if not finite:
-        return ""
-    longest, what = max(finite)
-    if longest <= calibration.duration:
-        return f"Every parameter has an error of at most {100.0 * _AIM:g} %"
-    found = _worst(calibration, SHOWN)
-    aside = "; a filter needs less" if found is not None and longest > found[2] else ""
-    return (
-        f"For {100.0 * _AIM:g} % in every parameter record {duration_text(longest)} ({what}){aside}"
-    )
 
 
 def _part_sentence(calibration: Calibration, length: float, horizon: float) -> str:

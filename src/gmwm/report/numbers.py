@@ -1,22 +1,20 @@
-"""Filter numbers for several outages, and the texts to copy."""
+"""Filter numbers for outages, and the texts to copy."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence, Set
+from collections.abc import Mapping, Set
 from dataclasses import dataclass, replace
 
 import yaml
 
 from gmwm.calibration import Calibration
 from gmwm.errors import InputError
-from gmwm.export import SENSORS, TARGETS, Axis, ImuFile, ImuNumbers, Triad, axis_of, imu_of
+from gmwm.estimate import Fit
+from gmwm.export import SENSORS, TARGETS, Axis, ImuFile, Triad, axis_of, imu_of
 from gmwm.filter_numbers import bound
 
-HORIZONS = (1.0, 10.0, 60.0, 600.0)
-"""s: keyframes, a bridge, a tunnel, a long outage."""
-
 SHOWN = 60.0
-"""s: the horizon that a page opens with."""
+"""s: length of outages of all filter numbers on a page."""
 
 _TITLES = {name: each.to_copy for name, each in TARGETS.items() if each.to_copy}
 """Of the files of programs, by their languages."""
@@ -26,80 +24,62 @@ _NOT_VALID = "the fit failed; do not use these numbers"
 
 @dataclass(frozen=True)
 class Certified:
-    """Filter numbers for one length of outages.
+    """Filter numbers for outages of `SHOWN`.
 
-    horizon: s.
     axes: The numbers of each channel for which there are some.
-    triads: Gyros and accelerometers, with one value for the axes of each, where both are there.
+    triads: Gyros and accelerometers, with one value for the axes of each.
     problem: Why a channel has none, if one has none.
     texts: Title -> text for the clipboard: the files that `gmwm.export` writes.
-    notes: Why there is no text for some program.
+    note: Why there is no text for programs; empty if there is.
     """
 
-    horizon: float
     axes: Mapping[str, Axis]
     triads: tuple[Triad, ...]
     problem: str
     texts: Mapping[str, str]
-    notes: tuple[str, ...]
+    note: str
 
 
-def certified(
-    calibration: Calibration, horizons: Sequence[float] | None = None
-) -> dict[float, Certified]:
-    """The numbers by horizon; a horizon shorter than two samples is left out."""
-    longest = max((fit.wv.dt for fit in calibration.values()), default=0.0)
-    found: dict[float, Certified] = {}
-    imu = None
-    for horizon in horizons or HORIZONS:
-        if horizon >= 2.0 * longest or horizon == SHOWN:
-            found[horizon], imu = _at(calibration, horizon, imu)
-    return found
-
-
-def _at(
-    calibration: Calibration, horizon: float, before: ImuNumbers | None
-) -> tuple[Certified, ImuNumbers | None]:
-    """The numbers for a horizon, and the IMU that they make; ``before`` is that of another."""
+def certified(calibration: Calibration) -> Certified:
+    """The filter numbers of a calibration."""
     axes: dict[str, Axis] = {}
     problem = ""
-    imu, why = _imu(calibration, tuple(calibration), horizon, before)
-    if imu is not None:
-        axes = {axis.name: axis for triad in imu.triads for axis in triad.axes}
     for name, fitted in calibration.items():
         try:
-            if name not in axes:
-                axes[name] = axis_of(name, bound(fitted, horizon=horizon), float("nan"), fitted)
+            axes[name] = axis_of(name, bound(fitted, horizon=SHOWN), float("nan"), fitted)
         except InputError as error:
             problem = f"{name}: {error}"
-    if imu is None and problem:  # without the channels that have none
-        imu, why = _imu(calibration, tuple(axes), horizon, before)
-    shown = {name: axes[name] for name in calibration if name in axes}
-    invalid = {name for name in shown if not calibration[name].valid}
-    texts = _by_axis(shown, invalid, horizon)
-    if imu is None:
-        return Certified(horizon, axes, (), problem, texts, (why,)), None
-    for name, title in _TITLES.items():
-        target = TARGETS[name]
-        if isinstance(target, ImuFile):
-            texts[title] = target.text(imu if target.shared else imu.by_axis())
-    return Certified(horizon, axes, imu.triads, problem, texts, ()), imu
-
-
-def _imu(
-    calibration: Calibration, names: tuple[str, ...], horizon: float, before: ImuNumbers | None
-) -> tuple[ImuNumbers | None, str]:
-    """The IMU of some channels, or why there is none."""
-    fits = {name: calibration[name] for name in names if calibration[name].wv.quantity in SENSORS}
-    outlook = None if before is None else before.outlook
+    fits = {name: calibration[name] for name in axes if calibration[name].wv.quantity in SENSORS}
+    triads = tuple(
+        triad_of(quantity, own)
+        for quantity in SENSORS
+        if (own := {name: fit for name, fit in fits.items() if fit.wv.quantity == quantity})
+    )
+    texts = {}
     try:
-        given = [replace(calibration, fits=fits)]
-        return imu_of(given, "N+K", horizon, horizon, shared=True, outlook=outlook), ""
+        imu = imu_of([replace(calibration, fits=fits)], "N+K", SHOWN, SHOWN, shared=True)
+        for name, title in _TITLES.items():
+            target = TARGETS[name]
+            if isinstance(target, ImuFile):
+                texts[title] = target.text(imu if target.shared else imu.by_axis())
+        why = ""
     except InputError as error:
-        return None, str(error)
+        why = str(error)
+    texts |= _by_axis(axes, {name for name in axes if not calibration[name].valid})
+    return Certified(axes, triads, problem, texts, why)
 
 
-def _by_axis(axes: Mapping[str, Axis], invalid: Set[str], horizon: float) -> dict[str, str]:
+def triad_of(quantity: str, fits: Mapping[str, Fit]) -> Triad:
+    """The axes of a sensor with their numbers, and one value for all of them.
+
+    Raises InputError if an axis has none.
+    """
+    own, shared = (bound(fits, horizon=SHOWN, shared=each) for each in (False, True))
+    axes = tuple(axis_of(name, one, own.rate, fits[name]) for name, one in own.items())
+    return Triad(quantity, axes, next(iter(shared.values())))
+
+
+def _by_axis(axes: Mapping[str, Axis], invalid: Set[str]) -> dict[str, str]:
     """Plain numbers of each axis, for a filter of one's own; a comment where they are not valid."""
     if not axes:
         return {}
@@ -111,7 +91,7 @@ def _by_axis(axes: Mapping[str, Axis], invalid: Set[str], horizon: float) -> dic
         for name, each in axes.items()
     }
     about = (
-        f"filter numbers for outages up to {horizon:g} s: N [u/sqrt(Hz)], K [u/s/sqrt(Hz)], sd of "
+        f"filter numbers for outages up to {SHOWN:g} s: N [u/sqrt(Hz)], K [u/s/sqrt(Hz)], sd of "
         "the bias state at\n# the start [u] (add your turn-on bias); u: rad/s, m/s^2"
     )
     marks = {name: f"  # {_NOT_VALID}" if name in invalid else "" for name in values}

@@ -13,7 +13,7 @@
   function colour(trace) {
     return (trace.line && trace.line.color) || (trace.marker && trace.marker.color) || "#888";
   }
-  var STYLES = { dash: "dashed", longdashdot: "dashed", dot: "dotted" };
+  var STYLES = { dash: "dashed", longdash: "dashed", dashdot: "dashed", longdashdot: "dashed", dot: "dotted" };
   function scaled(values, factor) {
     return values.map(function (v) { return v === null ? null : v * factor; });
   }
@@ -24,6 +24,7 @@
     var unit = figure.units[Math.min(units, figure.units.length - 1)];
     if (!unit || unit[1] === 1) { return original; }
     var copy = Object.assign({}, original, { y: scaled(original.y, unit[1]) });
+    if (original.si) { copy.text = original.si; }
     if (original.error_y) {
       copy.error_y = Object.assign({}, original.error_y, {
         array: scaled(original.error_y.array, unit[1]),
@@ -67,7 +68,7 @@
     figure.toggles.forEach(function (index) {
       var first = figure.data[index], label = element("label", "", bar);
       var box = element("input", "", label);
-      box.type = "checkbox"; box.checked = true; box.dataset.trace = index;
+      box.type = "checkbox"; box.checked = first.visible !== false; box.dataset.trace = index;
       var swatch = element("span", "", label);
       swatch.className = "swatch " + (first.line ? STYLES[first.line.dash] || "" : "points");
       swatch.style.color = /^#(000000|444444)$/.test(colour(first))
@@ -138,17 +139,20 @@
           return figure.whatif.factor * Math.sqrt(now.N * now.N / tau + now.K * now.K * tau / 3);
         });
       }
-      if (t.text) {
-        t.y = t.y.map(function (y, i) {
-          return t.text[i][0] in now ? now[t.text[i][0]] * figure.whatif.factor : y;
-        });
-      }
     });
   }
   each("input[data-whatif]", function (slider) {
     var place = slider.dataset.whatif;
     moved(place);
-    slider.addEventListener("input", function () { moved(place); draw(place); });
+    slider.addEventListener("input", function () {
+      drawn[place].data.forEach(function (t, i) {
+        if (t.name === drawn[place].whatif.curve) {
+          t.visible = true;
+          document.querySelector('[data-legend="' + place + '"] [data-trace="' + i + '"]').checked = true;
+        }
+      });
+      moved(place); draw(place);
+    });
   });
   each("button[data-reset]", function (button) {
     button.addEventListener("click", function () {
@@ -158,7 +162,7 @@
     });
   });
 
-  // -- units, horizon, copies -----------------------------------------------------------------
+  // -- units, copies -----------------------------------------------------------------
 
   each("select[data-units]", function (select) {
     select.addEventListener("change", function () {
@@ -168,11 +172,6 @@
         if (drawn[place].whatif) { moved(place); }
         draw(place);
       });
-    });
-  });
-  each("select[data-horizon]", function (select) {
-    select.addEventListener("change", function () {
-      each("[data-for]", function (box) { box.hidden = box.dataset.for !== select.value; });
     });
   });
   function copied(button, ok) {

@@ -10,12 +10,12 @@ from gmwm._core.units import si_parameter_unit
 from gmwm.calibration import LONGEST_PART, Calibration, SensorNumbers
 from gmwm.errors import InputError
 from gmwm.estimate import Fit, JointFit
-from gmwm.export import SENSORS, Triad, axis_of
+from gmwm.export import SENSORS
 from gmwm.filter_numbers import bound
 from gmwm.issues import Notice, worst_first
 from gmwm.report.answer import quantity_text, trust
 from gmwm.report.health import findings, length_sentence
-from gmwm.report.numbers import SHOWN
+from gmwm.report.numbers import SHOWN, triad_of
 from gmwm.report.page import duration_text
 
 _LINES = 30  # of the page, with those about files
@@ -164,9 +164,7 @@ def _filter(calibration: Calibration) -> list[str]:
 
 
 def _of_sensor(quantity: str, fits: Mapping[str, Fit]) -> list[str]:
-    own, shared = (bound(fits, horizon=SHOWN, shared=each) for each in (False, True))
-    axes = tuple(axis_of(name, one, own.rate, fits[name]) for name, one in own.items())
-    triad = Triad(quantity, axes, next(iter(shared.values())))
+    triad = triad_of(quantity, fits)
     row = f"{quantity:<6}"
     values = {"N": ("u/sqrt(Hz)", triad.N), "K": ("u/s/sqrt(Hz)", triad.K)}
     for key, (unit, value) in (values | {"start": ("u", triad.initial_sd)}).items():

@@ -395,5 +395,6 @@ def _bridged(means: FloatArray, known: BoolArray) -> FloatArray:
             if side.any()
         ]
         if ends:
-            means[start:stop] = np.interp(place[start:stop], *zip(*ends, strict=True))
+            times, values = np.array(ends).T
+            means[start:stop] = np.interp(place[start:stop], times, values)
     return means

@@ -78,7 +78,9 @@ def test_results_draw_into_given_axes(fit):
 def test_legend_names_data_model_and_components(fit):
     axes = fit.plot()
     texts = [text.get_text() for text in axes.get_legend().get_texts()]
-    assert sorted(texts) == sorted(["data, 95 % interval", "white noise", "random walk", "model"])
+    assert sorted(texts) == sorted(
+        ["data, 95 % interval", "95 % band", "white noise", "random walk", "model"]
+    )
     lines = {line.get_label(): line for line in axes.lines}
     tau = lines["white noise"].get_xdata()
     assert tau.size > 4 * fit.wv.tau.size  # between octaves too
@@ -115,14 +117,35 @@ def test_components_of_zero_are_left_out(fit):
     assert "white noise" in texts
 
 
-def test_many_components_have_a_colour_each():
+def test_a_kind_has_one_colour_whatever_is_drawn_with_it():
+    first = dict(zip(labels := ["white noise", "Gauss-Markov"], plot.styles(labels), strict=True))
+    labels = ["Gauss-Markov 1", "own process", "Gauss-Markov 2", "random walk", "white noise"]
+    second = dict(zip(labels, plot.styles(labels), strict=True))
+    assert second["white noise"] == first["white noise"]
+    assert second["Gauss-Markov 1"] == first["Gauss-Markov"] == (second["Gauss-Markov 2"][0], 0)
+    assert second["Gauss-Markov 2"][1] == 1  # another dash
+    assert len({colour for colour, _ in second.values()}) == 4
     axes = drawn_deviation()
-    components = {f"Gauss-Markov {i}": VALUE * i for i in range(1, 8)}
-    plot.curves(axes, TAU, VALUE, components)
-    colours = [line.get_color() for line in axes.lines if line.get_label() in components]
-    assert len(set(colours)) == 7
-    assert plot.SUM_COLOUR not in colours
-    plot.curves(drawn_deviation(), TAU, VALUE, {str(i): VALUE for i in range(9)})  # and repeat
+    plot.curves(axes, TAU, VALUE, dict.fromkeys(labels, VALUE), band=(0.9 * VALUE, 1.1 * VALUE))
+    drawn = {line.get_label(): line for line in axes.lines}
+    dashes = {drawn[label].get_linestyle() for label in ("Gauss-Markov 1", "Gauss-Markov 2")}
+    assert len(dashes) == 2
+    plot.curves(drawn_deviation(), TAU, VALUE, {str(i): VALUE for i in range(12)})  # and repeat
+
+
+def test_sensor_numbers_are_read_at_one_and_three_seconds():
+    lines = plot.sensor_lines({"N": ("N = 2", 2.0), "B": ("B = 3", 3.0), "K": ("K <= 4", 4.0)}, 8.0)
+    axes = drawn_deviation()
+    plot.straight_lines(axes, lines)
+    points = {each.get_label(): each for each in axes.lines if each.get_marker() == "D"}
+    at = {label: (line.get_xdata()[0], line.get_ydata()[0]) for label, line in points.items()}
+    assert at["N = 2"] == (1.0, 2.0)
+    assert at["B = 3"] == pytest.approx((8.0, 0.664 * 3.0), rel=1e-3)
+    assert at["K <= 4"] == pytest.approx((3.0, 4.0))
+    low, high = axes.get_ylim()
+    assert all(low < y < high for _, y in at.values())
+    assert {text.get_text() for text in axes.texts} == {"N", "B", "K"}
+    assert plot.sensor_lines({"N": ("", 0.0), "K": ("", np.inf)}, 8.0) == {}
 
 
 def test_axis_hides_negligible_components_but_not_the_model():

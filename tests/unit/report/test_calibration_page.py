@@ -5,20 +5,22 @@ import re
 from base64 import b64encode
 from dataclasses import replace
 from hashlib import sha256
-from html import escape, unescape
+from html import escape
 from html.parser import HTMLParser
 
+import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 import yaml
 
 import gmwm
 from gmwm import Channel, InputError, Process, RandomWalk, WhiteNoise, parameter
+from gmwm.calibration import axis_numbers
 from gmwm.cli.hints import in_options
 from gmwm.issues import Notice
 from gmwm.plotting import COMPONENT_COLOURS
 from gmwm.report import figure as figures, write_report
-from gmwm.report.answer import answer, trust
+from gmwm.report.answer import trust
 from gmwm.report.budget import navigation
 from gmwm.report.calibration import _needed as needed, page
 from gmwm.report.datasheet import read_datasheet
@@ -31,6 +33,7 @@ from gmwm.report.figure import (
 from gmwm.report.health import health
 from gmwm.report.numbers import certified
 from gmwm.report.page import duration_text, resource
+from gmwm.report.screen import first_screen
 
 VOID = {"meta", "wbr", "link", "br", "img", "input", "hr"}
 NAVIGATION = "plot-navigation"
@@ -123,12 +126,6 @@ def parsed(html):
     return Page(html)
 
 
-@pytest.fixture(autouse=True)
-def one_horizon(monkeypatch):
-    """Pages that a test makes itself have the numbers for 60 s only, which takes a quarter."""
-    monkeypatch.setattr("gmwm.report.numbers.HORIZONS", (60.0,))
-
-
 # -- self-contained -------------------------------------------------------------------------------
 
 
@@ -165,15 +162,16 @@ def test_nothing_runs_but_the_two_scripts_of_the_page(parsed):
 
 def test_every_channel_is_there(parsed, calibration):
     headings = [attributes.get("id") for tag, attributes in parsed.elements if tag == "h2"]
-    assert headings == ["health", "navigation", *calibration]
+    above = ["sensor", "filter", "actions", "health", "by-axis", "navigation"]
+    assert headings == [*above, *calibration]
     links = [attributes["href"] for tag, attributes in parsed.elements if tag == "a"]
-    # The name, and the findings where it is not valid; above, why each of those is not.
-    above = ["#health" for fit in calibration.values() if not fit.valid]
-    assert links == above + [
+    # The name, and the findings where it is not valid.
+    in_table = [
         link
         for name, fit in calibration.items()
         for link in ([f"#{name}"] if fit.valid else [f"#{name}", "#health"])
     ]
+    assert links == [*in_table, "#by-axis", "#health"]
     plots = [a["id"] for t, a in parsed.elements if t == "div" and a.get("class") == "plot"]
     overviews = 3  # gyros, accelerometers, others
     assert len(plots) == len(parsed.scripts) - 2 == overviews + 2 * len(calibration) + 1
@@ -188,8 +186,8 @@ def test_the_page_says_what_was_found(parsed, calibration):
     notes = gmwm.error_budget(calibration).notes
     assert notices and notes, "the fixture must have some"
     for words in (
-        "bench.csv: stochastic error models",
-        "80 s static at 100 Hz, 8,000 samples a channel",
+        "bench.csv: 80 s at 100 Hz. 2 of 4 axes usable",
+        "8,000 samples a channel",
         f"gmwm {gmwm.__version__}, numpy",
         "Column not used: 'temp'",
         f"objective {fit.objective:.4g} on {fit.dof} degrees of freedom",
@@ -197,39 +195,40 @@ def test_the_page_says_what_was_found(parsed, calibration):
         *(f"{note[0].upper()}{note[1:]}." for note in notes),
     ):
         assert words in parsed.text
-    assert ["gyro_y", "skipped: constant at 0 rad/s", "skipped"] in parsed.cells
+    assert ["gyro_y", "no model: constant at 0 rad/s"] in parsed.cells
     # What is not valid is said before the headline.
     warned = parsed.text.index("The model of accel_x is not valid: read the notices first.")
     assert warned < parsed.text.index("After a 60 s outage")
 
 
-def test_valid_and_not_valid(calibration):
-    for valid in (True, False):
-        notices = () if valid else (Notice("misfit", "bad", "", "misses the data"),)
-        fits = {name: replace(fit, notices=notices) for name, fit in calibration.fits.items()}
-        shown = Page(page(replace(calibration, fits=fits)))
-        verdicts = {row[0]: row[-1] for row in shown.cells if row[0] in fits and len(row) == 7}
-        assert set(verdicts) == set(fits)
-        start = "valid: within" if valid else "not valid: the model misses the data"
-        assert all(text.startswith(start) for text in verdicts.values())
+def test_the_sensor_table_has_the_numbers_of_the_calibration(parsed, calibration):
+    rows = {row[0]: row[1:] for row in reversed(parsed.cells) if row}
+    for name, axis in calibration.numbers.items():
+        if not axis.valid:
+            assert rows[name][0].startswith("not valid: ")
+            continue
+        for letter, cell in zip("NBK", rows[name], strict=True):
+            texts = [axis.text(letter, units=units) for units in ("field", "si")]
+            at = f" at {axis.tau:.3g} s" if letter == "B" else ""
+            shown = "".join(f"{'no limit' if text == '-' else text + at}" for text in texts)
+            assert cell.replace("±", "+-").replace("≤", "<=").replace("\xa0", " ") == shown
+    assert rows["gyro"] == [
+        "N, angle random walkdeg/sqrt(h)rad/s/sqrt(Hz)",
+        "B, bias instabilitydeg/hrad/s",
+        "K, rate random walkdeg/h/sqrt(h)rad/s^2/sqrt(Hz)",
+    ]
 
 
 def test_numbers_that_are_not_valid_are_marked(calibration):
     assert not calibration["accel_x"].valid
     found = certified(calibration)
-    first = answer(calibration, found)
-    assert first["trusted"] == [name for name, fit in calibration.items() if fit.valid]
-    assert [names for names, _ in first["causes"]] == ["accel_x"]
-    uses = {row["name"]: row["use"] for row in first["boxes"][0]["sensors"]}
-    assert uses == {"gyro": "", "accel": "do not use accel_x yet"}
+    warnings = [row["warning"] for row in first_screen(calibration, found)["filter"]]
+    assert warnings == ["", "do not use yet: accel_x is not valid"]
     fits = {name: replace(fit, notices=()) for name, fit in calibration.items()}
-    right = answer(right := replace(calibration, fits=fits), certified(right))
-    assert [row["use"] for row in right["boxes"][0]["sensors"]] == ["", ""]
-    assert right["causes"] == []
-    two = {"accel_y": fits["accel_x"], **calibration.fits}
-    mixed = answer(mixed := replace(calibration, fits=two), certified(mixed))["boxes"][0]
-    assert mixed["sensors"][1]["use"] == ("use for accel_y; do not use accel_x yet")
-    as_yaml, as_python = (found[60.0].texts[f"{each}, axis by axis"] for each in ("YAML", "Python"))
+    right = first_screen(right := replace(calibration, fits=fits), certified(right))
+    assert [row["warning"] for row in right["filter"]] == ["", ""]
+    assert all(row["why"] == "" for table in right["sensors"] for row in table["rows"])
+    as_yaml, as_python = (found.texts[f"{each}, axis by axis"] for each in ("YAML", "Python"))
     for text in (as_yaml, as_python):
         (line,) = [line for line in text.splitlines() if "# the fit failed" in line]
         assert "accel_x" in line
@@ -247,12 +246,6 @@ def test_how_well_a_curve_fits_is_said_of_the_levels_that_tell(calibration):
     assert trust("gyro_x", fit, calibration)[1] == (
         f"within {share:.2g} % of the data up to {known[-1]:.2g} s"
     )
-
-
-def test_a_sign_is_explained_where_a_row_has_it(parsed, calibration):
-    assert "≤ before N or K" in parsed.text
-    one = replace(calibration, fits={"gyro_x": calibration["gyro_x"]})
-    assert "before N or K" not in Page(page(one)).text
 
 
 def test_one_p_value_and_one_misfit(calibration):
@@ -362,7 +355,8 @@ def test_the_growth_figure(parsed, calibration):
 def test_without_inertial_sensors_nothing_is_said_of_navigation(calibration):
     fits = {"voltage": calibration["voltage"]}
     shown = Page(page(replace(calibration, fits=fits)))
-    assert [a.get("id") for t, a in shown.elements if t == "h2"] == ["health", "voltage"]
+    headings = [a.get("id") for t, a in shown.elements if t == "h2"]
+    assert headings[-3:] == ["health", "by-axis", "voltage"]
 
 
 def test_a_channel_without_an_axis_has_rows_of_its_own(calibration):
@@ -394,8 +388,10 @@ def test_figures_hold_data_model_and_components(parsed, calibration):
     for fit, figure in zip(calibration.fits.values(), parsed.figures(), strict=True):
         traces = {trace["name"]: trace for trace in figure["data"]}
         positive = [label for label, curve in fit.components.items() if np.any(curve > 0.0)]
-        filtered, marks = "filter: N and K", "N at 1 s, 0.664 B at the lowest point, K at 3 s"
-        assert list(traces) == [*positive, "model", DATA, filtered, marks]
+        band = "95 % band of the model"
+        start = [f"{band}, lower end", band, *positive, "model", DATA, "filter N and K"]
+        assert list(traces)[: len(start)] == start
+        assert list(traces)[-1] == "N, B, K of the sensor"
         scale = {"gyro": 180.0 / np.pi * 3600.0, "accel": 1.0 / 9.80665e-6, None: 1.0}
         factor = scale[fit.wv.quantity]
         data = traces[DATA]
@@ -411,63 +407,115 @@ def test_figures_hold_data_model_and_components(parsed, calibration):
         assert at_octaves == pytest.approx(np.sqrt(2.0 * fit.implied) * factor, rel=1e-4)
 
 
-def test_marks_and_the_curve_of_the_filter_are_the_certified_numbers(parsed, calibration):
-    numbers = gmwm.bound(calibration["gyro_x"], horizon=60.0)
-    curve, marks = parsed.figures()[0]["data"][-2:]
-    per_si = 180.0 / np.pi * 3600.0
-    at = dict(zip(marks["text"], zip(marks["x"], marks["y"], strict=True), strict=True))
-    assert at["N at 1 s"] == pytest.approx((1.0, per_si * numbers.N), rel=1e-4)
-    assert at["K at 3 s"] == pytest.approx((3.0, per_si * numbers.K), rel=1e-4)
+def test_marks_are_the_sensor_numbers_and_the_curve_is_that_of_the_filter(parsed, calibration):
+    sensor = calibration.numbers["gyro_x"]
+    traces = {trace["name"]: trace for trace in parsed.figures()[0]["data"]}
+    marks, per_si = traces["N, B, K of the sensor"], 180.0 / np.pi * 3600.0
+    found = list(zip(marks["x"], marks["y"], strict=True))
+    values = [each.upper if each.kind == "bound" else each.value for each in sensor]
+    n, b, k = (per_si * value for value in values)
+    expected = [(1.0, n), (sensor.tau, gmwm.calibration.PLATEAU * b), (3.0, k)]
+    for (x, y), (at, value) in zip(found, expected, strict=True):
+        assert (x, y) == pytest.approx((at, value), rel=1e-4)
+    for label, letter in zip(marks["text"], "NBK", strict=True):
+        shown = sensor.text(letter).replace("+-", "±").replace("<=", "≤")
+        assert label.startswith(f"{letter} {shown} deg/")
+    for letter, slope in {"N": -0.5, "B": 0.0, "K": 0.5}.items():
+        x, y = (np.log(traces[f"{letter} line"][key]) for key in "xy")
+        assert (y[1] - y[0]) / (x[1] - x[0]) == pytest.approx(slope, abs=1e-4)
+    numbers, curve = gmwm.bound(calibration["gyro_x"], horizon=60.0), traces["filter N and K"]
     tau = np.array(curve["x"])
-    believed = per_si * np.sqrt(numbers.N**2 / tau + numbers.K**2 * tau / 3.0)
-    assert curve["y"] == pytest.approx(believed, rel=1e-4)
-    box = answer(calibration, certified(calibration))["boxes"][0]
-    shown = box["axes"]["gyro_x"]
-    assert float(shown["N"]["si"].split()[0]) == pytest.approx(numbers.N, rel=5e-3)
-    assert float(shown["K"]["si"].split()[0]) == pytest.approx(numbers.K, rel=5e-3)
-    (row,) = [row for row in parsed.cells if row[0] == "gyro_x" and len(row) == 7]
-    assert shown["N"]["field"] + shown["N"]["si"] in row[1]  # beside those for 1, 10 and 600 s
-    consistency = dict(box["about"])["gyro_x"].removeprefix("consistency ")
-    assert float(consistency) == pytest.approx(numbers.nees[60.0], rel=0.05)
+    filtered = per_si * np.sqrt(numbers.N**2 / tau + numbers.K**2 * tau / 3.0)
+    assert curve["y"] == pytest.approx(filtered, rel=1e-4)
+    assert curve["visible"] is False  # until a slider is moved
+    own = first_screen(calibration, certified(calibration))["by_axis"][0]
+    assert float(own["N"]["si"].split()[0]) == pytest.approx(numbers.N, rel=5e-3)
+    assert float(own["K"]["si"].split()[0]) == pytest.approx(numbers.K, rel=5e-3)
+    assert float(own["nees"]) == pytest.approx(numbers.nees[60.0], rel=0.05)
+
+
+def test_the_band_is_the_interval_of_the_curve(parsed, calibration):
+    fit = calibration["gyro_x"]
+    low, high = parsed.figures()[0]["data"][:2]
+    per_si = 180.0 / np.pi * 3600.0
+    _, *ends = fit.deviation_interval(np.array(low["x"]))
+    for trace, end in zip((low, high), ends, strict=True):
+        assert trace["y"] == pytest.approx(per_si * end, rel=1e-3)
+
+
+def test_a_kind_of_term_has_one_colour_on_every_figure(calibration):
+    noise = gmwm.LowPassNoise(3e-4, bandwidth=20.0, order=1.0, damping=0.7071)
+    models = (
+        WhiteNoise(4e-4) + RandomWalk(3e-4) + gmwm.GaussMarkov(1e-3, 3.0),
+        RandomWalk(3e-4) + gmwm.GaussMarkov(1e-3, 1.0) + gmwm.GaussMarkov(1e-3, 30.0) + noise,
+    )
+    seen = {}
+    for model in models:
+        fit = replace(calibration["gyro_x"], model=model, keys=(), covariance=np.zeros((0, 0)))
+        drawn = {label: line.get_color() for label, line in lines_of(fit.plot()).items()}
+        for trace in deviation_figure(fit, calibration.numbers["gyro_x"])["data"]:
+            label = trace["name"]
+            if label in model.term_labels():
+                assert trace["line"]["color"] == drawn[label]
+                seen.setdefault(label.rstrip(" 12"), set()).add(drawn[label])
+    assert all(len(colours) == 1 for colours in seen.values())
+    assert len(set.union(*seen.values())) == len(seen) == 4
+
+
+def lines_of(axes):
+    found = {line.get_label(): line for line in axes.get_lines()}
+    plt.close(axes.figure)
+    return found
+
+
+def test_white_noise_behind_a_low_pass_is_one_row(calibration):
+    truth = WhiteNoise(3e-4) + gmwm.LowPassNoise(4e-4, bandwidth=15.0, order=1.0, damping=0.7071)
+    samples = Channel("gyro_x", truth.simulate(60_000, 0.01, 5), 0.01, "gyro", "rad/s")
+    fit = gmwm.fit(truth.opened().with_params({"lowpass_order": 1.0, "lowpass_damping": 0.7071}),
+                   gmwm.wavelet_variance(samples))  # fmt: skip
+    shown = Page(page(replace(calibration, fits={"gyro_x": fit}, rivals={})))
+    row = next(row for row in shown.cells if row[0] == "N, bandwidth")
+    assert float(row[2]) == pytest.approx(np.degrees(5e-4) * 60.0, rel=0.02)
+    low, high = (float(each) for each in row[3].split(" to "))
+    assert low < float(row[2]) < high
+    assert re.fullmatch(r"white noise: \d+ % of its power has a bandwidth of 1\d(\.\d)? Hz", row[1])
+    assert not any(row[0].startswith("lowpass") or row[0] == "N" for row in shown.cells if row)
 
 
 def test_what_is_copied_is_what_is_exported(calibration):
     inertial = {name: fit for name, fit in calibration.items() if fit.wv.quantity}
-    found = certified(calibration)[60.0]
+    found = certified(calibration)
     for title, target in (("YAML, Kalibr", "kalibr"), ("Python, GTSAM", "gtsam")):
         expected = gmwm.export(replace(calibration, fits=inertial), target, horizon=60.0)
         assert found.texts[title] == expected
 
 
-def test_the_box_says_what_white_noise_and_random_walk_stand_for(calibration):
-    truth = WhiteNoise(2e-4) + gmwm.GaussMarkov(1e-3, 0.1) + gmwm.GaussMarkov(1e-3, 20.0)
+def test_what_filter_numbers_cover_is_said(calibration):
+    truth = WhiteNoise(2e-4) + gmwm.GaussMarkov(1e-3, 20.0)
     samples = Channel("gyro_x", truth.simulate(40_000, 0.01, 5), 0.01, "gyro", "rad/s")
     fit = gmwm.fit(truth.opened(), gmwm.wavelet_variance(samples))
-    one = replace(calibration, fits={"gyro_x": fit})
-    texts = [n.text for n in gmwm.bound(fit).notices if n.code.startswith("more-than-")]
-    (box,) = answer(one, certified(one))["boxes"]
-    assert dict(box["about"])["gyro_x"].endswith(f"; {'; '.join(texts)}")
-    assert [re.search(r"\b([NK]) (?:is|covers) ", text)[1] for text in texts] == ["N", "K"]
-    assert "; ".join(texts) in unescape(page(one))
+    one = replace(calibration, fits={"gyro_x": fit}, rivals={})
+    found = first_screen(one, certified(one))
+    assert re.fullmatch(
+        r"N and K also cover a Gauss-Markov term of \d+ deg/h, \d+ s \(gyro_x\)",
+        found["filter"][0]["covers"],
+    )
+    assert found["by_axis"][0]["covers"] == found["filter"][0]["covers"].removesuffix(" (gyro_x)")
 
 
-def test_shared_numbers_stand_beside_those_of_the_axes(calibration):
+def test_shared_numbers_stand_above_those_of_the_axes(calibration):
     quiet = WhiteNoise(2e-4) + RandomWalk(1e-4)
     samples = Channel("gyro_y", quiet.simulate(8000, 0.01, 5), 0.01, "gyro", "rad/s")
     other = gmwm.fit(quiet.opened(), gmwm.wavelet_variance(samples))
-    fits = {"gyro_x": calibration["gyro_x"], "gyro_y": other, "accel_x": calibration["accel_x"]}
-    both = replace(calibration, fits=fits)
+    both = replace(calibration, fits={"gyro_x": calibration["gyro_x"], "gyro_y": other})
     shared = gmwm.bound(both, horizon=60.0, shared=True)
-    box = answer(both, certified(both))["boxes"][0]
-    first, said = box["sensors"][0], dict(box["about"])
-    assert first["name"] == "gyro"
-    assert float(first["N"]["si"].split()[0]) == pytest.approx(shared["gyro_y"].N, rel=5e-3)
-    assert float(first["K"]["si"].split()[0]) == pytest.approx(shared["gyro_y"].K, rel=5e-3)
-    nees = sorted(shared[name].nees[60.0] for name in ("gyro_x", "gyro_y"))
-    ends = [float(end) for end in said["gyro"].removeprefix("consistency ").split(" to ")]
-    assert ends == pytest.approx(nees, rel=0.05)
-    assert nees[0] < 0.5
-    assert said["gyro_y"].startswith("consistency 1")
+    found = first_screen(both, certified(both))
+    (row,) = found["filter"]  # without accelerometers too
+    assert row["name"] == "gyro"
+    assert float(row["N"].split()[0]) == pytest.approx(shared["gyro_y"].N, rel=5e-3)
+    assert float(row["K"].split()[0]) == pytest.approx(shared["gyro_y"].K, rel=5e-3)
+    assert "there is no accelerometer" in found["note"]
+    assert [each["nees"][0] for each in found["by_axis"]] == ["1", "1"]
 
 
 def test_models_that_tie_and_the_data_sheet_are_drawn(calibration, tmp_path):
@@ -480,8 +528,14 @@ def test_models_that_tie_and_the_data_sheet_are_drawn(calibration, tmp_path):
     tau, stated = (np.array(traces["data sheet"][key]) for key in "xy")
     expected = np.sqrt(72.0**2 / tau[-1] + 1.0**2 * tau[-1] / 3.0)
     assert stated[-1] == pytest.approx(expected, rel=1e-3)
-    assert traces["models that fit equally well"]["opacity"] < 1.0
-    assert "Data sheet: N 1.2 deg/sqrt(h) (measured" in shown.text
+    assert "95 % band of the models that fit equally well" in traces
+    n, _, k = calibration.numbers["gyro_x"]
+    assert k.kind == "estimated"
+    parts = (f"N 1.2 deg/sqrt(h) (measured: {n.usual.value / 1.2:.3g} times)",
+             f"K 60 deg/h/sqrt(h) (measured: {k.usual.value / 60.0:.3g} times)")  # fmt: skip
+    assert f"Data sheet: {', '.join(parts)}." in shown.text
+    (row,) = [row for row in shown.cells if row[:1] == ["data sheet, gyro"]]
+    assert row[1].startswith("1.2") and row[2] == ""
 
 
 @pytest.mark.parametrize(
@@ -539,8 +593,10 @@ def test_axes_are_logarithmic_and_have_units(parsed):
 def test_a_component_of_zero_is_not_drawn(calibration):
     fit = calibration["gyro_x"]
     nil = replace(fit, model=fit.model.with_params({"K": 0.0}))
-    assert [t["name"] for t in deviation_figure(fit)["data"]][:2] == ["white noise", "random walk"]
-    assert "random walk" not in [trace["name"] for trace in deviation_figure(nil)["data"]]
+    numbers = calibration.numbers["gyro_x"]
+    names = [[t["name"] for t in deviation_figure(each, numbers)["data"]] for each in (fit, nil)]
+    assert names[0][2:4] == ["white noise", "random walk"]
+    assert "random walk" not in names[1]
 
 
 # Period of four samples: averages over four and more do not change at all. And white noise whose
@@ -555,7 +611,7 @@ ODD_SERIES = {
 def test_a_level_that_says_nothing_leaves_the_figure_in_numbers(what):
     odd = Channel("gyro_x", ODD_SERIES[what], 0.01, "gyro", "rad/s")
     fit = gmwm.fit(WhiteNoise() + RandomWalk(), odd)
-    json.dumps(deviation_figure(fit), allow_nan=False)
+    json.dumps(deviation_figure(fit, axis_numbers(fit)), allow_nan=False)
 
 
 def test_residuals_are_in_per_cent_of_the_deviation(parsed, calibration):
@@ -652,15 +708,11 @@ def test_health_is_in_the_first_lines_and_findings_worst_first(calibration):
         issue("note", "seen"),
     )
     shown = Page(page(replace(calibration, notices=notices)))
-    assert shown.text.startswith("Sensor error")
-    (first,) = re.findall(r"Not healthy: .*? Length", shown.text)
-    (why,) = (trust(n, fit, calibration)[1] for n, fit in calibration.items() if not fit.valid)
-    assert (
-        f"Usable axes gyro_x, voltage; not accel_x: {why}; no model of gyro_y. Filter for" in first
-    )
+    assert shown.text.startswith("Sensor error models: bench.csv bench.csv: 80 s at 100 Hz. 2 of 4")
+    to_do = shown.text[shown.text.index("What to do") : shown.text.index("All findings")]
+    assert "broken" in to_do and "seen" not in to_do
     # With those for which fits are not valid.
     severe = 1 + sum(n.severity == "bad" for fit in calibration.values() for n in fit.notices)
-    assert f"Not healthy: {severe} severe issues (accel_x); 1 warning (gyro_x)." in first
     assert f"{severe} severe issues, 1 warning and" in shown.text
     order = [shown.text.index(words) for words in ("Broken", "Shaken", "Seen", "Fine")]
     assert order == sorted(order)
@@ -742,7 +794,7 @@ def test_names_are_text_not_markup(calibration):
     for words in ("skip", "why", "Found", "Done", "tie", "A"):
         assert f"{words} {HOSTILE}" in shown.text
     headings = [attributes.get("id") for tag, attributes in shown.elements if tag == "h2"]
-    assert headings == ["health", "navigation", HOSTILE]
+    assert headings[-3:] == ["by-axis", "navigation", HOSTILE]
     assert [row[0] for row in shown.cells if row[-1:] == ["deg"]][-1] == f"{HOSTILE} not valid"
 
 

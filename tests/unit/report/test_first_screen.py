@@ -1,4 +1,4 @@
-"""What the first screen says of length, of ties, and of values that have one name."""
+"""What the first screen and the section of health say of length and of ties; a notebook."""
 
 import re
 from dataclasses import replace
@@ -8,15 +8,13 @@ import numpy as np
 import pytest
 
 import gmwm
-from gmwm import GaussMarkov, QuantizationNoise, RandomWalk, WhiteNoise
+from gmwm import QuantizationNoise, RandomWalk, WhiteNoise
 from gmwm.issues import Notice
-from gmwm.report.answer import filter_sentence
 from gmwm.report.health import (
     ambiguity,
     health,
     known_at,
     length_sentence,
-    parameters_sentence,
 )
 
 TIE = Notice("ambiguity", "note", "gyro_x", "2 models fit", hint="the first is used")
@@ -56,18 +54,6 @@ def test_a_part_of_the_recording_is_judged_too(gyro):
         assert advice == (f"The longest part: calibrate it. That part is {word} for 60 s outages.")
 
 
-def test_parameters_need_more_length_than_a_filter(gyro, monkeypatch):
-    lengths = gyro["gyro_x"].needed_length(0.1)
-    longest, key = max((seconds, key) for key, seconds in lengths.items())
-    least = gyro.duration * (known_at(gyro["gyro_x"], 60.0) / 0.1) ** 2
-    assert gyro.duration < longest < least
-    text = parameters_sentence(gyro)
-    assert text.startswith("For 10 % in every parameter record ")
-    assert text.endswith(f"({key} of gyro_x)")
-    monkeypatch.setattr("gmwm.report.health.known_at", lambda *_: 0.01)
-    assert parameters_sentence(gyro).endswith("; a filter needs less")
-
-
 def test_what_a_tie_does_to_a_filter_is_said(gyro):
     model = gyro["gyro_x"].model
     (other,) = ambiguity(replace(gyro, notices=(TIE,)), "gyro_x")
@@ -83,29 +69,16 @@ def test_what_a_tie_does_to_a_filter_is_said(gyro):
         assert text == f"2 models fit (the first is used). {said}"
 
 
-def test_one_name_of_two_values_is_explained(calibration, tmp_path):
-    truth = WhiteNoise(2e-4) + GaussMarkov(1e-3, 20.0)
-    wv = gmwm.wavelet_variance(truth.simulate(40_000, 0.01, 5), 0.01)
-    wv = replace(wv, name="gyro_x", quantity="gyro", unit="rad/s")
-    fit = gmwm.fit(truth.opened(), wv)
-    own = gmwm.bound(fit, horizon=60.0)
-    assert 1.05 * fit.params["N"] < own.N
-    text = replace(calibration, fits={"gyro_x": fit}).report(tmp_path / "r.html")
-    shown = own.N * np.degrees(1.0) * 60.0
-    assert f"Filter N for 60 s is {shown:.3g} deg/sqrt(h): it covers slower terms too" in unescape(
-        text.read_text()
-    )
-
-
 def test_a_notebook_has_the_answers(calibration):
-    shown = calibration._repr_html_()
-    lines = re.findall(r"<p>(.*?)</p>", shown)
-    assert lines[1] == filter_sentence(calibration)
+    shown = unescape(calibration._repr_html_())
+    assert "bench.csv: 80 s at 100 Hz. 2 of 4 axes usable" in shown
+    text = " ".join(re.sub("<[^>]+>", " ", shown).split())
+    axis = calibration.numbers["gyro_x"]
+    n, k = (axis.text(letter).replace("+-", "±") for letter in "NK")
+    assert re.search(rf"gyro_x {re.escape(n)} .* {re.escape(k)} ", text)
+    assert re.search(r"accel_x not valid : \w+", text)
     numbers = gmwm.bound(calibration["gyro_x"], horizon=60.0)
-    assert lines[1].startswith(
-        f"N and K for outages up to 60 s: gyro N {numbers.N:.3g} rad/s/sqrt(Hz), K "
-    )
-    assert "do not use accel_x yet" in lines[1]
-    assert lines[2].startswith(f"Length: {length_sentence(calibration, 60.0)}. ")
+    assert f"gyro {numbers.N:.2e} rad/s/sqrt(Hz)".replace("e-0", "e-") in text
+    assert "do not use yet: accel_x is not valid" in text
     alone = replace(calibration, fits={"voltage": calibration["voltage"]})
-    assert "N and K for" not in alone._repr_html_()
+    assert "For your filter" not in alone._repr_html_()

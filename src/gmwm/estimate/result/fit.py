@@ -385,10 +385,10 @@ class Fit(Document, Printed):
         return f"{self.wv.n:,} samples at {1.0 / self.wv.dt:g} Hz"
 
     def plot(self, ax: Axes | None = None, *, units: str = "field") -> Axes:
-        """Allan deviation with error bars, fitted curve and components; returns the axes.
+        """Allan deviation with error bars, fitted curve, its 95 % band and components.
 
         In data-sheet units (deg/h, ug), or in SI if ``units`` is "si". For ``method="allan"`` the
-        lines and their regions take the place of the components.
+        lines and their regions take the place of the band and the components. Returns the axes.
         """
         from gmwm import plotting
 
@@ -397,9 +397,12 @@ class Fit(Document, Printed):
         tau, curves = dense_curves(self)
         components = {label: factor * curve for label, curve in curves.items() if np.any(curve)}
         total = np.sqrt(factor**2 * np.sum([c**2 for c in curves.values()], axis=0))
-        shown = {} if self.regions else components
-        plotting.curves(axes, tau, total, shown, factor * self.wv.allan_deviation)
-        if self.regions:
+        data = factor * self.wv.allan_deviation
+        if not self.regions:
+            _, *band = (factor * each for each in self.deviation_interval(tau))
+            plotting.curves(axes, tau, total, components, data, band)
+        else:
+            plotting.curves(axes, tau, total, {}, data)
             lines = {}
             for region in self.regions:
                 found, slope = self[region.key], slope_name(region.slope)
