@@ -19,7 +19,7 @@ from gmwm.errors import InputError
 from gmwm.issues import notice
 from gmwm.readers import tuning
 from gmwm.readers.names import CANONICAL
-from gmwm.readers.table import LARGEST, Columns, Table, usable
+from gmwm.readers.table import Columns, Table
 
 
 @dataclass(frozen=True)
@@ -126,10 +126,7 @@ class BinaryTable(Table):
             for column in columns:
                 with np.errstate(all="ignore"):
                     found[column] = raw[column] * scales[column]
-                if not usable(found[column]):
-                    row = int(np.flatnonzero(np.abs(found[column]) >= LARGEST)[0])
-                    text = f"{self.source}, {self.where(start + row)}: {found[column][row]}"
-                    raise InputError(f"{text} is not a usable number: check the layout")
+                self.check_usable(column, found[column], start)
             yield found
 
     def _raw(self, start: int, rows: int) -> list[FloatArray]:
