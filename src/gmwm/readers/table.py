@@ -31,6 +31,7 @@ class Table(ABC):
     # One for each column, as written in the file; ``""`` where a column has none.
     names: tuple[str, ...]
     rate: float | None = None  # sampling rate that the file states, Hz
+    rows: float = 0.0  # number of rows expected before the file is read; 0 if unknown
     tentative: bool = False  # whether the names come from a comment and may be something else
     # What was noticed while opening and reading the file.
     notices: list[Notice] = field(default_factory=list)
@@ -48,17 +49,13 @@ class Table(ABC):
         """The place of a row of data, e.g. ``"line 12"``."""
         return f"row {row} (counted from 0)"
 
-    def expected_rows(self) -> float:
-        """Number of rows before the file is read; 0 if unknown."""
-        return 0.0
-
     def column(self, index: int) -> str:
         """How messages call a column."""
         return self.stamps or f"column {label(self.names, index)}"
 
     def load(self, columns: Sequence[int]) -> Columns:
         """Read some columns, each once, into memory; rejected with "memory" if it is too small."""
-        samples, held = self.expected_rows() * len(columns), 0
+        samples, held = self.rows * len(columns), 0
         memory.require(tuning.BYTES_PER_SAMPLE * samples, self.source)
         allowed = memory.budget()
         parts: dict[int, list[FloatArray]] = {column: [] for column in columns}

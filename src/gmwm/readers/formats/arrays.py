@@ -153,9 +153,6 @@ class ArrayTable(Table):
             raise InputError(f"{source} has shape {array.like.shape}: {hint}")
         return cls.of_entries(source, {"": array})
 
-    def expected_rows(self) -> float:
-        return float(max(array.like.shape[0] if array.like.ndim else 1 for array in self.arrays))
-
     def load(self, columns: Sequence[int]) -> Columns:
         """Read some columns, which must have one length."""
         samples = sum(self.arrays[column].like.size for column in columns)

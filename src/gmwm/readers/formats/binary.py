@@ -85,7 +85,6 @@ class BinaryTable(Table):
 
     path: Path
     layout: BinaryLayout
-    count: int
 
     @classmethod
     def open(cls, path: Path, layout: BinaryLayout) -> BinaryTable:
@@ -102,7 +101,7 @@ class BinaryTable(Table):
         units = {"gyro": "rad/s", "accel": "m/s^2"}
         names = ("time [s]", *(f"{name} [{units[name.partition('_')[0]]}]" for name in CANONICAL))
         table = cls(
-            source=path.name, names=names, notices=notices, path=path, layout=layout, count=count
+            source=path.name, names=names, notices=notices, path=path, layout=layout, rows=count
         )
         first = table._raw(0, tuning.FEWEST_SAMPLES)[0]
         with np.errstate(all="ignore"):
@@ -115,13 +114,10 @@ class BinaryTable(Table):
             raise InputError(f"{times}, are not seconds of a clock: {hint}", "layout")
         return table
 
-    def expected_rows(self) -> float:
-        return float(self.count)
-
     def segments(self, columns: Sequence[int], rows: int) -> Iterator[Columns]:
         interval = self._interval(rows) if self.layout.increments else 1.0
         scales = (1.0, *(self.layout.gyro / interval,) * 3, *(self.layout.accel / interval,) * 3)
-        for start in range(0, self.count, rows):
+        for start in range(0, int(self.rows), rows):
             raw, found = self._raw(start, rows), {}
             for column in columns:
                 with np.errstate(all="ignore"):
@@ -133,12 +129,12 @@ class BinaryTable(Table):
         """Time and six numbers of some records as they are."""
         record = self.layout.record
         block = np.fromfile(self.path, record, rows, offset=start * record.itemsize)
-        block = block[: self.count - start]
+        block = block[: int(self.rows) - start]
         return [block["time"].astype(float), *block["values"].T.astype(float)]
 
     def _interval(self, rows: int) -> float:
         """Seconds between records that follow each other."""
-        times = [self._raw(start, rows)[0] for start in range(0, self.count, rows)]
+        times = [self._raw(start, rows)[0] for start in range(0, int(self.rows), rows)]
         with np.errstate(all="ignore"):
             steps = np.diff(np.concatenate(times))
             usual = float(np.median(steps))

@@ -230,6 +230,7 @@ def open_ardupilot(path: Path, wanted: Wanted) -> tuple[Table, ...]:
                 names=tuple(series.columns),
                 notices=list(notices),
                 topic=topic,
+                rows=topic.count,
                 path=path,
                 series=series,
                 stamps=f"{series.columns[_TIME]} of {series.name}",

@@ -225,6 +225,7 @@ def open_bag(path: Path, wanted: Wanted) -> tuple[BagTable, ...]:
             stamps="times of recording" if is_log else "header stamps",
             origin="sensor_msgs/Imu",
             topic=topic,
+            rows=topic.count,
             bag=bag,
             message=message,
             is_log=is_log,

@@ -139,9 +139,6 @@ class MessageTable(Table):
     def parts(self, columns: Sequence[int]) -> Iterator[Columns]:
         """Columns of one block of messages after another."""
 
-    def expected_rows(self) -> float:
-        return float(self.topic.count)
-
     def segments(self, columns: Sequence[int], rows: int) -> Iterator[Columns]:
         row = 0
         for part in self.parts(columns):
@@ -149,7 +146,7 @@ class MessageTable(Table):
                 self.check_usable(column, values, row)
             row += next(iter(part.values())).size
             yield part
-        if not 0 < row <= self.topic.count:
+        if not 0 < row <= self.rows:
             text = f"{self.source}, topic {self.topic.name}: its messages are not as many"
             raise InputError(f"{text} as its index says: get a whole copy, or reindex it")
 

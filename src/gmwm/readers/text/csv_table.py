@@ -53,9 +53,13 @@ class CsvTable(Table):
         if damages and not head:
             damage_notice(path.name, damages[0], is_taken)
         layout = with_dialect(find_layout(path.name, head), path.name, head)
+        data = head[layout.offset :]
+        # What is left of a packed file may not state its size, which is at its end.
+        size = 0 if is_taken else content_size(path)
         return cls(
             source=path.name,
             names=layout.names,
+            rows=size / max(len(data) / max(len(data.splitlines()), 1), 1.0),
             tentative=layout.tentative,
             notices=list(layout.notices),
             path=path,
@@ -67,14 +71,6 @@ class CsvTable(Table):
         found = damage_notice(self.source, what, self.is_taken)
         if found not in self.notices:
             self.notices.append(found)
-
-    def expected_rows(self) -> float:
-        """Number of rows by the size of the file and its first lines."""
-        if self.is_taken:  # the size that a packed file states is at its end
-            return 0.0
-        _, head = next(blocks(self.path, self.layout.offset, size=_HEAD), (1, b""))
-        lines = max(len(head.splitlines()), 1)
-        return content_size(self.path) / max(len(head) / lines, 1.0)
 
     def segments(self, columns: Sequence[int], rows: int) -> Iterator[Columns]:
         """See `Table`; infinite numbers are reported at the end, after lines that are wrong."""
