@@ -180,9 +180,8 @@ def running_scale(errors: FloatArray, floor: float) -> FloatArray:
 def crosstalk_notices(errors: dict[str, npt.NDArray[np.float32]]) -> list[Notice]:
     """Find pairs of channels whose prediction errors are correlated.
 
-    The correlation of two white series has the variance 1/n, whatever the spectra of the channels
-    were. Prediction errors are in standard deviations, clipped, and 0 where they are unknown, which
-    adds nothing to a sum of products.
+    The correlation of two white series has the variance 1/n. Errors are in standard deviations,
+    clipped, and 0 where they are unknown, which adds nothing to a sum of products.
     """
     pairs, notices = list(combinations(errors, 2)), []
     for one, other in pairs:

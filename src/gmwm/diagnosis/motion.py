@@ -97,10 +97,9 @@ def remembered(examine: Callable[[Recording], T]) -> Callable[[Recording], T]:
 def find_motion(recording: Recording) -> Motion:
     """Find the stretches in which a recording is static.
 
-    Means of a second, without shocks by a running median, move where they change within some
-    seconds by more than sensors at rest do (1 deg/s, or 1 deg of gravity) and by more than their
-    own noise. Between two changes the level is static if its rate is the one nearest to zero. Slow
-    motion is found where gravity turns as the gyros predict.
+    Means of a second, without shocks by a running median, move where they change within seconds by
+    more than sensors at rest and their own noise do. Between two changes the level is static if its
+    rate is the one nearest to zero. Slow motion turns gravity as the gyros predict.
     """
     size = max(round(tuning.MOTION_BLOCK / recording.dt), tuning.FEWEST_OF_MOTION)
     whole = ((0.0, recording.duration),)
@@ -117,7 +116,9 @@ def find_motion(recording: Recording) -> Motion:
     changing = np.zeros(known.size, dtype=bool)
     for sensor, values in level.items():
         for channel, series in zip(_channels(recording, sensor), values.T, strict=True):
-            changing |= _changing(series, _LIMIT[sensor], _white(channel.values, size))
+            white = _white(channel.values, size)
+            for row in np.flatnonzero(level_changes(series, _LIMIT[sensor], white)[1]):
+                changing[row : row + tuning.MEDIAN_BLOCKS + 1] = True
     turn = steady_turn(recording, size)
     if turn > 0.0:
         still = []
@@ -177,18 +178,16 @@ def _white(values: FloatArray, size: int) -> float:
     return float(np.median(np.abs(steps))) / (norm.ppf(0.75) * np.sqrt(2.0 * size))
 
 
-def _changing(series: FloatArray, limit: float, least: float) -> BoolArray:
-    """Mark blocks across which the level changes by more than noise."""
+def level_changes(
+    series: FloatArray, limit: float, least: float = 0.0, unsure: float = 1.0
+) -> tuple[FloatArray, BoolArray]:
+    """Changes of a level over some blocks, and which are larger than a limit and than noise."""
     lag = tuning.MEDIAN_BLOCKS
-    change = np.abs(series[lag:] - series[:-lag])
+    change = series[lag:] - series[:-lag]
     # Most blocks may move: a low quantile knows the noise all the same.
-    scale = np.quantile(change, tuning.QUIET) / norm.ppf(0.5 + 0.5 * tuning.QUIET)
-    far = norm.isf(0.5 * tuning.FALSE_ALARM / series.size) * tuning.BEYOND_NOISE
-    flagged = change > max(limit, far * max(float(scale), least))
-    found = np.zeros(series.size, dtype=bool)
-    for shift in range(lag + 1):
-        found[shift : shift + flagged.size] |= flagged
-    return found
+    scale = float(np.quantile(np.abs(change), tuning.QUIET)) / norm.ppf(0.5 + 0.5 * tuning.QUIET)
+    far = norm.isf(0.5 * tuning.FALSE_ALARM / series.size) * tuning.BEYOND_NOISE * unsure
+    return change, np.abs(change) > max(limit, far * max(scale, least))
 
 
 def runs_of(chosen: BoolArray) -> list[tuple[int, int]]:

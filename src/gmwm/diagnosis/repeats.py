@@ -20,8 +20,8 @@ from gmwm.readers import Channel
 def repetition(channel: Channel) -> Repetition | None:
     """Find out whether a channel changes at every k-th sample only.
 
-    Of samples that are not repeated, every change is in the same place modulo k with a probability
-    of 1/k, so that some dozen changes leave no room for chance, however coarse the rounding is.
+    Other changes are in the same place modulo k with a probability of 1/k each, so that some dozen
+    leave no room for chance.
     """
     steps = np.diff(channel.values)
     changes = np.flatnonzero((steps != 0.0) & ~np.isnan(steps)) + 1
@@ -72,12 +72,11 @@ def interpolation_notice(channel: Channel) -> Notice | None:
 
 
 def held_samples(channel: Examined) -> Held:
-    """Find samples that repeat the one before without being measured.
+    """Find samples that repeat the one before, as recorders write them for a lost packet.
 
-    Where a packet is lost, recorders write the last sample again. Of measured samples, differences
-    of no step are by a power of the ratio more frequent than those of one step by which these are
-    than those of two: 1/3 of a Gaussian law. Nothing is held if chance, with three standard errors,
-    explains those that repeat.
+    Measured differences of no step are by a power of the ratio more frequent than those of one step
+    by which these are than those of two: 1/3 of a Gaussian law. Nothing is held if chance, with
+    three standard errors, explains those that repeat.
     """
     values, step, scatter = channel.values, channel.step, channel.scatter
     # Where steps are wide in a part of the values, neighbours are equal by chance in that part.

@@ -39,9 +39,8 @@ def find_resonances(
 ) -> tuple[Bump, ...]:
     """Resonances by their height, highest first.
 
-    A band that stands out of the running median by more than Gaussian noise would in any of them,
-    and by half, is a candidate; a second-order Gauss-Markov spectrum on the background is fitted
-    around it by Whittle's likelihood, which gives frequency and damping.
+    Bands that stand out of the running median by more than Gaussian noise would, and by half, are
+    candidates, around which a resonance on the background is fitted by Whittle's likelihood.
     """
     height = found.level - found.smooth
     count = height.size
@@ -123,11 +122,7 @@ def _bump(free: FloatArray, f: FloatArray, centre: float, dt: float) -> FloatArr
 def _scored(
     free: FloatArray, f: FloatArray, power: FloatArray, weight: FloatArray, centre: float, dt: float
 ) -> tuple[FloatArray, float]:
-    """Minimize Whittle's deviance by Fisher scoring with Levenberg's damping.
-
-    The parameters are the logarithms of frequency (over ``centre``), damping and height, and the
-    three coefficients of the logarithm of the background.
-    """
+    """Minimize Whittle's deviance by Fisher scoring with Levenberg's damping."""
     place = np.log(f / centre)
 
     def deviance(expected: FloatArray) -> float:

@@ -69,11 +69,7 @@ def spectrum(values: FloatArray, dt: float) -> Spectrum:
 
 
 def bands(spectrum: Spectrum, left_out: BoolArray | None = None) -> Bands:
-    """Band levels and their running median.
-
-    The mean of logarithms is little moved by lines, and the running median by bumps narrower than
-    half an octave; where the spectrum rises or falls steadily the median is exact.
-    """
+    """Band levels and their running median, which lines and narrow bumps hardly move."""
     logs = np.log(np.maximum(spectrum.density, np.finfo(float).tiny)) + np.euler_gamma
     used = np.ones(logs.size)
     if left_out is not None:

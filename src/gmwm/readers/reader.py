@@ -267,8 +267,7 @@ def _timing(
     """What the time stamps say, checked against the stated rate if there is one."""
 
     def same(order: IntArray) -> BoolArray:
-        found = np.ones(order.size, dtype=bool)
-        found[0] = False
+        found = np.arange(order.size) > 0
         for values in (arrays[i][order] for i in arrays if i != time):
             both = np.isnan(values[1:]) & np.isnan(values[:-1])
             found[1:] &= (values[1:] == values[:-1]) | both

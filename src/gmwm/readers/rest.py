@@ -207,17 +207,16 @@ def _counts(recording: Recording, unit_of: Mapping[str, str]) -> tuple[Notice, .
     notices = []
     for sensor, largest in _LEAST_COUNT.items():
         units = {name: unit for name, unit in unit_of.items() if name.startswith(sensor)}
-        sizes = {name: factor(unit, SI_UNIT[sensor]) for name, unit in units.items()}
-        found = [
-            name
-            for name, size in sizes.items()
-            if size >= largest and _is_counted(recording[name].values, size)
-        ]
-        if not found:
-            continue
-        noise = float(np.max(_noise_of([recording[name].values / sizes[name] for name in found])))
-        listed, unit = ", ".join(found), units[found[0]]
-        notices.append(notice("counts", sensor, {"noise": noise}, listed=listed, unit=unit))
+        counts = {
+            name: recording[name].values / size
+            for name, unit in units.items()
+            if (size := factor(unit, SI_UNIT[sensor])) >= largest
+            and _is_counted(recording[name].values, size)
+        }
+        if counts:
+            noise = float(np.max(_noise_of([*counts.values()])))
+            listed, unit = ", ".join(counts), units[next(iter(counts))]
+            notices.append(notice("counts", sensor, {"noise": noise}, listed=listed, unit=unit))
     return tuple(notices)
 
 

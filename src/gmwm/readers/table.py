@@ -75,12 +75,11 @@ class Table(ABC):
         """Reject infinite values and those too large for use; ``first`` is the row of the first."""
         if not usable(values):
             rows = np.flatnonzero(np.abs(values) >= LARGEST)
-            others = f", and {rows.size - 1:,} more such" if rows.size > 1 else ""
+            place = f"column {label(self.names, column)}, {self.where(first + int(rows[0]))}"
             raise InputError(
-                f"{self.source}, column {label(self.names, column)}, "
-                f"{self.where(first + int(rows[0]))}: {values[rows[0]]} is not a usable "
-                f"number{others}: cut the file before that row, or save NaN if the sample is "
-                "missing"
+                f"{self.source}, {place}: {values[rows[0]]} is not a usable number"
+                f"{more_such(rows.size)}: cut the file before that row, or save NaN if the sample "
+                "is missing"
             )
 
 
@@ -105,6 +104,11 @@ def load_columns(table: Table, columns: Sequence[int]) -> Columns:
 def label(names: Sequence[str], index: int) -> str:
     """How messages call a column: its name, or its place if it has none."""
     return repr(names[index]) if names[index] else f"{index} (counted from 0)"
+
+
+def more_such(count: int) -> str:
+    """How messages count what they name the first of."""
+    return f", and {count - 1:,} more such" if count > 1 else ""
 
 
 def usable(values: FloatArray) -> bool:

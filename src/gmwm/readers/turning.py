@@ -31,15 +31,15 @@ def _triad(recording: Recording, sensor: str) -> list[FloatArray]:
     return [recording[name].values for name in names] if set(names) <= set(recording) else []
 
 
-def block_means(axes: Sequence[FloatArray], size: int) -> FloatArray:
-    """Means (n // size, axes) of blocks; NaN where three quarters of one are missing."""
+def block_means(axes: Sequence[FloatArray], size: int, least: float = 0.25) -> FloatArray:
+    """Means (n // size, axes) of blocks; NaN where no more than the least share is present."""
 
     def means(values: FloatArray) -> FloatArray:
         rows = values[: values.size // size * size].reshape(-1, size)
         known = ~np.isnan(rows)
         count = np.count_nonzero(known, axis=1)
         total = np.sum(rows, axis=1, where=known)
-        return np.where(4 * count > size, total / np.maximum(count, 1), np.nan)
+        return np.where(count > least * size, total / np.maximum(count, 1), np.nan)
 
     return np.stack([means(values) for values in axes], axis=1)
 

@@ -218,7 +218,7 @@ def open_ardupilot(path: Path, wanted: Wanted) -> tuple[Table, ...]:
         raise InputError(
             f"{path.name} has no messages IMU, GYR, ACC or ISBD: set LOG_BITMASK to log the IMU"
         )
-    chosen = topics.choose_first(path.name, ranks, wanted)
+    chosen = topics.choose(path.name, ranks, wanted)
     by_name = {series.name: series for series in counts}
     tables: list[Table] = []
     for topic in chosen:

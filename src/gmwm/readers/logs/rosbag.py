@@ -212,7 +212,7 @@ def open_bag(path: Path, wanted: Wanted) -> tuple[BagTable, ...]:
             Topic(topic, count, _sensors(reader, topic, bag, heads[topic]))
             for topic, count in of_imu.items()
         ]
-        chosen = choose(path.name, found, wanted)
+        chosen = choose(path.name, [found], wanted)
         is_log = wanted.clock == "log"
         _, start, message = heads[chosen[0].name][0]
         if not is_log:

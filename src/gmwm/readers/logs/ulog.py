@@ -60,7 +60,7 @@ def _tables(path: Path, wanted: Wanted) -> tuple[ArrayTable, ...]:
         ranks[rank].append(Topic(_name(each), each.data["timestamp"].size, sensors))
     if not any(ranks):
         raise InputError(f"{path.name} has no samples of an IMU: {_HINT}")
-    chosen = topics.choose_first(path.name, ranks, wanted)
+    chosen = topics.choose(path.name, ranks, wanted)
     notices += topics.left_out(ranks[:2], chosen)
     found: list[tuple[Topic, _Columns]] = []
     for topic in chosen:

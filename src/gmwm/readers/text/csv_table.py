@@ -20,7 +20,7 @@ import numpy as np
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.readers.registry import Wanted
-from gmwm.readers.table import Columns, Table, damage_notice, label, usable
+from gmwm.readers.table import Columns, Table, damage_notice, label, more_such, usable
 from gmwm.readers.text import cells
 from gmwm.readers.text.cells import BLANKS
 from gmwm.readers.text.layout import Layout, find_layout, with_dialect
@@ -89,11 +89,9 @@ class CsvTable(Table):
                 yield self._joined(columns, parts)
                 parts = []
         if infinite:
-            others = f", and {len(infinite) - 1:,} more such" if len(infinite) > 1 else ""
-            raise InputError(
-                f"{self.source}, {infinite[0]} is not a usable number{others}: cut the file before "
-                "that line, or empty the field if the sample is missing"
-            )
+            text = f"{self.source}, {infinite[0]} is not a usable number{more_such(len(infinite))}"
+            hint = "cut the file before that line, or empty the field if the sample is missing"
+            raise InputError(f"{text}: {hint}")
         if parts:
             yield self._joined(columns, parts)
         pyarrow.default_memory_pool().release_unused()  # Arrow keeps memory for more columns
