@@ -258,10 +258,7 @@ def _never_rests(recording: Recording, rate: FloatArray, size: int) -> bool:
 
 
 def moves(recording: Recording) -> Iterator[Notice]:
-    """Say when the recording moves, and which stretches are static.
-
-    A move between two static attitudes is a tilt, which spoils the accelerometers only.
-    """
+    """Say when the recording moves or tilts, and which stretches are static."""
     motion = find_motion(recording)
     ends: dict[str, float] = {}
     hint = f"no stretch of {tuning.SHORTEST_STATIC:g} s is static: record again, at rest"

@@ -44,8 +44,8 @@ def thinned(channel: Channel, found: Repetition) -> Channel:
 def interpolation_notice(channel: Channel) -> Notice | None:
     """Say that samples lie on straight lines between others, all over or now and then.
 
-    Second differences vanish but where two lines meet, which two of them see: of an interpolation
-    from f to F Hz a share of 1 - 2 f / F vanishes; of noise nearly none, if its step is small.
+    Of an interpolation from f to F Hz a share of 1 - 2 f / F of the second differences vanishes; of
+    noise nearly none, if its step is small.
     """
     values = np.asarray(channel.values, dtype=float)
     steps = np.diff(values)

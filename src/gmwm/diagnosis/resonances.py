@@ -88,10 +88,9 @@ def _fitted(
     f, power, weight = _points(spectrum, left_out, start, stop)
     level = float(np.interp(centre, spectrum.frequency, smooth))
     power = power / level
-    fits = []
-    for damping in tuning.DAMPING_STARTS:
-        first = np.array([0.0, np.log(damping), np.log(np.expm1(height)), 0.0, 0.0, 0.0])
-        fits.append(_scored(first, f, power, weight, centre, spectrum.dt))
+    starts = np.zeros((len(tuning.DAMPING_STARTS), _LOW.size))
+    starts[:, 1], starts[:, 2] = np.log(tuning.DAMPING_STARTS), np.log(np.expm1(height))
+    fits = [_scored(start, f, power, weight, centre, spectrum.dt) for start in starts]
     free, _ = min(fits, key=lambda result: result[1])
     unit = _unit(free, centre, spectrum.dt)
     bottom = float(np.interp(unit.frequency, f, _floor(free, np.log(f / centre))))
@@ -150,9 +149,9 @@ def _scored(
             if damping > _MOST_DAMPED:
                 break
             continue
-        gain = value - new_value
+        is_settled = value - new_value < _GAIN
         free, bump, floor, value, damping = new, new_bump, new_floor, new_value, 0.3 * damping
-        if gain < _GAIN:
+        if is_settled:
             break
     return free, value
 

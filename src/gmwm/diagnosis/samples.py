@@ -74,10 +74,9 @@ def _run_lengths(values: FloatArray) -> IntArray:
 def stuck(channel: Examined) -> Iterator[Notice]:
     """Find runs of equal samples longer than rounding explains.
 
-    Whatever came before, a Gaussian prediction error of standard deviation s keeps a sample in
-    the step of the one before with a probability of at most erf(step / (2^(3/2) s)), that of the
-    interval around the prediction (Anderson 1955, *Proc. AMS* 6, 170-176). A run of L repetitions
-    somewhere in n samples therefore has a probability below n times the L-th power.
+    A Gaussian prediction error of standard deviation s keeps a sample in the step of the one before
+    with a probability of at most erf(step / (2^(3/2) s)) (Anderson 1955, *Proc. AMS* 6, 170-176); a
+    run of L repetitions in n samples has one below n times its L-th power.
     """
     errors, series = channel.errors, channel.present
     if not is_dithered(series, channel.step):
@@ -121,9 +120,8 @@ def cut_off_or_abrupt_end(channel: Examined) -> Iterator[Notice]:
 def _cut_off(channel: Examined) -> Iterator[Notice]:
     """Find more samples at the largest or smallest value than at the one before it.
 
-    A tail falls outwards, and for noise faster and faster: from the last step but one to the last
-    by no less than from the one before to it, up to chance (binomial test, with three standard
-    errors for that fall). Peaks of shocks may be cut off without harm.
+    A tail falls faster and faster: from the last step but one to the last by no less than before,
+    up to chance (binomial test). Peaks of shocks may be cut off without harm.
     """
     step, values = channel.step, channel.present
     if not is_dithered(values, step):

@@ -110,10 +110,9 @@ def find_still(recording: Recording) -> Still:
 
 
 def rest_of(recording: Recording) -> Still | None:
-    """The stretches at rest of a log that is not static; None if it is.
+    """The stretches at rest of a log that moves, or vibrates at some times only; None of others.
 
-    It is not if it moves, or if it scatters more at some times than at others and begins or ceases
-    to do so within seconds, as what vibrates. A tilt between two attitudes does not count.
+    A tilt between two attitudes does not count.
     """
     motion = find_motion(recording)
     if motion.turns_steadily:

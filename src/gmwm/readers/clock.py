@@ -218,10 +218,7 @@ def _unit(clock: Clock, step: float, expected: float | None) -> tuple[float, boo
 def without_unit(
     source: str, column: str, step: float, expected: float | None = None
 ) -> InputError | None:
-    """What stamps without a unit may be; None if they are seconds of a sensor.
-
-    expected: Rate (Hz) that is stated but fits no unit.
-    """
+    """What stamps without a unit may be, and the rate stated; None if seconds of a sensor."""
     if tuning.LEAST_STEP <= step < tuning.LARGEST_STEP or not step > 0.0:
         return None
     slowest, fastest = tuning.RATES_OF_SENSORS

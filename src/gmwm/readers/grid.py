@@ -250,10 +250,7 @@ def interval_of(stamps: FloatArray, number: IntArray, starts: BoolArray) -> floa
     """Sampling interval: slope of the robust line through the stamps over their sample numbers.
 
     From the median slope of rows half of the record apart, least squares with the residuals bounded
-    at three robust standard deviations. From independent errors of s intervals the slope has a
-    relative error of ``s sqrt(12 / n^3)``, that from the first to the last stamp ``s sqrt(2) / n``.
-
-    starts: (n,), where a part begins whose clock has an offset of its own.
+    at three robust standard deviations. A new part, whose clock has an offset, ``starts`` at (n,).
     """
     edges = [0, *np.flatnonzero(starts), stamps.size]
     parts = [slice(a, b) for a, b in pairwise(edges) if b > a]

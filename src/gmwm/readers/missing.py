@@ -60,16 +60,14 @@ def missing_notices(found: Mapping[str, Missing]) -> list[Notice]:
 def without_sentinels(
     name: str, values: FloatArray, largest: float, where: Callable[[int], str]
 ) -> tuple[FloatArray, list[Notice]]:
-    """Mask numbers that are no samples, and report them.
+    """Mask numbers that are no samples, and report them; a copy if there is any.
 
     These are numbers beyond the range of any sensor; error codes (999, -9999, ...) and the smallest
-    and largest integers of 16, 24, 32 or 64 bit, if far outside all others; and numbers that come
-    again and again, exactly, with nothing between them and the others: motion passes through.
+    and largest integers of 16 to 64 bit, if far outside all others; and numbers that come again and
+    again, exactly, with nothing between them and the others.
 
-    values: (n,), in the unit of the file; NaN where one is missing.
-    largest: Magnitude beyond the range of any sensor, in the same unit.
+    largest: Magnitude beyond the range of any sensor, in the unit of the file.
     where: Row -> its place in the file.
-    Returns: a copy if any number is masked, else ``values``; notices, one for each number.
     """
     some = values[:: -(-values.size // tuning.SAMPLED_FOR_RANGE)]
     some = some[~np.isnan(some)]

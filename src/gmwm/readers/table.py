@@ -119,10 +119,7 @@ def usable(values: FloatArray) -> bool:
 
 
 def damage_notice(source: str, what: str, is_taken: bool | None) -> Notice:
-    """Notice about a damaged file, the rest of which is used, or else rejected.
-
-    is_taken: Whether the caller asks for the rest; None if it cannot be asked for.
-    """
+    """Notice about a damaged file whose rest is used (``is_taken``); it is rejected otherwise."""
     if is_taken is None:
         raise InputError(f"{source} {what}: get a whole copy")
     if not is_taken:

@@ -121,10 +121,7 @@ class ArrayTable(Table):
     def of_entries(
         cls, source: str, entries: Mapping[str, Array], notices: Sequence[Notice] = (), **about: Any
     ) -> ArrayTable:
-        """Columns of the arrays of a file by their names.
-
-        about: ``stamps`` and ``origin`` of the table.
-        """
+        """Columns of the arrays of a file by their names; ``about`` has `stamps` and `origin`."""
         named, matrices = list[_Named](), list[_Named]()
         for name, array in entries.items():
             if array.like.dtype.names and array.like.ndim == 1:

@@ -63,8 +63,7 @@ def _walk(
     """Kinds and places of wanted messages, up to an FMT or the end of what is there.
 
     end: Of the message before.
-    Returns: count; at, where the walk goes on; between, bytes that are no messages; end of the last
-        message.
+    Returns: their count, where the walk goes on, bytes that are no messages, end of the last one.
     """
     count = between = 0
     while at + 3 <= data.size:
@@ -203,8 +202,8 @@ class DataflashTable(MessageTable):
 def open_ardupilot(path: Path, wanted: Wanted) -> tuple[Table, ...]:
     """Open a binary log of ArduPilot.
 
-    wanted: Topics as ``"IMU[1]"``, or ``"GYR[0]"`` and ``"ACC[0]"``; by default that of `IMU`, else
-        those of `GYR` and `ACC`, else the batches, if there is one IMU.
+    Topics are ``"IMU[1]"``, or ``"GYR[0]"`` and ``"ACC[0]"``; by default that of `IMU`, else of
+    `GYR` and `ACC`, else the batches, if there is one IMU.
     """
     with damage_named(path.name, _DAMAGE):
         counts, sensors, batches, damage = _contents(path)

@@ -181,11 +181,7 @@ class BagTable(MessageTable):
 
 
 def open_bag(path: Path, wanted: Wanted) -> tuple[BagTable, ...]:
-    """Open a bag.
-
-    path: A file, or the folder of a bag of ROS 2.
-    Returns: one table for each topic, those of thermometers last.
-    """
+    """A table for each topic of a file, or of the folder of a bag of ROS 2; thermometers last."""
     is_folder = path.is_dir()
     if is_folder and not (path / "metadata.yaml").is_file():
         hint = "name the .db3 or .mcap file in it, or write one with ros2 bag reindex"

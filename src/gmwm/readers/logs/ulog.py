@@ -41,10 +41,7 @@ _Columns = dict[str, AnyArray]
 
 
 def open_ulog(path: Path, wanted: Wanted) -> tuple[ArrayTable, ...]:
-    """Open a ULog.
-
-    wanted: Topics as ``"sensor_gyro_fifo[1]"``; by default `sensor_combined`, else the FIFO topics.
-    """
+    """The topics wanted (``"sensor_gyro_fifo[1]"``), or `sensor_combined`, else the FIFO topics."""
     with damage_named(path.name, _DAMAGE):  # formats that are damaged lack fields
         return _tables(path, wanted)
 
