@@ -265,7 +265,7 @@ def moves(recording: Recording) -> Iterator[Notice]:
     if motion.static:
         start, stop = max(motion.static, key=lambda each: each[1] - each[0])
         ends = {"start": start, "stop": stop}
-        hint = f"use one static stretch: {_times(motion.static)}"
+        hint = f"use one static stretch: from {times_of(motion.static)}"
     others = [move for move in motion.moves if not move.is_tilt]
     tilts = [move for move in motion.moves if move.is_tilt]
     if others:
@@ -275,7 +275,7 @@ def moves(recording: Recording) -> Iterator[Notice]:
         if rate > tuning.TURNS:
             verb = f"it turns at {most}{readable(rate, 'rad/s')}"
         values = {"moves": len(others), "rate": rate, "angle": tilt} | ends
-        times = _times([(move.start, move.stop) for move in others])
+        times = f"from {times_of([(move.start, move.stop) for move in others])}"
         yield notice("not-static", "", values, severity="bad", hint=hint, verb=verb, times=times)
     if tilts:
         largest = max(tilts, key=lambda move: move.tilt)
@@ -286,10 +286,10 @@ def moves(recording: Recording) -> Iterator[Notice]:
         yield notice("tilt", "", values, severity="bad", hint=hint, degrees=degrees, others=more)
 
 
-def _times(stretches: Sequence[tuple[float, float]]) -> str:
+def times_of(stretches: Sequence[tuple[float, float]]) -> str:
     """Some stretches, the longest ones of many."""
     longest = sorted(stretches, key=lambda each: each[0] - each[1])[:_LISTED]
     parts = [f"{start:.4g} to {stop:.4g} s" for start, stop in sorted(longest)]
     rest = len(stretches) - _LISTED
     more = f", and {rest} shorter one{'s' if rest > 1 else ''}" if rest > 0 else ""
-    return f"from {', '.join(parts)}{more}"
+    return ", ".join(parts) + more

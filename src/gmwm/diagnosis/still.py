@@ -20,14 +20,20 @@ from gmwm._core.text import brief
 from gmwm._core.typing import BoolArray, FloatArray
 from gmwm._core.units import SI_UNIT, factor
 from gmwm.diagnosis import tuning
-from gmwm.diagnosis.motion import find_motion, is_moved_with, level_changes, remembered, runs_of
+from gmwm.diagnosis.motion import (
+    find_motion,
+    is_moved_with,
+    level_changes,
+    remembered,
+    runs_of,
+    times_of,
+)
 from gmwm.diagnosis.resolution import step_size
 from gmwm.issues import Notice, notice
 from gmwm.readers import Channel, Recording
 
 _GRAVITY = factor("g", SI_UNIT["accel"])
 _WIDTH = 60  # characters of the timeline
-_LISTED = 3
 
 
 @dataclass(frozen=True)
@@ -266,11 +272,8 @@ def vibration(recording: Recording) -> Iterator[Notice]:
     if blocks is None or not (stretches := blocks.loud_stretches):
         return
     total, ratio = sum(stop - start for start, stop in stretches), blocks.loudness.ratio
-    longest = sorted(stretches, key=lambda each: each[0] - each[1])[:_LISTED]
-    listed = ", ".join(f"{start:.4g} to {stop:.4g} s" for start, stop in sorted(longest))
-    more = f" and {len(stretches) - _LISTED} more" if len(stretches) > _LISTED else ""
     values = {"stretches": len(stretches), "total": total, "ratio": ratio}
-    yield notice("vibration", "", values, times=brief(ratio), listed=listed + more)
+    yield notice("vibration", "", values, times=brief(ratio), listed=times_of(stretches))
 
 
 @remembered

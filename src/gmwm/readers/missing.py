@@ -38,9 +38,8 @@ class Missing:
         gone = np.isnan(values)
         edges = np.flatnonzero(np.diff(gone, prepend=False, append=False))
         lengths = edges[1::2] - edges[::2]
-        if not lengths.size:
-            return cls(gone.size)
-        return cls(gone.size, int(np.sum(lengths)), lengths.size, int(np.max(lengths)))
+        longest = int(np.max(lengths, initial=0))
+        return cls(gone.size, int(np.sum(lengths)), lengths.size, longest)
 
 
 def missing_notices(found: Mapping[str, Missing]) -> list[Notice]:

@@ -58,15 +58,11 @@ def layout_of(text: str) -> BinaryLayout:
     if text.upper() in LAYOUTS:
         return LAYOUTS[text.upper()]
     parts = [part.strip() for part in text.split(",")]
-    number = re.compile(r"[0-9.]+(?:[eE][+-]?[0-9]+)?")
+    number = re.compile(r"(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
     if len(parts) < 3 or parts[0] not in _KINDS or not all(map(number.fullmatch, parts[1:3])):
         known = f"{', '.join(LAYOUTS)}, or {_FORM} with a type of {', '.join(_KINDS)}"
         raise InputError(f"layout {text!r} is unknown: give one of {known}", "layout")
-    try:
-        found = BinaryLayout(_KINDS[parts[0]], float(parts[1]), float(parts[2]))
-    except ValueError:
-        problem = f"layout {text!r}: a scale is not a number: write {_FORM}"
-        raise InputError(problem, "layout") from None
+    found = BinaryLayout(_KINDS[parts[0]], float(parts[1]), float(parts[2]))
     for word in parts[3:]:
         if word in _ORDERS:
             found = replace(found, order=_ORDERS[word])

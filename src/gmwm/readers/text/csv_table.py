@@ -23,7 +23,7 @@ from gmwm.readers.registry import Wanted
 from gmwm.readers.table import Columns, Table, damage_notice, label, more_such, usable
 from gmwm.readers.text import cells
 from gmwm.readers.text.cells import BLANKS
-from gmwm.readers.text.layout import Layout, find_layout, with_dialect
+from gmwm.readers.text.layout import Layout, fields_of, find_layout, with_dialect
 from gmwm.readers.text.lines import blocks, content_size, count_lines
 
 if TYPE_CHECKING:
@@ -139,11 +139,7 @@ class CsvTable(Table):
     def _fields(self, line: int, text: str) -> list[str]:
         """Fields of a line; a delimiter after the last one does no harm."""
         width = self.layout.width
-        try:
-            fields = cells.split_line(text, self.layout.delimiter)
-        except ValueError as error:
-            text = f"{self.source}, line {line}: quotes that do not match"
-            raise InputError(f"{text}: correct the line") from error
+        fields = fields_of(self.source, line, text, self.layout.delimiter)
         if len(fields) == width + 1 and not fields[-1]:
             fields.pop()
         if len(fields) != width:
