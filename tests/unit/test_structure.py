@@ -204,7 +204,7 @@ def test_where_things_are_added_is_there():
 
 
 def test_what_was_found_does_not_change():
-    """Dataclasses are frozen; what fills up while a file is read is not."""
+    """Dataclasses are frozen."""
     thawed = [
         f"{file.name}: {node.name}"
         for file in FILES
