@@ -113,8 +113,8 @@ def test_outsiders_import_faces_only():
 
 
 LINES = {
-    "": 860, "_core": 2120, "process": 3190, "readers": 5570, "plotting": 700, "variance": 4100,
-    "diagnosis": 3360, "estimate": 7010, "selection": 1110, "calibration": 2220,
+    "": 860, "_core": 2120, "process": 3190, "readers": 5350, "plotting": 700, "variance": 4100,
+    "diagnosis": 3290, "estimate": 7010, "selection": 1110, "calibration": 2220,
     "filter_numbers": 3450, "ins": 9870, "population": 2250, "export": 1790, "report": 2400,
     "study": 1700, "cli": 2000,
 }  # fmt: skip
@@ -204,7 +204,7 @@ def test_where_things_are_added_is_there():
 
 
 def test_what_was_found_does_not_change():
-    """Dataclasses are frozen; what fills up while a file is read is not."""
+    """Dataclasses are frozen."""
     thawed = [
         f"{file.name}: {node.name}"
         for file in FILES
@@ -213,4 +213,4 @@ def test_what_was_found_does_not_change():
         for decorator in map(ast.unparse, node.decorator_list)
         if decorator.startswith("dataclass") and "frozen=True" not in decorator
     ]
-    assert thawed == ["ardupilot.py: Extent"]
+    assert thawed == []

@@ -39,5 +39,8 @@ student = SimpleNamespace(
 )
 fisher = SimpleNamespace(isf=_fisher_isf)
 binom = SimpleNamespace(sf=lambda k, n, p: special.bdtrc(k, n, p))
-gennorm = SimpleNamespace(sf=lambda x, shape: 0.5 * special.gammaincc(1.0 / shape, x**shape))
+gennorm = SimpleNamespace(
+    sf=lambda x, shape: 0.5 * special.gammaincc(1.0 / shape, x**shape),
+    isf=lambda p, shape: special.gammainccinv(1.0 / shape, 2.0 * p) ** (1.0 / shape),
+)
 """Density exp(-|x|^shape) up to its factor, at x >= 0."""

@@ -118,12 +118,6 @@ def worker_pool(others: int, first: str) -> Iterator[None]:
                 each.join(_LAST_SECONDS)
 
 
-def during_startup(work: Callable[[], object]) -> None:
-    """Do what helps the processes of `worker_pool`, if one of them is not ready."""
-    if not all(each.done() for each in _pool.get()[1]):
-        work()
-
-
 def shared(work: Work[T, R], items: Iterable[T]) -> Iterator[tuple[T, R]]:
     """Do the work of every item, in any order, in this process and in those of `worker_pool`.
 

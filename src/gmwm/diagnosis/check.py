@@ -129,18 +129,18 @@ def _channels_found(recording: Recording, progress: Progress | None) -> dict[str
     channels = recording.inertial
     found: dict[str, _Found] = {}
 
+    progress = progress or (lambda done, total, name: None)
+
     def begun() -> Iterator[Channel]:
         for channel in channels:
-            if progress is not None:
-                progress(len(found), len(channels), channel.name)
+            progress(len(found), len(channels), channel.name)
             yield channel
 
     work = partial(_without_copies, copies=find_copies(recording), motion=find_motion(recording))
     for channel, one in shared(work, begun()):
         found[channel.name] = one
         release(channel.values)
-    if progress is not None:
-        progress(len(channels), len(channels), "")
+    progress(len(channels), len(channels), "")
     return {channel.name: found[channel.name] for channel in channels}
 
 

@@ -97,11 +97,7 @@ def _row_keys(columns: Iterable[FloatArray]) -> _RowKeys:
 
 
 def _window(keys: _RowKeys) -> int:
-    """Rows that are not the same twice by chance.
-
-    Rows of fine samples are hardly ever; where they are coarse or slow, one that is the same makes
-    the next likely to be.
-    """
+    """Rows that are not the same twice by chance: many of coarse or slow samples."""
     again = []
     for part in tuning.LAGS_OF_ROWS:
         lag = int(part * keys.size)
@@ -115,10 +111,9 @@ def _window(keys: _RowKeys) -> int:
 def _seen_before(keys: _RowKeys, window: int) -> tuple[IntArray, IntArray]:
     """Rows from which a window is as an earlier one, and where that begins.
 
-    Of all windows those are looked at whose number ends in some zero bits: which these are, the
-    content says, so that they are the same in a copy (Manber 1994, *USENIX Winter*, 1-10). The
-    number is a polynomial in an odd number modulo 2^64 (Karp and Rabin 1987, *IBM J. Res. Dev.* 31,
-    249-260).
+    Only windows whose number ends in some zero bits are looked at, which are the same in a copy
+    (Manber 1994, *USENIX Winter*, 1-10). The number is a polynomial modulo 2^64 (Karp and Rabin
+    1987, *IBM J. Res. Dev.* 31, 249-260).
     """
     none = np.empty(0, dtype=np.intp), np.empty(0, dtype=np.intp)
     if keys.size <= window:

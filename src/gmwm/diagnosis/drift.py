@@ -13,26 +13,21 @@ from gmwm._core.typing import FloatArray, inner
 from gmwm.diagnosis import tuning
 from gmwm.diagnosis.innovations import Examined
 from gmwm.issues import Notice, Severity, notice
-from gmwm.readers import Recording
+from gmwm.readers import Recording, block_means
 
 
 def part_means(values: FloatArray, parts: int = tuning.PARTS, least: float = 0.5) -> FloatArray:
     """Means of equal parts of a series; NaN where no more than the least fraction is present."""
     size = values.size // parts
-    rows = values[: size * parts].reshape(-1, size)
-    known = ~np.isnan(rows)
-    count = np.count_nonzero(known, axis=1)
-    total = np.sum(rows, axis=1, where=known)
-    return np.where(count > least * size, total / np.maximum(count, 1), np.nan)
+    return block_means([values[: size * parts]], size, least)[:, 0]
 
 
 def drift(channel: Examined) -> Iterator[Notice]:
     """Say how far the level wanders, and whether it does so in one direction.
 
-    The variance of the means of 64 parts is compared with what the differences between means of
-    64 samples would give if all noise were white (F test). A straight line through the means is a
-    drift only where a random walk would hardly have it: 99.9 % of random walks change by less than
-    20 times the root mean square of what the line leaves (200,000 simulated).
+    The variance of the means of 64 parts is compared with that of white noise, by the differences
+    between means of 64 samples (F test). A straight line is a drift only where a random walk would
+    hardly have it: 99.9 % change by less than 20 times the rms of what the line leaves.
     """
     name, unit, quiet = channel.name, channel.unit, channel.quiet
     size = quiet.size // tuning.PARTS
@@ -139,11 +134,9 @@ def _change(channel: Examined) -> Notice | None:
 def _unsteadiness(channel: Examined) -> dict[str, float] | None:
     """By how much noise that comes and goes, or swells and dies, is above that of its quiet parts.
 
-    Sizes of prediction errors, bounded so that tails do no harm, are averaged over parts of 64,
-    256, ... samples. Those of stationary noise vary from part to part by their long-run variance
-    over the length, chi-square distributed; that variance is estimated from neighbouring means of
-    16 samples, so that no memory of the sizes of a few samples counts. What the mean squares of
-    the parts vary beyond the same of their own is the variance of the noise that changes.
+    Sizes of prediction errors, bounded against tails, are averaged over parts of 64, 256, ...
+    samples. Those of stationary noise vary by their long-run variance over the length (chi-square),
+    which neighbouring means of 16 samples give. What mean squares vary more is noise that changes.
     """
     errors, usable = channel.errors, channel.usable
     size = errors.values[usable]
@@ -199,8 +192,7 @@ def _means(values: FloatArray, length: int) -> FloatArray:
 def temperature_notices(recording: Recording) -> list[Notice]:
     """Find channels that follow a temperature channel, each with the one it follows most closely.
 
-    Changes from one of 64 parts of the record to the next are correlated: what only drifts in
-    the same direction does not count.
+    Changes from one of 64 parts of the record to the next are correlated: mere drift is not.
     """
     thermometers = [c for c in recording.values() if c.quantity == "temperature"]
     if recording.n < tuning.PARTS * tuning.SHORTEST_PART or not thermometers:

@@ -21,11 +21,9 @@ _LISTED = 3
 def find_events(errors: Innovations, tails: Tails | None = None) -> Spans:
     """Sample intervals in which prediction errors are too large for noise.
 
-    An error is too large beyond the quantile of the law of the noise that it passes with
-    `tuning.FALSE_ALARM` in the whole channel, plus what rounding can add. Errors beyond four
-    standard deviations next to it belong to the same event. In noise of heavy tails, where such
-    errors are usual, more of them next to each other than independent samples have with the same
-    chance are an event too.
+    They pass the quantile for `tuning.FALSE_ALARM` in the whole channel, plus what rounding can
+    add. Errors beyond four standard deviations next to one belong to its event; of heavy tails, so
+    do more of them next to each other than independent samples have with the same chance.
     """
     n = errors.values.size
     beyond = np.abs(errors.values) - errors.rounding
@@ -63,9 +61,8 @@ def with_single_outliers(
 ) -> Spans:
     """Events and, without any guard, outliers all over the record; of many, these alone.
 
-    Predictions from an outlier are in error too. So the first that are left out are those farther
-    from the level than four standard deviations of such distances; where samples are predicted
-    better than by their level, errors of prediction without these show the rest.
+    Predictions from an outlier are in error too: the first that are left out are those far from
+    the level. Where samples are predicted better than by it, predictions without these show more.
     """
     place = np.arange(values.size)
     there = ~np.isnan(values)
@@ -86,8 +83,8 @@ def with_single_outliers(
 def _level(values: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Medians of blocks, joined by lines, and the robust standard deviation from them.
 
-    Samples that stay are cut off on both sides of the level, which makes them depend on it and so
-    on each other. The blocks are therefore as long as they can be without adding to the distances.
+    The blocks are as long as they can be without adding to the distances: samples that are cut off
+    on both sides of a short one depend on each other.
     """
     place = np.arange(values.size)
     found: list[tuple[FloatArray, FloatArray]] = []

@@ -229,10 +229,7 @@ class Health(Document, Printed):
 
 
 def gathered(notices: Iterable[Notice]) -> list[Notice]:
-    """Lines and resonances that channels share, reported once: by the channel that shows it best.
-
-    A mounting or a power supply is seen by several sensors at the same frequency.
-    """
+    """Lines and resonances that several sensors see, reported once: where they show best."""
     groups: list[list[Notice]] = []
     for each in notices:
         group = next((group for group in groups if _is_shared(group, each)), None)

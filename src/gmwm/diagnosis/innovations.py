@@ -124,10 +124,7 @@ def innovations(values: FloatArray, step: float) -> Innovations | None:
 
 
 def robust_scale(values: FloatArray, floor: float) -> float:
-    """Standard deviation of the values within four of them, at least ``floor``.
-
-    The median absolute value starts it; it alone would see the steps of rounded data.
-    """
+    """Standard deviation of the values within four of them, from a median; at least ``floor``."""
     size = np.abs(values)
     scale = max(_NORMAL_MAD * float(np.median(size, overwrite_input=True)), floor)
     size *= size
@@ -165,10 +162,7 @@ def _complete(known: BoolArray, order: int) -> BoolArray:
 
 
 def running_scale(errors: FloatArray, floor: float) -> FloatArray:
-    """Scale in blocks, each replaced by the median of itself and its four neighbours.
-
-    A shock may fill a block; it does not fill three of five.
-    """
+    """Scale in blocks, by the median of five: a shock does not fill three of them."""
     blocks = max(errors.size // tuning.SCALE_BLOCK, 1)
     edges = np.linspace(0, errors.size, blocks + 1).astype(int)
     scales = [robust_scale(errors[a:b], floor) for a, b in pairwise(edges)]
@@ -180,9 +174,8 @@ def running_scale(errors: FloatArray, floor: float) -> FloatArray:
 def crosstalk_notices(errors: dict[str, npt.NDArray[np.float32]]) -> list[Notice]:
     """Find pairs of channels whose prediction errors are correlated.
 
-    The correlation of two white series has the variance 1/n, whatever the spectra of the channels
-    were. Prediction errors are in standard deviations, clipped, and 0 where they are unknown, which
-    adds nothing to a sum of products.
+    The correlation of two white series has the variance 1/n. Errors are in standard deviations,
+    clipped, and 0 where they are unknown, which adds nothing to a sum of products.
     """
     pairs, notices = list(combinations(errors, 2)), []
     for one, other in pairs:

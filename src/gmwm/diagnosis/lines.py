@@ -33,10 +33,9 @@ class Line:
 def find_lines(spectrum: Spectrum, smooth: FloatArray) -> tuple[Line, ...]:
     """Lines by their power, strongest first.
 
-    The mean of m = 1, 2, 4, ... neighbouring bins, over the local background, is compared with
-    the quantile of an F distribution that noise passes with `tuning.FALSE_ALARM` in all bins and
-    widths together (Bonferroni); its degrees of freedom are those of the largest eigenvalue of the
-    correlation between Hann bins, which rules the tail. Wider means find lines that wander.
+    The mean of m = 1, 2, 4, ... neighbouring bins, over the local background, is compared with an
+    F quantile for `tuning.FALSE_ALARM` in all bins and widths together (Bonferroni), whose degrees
+    of freedom come from the largest eigenvalue of the correlation between Hann bins.
     """
     last = spectrum.density.size - 1
     if last <= tuning.FIRST_BIN + 2 * tuning.UNRESOLVED:
@@ -92,10 +91,7 @@ def line_notices(name: str, unit: str, lines: tuple[Line, ...]) -> list[Notice]:
 
 
 def _local_background(density: FloatArray, smooth: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Background that follows bumps, and its degrees of freedom.
-
-    Mean logarithm over the neighbours, those cut that are too high for noise.
-    """
+    """Mean logarithm over neighbours, without those too high for noise; degrees of freedom."""
     k = np.arange(density.size)
     reach = np.maximum(tuning.BESIDE_LINE, (tuning.BESIDE_LINE_FRACTION * k).astype(int))
     high = np.minimum(k + reach + 1, density.size - 1)

@@ -97,10 +97,9 @@ def remembered(examine: Callable[[Recording], T]) -> Callable[[Recording], T]:
 def find_motion(recording: Recording) -> Motion:
     """Find the stretches in which a recording is static.
 
-    Means of a second, without shocks by a running median, move where they change within some
-    seconds by more than sensors at rest do (1 deg/s, or 1 deg of gravity) and by more than their
-    own noise. Between two changes the level is static if its rate is the one nearest to zero. Slow
-    motion is found where gravity turns as the gyros predict.
+    Means of a second, without shocks by a running median, move where they change within seconds by
+    more than sensors at rest and their own noise do. Between two changes the level is static if its
+    rate is the one nearest to zero. Slow motion turns gravity as the gyros predict.
     """
     size = max(round(tuning.MOTION_BLOCK / recording.dt), tuning.FEWEST_OF_MOTION)
     whole = ((0.0, recording.duration),)
@@ -117,7 +116,9 @@ def find_motion(recording: Recording) -> Motion:
     changing = np.zeros(known.size, dtype=bool)
     for sensor, values in level.items():
         for channel, series in zip(_channels(recording, sensor), values.T, strict=True):
-            changing |= _changing(series, _LIMIT[sensor], _white(channel.values, size))
+            white = _white(channel.values, size)
+            for row in np.flatnonzero(level_changes(series, _LIMIT[sensor], white)[1]):
+                changing[row : row + tuning.MEDIAN_BLOCKS + 1] = True
     turn = steady_turn(recording, size)
     if turn > 0.0:
         still = []
@@ -177,18 +178,16 @@ def _white(values: FloatArray, size: int) -> float:
     return float(np.median(np.abs(steps))) / (norm.ppf(0.75) * np.sqrt(2.0 * size))
 
 
-def _changing(series: FloatArray, limit: float, least: float) -> BoolArray:
-    """Mark blocks across which the level changes by more than noise."""
+def level_changes(
+    series: FloatArray, limit: float, least: float = 0.0, unsure: float = 1.0
+) -> tuple[FloatArray, BoolArray]:
+    """Changes of a level over some blocks, and which are larger than a limit and than noise."""
     lag = tuning.MEDIAN_BLOCKS
-    change = np.abs(series[lag:] - series[:-lag])
+    change = series[lag:] - series[:-lag]
     # Most blocks may move: a low quantile knows the noise all the same.
-    scale = np.quantile(change, tuning.QUIET) / norm.ppf(0.5 + 0.5 * tuning.QUIET)
-    far = norm.isf(0.5 * tuning.FALSE_ALARM / series.size) * tuning.BEYOND_NOISE
-    flagged = change > max(limit, far * max(float(scale), least))
-    found = np.zeros(series.size, dtype=bool)
-    for shift in range(lag + 1):
-        found[shift : shift + flagged.size] |= flagged
-    return found
+    scale = float(np.quantile(np.abs(change), tuning.QUIET)) / norm.ppf(0.5 + 0.5 * tuning.QUIET)
+    far = norm.isf(0.5 * tuning.FALSE_ALARM / series.size) * tuning.BEYOND_NOISE * unsure
+    return change, np.abs(change) > max(limit, far * max(scale, least))
 
 
 def runs_of(chosen: BoolArray) -> list[tuple[int, int]]:
@@ -259,17 +258,14 @@ def _never_rests(recording: Recording, rate: FloatArray, size: int) -> bool:
 
 
 def moves(recording: Recording) -> Iterator[Notice]:
-    """Say when the recording moves, and which stretches are static.
-
-    A move between two static attitudes is a tilt, which spoils the accelerometers only.
-    """
+    """Say when the recording moves or tilts, and which stretches are static."""
     motion = find_motion(recording)
     ends: dict[str, float] = {}
     hint = f"no stretch of {tuning.SHORTEST_STATIC:g} s is static: record again, at rest"
     if motion.static:
         start, stop = max(motion.static, key=lambda each: each[1] - each[0])
         ends = {"start": start, "stop": stop}
-        hint = f"use one static stretch: {_times(motion.static)}"
+        hint = f"use one static stretch: from {times_of(motion.static)}"
     others = [move for move in motion.moves if not move.is_tilt]
     tilts = [move for move in motion.moves if move.is_tilt]
     if others:
@@ -279,7 +275,7 @@ def moves(recording: Recording) -> Iterator[Notice]:
         if rate > tuning.TURNS:
             verb = f"it turns at {most}{readable(rate, 'rad/s')}"
         values = {"moves": len(others), "rate": rate, "angle": tilt} | ends
-        times = _times([(move.start, move.stop) for move in others])
+        times = f"from {times_of([(move.start, move.stop) for move in others])}"
         yield notice("not-static", "", values, severity="bad", hint=hint, verb=verb, times=times)
     if tilts:
         largest = max(tilts, key=lambda move: move.tilt)
@@ -290,10 +286,10 @@ def moves(recording: Recording) -> Iterator[Notice]:
         yield notice("tilt", "", values, severity="bad", hint=hint, degrees=degrees, others=more)
 
 
-def _times(stretches: Sequence[tuple[float, float]]) -> str:
+def times_of(stretches: Sequence[tuple[float, float]]) -> str:
     """Some stretches, the longest ones of many."""
     longest = sorted(stretches, key=lambda each: each[0] - each[1])[:_LISTED]
     parts = [f"{start:.4g} to {stop:.4g} s" for start, stop in sorted(longest)]
     rest = len(stretches) - _LISTED
     more = f", and {rest} shorter one{'s' if rest > 1 else ''}" if rest > 0 else ""
-    return f"from {', '.join(parts)}{more}"
+    return ", ".join(parts) + more

@@ -20,8 +20,8 @@ from gmwm.readers import Channel
 def repetition(channel: Channel) -> Repetition | None:
     """Find out whether a channel changes at every k-th sample only.
 
-    Of samples that are not repeated, every change is in the same place modulo k with a probability
-    of 1/k, so that some dozen changes leave no room for chance, however coarse the rounding is.
+    Other changes are in the same place modulo k with a probability of 1/k each, so that some dozen
+    leave no room for chance.
     """
     steps = np.diff(channel.values)
     changes = np.flatnonzero((steps != 0.0) & ~np.isnan(steps)) + 1
@@ -44,8 +44,8 @@ def thinned(channel: Channel, found: Repetition) -> Channel:
 def interpolation_notice(channel: Channel) -> Notice | None:
     """Say that samples lie on straight lines between others, all over or now and then.
 
-    Second differences vanish but where two lines meet, which two of them see: of an interpolation
-    from f to F Hz a share of 1 - 2 f / F vanishes; of noise nearly none, if its step is small.
+    Of an interpolation from f to F Hz a share of 1 - 2 f / F of the second differences vanishes; of
+    noise nearly none, if its step is small.
     """
     values = np.asarray(channel.values, dtype=float)
     steps = np.diff(values)
@@ -72,12 +72,11 @@ def interpolation_notice(channel: Channel) -> Notice | None:
 
 
 def held_samples(channel: Examined) -> Held:
-    """Find samples that repeat the one before without being measured.
+    """Find samples that repeat the one before, as recorders write them for a lost packet.
 
-    Where a packet is lost, recorders write the last sample again. Of measured samples, differences
-    of no step are by a power of the ratio more frequent than those of one step by which these are
-    than those of two: 1/3 of a Gaussian law. Nothing is held if chance, with three standard errors,
-    explains those that repeat.
+    Measured differences of no step are by a power of the ratio more frequent than those of one step
+    by which these are than those of two: 1/3 of a Gaussian law. Nothing is held if chance, with
+    three standard errors, explains those that repeat.
     """
     values, step, scatter = channel.values, channel.step, channel.scatter
     # Where steps are wide in a part of the values, neighbours are equal by chance in that part.

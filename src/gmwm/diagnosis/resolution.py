@@ -17,12 +17,10 @@ _SMALLEST = 1e-9  # of the range: what is smaller is the rounding of floating po
 
 
 def step_size(values: FloatArray) -> float:
-    """Largest step of which all differences between samples are multiples.
+    """Largest step of which all differences between samples are multiples; 0 if there is none.
 
     Text holds steps rounded to some decimals (0.00333, 0.00667, 0.01): places may be off the
-    lattice by a tenth of a step (root mean square).
-
-    0 if there is none. No sample may be missing.
+    lattice by a tenth of a step (root mean square). No sample may be missing.
     """
     stride = -(-values.size // tuning.LEVELS_SAMPLED)
     part = values[::stride]
@@ -59,12 +57,9 @@ def _lattice(levels: FloatArray, gaps: FloatArray, step: float) -> tuple[float, 
 def widest_step(values: FloatArray, step: float) -> float:
     """Step of the largest values, where numbers of few digits have wider ones from a power on.
 
-    With three decimal digits, or in half precision, steps are those of the value: ten times (or
-    twice) as wide above a power of ten (of two) as below it. Levels out there come often while
-    their neighbours at the smaller step never do.
-
-    It is ``step`` itself, that of `step_size`, if all are as wide, or if few samples are where they
-    are not. Where the smallest values hide the lattice, there is no ``step``, but a wide one.
+    With three decimal digits, or in half precision, steps grow with the value: levels out there
+    come often while their neighbours at the smaller ``step``, that of `step_size`, never do. That
+    is returned if few samples have wider ones.
     """
     part = values[:: -(-values.size // tuning.LEVELS_SAMPLED)]
     if step == 0.0 and 2 * np.unique(part).size >= part.size:
@@ -88,9 +83,8 @@ def widest_step(values: FloatArray, step: float) -> float:
 def is_coarse(values: FloatArray, step: float) -> bool:
     """Whether the step is more than three times the noise, by how few samples leave two levels.
 
-    Noise about the middle of a step switches between the two levels beside it: its scatter is half
-    a step or more however small it is, and shows nothing. Beyond these two lie, of Gaussian noise
-    of a third of a step, ``2 Q(3)`` of the samples, and more about any other mean.
+    Noise about the middle of a step switches between the two levels beside it, and beyond these
+    lie, of Gaussian noise of a third of a step, ``2 Q(3)`` of the samples.
     """
     if not values.size:  # all of them belong to events
         return False
@@ -106,9 +100,8 @@ def is_coarse(values: FloatArray, step: float) -> bool:
 def rounding(channel: Examined) -> Iterator[Notice]:
     """Say how coarse the step is against the white noise.
 
-    The error of rounding is uniform, white and independent of the signal as long as the noise
-    before rounding is not much below half a step (Widrow & Kollar, *Quantization Noise*, 2008,
-    sec. 5): of variance step^2/12, plain additive noise.
+    Rounding adds white noise of variance step^2/12 as long as the noise before it is not much
+    below half a step (Widrow & Kollar, *Quantization Noise*, 2008, sec. 5).
     """
     unit, step, smallest = channel.unit, channel.step, channel.smallest
     if step == 0.0:

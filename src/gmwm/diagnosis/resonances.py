@@ -39,9 +39,8 @@ def find_resonances(
 ) -> tuple[Bump, ...]:
     """Resonances by their height, highest first.
 
-    A band that stands out of the running median by more than Gaussian noise would in any of them,
-    and by half, is a candidate; a second-order Gauss-Markov spectrum on the background is fitted
-    around it by Whittle's likelihood, which gives frequency and damping.
+    Bands that stand out of the running median by more than Gaussian noise would, and by half, are
+    candidates, around which a resonance on the background is fitted by Whittle's likelihood.
     """
     height = found.level - found.smooth
     count = height.size
@@ -89,10 +88,9 @@ def _fitted(
     f, power, weight = _points(spectrum, left_out, start, stop)
     level = float(np.interp(centre, spectrum.frequency, smooth))
     power = power / level
-    fits = []
-    for damping in tuning.DAMPING_STARTS:
-        first = np.array([0.0, np.log(damping), np.log(np.expm1(height)), 0.0, 0.0, 0.0])
-        fits.append(_scored(first, f, power, weight, centre, spectrum.dt))
+    starts = np.zeros((len(tuning.DAMPING_STARTS), _LOW.size))
+    starts[:, 1], starts[:, 2] = np.log(tuning.DAMPING_STARTS), np.log(np.expm1(height))
+    fits = [_scored(start, f, power, weight, centre, spectrum.dt) for start in starts]
     free, _ = min(fits, key=lambda result: result[1])
     unit = _unit(free, centre, spectrum.dt)
     bottom = float(np.interp(unit.frequency, f, _floor(free, np.log(f / centre))))
@@ -123,11 +121,7 @@ def _bump(free: FloatArray, f: FloatArray, centre: float, dt: float) -> FloatArr
 def _scored(
     free: FloatArray, f: FloatArray, power: FloatArray, weight: FloatArray, centre: float, dt: float
 ) -> tuple[FloatArray, float]:
-    """Minimize Whittle's deviance by Fisher scoring with Levenberg's damping.
-
-    The parameters are the logarithms of frequency (over ``centre``), damping and height, and the
-    three coefficients of the logarithm of the background.
-    """
+    """Minimize Whittle's deviance by Fisher scoring with Levenberg's damping."""
     place = np.log(f / centre)
 
     def deviance(expected: FloatArray) -> float:
@@ -155,9 +149,9 @@ def _scored(
             if damping > _MOST_DAMPED:
                 break
             continue
-        gain = value - new_value
+        is_settled = value - new_value < _GAIN
         free, bump, floor, value, damping = new, new_bump, new_floor, new_value, 0.3 * damping
-        if gain < _GAIN:
+        if is_settled:
             break
     return free, value
 

@@ -74,10 +74,9 @@ def _run_lengths(values: FloatArray) -> IntArray:
 def stuck(channel: Examined) -> Iterator[Notice]:
     """Find runs of equal samples longer than rounding explains.
 
-    Whatever came before, a Gaussian prediction error of standard deviation s keeps a sample in
-    the step of the one before with a probability of at most erf(step / (2^(3/2) s)), that of the
-    interval around the prediction (Anderson 1955, *Proc. AMS* 6, 170-176). A run of L repetitions
-    somewhere in n samples therefore has a probability below n times the L-th power.
+    A Gaussian prediction error of standard deviation s keeps a sample in the step of the one before
+    with a probability of at most erf(step / (2^(3/2) s)) (Anderson 1955, *Proc. AMS* 6, 170-176); a
+    run of L repetitions in n samples has one below n times its L-th power.
     """
     errors, series = channel.errors, channel.present
     if not is_dithered(series, channel.step):
@@ -121,9 +120,8 @@ def cut_off_or_abrupt_end(channel: Examined) -> Iterator[Notice]:
 def _cut_off(channel: Examined) -> Iterator[Notice]:
     """Find more samples at the largest or smallest value than at the one before it.
 
-    A tail falls outwards, and for noise faster and faster: from the last step but one to the last
-    by no less than from the one before to it, up to chance (binomial test, with three standard
-    errors for that fall). Peaks of shocks may be cut off without harm.
+    A tail falls faster and faster: from the last step but one to the last by no less than before,
+    up to chance (binomial test). Peaks of shocks may be cut off without harm.
     """
     step, values = channel.step, channel.present
     if not is_dithered(values, step):
@@ -159,12 +157,10 @@ def _cut_off(channel: Examined) -> Iterator[Notice]:
 def _abrupt_end(channel: Examined) -> Iterator[Notice]:
     """Find an extreme at which samples end although they are as dense there as before.
 
-    Noise thins out towards its extremes. Numbers that were rectified, wrapped round or sorted out
-    end where they are dense: the outer half of the last samples then holds half of them, where a
-    density that falls to a fifth leaves a third. Each of `PARTS_OF_END` parts of the record with
-    enough samples there has a larger share with a probability of a half at most, however few of
-    them a slow process takes to its extreme (sign test). Steps above half of the scatter are not
-    looked at: they hide how noise ends.
+    Numbers that were rectified, wrapped round or sorted out end where they are dense: the outer
+    half of the last samples then holds half of them, where a density that falls to a fifth leaves
+    a third. Each of `PARTS_OF_END` parts of the record has a larger share with a probability of a
+    half at most (sign test). Steps above half of the scatter hide how noise ends.
     """
     step, scatter, values = channel.step, channel.scatter, channel.noise
     count = max(int(tuning.LAST_OF_END * values.size), tuning.FEWEST_OF_END)
@@ -205,9 +201,8 @@ def _ends(channel: Examined, ends: Iterable[float]) -> str:
 def repeated_value(channel: Examined) -> Iterator[Notice]:
     """Find a value that comes far more often than the ones next to it, in many places.
 
-    Noise above its step has no such value: the two values on either side come nearly as often. A
-    driver that puts zero where the sensor did not answer, or a dead band, makes one. Runs of equal
-    samples count once: what stays is stuck.
+    A driver that puts zero where the sensor did not answer, or a dead band, makes one. Runs of
+    equal samples count once: what stays is stuck.
     """
     values = channel.present
     if channel.step > channel.scatter:
@@ -237,8 +232,7 @@ def _repeated(channel: Examined, value: float, count: float, **words: str) -> No
 def _cut_towards_zero(channel: Examined) -> Iterator[Notice]:
     """Find twice as many zeros as noise has, as where numbers are cut instead of rounded.
 
-    The fall from zero to one step is larger then than from one to two, where that of noise is
-    smaller, and of a Laplace law the same.
+    The fall from zero to one step is larger then than from one to two; that of noise is smaller.
     """
     step, values = channel.step, channel.present
     if step == 0.0:

@@ -43,11 +43,9 @@ class Spectrum:
 
 
 def spectrum(values: FloatArray, dt: float) -> Spectrum:
-    """Periodogram of a series without its linear trend.
+    """Periodogram of a series (n,) without its linear trend; straight lines bridge gaps (NaN).
 
-    values: (n,), samples, NaN where missing: there a straight line takes their place.
-    dt: s.
-    Returns: a spectrum of unit gain for density; a line of amplitude A has the area A^2/2.
+    It has unit gain for density; a line of amplitude A has the area A^2/2.
     """
     n = values.size
     place = np.arange(n, dtype=float)
@@ -69,20 +67,14 @@ def spectrum(values: FloatArray, dt: float) -> Spectrum:
 
 
 def bands(spectrum: Spectrum, left_out: BoolArray | None = None) -> Bands:
-    """Band levels and their running median.
-
-    The mean of logarithms is little moved by lines, and the running median by bumps narrower than
-    half an octave; where the spectrum rises or falls steadily the median is exact.
-    """
+    """Band levels and their running median, which lines and narrow bumps hardly move."""
     logs = np.log(np.maximum(spectrum.density, np.finfo(float).tiny)) + np.euler_gamma
     used = np.ones(logs.size)
     if left_out is not None:
         used[left_out] = 0.0
     edges = _edges(logs.size - 1)  # the last bin, at half the rate, is another distribution
-    sums = np.add.reduceat(logs * used, edges[:-1])[: edges.size - 1]
-    sums[-1] -= np.sum((logs * used)[edges[-1] :])
-    counts = np.add.reduceat(used, edges[:-1])[: edges.size - 1]
-    counts[-1] -= np.sum(used[edges[-1] :])
+    within = slice(edges[-1])
+    sums, counts = (np.add.reduceat(x[within], edges[:-1]) for x in (logs * used, used))
     kept = counts >= 0.5 * np.diff(edges)
     # A band that is nearly all line takes the level of its neighbours.
     places = np.arange(kept.size)

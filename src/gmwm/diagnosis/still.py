@@ -15,19 +15,25 @@ from itertools import pairwise
 import numpy as np
 import scipy
 
-from gmwm._core.distributions import chi2, norm
+from gmwm._core.distributions import chi2
 from gmwm._core.text import brief
 from gmwm._core.typing import BoolArray, FloatArray
 from gmwm._core.units import SI_UNIT, factor
 from gmwm.diagnosis import tuning
-from gmwm.diagnosis.motion import find_motion, is_moved_with, remembered, runs_of
+from gmwm.diagnosis.motion import (
+    find_motion,
+    is_moved_with,
+    level_changes,
+    remembered,
+    runs_of,
+    times_of,
+)
 from gmwm.diagnosis.resolution import step_size
 from gmwm.issues import Notice, notice
 from gmwm.readers import Channel, Recording
 
 _GRAVITY = factor("g", SI_UNIT["accel"])
 _WIDTH = 60  # characters of the timeline
-_LISTED = 3
 
 
 @dataclass(frozen=True)
@@ -79,9 +85,8 @@ class Still:
 def find_still(recording: Recording) -> Still:
     """Find the stretches of a log in which the sensor is at rest.
 
-    Blocks of a quarter of a second whose scatter is that of the noise, in all axes together and in
-    each, and whose mean rate is that of the quietest ones. A stretch in which an axis scatters more
-    than in the quietest stretch, or has a narrow band of vibration, is not at rest.
+    Blocks of a quarter of a second whose scatter is that of the noise, and whose mean rate is that
+    of the quietest ones; without stretches that scatter more than the quietest, or in a band.
     """
     blocks = blocks_of(recording)
     if blocks is None:
@@ -111,10 +116,9 @@ def find_still(recording: Recording) -> Still:
 
 
 def rest_of(recording: Recording) -> Still | None:
-    """The stretches at rest of a log that is not static; None if it is.
+    """The stretches at rest of a log that moves, or vibrates at some times only; None of others.
 
-    It is not if it moves, or if it scatters more at some times than at others and begins or ceases
-    to do so within seconds, as what vibrates. A tilt between two attitudes does not count.
+    A tilt between two attitudes does not count.
     """
     motion = find_motion(recording)
     if motion.turns_steadily:
@@ -145,11 +149,7 @@ def _floor(scatter: FloatArray, size: int) -> FloatArray:
 
 
 def _quiet(scatter: FloatArray, floor: FloatArray, size: int) -> BoolArray:
-    """Mark blocks that scatter as noise does.
-
-    By running medians: motion lasts longer than a shock, and to leave out the largest samples of
-    noise of heavy tails would make it smaller than it is.
-    """
+    """Mark blocks that scatter as noise does, by running medians: a shock is shorter."""
     known = np.where(np.isnan(scatter), np.inf, scatter) / floor
     width = 2 * tuning.BLOCKS_OF_SHOCK + 1
     ratio = scipy.ndimage.median_filter(known, (width, 1), mode="nearest")
@@ -272,11 +272,8 @@ def vibration(recording: Recording) -> Iterator[Notice]:
     if blocks is None or not (stretches := blocks.loud_stretches):
         return
     total, ratio = sum(stop - start for start, stop in stretches), blocks.loudness.ratio
-    longest = sorted(stretches, key=lambda each: each[0] - each[1])[:_LISTED]
-    listed = ", ".join(f"{start:.4g} to {stop:.4g} s" for start, stop in sorted(longest))
-    more = f" and {len(stretches) - _LISTED} more" if len(stretches) > _LISTED else ""
     values = {"stretches": len(stretches), "total": total, "ratio": ratio}
-    yield notice("vibration", "", values, times=brief(ratio), listed=listed + more)
+    yield notice("vibration", "", values, times=brief(ratio), listed=times_of(stretches))
 
 
 @remembered
@@ -366,12 +363,10 @@ def _changes(logs: FloatArray) -> list[int]:
     seconds = logs[: logs.size // width * width].reshape(-1, width).mean(axis=1)
     padded = np.pad(seconds, lag // 2, mode="edge")
     smooth = np.median(np.lib.stride_tricks.sliding_window_view(padded, lag), axis=1)
-    change = smooth[lag:] - smooth[:-lag]
-    scale = float(np.quantile(np.abs(change), tuning.QUIET)) / norm.ppf(0.5 + 0.5 * tuning.QUIET)
     # The scale is known the less, the shorter the recording.
     unsure = 1.0 + tuning.FEW_SECONDS / np.sqrt(seconds.size)
-    far = norm.isf(0.5 * tuning.FALSE_ALARM / seconds.size) * tuning.BEYOND_NOISE * unsure
-    sign = np.sign(change) * (np.abs(change) > max(np.log(tuning.LOUDER_THAN_REST), far * scale))
+    change, is_far = level_changes(smooth, np.log(tuning.LOUDER_THAN_REST), unsure=unsure)
+    sign = np.sign(change) * is_far
     edges = np.flatnonzero(np.diff(sign, prepend=0.0, append=0.0))
     ends = [0]
     for a, b in pairwise(edges.tolist()):

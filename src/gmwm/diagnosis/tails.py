@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import brentq, minimize
+from scipy.optimize import minimize
 
 from gmwm._core.distributions import binom, gennorm, norm, student
 from gmwm._core.typing import FloatArray, inner
@@ -49,23 +49,14 @@ class Tails:
 
     def beyond(self, distance: FloatArray) -> FloatArray:
         """Probability of a larger absolute value, of distances in robust standard deviations."""
-        return _LAWS[self.law](distance, self.shape, self.scale)
+        return np.asarray(2.0 * _LAWS[self.law].sf(distance / self.scale, self.shape))
 
     def distance(self, chance: float) -> float:
         """Robust standard deviations that are passed with this probability."""
-        top = 2.0 * tuning.FAR
-        while float(self.beyond(np.array([top]))[0]) > chance:
-            top *= 2.0
-        return float(
-            brentq(lambda x: float(self.beyond(np.array([x]))[0]) / chance - 1.0, 0.0, top)
-        )
+        return float(self.scale * _LAWS[self.law].isf(0.5 * chance, self.shape))
 
 
-_LAWS: dict[str, Callable[[FloatArray, float, float], FloatArray]] = {
-    "student": lambda x, shape, scale: np.asarray(2.0 * student.sf(x / scale, shape)),
-    "power": lambda x, shape, scale: np.asarray(2.0 * gennorm.sf(x / scale, shape)),
-}
-"""Probabilities beyond x, on both sides together."""
+_LAWS = {"student": student, "power": gennorm}
 
 
 def heavy_tails(errors: Innovations) -> Tails | None:
@@ -98,7 +89,7 @@ def heavy_tails(errors: Innovations) -> Tails | None:
 
 
 def _with_scale(law: str) -> Callable[[FloatArray, FloatArray], FloatArray]:
-    return lambda x, logs: _LAWS[law](x, *(float(each) for each in np.exp(logs)))
+    return lambda x, logs: Tails(law, *np.exp(logs).tolist()).beyond(x)
 
 
 def _mixture(x: FloatArray, at: FloatArray) -> FloatArray:

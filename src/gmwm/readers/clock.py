@@ -13,6 +13,7 @@ from gmwm.errors import InputError
 from gmwm.issues import Notice, notice
 from gmwm.readers import tuning
 from gmwm.readers.grid import Change, Jumps, Uneven, find_change, find_jumps, place_uneven
+from gmwm.readers.table import more_such
 
 # Names of units of time, by their seconds.
 UNITS = {86400.0: "days", 3600.0: "hours", 60.0: "minutes", 1.0: "seconds"}
@@ -28,15 +29,13 @@ _DAY = 86400.0
 class Clock:
     """Time stamps of a recording."""
 
-    # source, column: file and column, for messages, ``"column 't'"``.
-    source: str
-    column: str
+    source: str  # file, for messages
+    column: str  # ``"column 't'"``
     stamps: FloatArray  # (n,), in a unit of ``seconds``
     seconds: float | None  # the unit; None if the header states none that is known
     own_unit: str  # the unit as the header states it
     where: Callable[[int], str]  # row -> its place in the file
-    # Row numbers in an order -> whether each has the samples of the one before.
-    same: Callable[[IntArray], BoolArray]
+    same: Callable[[IntArray], BoolArray]  # rows -> whether each has the samples of the one before
 
     def error(self, row: int | None, text: str, hint: str = _WAY_OUT) -> InputError:
         """An error about the stamps, with the file, the column and the place."""
@@ -50,8 +49,7 @@ class Timing:
 
     rate: float  # Hz, as the stamps have it
     jumps: Jumps  # where rows are missing
-    # The rate, its unit, the jitter, the jumps, and what else is uneven.
-    notices: tuple[Notice, ...]
+    notices: tuple[Notice, ...]  # the rate, its unit, the jitter, jumps, and what else is uneven
     jitter: float  # standard deviation of the steps, as a share of a step
 
 
@@ -61,18 +59,15 @@ def agree(rate: float, other: float) -> bool:
 
 
 def timing_of(clock: Clock, expected: float | None = None) -> Timing:
-    """Sampling rate over the whole recording, and the jumps.
+    """Sampling rate over the whole recording, and the jumps; InputError if no even clock fits.
 
     Stamps without a unit are seconds where that gives the rate of an inertial sensor; for others a
     rate is asked for. With an expected rate (Hz), the unit is the one that fits it, or where the
     header states a unit that is unknown here, whatever makes it fit.
-
-    Raises InputError if a stamp is missing, most are far from any even clock, the clock was set
-        back, more than half of the rows are missing, or the stamps contradict the expected rate.
     """
     missing = np.flatnonzero(np.isnan(clock.stamps))
     if missing.size:
-        text = f"no time stamp{_others(missing.size)}"
+        text = f"no time stamp{more_such(missing.size)}"
         raise clock.error(int(missing[0]), text, f"remove such lines, or, {_WAY_OUT}")
     last, copies = list[Notice](), _copies(clock)
     kept = np.delete(np.arange(clock.stamps.size), copies) if copies.size else None
@@ -110,10 +105,6 @@ def timing_of(clock: Clock, expected: float | None = None) -> Timing:
     if kept is not None:
         jumps = replace(jumps, rows=kept[jumps.rows], repeated=copies)
     return Timing(rate, jumps, (*notices, *last), found.jitter)
-
-
-def _others(count: int) -> str:
-    return f", and {count - 1:,} more such" if count > 1 else ""
 
 
 def _copies(clock: Clock) -> IntArray:
@@ -192,7 +183,7 @@ def _grid(clock: Clock) -> _Grid:
     if uneven is not None and np.count_nonzero(steps < 0.0) <= 1:
         back = "the clock goes back: from here on stamps are early, or the rows are not in order"
         raise clock.error(uneven, back, f"use the part before or after, or, {_WAY_OUT}")
-    stamp = f"time stamp {clock.stamps[wrong[0]]:.15g} {what}{_others(wrong.size)}"
+    stamp = f"time stamp {clock.stamps[wrong[0]]:.15g} {what}{more_such(wrong.size)}"
     hint = f"sort the rows or use a part with an even clock, or, {_WAY_OUT}"
     raise clock.error(int(wrong[0]), f"{stamp}, so that no even clock fits most of them", hint)
 
@@ -227,10 +218,7 @@ def _unit(clock: Clock, step: float, expected: float | None) -> tuple[float, boo
 def without_unit(
     source: str, column: str, step: float, expected: float | None = None
 ) -> InputError | None:
-    """What stamps without a unit may be; None if they are seconds of a sensor.
-
-    expected: Rate that is stated but fits no unit, Hz.
-    """
+    """What stamps without a unit may be, and the rate stated; None if seconds of a sensor."""
     if tuning.LEAST_STEP <= step < tuning.LARGEST_STEP or not step > 0.0:
         return None
     slowest, fastest = tuning.RATES_OF_SENSORS

@@ -66,10 +66,9 @@ class Roles:
 
 
 def roles_of(table: Table, given: Given) -> Roles:
-    """Decide which column is which channel.
+    """Decide which column is which channel: as the caller says, by their names, by their number.
 
-    The caller decides first, then the columns' names, then their number; the units decide what one
-    or three columns without names are.
+    The units decide what one or three columns without names are.
     """
     names, channels = table.names, given.channels
     time: int | None = None
@@ -257,11 +256,9 @@ def channel_units(
     units: Mapping[str, str],
     unknown_rate: Callable[[], InputError | None],
 ) -> tuple[dict[str, str], tuple[Notice, ...]]:
-    """Unit of every channel, as the user gives it, else as the header does.
+    """Unit of every channel, as the user gives it (by channel, else by sensor) or the header.
 
-    units: Units that the user gave, by sensor or by channel; the latter goes first.
     unknown_rate: Says what is wrong with the sampling rate, which is then asked for at once.
-    Returns: units, by channel; notices of units that the user did not give.
     """
     known = (*roles.channels, *(column.name for column in roles.auxiliary))
     for key in units:

@@ -17,12 +17,10 @@ class Jumps:
     """Where a clock jumps forward because rows are missing, and which rows are copies."""
 
     rows: IntArray  # (k,), first row after each jump
-    # (k,), how far the clock goes there, in sampling intervals; 1 would be no jump.
-    steps: FloatArray
+    steps: FloatArray  # (k,), how far the clock goes there, in intervals; 1 would be no jump
     missing: FloatArray  # (k,), whole number of rows that are missing there, one or more
     interval: float  # sampling interval, in the unit of the stamps
-    # (r,), rows that repeat one before them.
-    repeated: IntArray = field(default_factory=lambda: np.empty(0, dtype=np.int64))
+    repeated: IntArray = field(default_factory=lambda: np.empty(0, int))  # (r,), copies
 
     @property
     def total(self) -> float:
@@ -45,10 +43,9 @@ class Jumps:
 
     @property
     def are_rounding(self) -> bool:
-        """Whether they look like stamps rounded to a coarse unit rather than like missing rows.
+        """Whether they come in the rhythm of stamps rounded to a coarse unit, as 700 Hz in ms.
 
-        A clock of 700 Hz that is written in whole milliseconds steps by 1 and now and then by 2,
-        in a rhythm; rows are lost without one. A lost row breaks the rhythm at two distances.
+        Rows are lost without one, and a lost row breaks it at two distances.
         """
         single = self.missing == 1.0
         if np.count_nonzero(single) < max(tuning.FEWEST_IN_RHYTHM, 0.9 * self.rows.size):
@@ -88,10 +85,8 @@ def find_change(stamps: FloatArray) -> Change | None:
     """The change of the sampling rate between parts of a recording; None if there is none.
 
     Both the median and the mean of the steps, without jumps, must differ: rounded stamps change
-    the median from part to part, a few missing rows the mean.
-
-    Returns: the largest change from one part to the next; or, if the rate comes and goes, so that
-        the parts before and after differ by less than half as much, from or to the extreme part.
+    the median from part to part, a few missing rows the mean. It is the largest change from one
+    part to the next or, if the rate comes and goes, that from or to the extreme part.
     """
     steps = np.diff(stamps)
     parts = min(tuning.RATE_PARTS, steps.size // tuning.LEAST_PART)
@@ -120,12 +115,7 @@ def find_change(stamps: FloatArray) -> Change | None:
 
 
 def find_jumps(stamps: FloatArray) -> Jumps:
-    """Jumps of a clock without short steps.
-
-    How many rows are missing is judged from the stamps of some rows before and after the jump,
-    so that one late stamp, which a short step follows, makes no gap. The sampling interval is the
-    slope of a robust line through the stamps.
-    """
+    """Jumps of a clock without short steps, judged from some stamps before and after each."""
     steps = np.diff(stamps)
     usual = np.mean(steps[steps <= tuning.USUAL_STEP * median(steps)])
     candidates = np.flatnonzero(steps > tuning.LONGEST_STEP * usual) + 1
@@ -180,10 +170,8 @@ def place_uneven(stamps: FloatArray) -> Uneven | int | None:
     """Place rows with uneven stamps on an even grid.
 
     The stamp of several rows is taken as that of the last of them. Rows are lost where the stamps
-    are later from then on; a host that stalls catches up again, and loses none.
-
-    Returns: the row from which on stamps are earlier, where a clock was set back; None if most
-        stamps are far from any even grid.
+    are later from then on; a host that stalls catches up again, and loses none. Of a clock that was
+    set back, the first row after it; None if most stamps are far from any even grid.
     """
     from scipy import ndimage
 
@@ -233,10 +221,7 @@ def place_uneven(stamps: FloatArray) -> Uneven | int | None:
 
 
 def _losses(late: FloatArray) -> tuple[IntArray, int | None]:
-    """Samples lost before each stamp, and the first stamp before which the clock was set back.
-
-    late: (m,), how far each stamp is after a clock without losses, in sampling intervals.
-    """
+    """Samples lost before each stamp, by its lateness, and the stamp before which one goes back."""
     lost = np.zeros(late.size, dtype=np.int64)
     rows = np.flatnonzero(np.abs(np.diff(late, prepend=late[0])) > 0.5)
     reach = np.arange(tuning.STAMPS_BESIDE)
@@ -265,11 +250,7 @@ def interval_of(stamps: FloatArray, number: IntArray, starts: BoolArray) -> floa
     """Sampling interval: slope of the robust line through the stamps over their sample numbers.
 
     From the median slope of rows half of the record apart, least squares with the residuals bounded
-    at three robust standard deviations: a late stamp has no more weight than one of the usual
-    jitter. From independent errors of the stamps of s intervals the slope has a relative error of
-    ``s sqrt(12 / n^3)``, the slope from the first to the last stamp ``s sqrt(2) / n``.
-
-    starts: (n,), where a part begins whose clock has an offset of its own.
+    at three robust standard deviations. A new part, whose clock has an offset, ``starts`` at (n,).
     """
     edges = [0, *np.flatnonzero(starts), stamps.size]
     parts = [slice(a, b) for a, b in pairwise(edges) if b > a]

@@ -51,9 +51,8 @@ def shares(
     known = set[str]()
     for table in tables:
         roles = {role for name in table.names if (role := meaning(name).role) in CANONICAL}
-        sensors = {str(role).partition("_")[0] for role in roles}
-        own = [name for name in wanted if name in roles | sensors]
-        if own:
+        roles |= {str(role).partition("_")[0] for role in roles}
+        if own := [name for name in wanted if name in roles]:
             found.append((table, own))
             known.update(own)
     for name in wanted:
@@ -122,23 +121,20 @@ def with_temperature(part: Part, table: Table) -> Part:
     recording, columns = part.recording, range(len(table.names))
     time = next((i for i in columns if meaning(table.names[i]).role == "time"), None)
     channels: list[Channel] = []
+    if time is None:
+        return part
     try:
         arrays = table.load(columns)
     except InputError as error:
         told = notice("columns-unreadable", what=f"temperature ({error})")
     else:
-        if time is None:
-            return part
-        stamps = arrays[time] * (meaning(table.names[time]).seconds or 1.0)
+        stamps = arrays.pop(time) * (meaning(table.names[time]).seconds or 1.0)
         order = np.argsort(stamps, kind="stable")
         grid = part.start + recording.dt * np.arange(recording.n)
-        for column in columns:
-            if column != time:
-                values = np.interp(
-                    grid, stamps[order], arrays[column][order], left=np.nan, right=np.nan
-                )
-                name = bare(table.names[column])
-                channels.append(Channel(name, values, recording.dt, "temperature", "degC"))
+        for column, own in arrays.items():
+            values = np.interp(grid, stamps[order], own[order], left=np.nan, right=np.nan)
+            name = bare(table.names[column])
+            channels.append(Channel(name, values, recording.dt, "temperature", "degC"))
         names, first = ", ".join(channel.name for channel in channels), recording.names[0]
         count = {"count": stamps.size}
         told = notice("temperature-interpolated", "", count, listed=names, first=first)

@@ -38,19 +38,15 @@ class Missing:
         gone = np.isnan(values)
         edges = np.flatnonzero(np.diff(gone, prepend=False, append=False))
         lengths = edges[1::2] - edges[::2]
-        if not lengths.size:
-            return cls(gone.size)
-        return cls(gone.size, int(np.sum(lengths)), lengths.size, int(np.max(lengths)))
+        longest = int(np.max(lengths, initial=0))
+        return cls(gone.size, int(np.sum(lengths)), lengths.size, longest)
 
 
 def missing_notices(found: Mapping[str, Missing]) -> list[Notice]:
     """One for all channels that miss equally many samples in equally many gaps."""
-    alike: dict[Missing, list[str]] = {}
-    for name, each in found.items():
-        if each.samples:
-            alike.setdefault(each, []).append(name)
     notices = []
-    for each, names in alike.items():
+    for each in dict.fromkeys(each for each in found.values() if each.samples):
+        names = [name for name, other in found.items() if other == each]
         variant = "all" if each.samples == each.n else "many" if each.gaps > 1 else "one"
         values = {"missing": each.samples, "gaps": each.gaps, "longest": each.longest}
         where, them = ", ".join(names), "each " if len(names) > 1 else ""
@@ -63,16 +59,14 @@ def missing_notices(found: Mapping[str, Missing]) -> list[Notice]:
 def without_sentinels(
     name: str, values: FloatArray, largest: float, where: Callable[[int], str]
 ) -> tuple[FloatArray, list[Notice]]:
-    """Mask numbers that are no samples, and report them.
+    """Mask numbers that are no samples, and report them; a copy if there is any.
 
     These are numbers beyond the range of any sensor; error codes (999, -9999, ...) and the smallest
-    and largest integers of 16, 24, 32 or 64 bit, if far outside all others; and numbers that come
-    again and again, exactly, with nothing between them and the others: motion passes through.
+    and largest integers of 16 to 64 bit, if far outside all others; and numbers that come again and
+    again, exactly, with nothing between them and the others.
 
-    values: (n,), in the unit of the file; NaN where one is missing.
-    largest: Magnitude beyond the range of any sensor, in the same unit.
+    largest: Magnitude beyond the range of any sensor, in the unit of the file.
     where: Row -> its place in the file.
-    Returns: a copy if any number is masked, else ``values``; notices, one for each number.
     """
     some = values[:: -(-values.size // tuning.SAMPLED_FOR_RANGE)]
     some = some[~np.isnan(some)]
@@ -99,13 +93,14 @@ def without_sentinels(
         return values, []
     clean = scaled(values, 1.0)
     clean[gone] = np.nan
-    is_bad = gone.size > tuning.MOST_SENTINELS * values.size
-    severity: Severity = "bad" if is_bad else "warning"
-    notices, which_chosen = [], np.flatnonzero(chosen).tolist()
-    beyond = [i for i in which_chosen if abs(numbers[i]) > largest]
-    for group in [*([i] for i in which_chosen if i not in beyond), *([beyond] if beyond else [])]:
+    most = tuning.MOST_SENTINELS * values.size
+    severity: Severity = "bad" if gone.size > most else "warning"
+    notices = []
+    own = [[i] for i in np.flatnonzero(chosen & (np.abs(numbers) <= largest)).tolist()]
+    beyond = np.flatnonzero(chosen & (np.abs(numbers) > largest)).tolist()
+    for group in [*own, beyond] if beyond else own:
         rows = far[np.isin(which, group)]
-        number = float(numbers[group[int(np.argmax(np.abs(numbers[group])))]])
+        number = max(numbers[group].tolist(), key=abs)
         data = {"count": rows.size, "value": number, "row": int(rows[0])}
         words: dict[str, Any] = {
             "samples": f"{rows.size:,} samples are" if rows.size > 1 else "a sample is",
@@ -120,21 +115,14 @@ def without_sentinels(
 def _are_isolated(
     values: FloatArray, far: IntArray, numbers: FloatArray, which: IntArray, middle: float
 ) -> BoolArray:
-    """Whether each of the numbers that are far outside comes several times, and from nowhere.
-
-    The samples before and after are not far outside, and hardly any other lies within half of the
-    distance to the middle.
-    """
+    """Whether each number comes several times, and from nowhere: motion passes through others."""
     counts = np.bincount(which, minlength=numbers.size)
     again = counts >= tuning.LEAST_REPEATS
     if not np.any(again):
         return again
-    is_far = np.zeros(values.size + 2, dtype=bool)
-    is_far[far + 1] = True
     # Beside another code, or the same one, is no transition.
-    repeated = np.zeros(values.size + 2, dtype=bool)
-    repeated[far + 1] = again[which]
-    passing = is_far & ~repeated
+    passing = np.zeros(values.size + 2, dtype=bool)
+    passing[far + 1] = ~again[which]
     beside = passing[far] | passing[far + 2]
     transitions = np.bincount(which, beside, minlength=numbers.size)
     again &= transitions <= tuning.TRANSITIONS * counts

@@ -48,10 +48,9 @@ def read(
     Parameters
     ----------
     path : str, path, DataFrame or Arrow table
-        Delimited text (comma, semicolon, tab or blanks; with or without a header; plain or gzip;
-        decimal commas where they do not part the columns), NPY or NPZ, a bag of ROS 1 or 2, a log
-        of PX4 (ULog) or ArduPilot (binary), MAT, HDF5, Parquet or Feather; or a table in memory of
-        pandas, polars or Arrow. What a file is shows in its first bytes.
+        Delimited text (plain or gzip, with or without a header), NPY or NPZ, a bag of ROS 1 or 2,
+        a log of PX4 (ULog) or ArduPilot (binary), MAT, HDF5, Parquet or Feather; or a table in
+        memory of pandas, polars or Arrow. What a file is shows in its first bytes.
     rate : float, optional
         Sampling rate, Hz. Not needed if the file has time stamps.
     units : mapping of str to str, optional
@@ -66,9 +65,8 @@ def read(
         their names; without names, six are gyro and accelerometer x, y, z, seven have time before
         them, one or three (with time: four) belong to the only sensor in ``units``.
     time : str, int or False, optional
-        Column of time stamps; ``False`` ignores one that is there. Its unit is that of the
-        header, e.g. ``time_us`` or ``t [min]``; without one, steps of 10 us to 0.5 s are taken
-        as seconds, and for others ``rate`` is needed.
+        Column of time stamps; ``False`` ignores one that is there. Without a unit in the header
+        (``time_us``, ``t [min]``), steps of 10 us to 0.5 s are seconds; others need ``rate``.
     layout : str, optional
         Of a binary file without a header: ``"IMAR"``, ``"LN200"``, ``"LN200IG"``, ``"IXSEA"``,
         ``"NAVCHIP_INT"``, ``"NAVCHIP_FLT"``, ``"KF-GINS"``, or
@@ -267,8 +265,7 @@ def _timing(
     """What the time stamps say, checked against the stated rate if there is one."""
 
     def same(order: IntArray) -> BoolArray:
-        found = np.ones(order.size, dtype=bool)
-        found[0] = False
+        found = np.arange(order.size) > 0
         for values in (arrays[i][order] for i in arrays if i != time):
             both = np.isnan(values[1:]) & np.isnan(values[:-1])
             found[1:] &= (values[1:] == values[:-1]) | both

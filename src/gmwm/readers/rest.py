@@ -37,8 +37,7 @@ def rest_notices(
     An accelerometer without gravity is fine (it may have been subtracted), and so is a gyro that
     turns.
 
-    unit_of: Unit of each channel in the file.
-    given: Units that the user gave, by channel or sensor.
+    unit_of, given: Unit of each channel in the file; those that the user gave.
     has_layout: Whether the scales are those of a binary layout, where gravity has to show.
     """
     rate, force = _Sensor.of(recording, unit_of, "gyro"), _Sensor.of(recording, unit_of, "accel")
@@ -57,15 +56,13 @@ def rest_notices(
 
 
 class _Sensor:
-    """Mean and noise of a sensor whose axes have one unit.
+    """Mean and noise of a sensor whose axes have one unit, in SI units.
 
-    unit: Unit in the file.
-    size: Length of the mean vector, SI.
-    size_error: Its standard deviation from the fast noise, SI.
-    usual: Median length of the means of a second, SI; motion hardly changes it.
-    scatter: Standard deviation of the fast noise of the noisiest axis, SI.
-    density: White noise of the noisiest axis, SI/sqrt(Hz): the smaller one of samples and of means
-        of a second, so that neither a filter's band nor a drift counts.
+    size, size_error: Length of the mean vector, and its standard deviation from the fast noise.
+    usual: Median length of the means of a second; motion hardly changes it.
+    scatter: Standard deviation of the fast noise of the noisiest axis.
+    density: White noise of it, per sqrt(Hz): the smaller one of samples and of means of a second,
+        so that neither a filter's band nor a drift counts.
     """
 
     def __init__(self, unit: str, axes: Sequence[FloatArray], dt: float) -> None:
@@ -207,17 +204,16 @@ def _counts(recording: Recording, unit_of: Mapping[str, str]) -> tuple[Notice, .
     notices = []
     for sensor, largest in _LEAST_COUNT.items():
         units = {name: unit for name, unit in unit_of.items() if name.startswith(sensor)}
-        sizes = {name: factor(unit, SI_UNIT[sensor]) for name, unit in units.items()}
-        found = [
-            name
-            for name, size in sizes.items()
-            if size >= largest and _is_counted(recording[name].values, size)
-        ]
-        if not found:
-            continue
-        noise = float(np.max(_noise_of([recording[name].values / sizes[name] for name in found])))
-        listed, unit = ", ".join(found), units[found[0]]
-        notices.append(notice("counts", sensor, {"noise": noise}, listed=listed, unit=unit))
+        counts = {
+            name: recording[name].values / size
+            for name, unit in units.items()
+            if (size := factor(unit, SI_UNIT[sensor])) >= largest
+            and _is_counted(recording[name].values, size)
+        }
+        if counts:
+            noise = float(np.max(_noise_of([*counts.values()])))
+            listed, unit = ", ".join(counts), units[next(iter(counts))]
+            notices.append(notice("counts", sensor, {"noise": noise}, listed=listed, unit=unit))
     return tuple(notices)
 
 

@@ -31,6 +31,7 @@ class Table(ABC):
     # One for each column, as written in the file; ``""`` where a column has none.
     names: tuple[str, ...]
     rate: float | None = None  # sampling rate that the file states, Hz
+    rows: float = 0.0  # number of rows expected before the file is read; 0 if unknown
     tentative: bool = False  # whether the names come from a comment and may be something else
     # What was noticed while opening and reading the file.
     notices: list[Notice] = field(default_factory=list)
@@ -48,17 +49,13 @@ class Table(ABC):
         """The place of a row of data, e.g. ``"line 12"``."""
         return f"row {row} (counted from 0)"
 
-    def expected_rows(self) -> float:
-        """Number of rows before the file is read; 0 if unknown."""
-        return 0.0
-
     def column(self, index: int) -> str:
         """How messages call a column."""
         return self.stamps or f"column {label(self.names, index)}"
 
     def load(self, columns: Sequence[int]) -> Columns:
         """Read some columns, each once, into memory; rejected with "memory" if it is too small."""
-        samples, held = self.expected_rows() * len(columns), 0
+        samples, held = self.rows * len(columns), 0
         memory.require(tuning.BYTES_PER_SAMPLE * samples, self.source)
         allowed = memory.budget()
         parts: dict[int, list[FloatArray]] = {column: [] for column in columns}
@@ -78,12 +75,11 @@ class Table(ABC):
         """Reject infinite values and those too large for use; ``first`` is the row of the first."""
         if not usable(values):
             rows = np.flatnonzero(np.abs(values) >= LARGEST)
-            others = f", and {rows.size - 1:,} more such" if rows.size > 1 else ""
+            place = f"column {label(self.names, column)}, {self.where(first + int(rows[0]))}"
             raise InputError(
-                f"{self.source}, column {label(self.names, column)}, "
-                f"{self.where(first + int(rows[0]))}: {values[rows[0]]} is not a usable "
-                f"number{others}: cut the file before that row, or save NaN if the sample is "
-                "missing"
+                f"{self.source}, {place}: {values[rows[0]]} is not a usable number"
+                f"{more_such(rows.size)}: cut the file before that row, or save NaN if the sample "
+                "is missing"
             )
 
 
@@ -110,6 +106,11 @@ def label(names: Sequence[str], index: int) -> str:
     return repr(names[index]) if names[index] else f"{index} (counted from 0)"
 
 
+def more_such(count: int) -> str:
+    """How messages count what they name the first of."""
+    return f", and {count - 1:,} more such" if count > 1 else ""
+
+
 def usable(values: FloatArray) -> bool:
     """Whether every value is missing (NaN) or finite and of sane magnitude."""
     # Without an array as long as the values.
@@ -118,10 +119,7 @@ def usable(values: FloatArray) -> bool:
 
 
 def damage_notice(source: str, what: str, is_taken: bool | None) -> Notice:
-    """Notice about a damaged file, the rest of which is used, or else rejected.
-
-    is_taken: Whether the caller asks for the rest; None if it cannot be asked for.
-    """
+    """Notice about a damaged file whose rest is used (``is_taken``); it is rejected otherwise."""
     if is_taken is None:
         raise InputError(f"{source} {what}: get a whole copy")
     if not is_taken:

@@ -31,29 +31,27 @@ def _triad(recording: Recording, sensor: str) -> list[FloatArray]:
     return [recording[name].values for name in names] if set(names) <= set(recording) else []
 
 
-def block_means(axes: Sequence[FloatArray], size: int) -> FloatArray:
-    """Means (n // size, axes) of blocks; NaN where three quarters of one are missing."""
+def block_means(axes: Sequence[FloatArray], size: int, least: float = 0.25) -> FloatArray:
+    """Means (n // size, axes) of blocks; NaN where no more than the least share is present."""
 
     def means(values: FloatArray) -> FloatArray:
         rows = values[: values.size // size * size].reshape(-1, size)
         known = ~np.isnan(rows)
         count = np.count_nonzero(known, axis=1)
         total = np.sum(rows, axis=1, where=known)
-        return np.where(4 * count > size, total / np.maximum(count, 1), np.nan)
+        return np.where(count > least * size, total / np.maximum(count, 1), np.nan)
 
     return np.stack([means(values) for values in axes], axis=1)
 
 
 def turning_gravity(recording: Recording, size: int, parts: int = 1) -> TurningGravity | None:
-    """Compare the specific force with the angular rate.
+    """Compare the specific force with the angular rate; None if an axis or any change is missing.
 
-    In the frame of a sensor that turns, gravity changes by da/dt = -w x a. The noises of gyros and
-    accelerometers are independent, so that they explain nothing of each other. The mean of the
-    rate, which is mostly bias, is left out.
+    In the frame of a sensor that turns, gravity changes by da/dt = -w x a, of which independent
+    noises explain nothing. The mean of the rate, which is mostly bias, is left out.
 
     size: Samples of the blocks, between whose means changes are compared.
     parts: Parts of the record that are compared separately; the medians are returned.
-    Returns: None if an axis is missing or nothing changes.
     """
     rate, force = _triad(recording, "gyro"), _triad(recording, "accel")
     if not (rate and force) or recording.n < 4 * size:
@@ -98,8 +96,8 @@ def _integral_means(
 def steady_turn(recording: Recording, size: int) -> float:
     """Constant rate at which gravity turns in the frame of a sensor, rad/s; 0 if there is none.
 
-    The constant w of da/dt = -w x a by least squares, from changes over several times. It counts if
-    it explains most of the changes and turns by a radian in all, which noise and drifts do not.
+    The w of da/dt = -w x a by least squares. It counts if it explains most of the changes and turns
+    by a radian in all, which noise and drifts do not.
     """
     force = _triad(recording, "accel")
     means = block_means(force, size) if force else np.full((1, 1), np.nan)

@@ -9,7 +9,7 @@ import pytest
 
 from gmwm import InputError
 from gmwm._core import jobs
-from gmwm._core.jobs import during_startup, extra_workers, results, shared, worker_pool
+from gmwm._core.jobs import extra_workers, results, shared, worker_pool
 
 
 class Square:
@@ -75,14 +75,7 @@ def until_ready():
 
 
 def test_nothing_waits_for_a_process_that_is_not_ready(tmp_path):
-    helped = []
-    during_startup(lambda: helped.append("alone"))
-    with worker_pool(1, "time:time"):
-        until_ready()
-        during_startup(lambda: helped.append("ready"))
     with worker_pool(1, "signal:pause"):
-        during_startup(lambda: helped.append("beginning"))
-        assert helped == ["beginning"]
         found = dict(shared(Square(tmp_path), range(1, 9)))
     assert found == {n: n**2 for n in range(1, 9)}
     assert {path.name.partition("-")[2] for path in tmp_path.iterdir()} == {str(os.getpid())}

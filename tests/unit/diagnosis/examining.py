@@ -1,8 +1,26 @@
-"""Channels as the checks see them, with prediction errors made by hand."""
+"""Noises, and channels as the checks see them with prediction errors made by hand."""
 
 import numpy as np
 
+import gmwm
+from gmwm import BiasInstability, GaussMarkov, QuantizationNoise, RandomWalk, WhiteNoise
 from gmwm.diagnosis.innovations import Examined, Innovations
+from gmwm.process import as_model
+
+DT = 0.01
+SMOOTH = {
+    "white": WhiteNoise(0.1),
+    "walk": RandomWalk(1.0),
+    "white on walk": WhiteNoise(0.1) + RandomWalk(0.1),
+    "Gauss-Markov": WhiteNoise(0.02) + GaussMarkov(1.0, 5.0),
+    "flicker": WhiteNoise(0.01) + BiasInstability(0.1),
+    "quantization": QuantizationNoise(0.01),
+}
+"""Noises with smooth spectra."""
+
+
+def simulated(model, n, seed):
+    return gmwm.simulate(as_model(model), n=n, dt=DT, seed=seed)
 
 
 def examined(

@@ -2,36 +2,21 @@
 
 import numpy as np
 import pytest
+from examining import DT, SMOOTH, simulated
 from hypothesis import given, settings, strategies as st
 from scipy.signal import butter, periodogram, sosfilt
 from scipy.stats import binom
 
 import gmwm
-from gmwm import (
-    BiasInstability,
-    GaussMarkov,
-    QuantizationNoise,
-    RandomWalk,
-    Resonance,
-    Sinusoid,
-    WhiteNoise,
-)
+from gmwm import GaussMarkov, Resonance, Sinusoid, WhiteNoise
 from gmwm.diagnosis import gathered
 from gmwm.diagnosis.lines import find_lines, line_notices
 from gmwm.diagnosis.spectrum import background, bands, spectrum
 from gmwm.diagnosis.tuning import FALSE_ALARM
 from gmwm.issues import Notice
-from gmwm.process import as_model
 
-DT = 0.01
-NOISES = {
-    "white": WhiteNoise(0.1),
-    "walk": RandomWalk(1.0),
-    "white on walk": WhiteNoise(0.1) + RandomWalk(0.1),
-    "Gauss-Markov": WhiteNoise(0.02) + GaussMarkov(1.0, 5.0),
+NOISES = SMOOTH | {
     "fast Gauss-Markov": GaussMarkov(1.0, 0.02),
-    "flicker": WhiteNoise(0.01) + BiasInstability(0.1),
-    "quantization": QuantizationNoise(0.01),
     "resonance": WhiteNoise(0.05) + Resonance(1.0, 20.0, 0.02),
 }
 
@@ -39,10 +24,6 @@ NOISES = {
 def lines(x, dt=DT):
     power = spectrum(x, dt)
     return find_lines(power, background(power, bands(power)))
-
-
-def simulated(model, n, seed):
-    return gmwm.simulate(as_model(model), n=n, dt=DT, seed=seed)
 
 
 @pytest.mark.parametrize("n", [1024, 4001, 10_007])

@@ -2,31 +2,15 @@
 
 import numpy as np
 import pytest
+from examining import SMOOTH, simulated
 from scipy.signal import butter, lfilter
 from scipy.stats import binom
 
 import gmwm
-from gmwm import (
-    ARMA,
-    BiasInstability,
-    GaussMarkov,
-    QuantizationNoise,
-    RandomWalk,
-    Resonance,
-    Sinusoid,
-    WhiteNoise,
-)
+from gmwm import ARMA, QuantizationNoise, RandomWalk, Resonance, Sinusoid, WhiteNoise
 from gmwm.diagnosis.tuning import FALSE_ALARM
-from gmwm.process import as_model
 
-DT = 0.01
-SMOOTH = {
-    "white": WhiteNoise(0.1),
-    "walk": RandomWalk(1.0),
-    "white on walk": WhiteNoise(0.1) + RandomWalk(0.1),
-    "Gauss-Markov": WhiteNoise(0.02) + GaussMarkov(1.0, 5.0),
-    "flicker": WhiteNoise(0.01) + BiasInstability(0.1),
-    "quantization": QuantizationNoise(0.01),
+NOISES = SMOOTH | {
     "valley": RandomWalk(0.1) + QuantizationNoise(0.01),
     "moving average": ARMA((), (0.6, 0.3), 1.0),
 }
@@ -34,10 +18,6 @@ SMOOTH = {
 
 def found(record, x):
     return gmwm.health(record(gyro_z=x))
-
-
-def simulated(model, n, seed):
-    return gmwm.simulate(as_model(model), n=n, dt=DT, seed=seed)
 
 
 @pytest.mark.parametrize(
@@ -58,11 +38,11 @@ def test_frequency_and_damping(record, frequency, damping, sigma, background):
     assert not health.lines("gyro_z")
 
 
-@pytest.mark.parametrize("name", SMOOTH)
+@pytest.mark.parametrize("name", NOISES)
 def test_smooth_spectra_have_none(record, name):
     runs = 25
     count = sum(
-        bool(found(record, simulated(SMOOTH[name], 8000, seed)).resonances("gyro_z"))
+        bool(found(record, simulated(NOISES[name], 8000, seed)).resonances("gyro_z"))
         for seed in range(runs)
     )
     assert count <= binom.isf(1e-6, runs, FALSE_ALARM)

@@ -14,7 +14,6 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache, partial
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -120,12 +119,9 @@ class ArrayTable(Table):
 
     @classmethod
     def of_entries(
-        cls, source: str, entries: Mapping[str, Array], notices: Sequence[Notice] = (), **about: str
+        cls, source: str, entries: Mapping[str, Array], notices: Sequence[Notice] = (), **about: Any
     ) -> ArrayTable:
-        """Columns of the arrays of a file by their names.
-
-        about: ``stamps`` and ``origin`` of the table.
-        """
+        """Columns of the arrays of a file by their names; ``about`` has `stamps` and `origin`."""
         named, matrices = list[_Named](), list[_Named]()
         for name, array in entries.items():
             if array.like.dtype.names and array.like.ndim == 1:
@@ -137,41 +133,22 @@ class ArrayTable(Table):
         # Columns without names come first.
         is_one = len(matrices) == 1
         columns = _unnamed(source, matrices[0][1]) + named if is_one else named + matrices
-        return cls._of(source, columns, _stated_rate(source, entries), notices, about)
-
-    @classmethod
-    def of_array(cls, source: str, array: Array) -> ArrayTable:
-        """Columns of a single array."""
-        like = array.like
-        if like.dtype.names and like.ndim == 1:
-            columns = _fields(array)
-        elif like.ndim == 1:
-            columns = [("", array)]
-        elif like.ndim == 2:
-            columns = _unnamed(source, array)
-        else:
-            hint = "save samples along rows, one column for each channel"
-            raise InputError(f"{source} has shape {like.shape}: {hint}")
-        return cls._of(source, columns)
-
-    @classmethod
-    def _of(
-        cls,
-        source: str,
-        columns: Sequence[_Named],
-        rate: float | None = None,
-        notices: Sequence[Notice] = (),
-        about: Mapping[str, Any] = MappingProxyType({}),
-    ) -> ArrayTable:
         if not columns:
             text = f"{source} holds no column of more than one sample"
             raise InputError(f"{text}: save arrays of samples in it")
         names, arrays = zip(*columns, strict=True)
-        own = list(notices)
+        rate, own = _stated_rate(source, entries), list(notices)
         return cls(source=source, names=names, arrays=arrays, rate=rate, notices=own, **about)
 
-    def expected_rows(self) -> float:
-        return float(max(array.like.shape[0] if array.like.ndim else 1 for array in self.arrays))
+    @classmethod
+    def of_array(cls, source: str, array: Array) -> ArrayTable:
+        """Columns of a single array, which need no names."""
+        if array.like.ndim == 1 and array.like.dtype.names is None:
+            return cls(source=source, names=("",), arrays=(array,))
+        if array.like.ndim not in (1, 2):
+            hint = "save samples along rows, one column for each channel"
+            raise InputError(f"{source} has shape {array.like.shape}: {hint}")
+        return cls.of_entries(source, {"": array})
 
     def load(self, columns: Sequence[int]) -> Columns:
         """Read some columns, which must have one length."""

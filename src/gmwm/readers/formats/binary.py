@@ -19,7 +19,7 @@ from gmwm.errors import InputError
 from gmwm.issues import notice
 from gmwm.readers import tuning
 from gmwm.readers.names import CANONICAL
-from gmwm.readers.table import LARGEST, Columns, Table, usable
+from gmwm.readers.table import Columns, Table
 
 
 @dataclass(frozen=True)
@@ -58,15 +58,11 @@ def layout_of(text: str) -> BinaryLayout:
     if text.upper() in LAYOUTS:
         return LAYOUTS[text.upper()]
     parts = [part.strip() for part in text.split(",")]
-    number = re.compile(r"[0-9.]+(?:[eE][+-]?[0-9]+)?")
+    number = re.compile(r"(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
     if len(parts) < 3 or parts[0] not in _KINDS or not all(map(number.fullmatch, parts[1:3])):
         known = f"{', '.join(LAYOUTS)}, or {_FORM} with a type of {', '.join(_KINDS)}"
         raise InputError(f"layout {text!r} is unknown: give one of {known}", "layout")
-    try:
-        found = BinaryLayout(_KINDS[parts[0]], float(parts[1]), float(parts[2]))
-    except ValueError:
-        problem = f"layout {text!r}: a scale is not a number: write {_FORM}"
-        raise InputError(problem, "layout") from None
+    found = BinaryLayout(_KINDS[parts[0]], float(parts[1]), float(parts[2]))
     for word in parts[3:]:
         if word in _ORDERS:
             found = replace(found, order=_ORDERS[word])
@@ -85,7 +81,6 @@ class BinaryTable(Table):
 
     path: Path
     layout: BinaryLayout
-    count: int
 
     @classmethod
     def open(cls, path: Path, layout: BinaryLayout) -> BinaryTable:
@@ -102,7 +97,7 @@ class BinaryTable(Table):
         units = {"gyro": "rad/s", "accel": "m/s^2"}
         names = ("time [s]", *(f"{name} [{units[name.partition('_')[0]]}]" for name in CANONICAL))
         table = cls(
-            source=path.name, names=names, notices=notices, path=path, layout=layout, count=count
+            source=path.name, names=names, notices=notices, path=path, layout=layout, rows=count
         )
         first = table._raw(0, tuning.FEWEST_SAMPLES)[0]
         with np.errstate(all="ignore"):
@@ -115,33 +110,27 @@ class BinaryTable(Table):
             raise InputError(f"{times}, are not seconds of a clock: {hint}", "layout")
         return table
 
-    def expected_rows(self) -> float:
-        return float(self.count)
-
     def segments(self, columns: Sequence[int], rows: int) -> Iterator[Columns]:
         interval = self._interval(rows) if self.layout.increments else 1.0
         scales = (1.0, *(self.layout.gyro / interval,) * 3, *(self.layout.accel / interval,) * 3)
-        for start in range(0, self.count, rows):
+        for start in range(0, int(self.rows), rows):
             raw, found = self._raw(start, rows), {}
             for column in columns:
                 with np.errstate(all="ignore"):
                     found[column] = raw[column] * scales[column]
-                if not usable(found[column]):
-                    row = int(np.flatnonzero(np.abs(found[column]) >= LARGEST)[0])
-                    text = f"{self.source}, {self.where(start + row)}: {found[column][row]}"
-                    raise InputError(f"{text} is not a usable number: check the layout")
+                self.check_usable(column, found[column], start)
             yield found
 
     def _raw(self, start: int, rows: int) -> list[FloatArray]:
         """Time and six numbers of some records as they are."""
         record = self.layout.record
         block = np.fromfile(self.path, record, rows, offset=start * record.itemsize)
-        block = block[: self.count - start]
+        block = block[: int(self.rows) - start]
         return [block["time"].astype(float), *block["values"].T.astype(float)]
 
     def _interval(self, rows: int) -> float:
         """Seconds between records that follow each other."""
-        times = [self._raw(start, rows)[0] for start in range(0, self.count, rows)]
+        times = [self._raw(start, rows)[0] for start in range(0, int(self.rows), rows)]
         with np.errstate(all="ignore"):
             steps = np.diff(np.concatenate(times))
             usual = float(np.median(steps))

@@ -24,11 +24,7 @@ class FrameTable(Table):
     """Columns of an Arrow table."""
 
     types: tuple[Any, ...]
-    rows: int
     parts: _Parts  # indices of columns and a number of rows -> their values, so many rows at a time
-
-    def expected_rows(self) -> float:
-        return float(self.rows)
 
     def segments(self, columns: Sequence[int], rows: int) -> Iterator[Columns]:
         for column in columns:

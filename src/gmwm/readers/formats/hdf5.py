@@ -47,10 +47,9 @@ _NO_NUMBERS = ("char", "cell", "object", "function", "opaque", "sparse", "logica
 
 
 def tried(opener: Callable[[Path], ArrayTable], path: Path) -> ArrayTable:
-    """Open a file of arrays, if another process could.
+    """Open a file of arrays if another process could; InputError if that ended, or as it did.
 
-    Raises InputError if that process ended, or as it did. An array that it could not read is
-    rejected when it is asked for.
+    An array that it could not read is rejected when it is asked for.
     """
     question = [f"{opener.__module__}:{opener.__qualname__}", os.fspath(path.absolute())]
     done = subprocess.run(

@@ -12,6 +12,7 @@ from collections import Counter, defaultdict
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -31,10 +32,11 @@ _FORM = np.dtype("u1, u1, S4, S16, S64")
 _FORM.names = ("type", "length", "name", "letters", "columns")
 _TYPES = {
     "a": "(32,)<i2", "b": "i1", "B": "u1", "g": "<f2", "h": "<i2", "H": "<u2", "i": "<i4",
-    "I": "<u4", "f": "<f4", "n": "S4", "N": "S16", "Z": "S64", "c": "<i2", "C": "<u2", "e": "<i4",
-    "E": "<u4", "L": "<i4", "d": "<f8", "M": "u1", "q": "<i8", "Q": "<u8",
+    "I": "<u4", "f": "<f4", "n": "S4", "N": "S16", "Z": "S64", "d": "<f8", "M": "u1", "q": "<i8",
+    "Q": "<u8",
 }  # fmt: skip
-_FACTORS = dict.fromkeys("cCeE", 0.01) | {"L": 1e-7}
+"""By the letter of a field; no message of an IMU has those that stand for a hundredth."""
+
 _BLOCK = 1 << 22  # bytes read at a time
 
 _RANKS = {"IMU": 0, "IMU2": 0, "IMU3": 0, "GYR": 1, "ACC": 1}
@@ -61,8 +63,7 @@ def _walk(
     """Kinds and places of wanted messages, up to an FMT or the end of what is there.
 
     end: Of the message before.
-    Returns: count; at, where the walk goes on; between, bytes that are no messages; end of the last
-        message.
+    Returns: their count, where the walk goes on, bytes that are no messages, end of the last one.
     """
     count = between = 0
     while at + 3 <= data.size:
@@ -83,97 +84,72 @@ def _walk(
     return count, at, between, end
 
 
-class _Forms:
-    """What the messages FMT have stated so far."""
+class Messages(NamedTuple):
+    """Messages of one kind that follow each other, and where each begins in the file."""
 
-    def __init__(self, wanted: Collection[str]):
-        self.wanted = wanted
-        self.names: dict[int, str] = {}
-        self.types: dict[int, np.dtype[np.void]] = {}
-        self.factors: dict[int, dict[str, float]] = {}
-        self.lengths = np.zeros(256, np.int64)
-        self.lengths[_FMT] = _BEGIN + _FORM.itemsize
-        self.is_wanted = np.zeros(256, np.bool_)
-        self.is_wanted[_FMT] = True
+    kind: str
+    rows: AnyArray
+    places: AnyArray
 
-    def add(self, body: npt.NDArray[np.uint8]) -> None:
-        """One more kind; ValueError if the fields of a wanted one do not have its length."""
+
+class Log:
+    """Messages of some kinds, block by block, whose statements FMT are followed.
+
+    KeyError, ValueError if the statement of a wanted kind is damaged.
+    """
+
+    def __init__(self, path: Path, wanted: Collection[str]):
+        self.path, self.wanted = path, wanted
+        self.between = self.end = 0  # bytes that are no messages, and the end of the last message
+        self._types: dict[int, tuple[str, np.dtype[np.void]]] = {}
+        self._lengths = np.zeros(256, np.int64)
+        self._lengths[_FMT] = _BEGIN + _FORM.itemsize
+        self._is_wanted = np.zeros(256, np.bool_)
+        self._is_wanted[_FMT] = True
+
+    def _add(self, body: npt.NDArray[np.uint8]) -> None:
         form = np.frombuffer(body.tobytes(), _FORM)[0]
         number, name = int(form["type"]), form["name"].decode("latin-1")
         if number == _FMT:
             return
-        self.lengths[number] = form["length"]
-        self.is_wanted[number] = name in self.wanted
+        self._lengths[number] = form["length"]
+        self._is_wanted[number] = name in self.wanted
         if name not in self.wanted:
             return
-        letters = form["letters"].decode("latin-1")
         fields = form["columns"].decode("latin-1").split(",")
-        pairs = list(zip(fields, letters, strict=True))
-        self.types[number] = np.dtype([(field, _TYPES[letter]) for field, letter in pairs])
-        if self.types[number].itemsize + _BEGIN != form["length"]:
+        pairs = zip(fields, form["letters"].decode("latin-1"), strict=True)
+        kind = np.dtype([(field, _TYPES[letter]) for field, letter in pairs])
+        if kind.itemsize + _BEGIN != form["length"]:
             raise ValueError(f"the fields of {name} do not have its length")
-        self.names[number] = name
-        self.factors[number] = {f: _FACTORS[c] for f, c in pairs if c in _FACTORS}
+        self._types[number] = name, kind
 
-
-class Messages:
-    """Messages of one kind that follow each other: structured rows, and where each begins."""
-
-    def __init__(self, kind: str, rows: AnyArray, places: AnyArray, factors: dict[str, float]):
-        self.kind, self.rows, self.places, self._factors = kind, rows, places, factors
-
-    @property
-    def fields(self) -> tuple[str, ...]:
-        return self.rows.dtype.names or ()
-
-    def __getitem__(self, field: str) -> AnyArray:
-        values = self.rows[field]
-        return values * self._factors[field] if field in self._factors else values
-
-
-@dataclass
-class Extent:
-    """How much of a log is messages, as far as it was read."""
-
-    between: int = 0  # bytes between them that are none
-    end: int = 0  # of the last one
-
-
-def messages(
-    path: Path, wanted: Collection[str], extent: Extent | None = None
-) -> Iterator[Messages]:
-    """Messages of some kinds, block by block; ``extent`` is kept up to date.
-
-    Raises KeyError, ValueError if the statement of a wanted kind is damaged.
-    """
-    forms, before, rest, end = _Forms(wanted), 0, b"", 0
-    extent = extent or Extent()
-    with path.open("rb") as stream:
-        while fresh := stream.read(_BLOCK):
-            data = np.frombuffer(rest + fresh, np.uint8)
-            at, count = 0, 1
-            kinds, places = np.empty((2, data.size // _BEGIN + 1), np.int64)
-            while count:
-                count, at, between, end = _walk(
-                    data, at, end, forms.lengths, forms.is_wanted, kinds, places
-                )
-                extent.between += between
-                is_form = bool(count) and kinds[count - 1] == _FMT
-                own = slice(count - is_form)
-                for kind in np.unique(kinds[own]):
-                    mine = places[own][kinds[own] == kind]
-                    inside = _BEGIN + np.arange(forms.types[kind].itemsize)
-                    rows = data[mine[:, None] + inside].view(forms.types[kind])[:, 0]
-                    name = forms.names[kind]
-                    yield Messages(name, rows, before + mine, forms.factors[kind])
-                if is_form:
-                    forms.add(data[at - _FORM.itemsize : at])
-                else:
-                    count = 0
-            extent.end = before + end
-            before += at
-            end -= at
-            rest = data[at:].tobytes()
+    def __iter__(self) -> Iterator[Messages]:
+        before, rest, end = 0, b"", 0
+        with self.path.open("rb") as stream:
+            while fresh := stream.read(_BLOCK):
+                data = np.frombuffer(rest + fresh, np.uint8)
+                at, count = 0, 1
+                kinds, places = np.empty((2, data.size // _BEGIN + 1), np.int64)
+                while count:
+                    count, at, between, end = _walk(
+                        data, at, end, self._lengths, self._is_wanted, kinds, places
+                    )
+                    self.between += between
+                    is_form = bool(count) and kinds[count - 1] == _FMT
+                    own = slice(count - is_form)
+                    for kind in np.unique(kinds[own]):
+                        mine, (name, dtype) = places[own][kinds[own] == kind], self._types[kind]
+                        inside = _BEGIN + np.arange(dtype.itemsize)
+                        rows = data[mine[:, None] + inside].view(dtype)[:, 0]
+                        yield Messages(name, rows, before + mine)
+                    if is_form:
+                        self._add(data[at - _FORM.itemsize : at])
+                    else:
+                        count = 0
+                self.end = before + end
+                before += at
+                end -= at
+                rest = data[at:].tobytes()
 
 
 @dataclass(frozen=True)
@@ -215,7 +191,7 @@ class DataflashTable(MessageTable):
     def parts(self, columns: Sequence[int]) -> Iterator[Columns]:
         fields = list(self.series.columns.values())
         with damage_named(self.source, _DAMAGE):
-            for found in messages(self.path, (self.series.kind,)):
+            for _, found, _ in Log(self.path, (self.series.kind,)):
                 part = {column: found[fields[column]].astype(float) for column in columns}
                 if self.series.instance is not None:
                     mine = found["I"] == self.series.instance
@@ -226,8 +202,8 @@ class DataflashTable(MessageTable):
 def open_ardupilot(path: Path, wanted: Wanted) -> tuple[Table, ...]:
     """Open a binary log of ArduPilot.
 
-    wanted: Topics as ``"IMU[1]"``, or ``"GYR[0]"`` and ``"ACC[0]"``; by default that of `IMU`, else
-        those of `GYR` and `ACC`, else the batches, if there is one IMU.
+    Topics are ``"IMU[1]"``, or ``"GYR[0]"`` and ``"ACC[0]"``; by default that of `IMU`, else of
+    `GYR` and `ACC`, else the batches, if there is one IMU.
     """
     with damage_named(path.name, _DAMAGE):
         counts, sensors, batches, damage = _contents(path)
@@ -241,7 +217,7 @@ def open_ardupilot(path: Path, wanted: Wanted) -> tuple[Table, ...]:
         raise InputError(
             f"{path.name} has no messages IMU, GYR, ACC or ISBD: set LOG_BITMASK to log the IMU"
         )
-    chosen = topics.choose_first(path.name, ranks, wanted)
+    chosen = topics.choose(path.name, ranks, wanted)
     by_name = {series.name: series for series in counts}
     tables: list[Table] = []
     for topic in chosen:
@@ -253,6 +229,7 @@ def open_ardupilot(path: Path, wanted: Wanted) -> tuple[Table, ...]:
                 names=tuple(series.columns),
                 notices=list(notices),
                 topic=topic,
+                rows=topic.count,
                 path=path,
                 series=series,
                 stamps=f"{series.columns[_TIME]} of {series.name}",
@@ -274,33 +251,35 @@ def _contents(
     """How many messages there are of each series, its sensors, the batches, and what is damaged."""
     counts, sensors = Counter[_Series](), defaultdict[_Series, frozenset[str]](frozenset)
     headers, data = list[Messages](), list[Messages]()
-    held, extent, stamps = 0, Extent(), list[float]()
-    for found in messages(path, (*_RANKS, _HEADER, _DATA), extent):
-        if "TimeUS" in found.fields:
-            stamps = [*stamps[:1], *found["TimeUS"][[0, -1]].tolist()]
-        if found.kind in (_HEADER, _DATA):
-            (headers if found.kind == _HEADER else data).append(found)
-            held += 4 * found.rows.nbytes  # as float64
+    held, log, stamps = 0, Log(path, (*_RANKS, _HEADER, _DATA)), list[float]()
+    for found in log:
+        kind, rows, _ = found
+        fields = rows.dtype.names or ()
+        if "TimeUS" in fields:
+            stamps = [*stamps[:1], *rows["TimeUS"][[0, -1]].tolist()]
+        if kind in (_HEADER, _DATA):
+            (headers if kind == _HEADER else data).append(found)
+            held += 4 * rows.nbytes  # as float64
             memory.require(held, path.name)
-        elif "TimeUS" in found.fields:
-            for number in np.unique(found["I"]).tolist() if "I" in found.fields else [None]:
-                mine = slice(None) if number is None else found["I"] == number
-                series = _Series(found.kind, number, found.fields)
-                counts[series] += found.rows[mine].size
+        elif "TimeUS" in fields:
+            for number in np.unique(rows["I"]).tolist() if "I" in fields else [None]:
+                mine = rows if number is None else rows[rows["I"] == number]
+                series = _Series(kind, number, fields)
+                counts[series] += mine.size
                 sensors[series] |= {
                     sensor
                     for sensor in _SENSORS
-                    if any(np.any(found[field][mine]) for field in series.fields_of(sensor))
+                    if any(np.any(mine[field]) for field in series.fields_of(sensor))
                 }
     order = sorted(counts, key=lambda each: (list(_RANKS).index(each.kind), each.instance or 0))
     seconds = (stamps[-1] - stamps[0]) * 1e-6 if stamps else 0.0
     end = topics.end_of_content(path)
     with path.open("rb") as stream:
-        stream.seek(extent.end)
-        rest = stream.read(max(min(end - extent.end, _REMAINS), 0))
+        stream.seek(log.end)
+        rest = stream.read(max(min(end - log.end, _REMAINS), 0))
     is_cut = bool(rest) and rest[:2] == _MARKS[: len(rest)]
     damage = topics.cut_off(seconds) if is_cut else ""
-    if between := extent.between + (len(rest) if len(rest) == _REMAINS else 0):
+    if between := log.between + (len(rest) if len(rest) == _REMAINS else 0):
         damage = f"is damaged in places, where {between:,} bytes or more are not messages"
     return {each: counts[each] for each in order}, sensors, _batches(headers, data), damage
 
@@ -312,7 +291,7 @@ def _batches(parts_of_header: Sequence[Messages], parts: Sequence[Messages]) -> 
         return found
     names = ("N", "type", "instance", "mul", "smp_cnt", "SampleUS", "smp_rate")
     headers, data = (
-        {name: np.concatenate([part[name] for part in each]) for name in fields}
+        {name: np.concatenate([part.rows[name] for part in each]) for name in fields}
         for each, fields in ((parts_of_header, names), (parts, ("N", "seqno", *AXES)))
     )
     place, place_of_header = (

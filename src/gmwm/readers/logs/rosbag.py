@@ -11,10 +11,11 @@ ROS 2 in either byte order, aligned to eight bytes counted from the end of the e
 from __future__ import annotations
 
 import weakref
+from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import islice
 from operator import itemgetter
 from pathlib import Path
@@ -31,11 +32,13 @@ from gmwm.readers.logs.topics import MessageTable, Topic, choose
 from gmwm.readers.registry import Wanted
 from gmwm.readers.table import Columns, damage_named, library
 
-_Bytes = npt.NDArray[np.uint8]
-_Integers = npt.NDArray[np.int64]
+_STAMP, _FRAME = 4, 16
+"""Bytes before the stamp, a counter or an encapsulation header, and before ``frame_id``."""
 
 # First number of these parts of `sensor_msgs/Imu`; their covariances follow.
-ANGULAR_VELOCITY, LINEAR_ACCELERATION = 13, 25
+_FIRST = {"gyro": 13, "accel": 25}
+_ORDERS = {b"\0\0": ">", b"\0\1": "<"}
+"""Byte order of plain CDR, by the first two bytes of its encapsulation header."""
 
 
 @dataclass(frozen=True)
@@ -48,108 +51,59 @@ class Message:
 
 IMU = Message(
     37,
-    {f"gyro_{axis} [rad/s]": ANGULAR_VELOCITY + i for i, axis in enumerate("xyz")}
-    | {f"accel_{axis} [m/s^2]": LINEAR_ACCELERATION + i for i, axis in enumerate("xyz")},
+    {
+        f"{sensor}_{axis} [{SI_UNIT[sensor]}]": first + i
+        for sensor, first in _FIRST.items()
+        for i, axis in enumerate("xyz")
+    },
 )
-
-COVARIANCE_OF = {"gyro": ANGULAR_VELOCITY + 3, "accel": LINEAR_ACCELERATION + 3}
-"""First number of the covariance of each sensor: -1 where the message does not have it."""
-
-
-@dataclass(frozen=True)
-class Serialization:
-    """How the header is written."""
-
-    stamp: int  # offset of the stamp, bytes
-    is_cdr: bool  # whether an encapsulation header says the byte order and numbers are aligned
-
-    @property
-    def text(self) -> int:
-        """Offset of ``frame_id``."""
-        return self.stamp + 12
-
-    def offset(self, frame: int) -> int:
-        """Where the numbers begin behind a ``frame_id`` of so many bytes."""
-        end = self.text + frame
-        return 4 + -(-(end - 4) // 8) * 8 if self.is_cdr else end
-
-
-ROS1, CDR = Serialization(4, False), Serialization(4, True)
-"""The stamp follows a counter in ROS 1, the encapsulation header in ROS 2."""
-
-_LITTLE = 0x0100
-_ORDERS = {0x0000: ">", _LITTLE: "<"}
-"""Byte order of plain CDR, by the two bytes of its encapsulation header as a small number."""
 
 
 def decode(
     raw: Sequence[bytes],
     message: Message,
     wanted: Sequence[int],
-    serialization: Serialization,
+    is_cdr: bool,
     where: Callable[[int], str],
-) -> tuple[_Integers, list[FloatArray]]:
-    """Stamps of the headers, ns, and numbers of messages.
+) -> tuple[npt.NDArray[np.int64], FloatArray]:
+    """Stamps of the headers, ns, and the wanted numbers behind them, by their indices.
 
-    wanted: Indices of the numbers behind the header.
-    where: Index of a message -> its place.
-    Raises InputError at a message that is too short, or of another encoding.
+    where: Index of a message -> its place, of one that is too short or of another encoding.
     """
-    n, lengths = len(raw), list(map(len, raw))
-    is_even = lengths.count(lengths[0]) == n  # as a topic is, almost always: no copies
-    sizes = np.full(n, lengths[0]) if is_even else np.array(lengths)
-    if sizes.min() < serialization.text:
-        raise _cut_off(where(int(np.argmax(sizes < serialization.text))))
-    joined = np.frombuffer(b"".join(raw), np.uint8)
-    starts = np.cumsum(sizes) - sizes
-    inside = np.arange(serialization.text)
-    head = joined.reshape(n, -1) if is_even else joined[starts[:, None] + inside]
-    codes = _field(head, 0, "<u2") if serialization.is_cdr else np.full(n, _LITTLE)
-    frames = _field(head, serialization.text - 4, "<u4")
-    stamps = np.empty(n, np.int64)
-    numbers = [np.empty(n) for _ in wanted]
-    left = np.ones(n, dtype=bool)
-    while left.any():  # once: a topic has one encoding and one frame_id, almost always
-        first = int(np.argmax(left))
-        size, code = int(sizes[first]), int(codes[first])
-        if code not in _ORDERS:
-            text = f"{where(first)}: encoding 0x{code.to_bytes(2, 'little').hex()} is not plain CDR"
+    alike: dict[tuple[int, bytes, bytes], list[int]] = defaultdict(list)
+    for i, each in enumerate(raw):  # a topic has one encoding and one frame_id, almost always
+        alike[len(each), each[: 2 * is_cdr], each[_FRAME - 4 : _FRAME]].append(i)
+    stamps, numbers = np.empty(len(raw), np.int64), np.empty((len(wanted), len(raw)))
+    for (size, code, frame), group in alike.items():
+        order = _ORDERS.get(code) if is_cdr else "<"
+        if order is None and size >= _FRAME:
+            text = f"{where(group[0])}: encoding 0x{code.hex()} is not plain CDR"
             hint = "record with a usual RMW, or convert the bag with ros2 bag convert"
             raise InputError(f"{text}: {hint}")
-        order = _ORDERS[code]
-        alike = (sizes == size) & (codes == code) & (frames == frames[first])
-        if alike.all():
-            rows: slice | _Integers = slice(None)
-            block = joined.reshape(n, size)
-        else:
-            rows = np.flatnonzero(alike)
-            block = joined[starts[rows][:, None] + np.arange(size)]
-        offset = serialization.offset(int(_field(block, serialization.text - 4, f"{order}u4")[0]))
-        if offset + 8 * message.count > size:
-            raise _cut_off(where(first))
+        offset = _FRAME + int.from_bytes(frame, "little" if order == "<" else "big")
+        offset = 4 + -(-(offset - 4) // 8) * 8 if is_cdr else offset
+        if size < _FRAME or offset + 8 * message.count > size:
+            hint = "record the bag again, or cut it before that message"
+            raise InputError(f"{where(group[0])} is cut off: {hint}")
+        block, rows = b"".join([raw[i] for i in group]), np.array(group)
+        field = partial(_field, block, size)
         # Seconds after 2038 are unsigned in ROS 1, and in ROS 2 as drivers write them.
-        seconds = _field(block, serialization.stamp, f"{order}u4").astype(np.int64)
-        stamps[rows] = seconds * 10**9 + _field(block, serialization.stamp + 4, f"{order}u4")
+        seconds = field(f"{order}u4", offset=_STAMP).astype(np.int64)
+        stamps[rows] = seconds * 10**9 + field(f"{order}u4", offset=_STAMP + 4)
         for values, index in zip(numbers, wanted, strict=True):
-            values[rows] = _field(block, offset + 8 * index, f"{order}f8")
-        left &= ~alike
+            values[rows] = field(f"{order}f8", offset=offset + 8 * index)
     return stamps, numbers
 
 
-def _field(block: _Bytes, offset: int, dtype: str) -> npt.NDArray[Any]:
-    """A number of each row, wherever it stands in it."""
-    rows, size = block.shape
-    return np.ndarray((rows,), dtype, block, offset, (size,))
-
-
-def _cut_off(place: str) -> InputError:
-    return InputError(f"{place} is cut off: record the bag again, or cut it before that message")
+def _field(block: bytes, size: int, dtype: str, offset: int) -> npt.NDArray[Any]:
+    """A number of each row of so many bytes, wherever it stands in it."""
+    return np.ndarray((len(block) // size,), dtype, block, offset, (size,))
 
 
 _BLOCK = 1024  # messages: 0.3 MB of sensor_msgs/Imu, which stay in the cache
 _SEEN = 64  # messages from which it is judged what a topic holds
 
-_ROS1, _MCAP, _SQLITE = b"#ROSBAG", b"\x89MCAP", b"SQLite format 3"
+_SQLITE = b"SQLite format 3"
 
 _TYPES = ("sensor_msgs/msg/Imu", "sensor_msgs/msg/Temperature")
 _STAMPS = "time [ns]"
@@ -163,10 +117,6 @@ class _Bag:
 
     path: Path
     is_ros1: bool
-
-    @property
-    def serialization(self) -> Serialization:
-        return ROS1 if self.is_ros1 else CDR
 
     @contextmanager
     def opened(self) -> Iterator[Any]:
@@ -222,7 +172,7 @@ class BagTable(MessageTable):
                 def where(i: int, first: int = row) -> str:
                     return f"{self.source}, {self.where(first + i)}"
 
-                stamps, found = decode(raw, self.message, numbers, self.bag.serialization, where)
+                stamps, found = decode(raw, self.message, numbers, not self.bag.is_ros1, where)
                 if self.is_log:
                     stamps = np.array(times, np.int64)
                 first = first if row else int(stamps[0])
@@ -236,20 +186,25 @@ class BagTable(MessageTable):
 
 
 def open_bag(path: Path, wanted: Wanted) -> tuple[BagTable, ...]:
-    """Open a bag.
-
-    path: A file, or the folder of a bag of ROS 2.
-    Returns: one table for each topic, those of thermometers last.
-    """
+    """A table for each topic of a file, or of the folder of a bag of ROS 2; thermometers last."""
     is_folder = path.is_dir()
     if is_folder and not (path / "metadata.yaml").is_file():
         hint = "name the .db3 or .mcap file in it, or write one with ros2 bag reindex"
         raise InputError(f"{path.name} has no metadata.yaml: {hint}")
-    bag = _Bag(path, not is_folder and _is_ros1(path))
+    is_ros1 = not is_folder and _is_ros1(path)
+    bag = _Bag(path, is_ros1)
     with bag.opened() as reader:
-        counts, others = _counts(reader)
-        of_imu, warmth = counts["sensor_msgs/msg/Imu"], counts["sensor_msgs/msg/Temperature"]
+        counts: dict[str, Counter[str]] = defaultdict(Counter)  # by type and topic
+        for each in reader.connections:
+            if each.msgcount:
+                counts[each.msgtype][each.topic] += each.msgcount
+        of_imu, warmth = (counts[kind] for kind in _TYPES)
         if not of_imu:
+            others = sorted(
+                f"{topic} ({kind.replace('/msg/', '/')})"
+                for kind, own in counts.items()
+                for topic in own
+            )
             listed = ", ".join(others[:8]) + (", ..." if len(others) > 8 else "")
             held = f"it has {listed}; record the topic of the IMU" if others else "it is empty"
             raise InputError(f"{path.name} has no messages of sensor_msgs/Imu: {held}")
@@ -258,12 +213,11 @@ def open_bag(path: Path, wanted: Wanted) -> tuple[BagTable, ...]:
             Topic(topic, count, _sensors(reader, topic, bag, heads[topic]))
             for topic, count in of_imu.items()
         ]
-        chosen = choose(path.name, found, wanted)
+        chosen = choose(path.name, [found], wanted)
         is_log = wanted.clock == "log"
         _, start, message = heads[chosen[0].name][0]
         if not is_log:
-            stamps, _ = decode([message], IMU, [], bag.serialization, lambda i: path.name)
-            start = int(stamps[0])
+            start = int(decode([message], IMU, [], not is_ros1, lambda i: path.name)[0][0])
 
     def table(topic: Topic, message: Message, names: Iterable[str]) -> BagTable:
         return BagTable(
@@ -272,6 +226,7 @@ def open_bag(path: Path, wanted: Wanted) -> tuple[BagTable, ...]:
             stamps="times of recording" if is_log else "header stamps",
             origin="sensor_msgs/Imu",
             topic=topic,
+            rows=topic.count,
             bag=bag,
             message=message,
             is_log=is_log,
@@ -295,27 +250,16 @@ def open_bag(path: Path, wanted: Wanted) -> tuple[BagTable, ...]:
 
 def _is_ros1(path: Path) -> bool:
     with damage_named(path.name), path.open("rb") as stream:
-        head = stream.read(16)
-    for magic, suffix in ((_ROS1, ".bag"), (_MCAP, ".mcap"), (_SQLITE, ".db3")):
+        head = stream.read(len(_SQLITE))
+    for magic, suffix in ((b"\x89MCAP", ".mcap"), (_SQLITE, ".db3")):
+        if head.startswith(magic) and path.suffix.lower() != suffix:
+            raise InputError(f"{path.name} is a bag of ROS 2: name it {path.stem}{suffix}")
         if head.startswith(magic):
-            if path.suffix.lower() != suffix and magic != _ROS1:
-                raise InputError(f"{path.name} is a bag of ROS 2: name it {path.stem}{suffix}")
-            return magic == _ROS1
+            return False
+    if head.startswith(b"#ROSBAG"):
+        return True
     what = "is not a ROS bag" if head else "is empty"
     raise InputError(f"{path.name} {what}: check that it is the right file, and a whole one")
-
-
-def _counts(reader: Any) -> tuple[dict[str, dict[str, int]], list[str]]:
-    """Messages of the topics of each type that is read, and all topics with their types."""
-    counts: dict[str, dict[str, int]] = {kind: {} for kind in _TYPES}
-    others = []
-    for each in reader.connections:
-        if each.msgcount:
-            others.append(f"{each.topic} ({each.msgtype.replace('/msg/', '/')})")
-            if each.msgtype in counts:
-                of_type = counts[each.msgtype]
-                of_type[each.topic] = of_type.get(each.topic, 0) + each.msgcount
-    return counts, sorted(set(others))
 
 
 def _messages(reader: Any, topic: str, start: int | None = None) -> Iterator[_Record]:
@@ -327,17 +271,16 @@ def _messages(reader: Any, topic: str, start: int | None = None) -> Iterator[_Re
 
 def _sensors(reader: Any, topic: str, bag: _Bag, head: Sequence[_Record]) -> frozenset[str]:
     """Sensors of which a topic holds something else than zeros, at its start and in its middle."""
-    first = {"gyro": IMU.columns["gyro_x [rad/s]"], "accel": IMU.columns["accel_x [m/s^2]"]}
     found: set[str] = set()
     middle = (reader.start_time + reader.end_time) // 2
     place = f"{bag.path.name}, a message of {topic}"
     for records in (head, islice(_messages(reader, topic, middle), _SEEN)):
         raw = [message for _, _, message in records]
-        for sensor, index in first.items() if raw else ():
-            wanted = [index, index + 1, index + 2, COVARIANCE_OF[sensor]]
-            _, (*axes, covariance) = decode(raw, IMU, wanted, bag.serialization, lambda row: place)
+        for sensor, index in _FIRST.items() if raw else ():
+            wanted = range(index, index + 4)  # the fourth is -1 where it is not measured
+            _, (*axes, covariance) = decode(raw, IMU, wanted, not bag.is_ros1, lambda row: place)
             if np.any(np.array(axes)) and not np.all(covariance == -1.0):
                 found.add(sensor)
-        if len(found) == len(first):
+        if len(found) == len(_FIRST):
             break
     return frozenset(found)

@@ -33,12 +33,13 @@ class Topic:
         return f"{self.name} ({self.count:,} messages{only})"
 
 
-def choose(source: str, topics: Sequence[Topic], wanted: Wanted) -> tuple[Topic, ...]:
-    """The topics to read: those wanted, else the only one, else one of gyros with one of forces.
+def choose(source: str, ranks: Sequence[Sequence[Topic]], wanted: Wanted) -> tuple[Topic, ...]:
+    """The topics to read: those wanted, else of the first rank that has any.
 
-    Raises InputError with the code "topic", if one is not there, or it cannot be decided; with
-        "sensor-absent", if the log has one sensor and not the other, and no channel is named.
+    There it is the only one, or one of gyros with one of forces. Raises InputError if it cannot be
+    decided, or the log has one sensor and not the other and no channel is named.
     """
+    topics = [t for rank in ranks for t in rank] if wanted.topics else next(filter(None, ranks))
     chosen = _chosen(source, topics, wanted.topics)
     there = frozenset[str]().union(*(topic.sensors for topic in chosen))
     absent = frozenset(SI_UNIT) - there
@@ -76,15 +77,6 @@ def _are_parts(topics: Sequence[Topic]) -> bool:
     return len(topics) == 2 and {frozenset(("gyro",)), frozenset(("accel",))} == {
         topic.sensors for topic in topics
     }
-
-
-def choose_first(
-    source: str, ranks: Sequence[Sequence[Topic]], wanted: Wanted
-) -> tuple[Topic, ...]:
-    """As `choose`, of the first rank that has any topic unless others are wanted."""
-    if wanted.topics:
-        return choose(source, [topic for rank in ranks for topic in rank], wanted)
-    return choose(source, next(filter(None, ranks)), wanted)
 
 
 def left_out(ranks: Sequence[Sequence[Topic]], chosen: Sequence[Topic]) -> tuple[Notice, ...]:
@@ -139,9 +131,6 @@ class MessageTable(Table):
     def parts(self, columns: Sequence[int]) -> Iterator[Columns]:
         """Columns of one block of messages after another."""
 
-    def expected_rows(self) -> float:
-        return float(self.topic.count)
-
     def segments(self, columns: Sequence[int], rows: int) -> Iterator[Columns]:
         row = 0
         for part in self.parts(columns):
@@ -149,7 +138,7 @@ class MessageTable(Table):
                 self.check_usable(column, values, row)
             row += next(iter(part.values())).size
             yield part
-        if not 0 < row <= self.topic.count:
+        if not 0 < row <= self.rows:
             text = f"{self.source}, topic {self.topic.name}: its messages are not as many"
             raise InputError(f"{text} as its index says: get a whole copy, or reindex it")
 

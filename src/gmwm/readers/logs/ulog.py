@@ -41,10 +41,7 @@ _Columns = dict[str, AnyArray]
 
 
 def open_ulog(path: Path, wanted: Wanted) -> tuple[ArrayTable, ...]:
-    """Open a ULog.
-
-    wanted: Topics as ``"sensor_gyro_fifo[1]"``; by default `sensor_combined`, else the FIFO topics.
-    """
+    """The topics wanted (``"sensor_gyro_fifo[1]"``), or `sensor_combined`, else the FIFO topics."""
     with damage_named(path.name, _DAMAGE):  # formats that are damaged lack fields
         return _tables(path, wanted)
 
@@ -56,11 +53,16 @@ def _tables(path: Path, wanted: Wanted) -> tuple[ArrayTable, ...]:
     for each in sets:
         rank = 0 if each.name == _COMBINED else 1 if each.name in _FIFO else 2
         only = (_FIFO | _SINGLE).get(each.name)
-        sensors = frozenset((only,)) if only else _not_zero(each.data)
+        not_zero = [
+            sensor
+            for sensor, field in _FIELDS.items()
+            if not only and any(np.any(each.data[f"{field}[{i}]"]) for i in range(3))
+        ]
+        sensors = frozenset([only] if only else not_zero)
         ranks[rank].append(Topic(_name(each), each.data["timestamp"].size, sensors))
     if not any(ranks):
         raise InputError(f"{path.name} has no samples of an IMU: {_HINT}")
-    chosen = topics.choose_first(path.name, ranks, wanted)
+    chosen = topics.choose(path.name, ranks, wanted)
     notices += topics.left_out(ranks[:2], chosen)
     found: list[tuple[Topic, _Columns]] = []
     for topic in chosen:
@@ -126,15 +128,6 @@ def _name(data_set: Any) -> str:
     if data_set.name == _COMBINED and data_set.multi_id == 0:
         return _COMBINED
     return f"{data_set.name}[{data_set.multi_id}]"
-
-
-def _not_zero(data: Mapping[str, AnyArray]) -> frozenset[str]:
-    """Sensors of which `sensor_combined` holds something else than zeros."""
-    return frozenset(
-        sensor
-        for sensor, field in _FIELDS.items()
-        if any(np.any(data[f"{field}[{i}]"]) for i in range(3))
-    )
 
 
 def _columns(stamps: AnyArray, sensor: str, axes: Sequence[AnyArray]) -> _Columns:

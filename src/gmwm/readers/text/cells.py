@@ -67,11 +67,10 @@ def split_header(line: str, delimiter: str) -> list[str]:
 
 
 def number(cell: str, decimal: str) -> float | None:
-    """The number in a field without blanks around it.
+    """The number in a field without blanks around it, by its decimal mark, "." or ",".
 
-    decimal: {".", ","}, decimal mark.
-    Returns: NaN where the field is empty or one of the usual words for a missing sample, infinity
-        where the number is infinite or too large for use, ``None`` where the field is text.
+    NaN where the field is empty or a usual word for a missing sample, infinity where the number is
+    infinite or too large for use, ``None`` where the field is text.
     """
     if _NUMBERS[decimal].fullmatch(cell):
         value = float(cell.replace(",", "."))
@@ -84,8 +83,7 @@ def number(cell: str, decimal: str) -> float | None:
 def seconds_of(found: re.Match[str]) -> float:
     """Seconds since 1970-01-01 of a match of `DATE` or `FIELD_OF_DATE`, without leap seconds.
 
-    The last minute of a day of UTC may have 61 s.
-    Raises ValueError if there is no such day, minute, second or zone.
+    The last minute of a day of UTC may have 61 s. ValueError if there is no such time.
     """
     day, hour, minute, second = (part for part in found.groups()[:8] if part is not None)
     start = datetime.combine(_day(day), time(int(hour), int(minute)), tzinfo=UTC)

@@ -20,10 +20,10 @@ import numpy as np
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.readers.registry import Wanted
-from gmwm.readers.table import Columns, Table, damage_notice, label, usable
+from gmwm.readers.table import Columns, Table, damage_notice, label, more_such, usable
 from gmwm.readers.text import cells
 from gmwm.readers.text.cells import BLANKS
-from gmwm.readers.text.layout import Layout, find_layout, with_dialect
+from gmwm.readers.text.layout import Layout, fields_of, find_layout, with_dialect
 from gmwm.readers.text.lines import blocks, content_size, count_lines
 
 if TYPE_CHECKING:
@@ -53,9 +53,13 @@ class CsvTable(Table):
         if damages and not head:
             damage_notice(path.name, damages[0], is_taken)
         layout = with_dialect(find_layout(path.name, head), path.name, head)
+        data = head[layout.offset :]
+        # What is left of a packed file may not state its size, which is at its end.
+        size = 0 if is_taken else content_size(path)
         return cls(
             source=path.name,
             names=layout.names,
+            rows=size / max(len(data) / max(len(data.splitlines()), 1), 1.0),
             tentative=layout.tentative,
             notices=list(layout.notices),
             path=path,
@@ -67,14 +71,6 @@ class CsvTable(Table):
         found = damage_notice(self.source, what, self.is_taken)
         if found not in self.notices:
             self.notices.append(found)
-
-    def expected_rows(self) -> float:
-        """Number of rows by the size of the file and its first lines."""
-        if self.is_taken:  # the size that a packed file states is at its end
-            return 0.0
-        _, head = next(blocks(self.path, self.layout.offset, size=_HEAD), (1, b""))
-        lines = max(len(head.splitlines()), 1)
-        return content_size(self.path) / max(len(head) / lines, 1.0)
 
     def segments(self, columns: Sequence[int], rows: int) -> Iterator[Columns]:
         """See `Table`; infinite numbers are reported at the end, after lines that are wrong."""
@@ -93,11 +89,9 @@ class CsvTable(Table):
                 yield self._joined(columns, parts)
                 parts = []
         if infinite:
-            others = f", and {len(infinite) - 1:,} more such" if len(infinite) > 1 else ""
-            raise InputError(
-                f"{self.source}, {infinite[0]} is not a usable number{others}: cut the file before "
-                "that line, or empty the field if the sample is missing"
-            )
+            text = f"{self.source}, {infinite[0]} is not a usable number{more_such(len(infinite))}"
+            hint = "cut the file before that line, or empty the field if the sample is missing"
+            raise InputError(f"{text}: {hint}")
         if parts:
             yield self._joined(columns, parts)
         pyarrow.default_memory_pool().release_unused()  # Arrow keeps memory for more columns
@@ -145,11 +139,7 @@ class CsvTable(Table):
     def _fields(self, line: int, text: str) -> list[str]:
         """Fields of a line; a delimiter after the last one does no harm."""
         width = self.layout.width
-        try:
-            fields = cells.split_line(text, self.layout.delimiter)
-        except ValueError as error:
-            text = f"{self.source}, line {line}: quotes that do not match"
-            raise InputError(f"{text}: correct the line") from error
+        fields = fields_of(self.source, line, text, self.layout.delimiter)
         if len(fields) == width + 1 and not fields[-1]:
             fields.pop()
         if len(fields) != width:

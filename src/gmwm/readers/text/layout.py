@@ -138,12 +138,12 @@ def find_layout(source: str, head: bytes) -> Layout:
     if delimiter is None:
         raise InputError(f"{source} has a header (line {first.number}) but no data: add samples")
     decimal = _decimal(sample, delimiter)
-    names = _fields(source, first, delimiter, header=True)
+    names = fields_of(source, first.number, first.text, delimiter, header=True)
     has_header = bool(following) and _are_names(names, decimal)
     # What pandas writes above columns without names.
     is_numbering = bool(following) and len(names) > 2 and names == [*map(str, range(len(names)))]
     data = following if has_header or is_numbering else lines
-    rows = [_fields(source, line, delimiter) for line in data]
+    rows = [fields_of(source, line.number, line.text, delimiter) for line in data]
     trailing = all(len(row) > 1 and not row[-1] for row in rows)
     width = mode(len(row) for row in rows) - trailing
     if has_header:
@@ -266,11 +266,14 @@ def _are_names(cells: Sequence[str], decimal: str) -> bool:
     )
 
 
-def _fields(source: str, line: _Line, delimiter: str, header: bool = False) -> list[str]:
+def fields_of(
+    source: str, number: int, text: str, delimiter: str, header: bool = False
+) -> list[str]:
+    """Fields of a line, which is rejected if its quotes do not match."""
     try:
-        return (split_header if header else split_line)(line.text, delimiter)
+        return (split_header if header else split_line)(text, delimiter)
     except ValueError as error:
-        text = f"{source}, line {line.number}: quotes that do not match"
+        text = f"{source}, line {number}: quotes that do not match"
         raise InputError(f"{text}: correct the line") from error
 
 

@@ -32,11 +32,9 @@ def blocks(
     Blank lines at the end of the file are left out. A last line without an end is a block by
     itself. If a compression is cut off, the whole lines before that are given.
 
-    offset: Bytes (after decompression) to leave out at the beginning.
-    line: Number of the line that begins there.
+    offset, line: Bytes (after decompression) that are left out, and the line that begins there.
     say: Is told that the compression is cut off, and may raise an error.
-    Yields: number of the first line of the block, counted from 1; the block, whole lines whose ends
-        may be ``\n``, ``\r\n`` or ``\r``.
+    Yields: number of the first line, counted from 1; whole lines (``\n``, ``\r\n`` or ``\r``).
     """
     with _open(path) as stream:
         _, damage = _read(stream, offset, path.name)
@@ -64,13 +62,12 @@ def blocks(
 
 def content_size(path: Path) -> int:
     """Bytes after decompression, at least, as far as that is known before reading."""
-    with _open(path) as stream:
-        size = path.stat().st_size
-        if isinstance(stream, gzip.GzipFile):
-            with path.open("rb") as packed:
-                packed.seek(-min(_SIZE_AT_END, size), 2)
-                # Modulo 4 GB, and of the last part only if there are several.
-                size = max(size, int.from_bytes(packed.read(_SIZE_AT_END), "little"))
+    size = path.stat().st_size
+    with path.open("rb") as stream:
+        if stream.read(len(_GZIP_MAGIC)) == _GZIP_MAGIC:
+            stream.seek(-min(_SIZE_AT_END, size), 2)
+            # Modulo 4 GB, and of the last part only if there are several.
+            size = max(size, int.from_bytes(stream.read(_SIZE_AT_END), "little"))
     return size
 
 
@@ -90,23 +87,15 @@ def _end_of_content(text: bytes) -> int:
 
 def _open(path: Path) -> BinaryIO:
     try:
-        stream = path.open("rb")
-        try:
-            magic = stream.read(2)
-            stream.seek(0)
-        except OSError:
-            stream.close()
-            raise
+        with path.open("rb") as stream:
+            magic = stream.read(len(_GZIP_MAGIC))
+        is_packed = magic == _GZIP_MAGIC
+        if magic and not is_packed and path.suffix.lower() == ".gz":
+            text = f"{path.name} is not a gzip file although its name ends in .gz"
+            raise InputError(f"{text}: compress it with gzip, or remove .gz from its name")
+        return cast(BinaryIO, gzip.open(path, "rb")) if is_packed else path.open("rb")
     except OSError as error:
         raise _unreadable(path.name, error) from error
-    if magic == _GZIP_MAGIC:
-        stream.close()
-        return cast(BinaryIO, gzip.open(path, "rb"))
-    if magic and path.suffix.lower() == ".gz":
-        stream.close()
-        hint = "compress it with gzip, or remove .gz from its name"
-        raise InputError(f"{path.name} is not a gzip file although its name ends in .gz: {hint}")
-    return stream
 
 
 def _read(stream: BinaryIO, size: int, name: str) -> tuple[bytes, str]:
