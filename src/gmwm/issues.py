@@ -606,6 +606,7 @@ _FILTER_NUMBERS = (
     _filter("uncertainty-not-covered", {
         "": "parameter uncertainty is not included",
         "why": "{reason}"}),
+    _filter("upper-limit", "no such term was found: {letters} is the 95 % upper limit"),
 )  # fmt: skip
 
 _INS = (

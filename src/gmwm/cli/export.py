@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import click
 
 from gmwm.cli.options import FILE_TO_WRITE, PATH, options
 from gmwm.errors import InputError
+
+NOT_VALID = 1
+"""Exit status."""
 
 
 @click.command()
@@ -15,10 +20,11 @@ from gmwm.errors import InputError
 @options(
     """
     --to NAME  The program; see --list.
-    --horizon S  Longest outage that the numbers cover, in seconds; by default 1 (keyframes, scans)
-        or 60, see --list.
+    --horizon S  Longest outage that the numbers cover, in seconds; 60 by default.
     --form FORM  N+K, N+GM, ...: most programs hold one; state-space holds any.
     -o --output FILE  File to write instead of printing; .npz for state-space.
+    --explain  Print what the numbers are, axis by axis, in place of the file.
+    --force  Write the numbers although an axis is not valid.
     --list  List the programs.
     """,
     to={"name": "target"},
@@ -31,19 +37,25 @@ def export(
     horizon: float | None,
     form: str | None,
     output: Path | None,
+    explain: bool,
+    force: bool,
     listed: bool,
 ) -> None:
     """Write numbers for a filter as the program wants them.
 
     FILE is a calibration.json, or numbers that gmwm bound or gmwm reduce saved. Several files make
     one IMU, such as gyros and accelerometers of different rates. The numbers of a calibration are
-    the smallest that are not overconfident for its error models; comments explain them.
+    the smallest that are not overconfident for its error models; --explain has the details.
+
+    Exit status: 0 if the numbers were written, 1 if an axis is not valid (nothing is written), 2 if
+    the input cannot be used.
 
     \b
     Examples:
       gmwm export out/calibration.json --to openvins -o kalibr_imu_chain.yaml
       gmwm export gyro.json accel.json --to px4
       gmwm export out/calibration.json --to kfgins --horizon 30
+      gmwm export out/calibration.json --to openvins --explain
       gmwm export --list
     """
     if listed:
@@ -55,17 +67,40 @@ def export(
             "(names: gmwm export --list)"
         )
     from gmwm import export as written, load
+    from gmwm._core import checks
+    from gmwm.export import TARGETS
 
-    text = written([load(file) for file in files], target, horizon=horizon, form=form, path=output)
+    checks.choice("--to", target, tuple(TARGETS))
+    given = [load(file) for file in files]
+    if explain:
+        click.echo(TARGETS[target].explain(given, horizon, form), nl=False)
+        return
+    if not force:
+        _refuse_not_valid(given)
+    text = written(given, target, horizon=horizon, form=form, path=output)
     click.echo(f"wrote {output}" if output else text, nl=output is not None)
+
+
+def _refuse_not_valid(given: Sequence[Any]) -> None:
+    """End with the status for axes that are not valid, if there are some."""
+    from gmwm.cli.hints import with_option
+    from gmwm.export import not_valid, reason
+
+    found = not_valid(given)
+    if not found:
+        return
+    places = ", ".join(f"{name} ({reason(each)})" for name, each in found.items())
+    hints = dict.fromkeys(filter(None, (with_option(each).hint for each in found.values())))
+    advice = next(iter(hints), "read the notices of the calibration")
+    click.echo(
+        f"gmwm: not valid: {places}: {advice}, or add --force to write the numbers", err=True
+    )
+    click.get_current_context().exit(NOT_VALID)
 
 
 def _list() -> None:
     from gmwm._core.tables import plain_table
     from gmwm.export import TARGETS
 
-    rows = [
-        (t.name, t.title, t.form, "" if t.form == "full model" else f"{t.horizon:g} s")
-        for t in TARGETS.values()
-    ]
-    click.echo(plain_table(("name", "program", "form", "horizon"), rows))
+    rows = [(t.name, t.title, t.form, t.file_name) for t in TARGETS.values()]
+    click.echo(plain_table(("name", "program", "form", "file"), rows))
