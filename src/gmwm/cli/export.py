@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import click
 
@@ -55,7 +53,6 @@ def export(
       gmwm export out/calibration.json --to openvins -o kalibr_imu_chain.yaml
       gmwm export gyro.json accel.json --to px4
       gmwm export out/calibration.json --to kfgins --horizon 30
-      gmwm export out/calibration.json --to openvins --explain
       gmwm export --list
     """
     if listed:
@@ -68,34 +65,21 @@ def export(
         )
     from gmwm import export as written, load
     from gmwm._core import checks
-    from gmwm.export import TARGETS
+    from gmwm.cli.hints import with_option
+    from gmwm.export import TARGETS, not_valid, refusal
 
     checks.choice("--to", target, tuple(TARGETS))
     given = [load(file) for file in files]
     if explain:
         click.echo(TARGETS[target].explain(given, horizon, form), nl=False)
         return
-    if not force:
-        _refuse_not_valid(given)
+    found = not_valid(given)
+    if found and not force:
+        why = refusal({name: with_option(each) for name, each in found.items()})
+        click.echo(f"gmwm: {why}, or add --force", err=True)
+        click.get_current_context().exit(NOT_VALID)
     text = written(given, target, horizon=horizon, form=form, path=output)
     click.echo(f"wrote {output}" if output else text, nl=output is not None)
-
-
-def _refuse_not_valid(given: Sequence[Any]) -> None:
-    """End with the status for axes that are not valid, if there are some."""
-    from gmwm.cli.hints import with_option
-    from gmwm.export import not_valid, reason
-
-    found = not_valid(given)
-    if not found:
-        return
-    places = ", ".join(f"{name} ({reason(each)})" for name, each in found.items())
-    hints = dict.fromkeys(filter(None, (with_option(each).hint for each in found.values())))
-    advice = next(iter(hints), "read the notices of the calibration")
-    click.echo(
-        f"gmwm: not valid: {places}: {advice}, or add --force to write the numbers", err=True
-    )
-    click.get_current_context().exit(NOT_VALID)
 
 
 def _list() -> None:

@@ -21,6 +21,7 @@ from gmwm.export.numbers import (
     imu_of as imu_of,
     not_valid as not_valid,
     reason as reason,
+    refusal as refusal,
 )
 from gmwm.export.target import ImuFile as ImuFile, Target as Target
 

@@ -70,6 +70,13 @@ def reason(notice: Notice) -> str:
     return notice.issue.reason or notice.code.replace("-", " ")
 
 
+def refusal(found: Mapping[str, Notice]) -> str:
+    """Which axes are not valid, why, and what to do, by the notices of `not_valid`."""
+    places = ", ".join(f"{name} ({reason(each)})" for name, each in found.items())
+    hints = [each.hint for each in found.values() if each.hint]
+    return f"not valid: {places}; {hints[0] if hints else 'read the notices of the calibration'}"
+
+
 def numbers_for(
     given: Sequence[Any], form: str, horizon: float | None, one_tau: bool = False
 ) -> list[FilterNumbers]:
