@@ -46,12 +46,8 @@ def comment(lines: Sequence[str], mark: str) -> list[str]:
     """Lines as comments of a language: those that begin with ``mark``, or XML for ``<!--``."""
     if mark == "<!--":
         # XML forbids two hyphens inside.
-        inside = [line.replace("--", "- -") for line in lines]
-        return [
-            f"<!-- {inside[0]}",
-            *(f"     {line}" for line in inside[1:-1]),
-            f"     {inside[-1]} -->",
-        ]
+        inside = "\n     ".join(lines).replace(" --", " ").replace("--", "- -")
+        return f"<!-- {inside} -->".splitlines()
     return [f"{mark} {line}".rstrip() for line in lines]
 
 
@@ -89,8 +85,7 @@ def not_valid_line(invalid: Mapping[str, str]) -> str:
     """One line about axes that are not valid, with the reasons if they fit."""
     reasons = ", ".join(f"{name} ({why})" for name, why in invalid.items())
     text = "not valid, do not use: "
-    short = f"{text}{', '.join(invalid)} (why: --explain)"
-    return text + reasons if len(text + reasons) <= WIDTH else short
+    return text + (reasons if len(text + reasons) <= WIDTH else ", ".join(invalid))
 
 
 def _fitting(text: str) -> str:
