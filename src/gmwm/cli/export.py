@@ -6,11 +6,11 @@ from pathlib import Path
 
 import click
 
+from gmwm._core import checks
+from gmwm._core.tables import plain_table
+from gmwm.cli.hints import with_option
 from gmwm.cli.options import FILE_TO_WRITE, PATH, options
 from gmwm.errors import InputError
-
-NOT_VALID = 1
-"""Exit status."""
 
 
 @click.command()
@@ -52,21 +52,18 @@ def export(
     Examples:
       gmwm export out/calibration.json --to openvins -o kalibr_imu_chain.yaml
       gmwm export gyro.json accel.json --to px4
-      gmwm export out/calibration.json --to kfgins --horizon 30
       gmwm export --list
     """
+    from gmwm.export import TARGETS, not_valid, refusal
+
     if listed:
-        _list()
+        rows = [(t.name, t.title, t.form, t.file_name) for t in TARGETS.values()]
+        click.echo(plain_table(("name", "program", "form", "file"), rows))
         return
     if not files or target is None:
-        raise InputError(
-            "gmwm export needs files and a program: gmwm export calibration.json --to NAME "
-            "(names: gmwm export --list)"
-        )
+        usage = "gmwm export calibration.json --to NAME (names: gmwm export --list)"
+        raise InputError(f"gmwm export needs files and a program: {usage}")
     from gmwm import export as written, load
-    from gmwm._core import checks
-    from gmwm.cli.hints import with_option
-    from gmwm.export import TARGETS, not_valid, refusal
 
     checks.choice("--to", target, tuple(TARGETS))
     given = [load(file) for file in files]
@@ -77,14 +74,6 @@ def export(
     if found and not force:
         why = refusal({name: with_option(each) for name, each in found.items()})
         click.echo(f"gmwm: {why}, or add --force", err=True)
-        click.get_current_context().exit(NOT_VALID)
+        click.get_current_context().exit(1)
     text = written(given, target, horizon=horizon, form=form, path=output)
     click.echo(f"wrote {output}" if output else text, nl=output is not None)
-
-
-def _list() -> None:
-    from gmwm._core.tables import plain_table
-    from gmwm.export import TARGETS
-
-    rows = [(t.name, t.title, t.form, t.file_name) for t in TARGETS.values()]
-    click.echo(plain_table(("name", "program", "form", "file"), rows))
