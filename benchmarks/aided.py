@@ -1,6 +1,7 @@
 """What the horizon of filter numbers costs a filter that is aided, by exact covariance analysis.
 
     python benchmarks/aided.py calibration.json [...] [--horizons 1 10 60]
+    python benchmarks/aided.py calibration.json [...] --best
 
 A horizontal channel: position, velocity, tilt, driven by a gyro and an accelerometer with their
 error models, and aided by positions. After 900 s of aiding it goes on without. For each aiding,
@@ -12,6 +13,9 @@ position errors, true and predicted, to the true errors of that filter.
 Terms that average out within a second are white noise of their density at low frequencies in the
 truth; slower terms are its states. The filter with the full models leaves out vibration lines, as
 the others do.
+
+``--best`` searches the N and K of gyro and accelerometer whose largest true ratio at those times is
+least: no N+K can do better, however it is found.
 """
 
 from __future__ import annotations
@@ -20,9 +24,10 @@ import argparse
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.optimize import minimize
 
 import gmwm
-from gmwm import Model
+from gmwm import Model, RandomWalk, WhiteNoise
 from gmwm.calibration import fast_density
 
 GRAVITY = 9.81
@@ -138,12 +143,65 @@ def numbers_of(
     return {name: (each.model, each.initial_sd) for name, each in bound.items()}
 
 
+def print_best(calibration: gmwm.Calibration) -> None:
+    """Print the true ratios of `gmwm.bound` and `gmwm.reduce` for 60 s, and of the best N+K."""
+    gyro, accel = PAIRS[0]
+    models = calibration[gyro].model, calibration[accel].model
+    found = {
+        "bound": gmwm.bound(calibration, "N+K", 60.0, shared=True),
+        "reduce": gmwm.reduce(calibration, "N+K", (60.0,), shared=True),
+    }
+    start = tuple(found["bound"][axis].initial_sd for axis in (gyro, accel))
+    for name in AIDINGS:
+        ratios = _true_ratios(models, name, start)
+        given = {
+            key: np.log([value for axis in (gyro, accel) for value in (each[axis].N, each[axis].K)])
+            for key, each in found.items()
+        }
+        first = given["bound"]
+        options = {
+            "maxfev": 130,
+            "xatol": 0.03,
+            "fatol": 1e-3,
+            "initial_simplex": np.vstack([first, first - np.diag([0.3, 1.0, 0.3, 1.0])]),
+        }
+        found_best = minimize(
+            lambda x, f=ratios: np.max(f(x)), first, method="Nelder-Mead", options=options
+        )
+        given["best"] = found_best.x
+        for key, logs in given.items():
+            cells = "".join(f"{each:8.3f}" for each in ratios(logs))
+            print(f"{calibration.source[:24]:<26}{name:<18}{key:<8}{cells}", flush=True)
+
+
+def _true_ratios(models: tuple[Model, Model], name: str, start: tuple[float, float]):
+    """Function of the logarithms of N and K of gyro and accelerometer: true ratios at `AFTER`."""
+    (interval, sd), step = AIDINGS[name], STEPS[name]
+    every = round(interval / step)
+    truth = channel(*models, step, (0.0, 0.0))
+    full = channel(*map(without_lines, models), step, (0.0, 0.0))
+    least, _ = errors(truth, full, sd, every, step)
+
+    def ratios(logs: np.ndarray) -> np.ndarray:
+        N, K, n, k = np.exp(logs)
+        own = WhiteNoise(N) + RandomWalk(K), WhiteNoise(n) + RandomWalk(k)
+        return errors(truth, channel(*own, step, start), sd, every, step)[0] / least
+
+    return ratios
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("files", nargs="+")
     parser.add_argument("--horizons", nargs="+", type=float, default=[1.0, 10.0, 60.0])
+    parser.add_argument("--best", action="store_true")
     options = parser.parse_args()
     calibrations = [gmwm.load(file) for file in options.files]
+    if options.best:
+        print(f"true ratio after{'':<36}" + "".join(f"{f'{after:g} s':>8}" for after in AFTER))
+        for calibration in calibrations:
+            print_best(calibration)
+        return
     choices = [("N+K", horizon) for horizon in options.horizons] + [("N+K+GM", 60.0)]
     print(f"{'aiding':<18}" + "".join(f"{f'{form} {t:g} s':^24}" for form, t in choices))
     print(f"{'':<18}" + f"{'true':^12}{'predicted':^12}" * len(choices))

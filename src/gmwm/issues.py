@@ -604,8 +604,8 @@ _FILTER_NUMBERS = (
     _filter("turn-on-left-out", "the start bias leaves out the turn-on bias, which a recording at "
         "rest cannot show", "add its variance"),
     _filter("uncertainty-not-covered", {
-        "": "parameter uncertainty is not included",
-        "why": "{reason}"}),
+        "": "parameter uncertainty is not included", "why": "{reason}"}),
+    _filter("upper-limit", "no such term was found: {letters} is the 95 % upper limit"),
 )  # fmt: skip
 
 _INS = (

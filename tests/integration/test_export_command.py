@@ -1,12 +1,15 @@
 """``gmwm export``: files from calibrations, and how it refuses what it cannot use."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import yaml
 
 import gmwm
-from gmwm import Channel, GaussMarkov, Recording, WhiteNoise
+from gmwm import Channel, GaussMarkov, Recording, WhiteNoise, bound
 from gmwm.export import TARGETS
+from gmwm.issues import Notice
 from imu_numbers import numbers
 
 DT = 0.01
@@ -70,6 +73,30 @@ def test_the_list_has_every_program(run):
     for name in TARGETS:
         assert f"\n{name} " in printed, name
     assert len({target.title for target in TARGETS.values()}) == len(TARGETS)
+
+
+def test_an_axis_that_is_not_valid_is_exported_by_force_only(run, calibration, tmp_path):
+    bad = Notice("step", "bad", "", "a step", {}, "cut it off")
+    fits = {**calibration.fits, "accel_x": replace(calibration["accel_x"], notices=(bad,))}
+    replace(calibration, fits=fits).save(tmp_path / "bad.json")
+    for target in ("kalibr", "state-space"):
+        code, printed, said = run("export", "bad.json", "--to", target, "-o", "file")
+        assert (code, printed, said.count("\n")) == (1, "", 1)
+        assert said.startswith("gmwm: not valid: accel_x (")
+        assert said.endswith("; cut it off, or add --force\n")
+        assert not (tmp_path / "file").exists()
+    code, printed, _ = run("export", "bad.json", "--to", "kalibr", "--force")
+    assert code == 0
+    assert "# not valid, do not use: accel_x" in printed
+    # The numbers have the mark too.
+    bound(replace(calibration, fits=fits)).save(tmp_path / "numbers.json")
+    assert run("export", "numbers.json", "--to", "kalibr")[0] == 1
+
+
+def test_the_explanation_is_printed_in_place_of_the_file(run, file, calibration):
+    code, printed, _ = run("export", file, "--to", "vins", "--explain")
+    assert code == 0
+    assert printed == TARGETS["vins"].explain([calibration])
 
 
 def test_calibrate_writes_the_same_file(run, tmp_path):

@@ -46,7 +46,7 @@ _number_options = options(
 @_number_options
 @options(
     """
-    --horizon S  Longest outage in seconds; for relative poses, the interval of keyframes.
+    --horizon S  Longest outage in seconds.
     --level NUMBER  Cover the confidence region of this level, e.g. 0.95, and not the estimate
         alone.
     """,

@@ -16,7 +16,13 @@ from gmwm.export.imu import (
     ImuNumbers as ImuNumbers,
     Triad as Triad,
 )
-from gmwm.export.numbers import axis_of as axis_of, imu_of as imu_of
+from gmwm.export.numbers import (
+    axis_of as axis_of,
+    imu_of as imu_of,
+    not_valid as not_valid,
+    reason as reason,
+    refusal as refusal,
+)
 from gmwm.export.target import ImuFile as ImuFile, Target as Target
 
 

@@ -1,28 +1,27 @@
-"""Comments of exported files: what the numbers are, in lines that cannot break the file."""
+"""What files say of their numbers: six lines in the file, all by ``gmwm export --explain``."""
 
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
-from gmwm._core.tables import cell, plain_table
-from gmwm._core.units import si_parameter_unit
-from gmwm.export.imu import Axis, ImuNumbers, Triad
+import numpy as np
+
+from gmwm._core.units import SI_UNIT
+from gmwm.export.imu import ImuNumbers
 
 WIDTH = 72
 """Columns of a line of comment, 80 with the marks of the languages around it."""
+
+MOST = 6
+"""Lines of comment in a file."""
 
 _LONGEST = 500  # characters of one remark or name
 
 _HOW = {
     "bound": "the smallest that are never overconfident for the error models",
-    "reduce": "those whose filter has the right errors at the horizon, see gmwm.reduce",
+    "reduce": "by gmwm.reduce, consistent on average, since no N+GM bounds a random walk",
     "given": "given, not from a recording",
-}
-
-_COLUMNS = {
-    "N+K": (("N", "u/sqrt(Hz)"), ("K", "u/s/sqrt(Hz)")),
-    "N+GM": (("N", "u/sqrt(Hz)"), ("sigma", "u"), ("tau", "s")),
 }
 
 
@@ -47,86 +46,91 @@ def comment(lines: Sequence[str], mark: str) -> list[str]:
     """Lines as comments of a language: those that begin with ``mark``, or XML for ``<!--``."""
     if mark == "<!--":
         # XML forbids two hyphens inside.
-        return ["<!--", *(f"  {line.replace('--', '- -')}" for line in lines), "-->"]
+        inside = "\n     ".join(lines).replace(" --", " ").replace("--", "- -")
+        return f"<!-- {inside} -->".splitlines()
     return [f"{mark} {line}".rstrip() for line in lines]
 
 
-def above(imu: ImuNumbers, name: str) -> list[str]:
-    """Lines above the numbers: their source, the program, and what they are for."""
-    texts = [plain(source) for source in imu.sources]
-    texts += [name, f"{imu.form} for {imu.horizon:g} s without aiding, explained below"]
+def notes(imu: ImuNumbers, title: str, caution: str) -> list[str]:
+    """The lines of comment in a file: what the numbers are, for what, and what to mind.
+
+    title: Of the program.
+    caution: A line about it; may be empty.
+    """
+    how = " (reduce)" if imu.method == "reduce" else ""
+    purpose = f"{imu.form} for outages up to {imu.horizon:g} s{how}"
+    upper = [f"{t.quantity} {k}" for t in imu.triads for k in ("N", "K", "sigma") if t.is_upper(k)]
+    worst = [max(triad.axes, key=lambda axis: axis.N) for triad in imu.triads]
+    covers = "; ".join(f"{axis.name} {axis.covers}" for axis in worst if axis.covers)
+    loose = [
+        n for t in imu.triads for axis in t.axes for n in axis.notices if n.code == "loose-form"
+    ]
+    lines = [
+        f"{title}: {' and '.join(imu.sources)}",
+        f"{purpose}; for details: gmwm export --explain",
+        not_valid_line(imu.invalid) if imu.invalid else "",
+        caution,
+        _consistency(imu),
+        _start(imu),
+        f"95 % upper limit, no such term was found: {', '.join(upper)}" if upper else "",
+        f"N, K also cover {covers}" if covers else "",
+        "for a filter with a Gauss-Markov state: gmwm bound --form N+K+GM"
+        if any(n.hint for n in loose)
+        else "",
+    ]
+    return [_fitting(line) for line in lines if line][:MOST]
+
+
+def not_valid_line(invalid: Mapping[str, str]) -> str:
+    """One line about axes that are not valid, with the reasons if they fit."""
+    reasons = ", ".join(f"{name} ({why})" for name, why in invalid.items())
+    text = "not valid, do not use: "
+    return text + (reasons if len(text + reasons) <= WIDTH else ", ".join(invalid))
+
+
+def _fitting(text: str) -> str:
+    """A text on one line."""
+    line = plain(text)
+    if len(line) > WIDTH:
+        line = line.replace("Gauss-Markov", "GM")
+    return line if len(line) <= WIDTH else f"{line[: WIDTH - 3].rstrip()}..."
+
+
+def _start(imu: ImuNumbers) -> str:
+    if not any(triad.initial_sd for triad in imu.triads):
+        return "add your turn-on bias to the bias at the start"
+    values = [
+        f"{triad.quantity} {triad.initial_sd:.2e} {SI_UNIT[triad.quantity]}"
+        for triad in imu.triads
+        if triad.initial_sd
+    ]
+    return f"start bias {', '.join(values)}, plus turn-on bias"
+
+
+def _consistency(imu: ImuNumbers) -> str:
+    """Range of the NEES of each sensor at the horizon; empty if unknown."""
+    parts = []
+    for triad in imu.triads:
+        by_axis = (triad.shared_nees or {}).values()
+        found = by_axis if triad.shared_nees is not None else [axis.nees for axis in triad.axes]
+        values = [each.get(imu.horizon, np.nan) for each in found]
+        if np.all(np.isfinite(values)):
+            ends = dict.fromkeys(f"{end(values):.3g}" for end in (min, max))
+            parts.append(f"{triad.quantity} {' to '.join(ends)}")
+    if not parts:
+        return "NEES unknown: the file holds other numbers; export the calibration"
+    return f"NEES at {imu.horizon:g} s: {', '.join(parts)}; 1: consistent"
+
+
+def purpose(imu: ImuNumbers) -> list[str]:
+    """What the numbers are for, how they were found, and what to mind, as texts."""
+    texts = [f"{imu.form} for outages up to {imu.horizon:g} s; {_HOW[imu.method]}"]
+    if imu.invalid:
+        why = ", ".join(f"{name} ({reason})" for name, reason in imu.invalid.items())
+        texts.append(plain(f"not valid, do not use: {why}"))
     if max(imu.gyro.rate, imu.accel.rate) > min(imu.gyro.rate, imu.accel.rate):
         texts.append(
-            f"gyros at {imu.gyro.rate:.6g} Hz, accelerometers at {imu.accel.rate:.6g} Hz: a rate f "
-            "below is the higher, of a message that holds both"
+            f"gyros at {imu.gyro.rate:.6g} Hz, accelerometers at {imu.accel.rate:.6g} Hz: the rate "
+            "of the file is the higher, of a message that holds both"
         )
-    texts += [plain(caution) for caution in imu.cautions]
-    return [line for text in texts for line in wrapped(text)]
-
-
-def below(imu: ImuNumbers, convention: str) -> list[str]:
-    """Lines below the numbers: convention, values by axis, consistency."""
-    lines = wrapped(f"{convention}; {_HOW[imu.method]}")
-    for triad in imu.triads:
-        lines += _table(imu, triad)
-    texts = []
-    if any(triad.shared_nees is not None for triad in imu.triads):
-        texts.append(
-            "shared: for all axes of a sensor, which this file holds; the others: of each axis by "
-            "itself, which it does not hold; use N and K as a pair"
-        )
-    known = [axis.nees for triad in imu.triads for axis in triad.axes]
-    known += [nees for triad in imu.triads for nees in (triad.shared_nees or {}).values()]
-    if any(known):
-        texts.append(
-            "NEES: expected error squared over the filter's covariance with these numbers, after "
-            "that time without aiding; 1 is consistent, below 1 conservative, above 1 overconfident"
-        )
-    if imu.method != "given" and not all(known):
-        texts.append(
-            "NEES is not known where the file holds other numbers than were found for an axis, "
-            "without its error model: export the calibration"
-        )
-    for triad in imu.triads:
-        by_horizon = imu.outlook.get(triad.quantity, {})
-        # Models without a random walk have the file's upper limit.
-        limit = f"< {triad.K:.3e}" if triad.is_upper("K") else None
-        values = [
-            f"{t:g} s: {n:.3e}, {limit if limit and k <= 0.0 else f'{k:.3e}'}"
-            for t, (n, k) in by_horizon.items()
-        ]
-        if values:
-            texts.append(f"{triad.quantity} N, K for all axes by horizon: {'; '.join(values)}")
-    texts += [plain(remark) for remark in imu.remarks]
-    return [*lines, *(line for text in texts for line in wrapped(text))]
-
-
-def _table(imu: ImuNumbers, triad: Triad) -> list[str]:
-    """The numbers of each axis under those that a file holds for all, with their consistency."""
-    columns = [*_COLUMNS[imu.form], ("start", "u")]
-    keys = [key for key, _ in columns]
-    times = sorted({time for axis in triad.axes for time in axis.nees})
-    shared = triad.shared_nees
-    heads, rows = ["", *keys], []
-    for time in times:
-        heads += [f"NEES\n{time:g} s"] if shared is None else [f"{time:g} s\nshared", "\nown"]
-    if shared is not None:
-        upper = frozenset(key for key in keys if triad.is_upper(key))
-        rows.append(["shared", *_values(triad, upper, keys), *[""] * 2 * len(times)])
-    for axis in triad.axes:
-        row = [plain(axis.name), *_values(axis, axis.upper, keys)]
-        together = (shared or {}).get(axis.name, {})
-        for time in times:
-            own = axis.nees.get(time)
-            row += [cell(own, 3)] if shared is None else [cell(together.get(time), 3), cell(own, 3)]
-        rows.append(row)
-    units = ", ".join(f"{key} [{si_parameter_unit(u, triad.quantity)}]" for key, u in columns)
-    title = f"{triad.quantity}: {units}"
-    title += "; NEES" if shared is not None and times else ""
-    return [*wrapped(title), *plain_table(heads, rows).splitlines()]
-
-
-def _values(of: Axis | Triad, upper: frozenset[str], keys: Sequence[str]) -> list[str]:
-    """Numbers as they are shown; upper limits have a sign before them."""
-    values = {key: of.initial_sd if key == "start" else getattr(of, key) for key in keys}
-    return [f"{'< ' if key in upper else ''}{value:.3e}" for key, value in values.items()]
+    return texts

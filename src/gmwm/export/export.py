@@ -54,8 +54,7 @@ def export(
     target : str
         Name of the program: "kalibr", "gtsam", ...
     horizon : float, optional
-        Time without aiding that the numbers are for, s; 1 s for programs that relate keyframes or
-        scans, 60 s for others.
+        Longest outage that the numbers are for, s; 60 s by default.
     form : str, optional
         Of the numbers, "N+K" or "N+GM"; each program holds one. For "state-space", which holds the
         full model, also another: see `gmwm.bound`.

@@ -10,13 +10,9 @@ import numpy as np
 from gmwm.errors import InputError
 from gmwm.filter_numbers import AxisFilterNumbers
 from gmwm.issues import Notice
-from gmwm.process import GaussMarkov, Model, RandomWalk, WhiteNoise
 
 SENSORS = {"gyro": "gyroscope", "accel": "accelerometer"}
 """Quantity -> how messages and most consumers call the sensor."""
-
-Outlook = Mapping[str, Mapping[float, tuple[float, float]]]
-"""Quantity -> horizon in s -> N and K for it."""
 
 LETTERS = "xyz"
 
@@ -35,6 +31,7 @@ class Axis:
     rate: Of its samples, Hz; NaN if it is not known.
     upper: Which of the numbers are upper limits of a term that was not found.
     notices: Those of its filter numbers.
+    covers: The largest term that N or K covers beside the sensor's own; empty if there is none.
     """
 
     name: str
@@ -47,12 +44,7 @@ class Axis:
     rate: float = float("nan")
     upper: frozenset[str] = frozenset()
     notices: tuple[Notice, ...] = ()
-
-    @property
-    def model(self) -> Model:
-        """The error model that a filter with these numbers has."""
-        slow = GaussMarkov(self.sigma, self.tau) if self.tau > 0.0 else RandomWalk(self.K)
-        return WhiteNoise(self.N) + slow
+    covers: str = ""
 
     def moved(self, tau: float) -> Axis:
         """With a Gauss-Markov process of another correlation time that bounds its own.
@@ -140,9 +132,7 @@ class ImuNumbers:
     horizon: Time without aiding, s.
     method: {"bound", "reduce", "given"}.
     sources: One line about each recording.
-    outlook: N and K at other horizons.
-    remarks: Terms that the numbers leave out.
-    cautions: Why the numbers are not to be used as they are.
+    invalid: Axes that are not valid -> why.
     topic: On which the samples were sent, where a bag was calibrated; else empty.
     """
 
@@ -152,9 +142,7 @@ class ImuNumbers:
     horizon: float
     method: str
     sources: tuple[str, ...] = ()
-    outlook: Outlook = field(default_factory=dict)
-    remarks: tuple[str, ...] = ()
-    cautions: tuple[str, ...] = ()
+    invalid: Mapping[str, str] = field(default_factory=dict)
     topic: str = ""
 
     def by_axis(self) -> ImuNumbers:

@@ -4,52 +4,35 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
-
 from gmwm._core import checks
-from gmwm.calibration import Calibration, upper_limit
+from gmwm._core.text import brief
+from gmwm._core.units import field_units
+from gmwm.calibration import Calibration
 from gmwm.errors import InputError
 from gmwm.estimate import Fit
-from gmwm.export.imu import LETTERS, SENSORS, Axis, ImuNumbers, Outlook, Triad
-from gmwm.filter_numbers import AxisFilterNumbers, FilterNumbers, bound, judged, reduce
-from gmwm.process import Model, RandomWalk, WhiteNoise
-
-OUTLOOK = (10.0, 60.0, 600.0)
-"""s: horizons that comments compare."""
-
-OUTAGES = (1.0 / 6.0, 0.5, 1.0)
-"""Shares of the horizon for which reduced numbers are found: 10, 30 and 60 s of 60 s."""
+from gmwm.export.imu import LETTERS, SENSORS, Axis, ImuNumbers, Triad
+from gmwm.filter_numbers import HORIZON, AxisFilterNumbers, FilterNumbers, usable
+from gmwm.issues import Notice
 
 _TOPIC = re.compile(r"/[A-Za-z0-9_/]+")  # a name of ROS, which no file can misread
-
-
-def find_numbers(
-    models: Calibration | Mapping[str, Any], form: str, horizon: float, tau: float | str | None
-) -> FilterNumbers:
-    """Numbers of a form that are never overconfident; ``tau`` as in `gmwm.bound`.
-
-    No stationary process bounds a random walk. So "N+GM" numbers of a model with one are those that
-    are consistent at the end of outages.
-    """
-    if form == "N+GM" and any(map(_has_walk, models.values())):
-        return reduce(models, form, [share * horizon for share in OUTAGES], tau=tau)
-    return bound(models, form, horizon=horizon, tau=tau)
+_COVERED = ("more-than-white-noise", "more-than-random-walk")
+_NOT_VALID = "fit-not-valid"
 
 
 def numbers_of(
-    given: Any, form: str, horizon: float | None, usual: float, tau: float | None = None
+    given: Any, form: str, horizon: float | None, tau: str | None = None
 ) -> FilterNumbers:
     """Those found of a calibration, or given ones if they have the form and the horizon.
 
-    tau: One correlation time for all axes, s; given numbers are then moved to it.
+    tau: Of those found, as in `gmwm.bound`.
     Raises InputError if there are none.
     """
     if isinstance(given, Calibration):
-        return find_numbers(given, form, usual if horizon is None else horizon, tau)
+        return usable(given, form, HORIZON if horizon is None else horizon, tau=tau)
     if not isinstance(given, FilterNumbers):
         raise InputError(
             f"{checks.shown(given)} has no numbers to export: give a calibration, or a "
@@ -65,87 +48,113 @@ def numbers_of(
             f"the numbers are for {given.horizon:g} s: leave the horizon out, or export the "
             "calibration"
         )
-    if tau is None or all(one.tau == (tau,) for one in given.values()):
-        return given
-    moved = find_numbers({name: one.model for name, one in given.items()}, form, given.horizon, tau)
-    axes = {
-        name: replace(one, model=moved[name].model, predicted=()) for name, one in given.items()
-    }
-    return replace(given, axes=axes)
+    return given
 
 
-def imu_of(
-    given: Sequence[Any],
-    form: str,
-    horizon: float | None,
-    usual: float,
-    shared: bool,
-    outlook: Outlook | None = None,
-    one_tau: bool = False,
-) -> ImuNumbers:
-    """The numbers of an IMU in a form, of calibrations or of numbers that were found before.
+def not_valid(given: Iterable[Any]) -> dict[str, Notice]:
+    """Axes that are not valid, each with the notice that says why."""
+    found = {}
+    for source in given:
+        for name, one in source.items() if isinstance(source, Calibration | FilterNumbers) else ():
+            notices = [n for n in one.notices if n.severity == "bad" or n.code == _NOT_VALID]
+            is_sensor = isinstance(one, AxisFilterNumbers) or one.wv.quantity in SENSORS
+            if notices and is_sensor:
+                # A departure from noise is why the model misses levels too.
+                departures = (n for n in notices if n.issue.topic == "departure")
+                found[name] = next(departures, notices[0])
+    return found
 
-    given: Together they have gyros and accelerometers.
-    horizon: s; by default that of the numbers or, of calibrations, the usual one.
-    shared: Whether the axes of a sensor have one value in the file.
-    outlook: N and K at other horizons, if known.
-    one_tau: Whether there is one correlation time in the file.
-    Raises InputError if a sensor is missing or given twice, or numbers are of another form or
-        horizon.
+
+def reason(notice: Notice) -> str:
+    """Why an axis is not valid, in about five words."""
+    return notice.issue.reason or notice.code.replace("-", " ")
+
+
+def refusal(found: Mapping[str, Notice]) -> str:
+    """Which axes are not valid, why, and what to do, by the notices of `not_valid`."""
+    places = ", ".join(f"{name} ({reason(each)})" for name, each in found.items())
+    hints = [each.hint for each in found.values() if each.hint]
+    return f"not valid: {places}; {hints[0] if hints else 'read the notices of the calibration'}"
+
+
+def numbers_for(
+    given: Sequence[Any], form: str, horizon: float | None, one_tau: bool = False
+) -> list[FilterNumbers]:
+    """The numbers of each of several calibrations, or given ones, that make one IMU.
+
+    horizon: s; by default that of the numbers or, of calibrations, `HORIZON`.
+    one_tau: Whether they have one correlation time; given numbers lose their predictions with it.
+    Raises InputError if a sensor is given twice, or numbers are of another form or horizon.
     """
     if horizon is not None:
         horizon = checks.positive("horizon", horizon, "give a positive time in seconds")
-    numbers = [numbers_of(each, form, horizon, usual) for each in given]
-    names = Counter(name for each in numbers for name in each)
+    found = [numbers_of(each, form, horizon, "shared" if one_tau else None) for each in given]
+    names = Counter(name for each in found for name in each)
     if not names:
         raise InputError("no numbers to export: give a calibration")
     twice = [name for name, count in names.items() if count > 1]
     if twice:
         raise InputError(f"{twice[0]} is given twice: give each sensor once")
-    horizons = sorted({one.horizon for each in numbers for one in each.values()})
+    horizons = sorted({one.horizon for each in found for one in each.values()})
     if len(horizons) > 1:
         times = ", ".join(f"{each:g} s" for each in horizons)
         raise InputError(f"the numbers are for {times}: give numbers for one horizon")
-    tau = None
-    if one_tau:
-        tau = _common_tau(given, numbers, form)
-        numbers = [numbers_of(each, form, horizon, usual, tau) for each in given]
+    if not one_tau or len({one.tau for each in found for one in each.values()}) == 1:
+        return found
+    models = {n: one if isinstance(one, Fit) else one.model for s in given for n, one in s.items()}
+    moved = usable(models, form, horizons[0], tau="shared")
+    for place, (source, each) in enumerate(zip(given, found, strict=True)):
+        own: dict[str, AxisFilterNumbers] = {name: moved[name] for name in each}
+        if not isinstance(source, Calibration):
+            own = {n: replace(o, model=moved[n].model, predicted=()) for n, o in each.items()}
+        found[place] = replace(each, axes=own)
+    return found
+
+
+def imu_of(
+    given: Sequence[Any],
+    form: str,
+    horizon: float | None = None,
+    *,
+    shared: bool = False,
+    one_tau: bool = False,
+) -> ImuNumbers:
+    """The numbers of an IMU in a form, of calibrations or of numbers that were found before.
+
+    given: Together they have gyros and accelerometers.
+    horizon, one_tau: As of `numbers_for`.
+    shared: Whether the axes of a sensor have one value in the file.
+    Raises InputError if a sensor is missing or given twice, or numbers are of another form or
+        horizon.
+    """
+    sources = numbers_for(given, form, horizon, one_tau)
+    numbers = {name: one for each in sources for name, one in each.items()}
+    first = next(iter(numbers.values()))
     calibrations = [each for each in given if isinstance(each, Calibration)]
     fits = {name: fit for each in calibrations for name, fit in each.items()}
-    axes = {
-        name: axis_of(name, one, each.rate, fits.get(name), tau)
-        for each in numbers
-        for name, one in each.items()
-    }
-    gyro, accel = (_triad(quantity, numbers, axes, form) for quantity in SENSORS)
+    rates = {name: each.rate for each in sources for name in each}
+    axes = [axis_of(name, one, rates[name], fits.get(name)) for name, one in numbers.items()]
+    gyro, accel = (
+        _triad(quantity, [a for a in axes if numbers[a.name].quantity == quantity], form)
+        for quantity in SENSORS
+    )
     if shared:
-        gyro, accel = (_with_shared(t, given, numbers, fits, form) for t in (gyro, accel))
-    if outlook is None:
-        outlook = _outlook(calibrations) if len(calibrations) == len(given) else {}
-    method = next(one.method for each in numbers for one in each.values())
+        gyro, accel = (_with_shared(each, fits, form, first.horizon) for each in (gyro, accel))
+    lengths = [f", {each.duration:.0f} s static" * (each.duration > 0.0) for each in sources]
     return ImuNumbers(
         gyro,
         accel,
         form,
-        horizons[0],
-        method,
-        sources=tuple(
-            f"{each.source or 'recording'}"
-            + (f", {each.duration:.0f} s static" if each.duration > 0.0 else "")
-            for each in numbers
-        ),
-        outlook=outlook,
-        remarks=_remarks(given, numbers),
-        cautions=_remarks(given, numbers, cautions=True),
-        topic=_topic(calibrations),
+        first.horizon,
+        first.method,
+        tuple(f"{s.source or 'recording'}{n}" for s, n in zip(sources, lengths, strict=True)),
+        {name: reason(each) for name, each in not_valid(given).items()},
+        _topic(calibrations),
     )
 
 
-def _triad(
-    quantity: str, numbers: Sequence[FilterNumbers], axes: Mapping[str, Axis], form: str
-) -> Triad:
+def _triad(quantity: str, own: Sequence[Axis], form: str) -> Triad:
     """The axes of a quantity; raises InputError if a file could not hold them."""
-    own = tuple(axes[name] for each in numbers for name in each.of(quantity))
     if not own:
         raise InputError(
             f"the file needs gyro and accelerometer, there is no {SENSORS[quantity]}: calibrate "
@@ -163,104 +172,53 @@ def _triad(
                     f"{key} of {axis.name} is zero, and filters divide by it: give a number, "
                     "or export the calibration, which has an upper limit"
                 )
-    return Triad(quantity, own)
+    return Triad(quantity, tuple(own))
 
 
-def _with_shared(
-    triad: Triad,
-    given: Sequence[Any],
-    numbers: Sequence[FilterNumbers],
-    fits: Mapping[str, Fit],
-    form: str,
-) -> Triad:
-    """With one value for all axes: their common bound, and how consistent each axis is with it."""
-    sources = [(s, n) for s, n in zip(given, numbers, strict=True) if n.of(triad.quantity)]
-    source, first = sources[0]
-    if len(sources) == 1 and isinstance(source, Calibration):
-        together = bound(source, form, horizon=first.horizon, shared=True)
-        triad = replace(triad, common=together[triad.axes[0].name])
-    model = WhiteNoise(triad.N) + RandomWalk(triad.K)
-    alike = replace(first[triad.axes[0].name], model=model, initial_sd=triad.initial_sd)
-    return replace(triad, shared_nees={axis.name: _nees(axis, alike, fits) for axis in triad.axes})
+def _with_shared(triad: Triad, fits: Mapping[str, Fit], form: str, horizon: float) -> Triad:
+    """With one value for all axes, and how consistent each axis is with it."""
+    if all(axis.name in fits for axis in triad.axes):
+        own = {axis.name: fits[axis.name] for axis in triad.axes}
+        together = usable(own, form, horizon, shared=True)
+        shared = {name: one.nees for name, one in together.items()}
+        return replace(triad, common=next(iter(together.values())), shared_nees=shared)
+    alike = (triad.N, triad.K, triad.initial_sd)
+    known = [axis.name for axis in triad.axes if (axis.N, axis.K, axis.initial_sd) == alike]
+    nees = {axis.name: axis.nees if axis.name in known else {} for axis in triad.axes}
+    return replace(triad, shared_nees=nees)
 
 
-def _nees(axis: Axis, numbers: AxisFilterNumbers, fits: Mapping[str, Fit]) -> Mapping[float, float]:
-    """Consistency of an axis with numbers in place of its own; empty if unknown."""
-    if axis.name in fits:
-        return judged({axis.name: fits[axis.name]}, numbers).nees
-    own = (axis.model.params, axis.initial_sd)
-    return axis.nees if own == (numbers.model.params, numbers.initial_sd) else {}
+def axis_of(name: str, numbers: AxisFilterNumbers, rate: float, fitted: Fit | None = None) -> Axis:
+    """An axis by its numbers; ``rate`` in Hz, NaN for that of the fit."""
+    sigma, tau = (values[0] if values else float("nan") for values in (numbers.sigma, numbers.tau))
+    if fitted is not None and not rate > 0.0:  # channels of several rates
+        rate = 1.0 / fitted.wv.dt
+    limits = [key for n in numbers.notices if n.code == "upper-limit" for key in n.values]
+    values = (numbers.N, numbers.K, sigma, tau, numbers.initial_sd, dict(numbers.nees), rate)
+    return Axis(name, *values, frozenset(limits), numbers.notices, _covered(numbers, fitted))
 
 
-def axis_of(
-    name: str, numbers: AxisFilterNumbers, rate: float, fitted: Fit | None, tau: float | None = None
-) -> Axis:
-    """An axis by its numbers; consumers reject zeros, so upper limits of its fit replace them."""
-    sigma, own = (values[0] if values else float("nan") for values in (numbers.sigma, numbers.tau))
-    values = (numbers.N, numbers.K, sigma, own, numbers.initial_sd, dict(numbers.nees))
-    axis = Axis(name, *values, rate, notices=numbers.notices)
-    if fitted is None:
-        return axis
-    if not rate > 0.0:  # channels of several rates
-        axis = replace(axis, rate=1.0 / fitted.wv.dt)
-    if axis.N <= 0.0:
-        axis = replace(axis, N=upper_limit(fitted, "N"), upper=axis.upper | {"N"})
-    if "K" in numbers.form and axis.K <= 0.0:
-        axis = replace(axis, K=upper_limit(fitted, "K"), upper=axis.upper | {"K"})
-    if "GM" in numbers.form and not axis.sigma > 0.0:
-        tau = numbers.horizon if tau is None else tau
-        # At high frequencies this process rises as a random walk of this K does.
-        sigma = upper_limit(fitted, "K") * float(np.sqrt(tau / 2.0))
-        axis = replace(axis, sigma=sigma, tau=tau, upper=axis.upper | {"sigma"})
-    if axis.upper:
-        filled = replace(numbers, model=axis.model)
-        axis = replace(axis, nees=dict(_nees(axis, filled, {name: fitted})))
-    return axis
-
-
-def _common_tau(given: Sequence[Any], numbers: Sequence[FilterNumbers], form: str) -> float:
-    """The one correlation time for all axes that costs least over them, s."""
-    slow = [one for each in numbers for one in each.values() if one.sigma[0] > 0.0]
-    horizon = numbers[0].horizon
-    taus = {one.tau[0] for one in slow} or {horizon}
-    if len(taus) == 1:
-        return taus.pop()
-    axes = {name: one for each in given for name, one in each.items()}
-    models = {
-        n: one.model if isinstance(one, AxisFilterNumbers) else one for n, one in axes.items()
-    }
-    return next(iter(find_numbers(models, form, horizon, "shared").values())).tau[0]
-
-
-def _has_walk(axis: Fit | Model) -> bool:
-    return any(term.is_walk for term in (axis.model if isinstance(axis, Fit) else axis).terms)
-
-
-def _outlook(calibrations: Sequence[Calibration]) -> Outlook:
-    """N and K for all axes at other horizons."""
-    found: dict[str, dict[float, tuple[float, float]]] = {quantity: {} for quantity in SENSORS}
-    for horizon in OUTLOOK:
-        numbers = [bound(each, "N+K", horizon=horizon, shared=True) for each in calibrations]
-        for quantity, by_horizon in found.items():
-            own = [one for each in numbers for one in each.of(quantity).values()]
-            by_horizon[horizon] = (max(one.N for one in own), max(one.K for one in own))
-    return found
-
-
-def _remarks(
-    given: Sequence[Any], numbers: Sequence[FilterNumbers], *, cautions: bool = False
-) -> tuple[str, ...]:
-    """Each notice once, after its channels: of fits that are not valid, or else the others."""
-    places: dict[str, list[str]] = {}
-    for source, each in zip(given, numbers, strict=True):
-        walks = [name for name, fit in source.items() if isinstance(fit, Fit) and _has_walk(fit)]
-        if walks and "K" not in each.form and not cautions:
-            text = f"a random walk, which {each.form} cannot bound: gmwm.reduce, not gmwm.bound"
-            places[text] = walks
-        for notice in each.notices:
-            if (notice.code == "fit-not-valid") is cautions:
-                places.setdefault(str(replace(notice, where="")), []).append(notice.where)
-    return tuple(f"{', '.join(where)}: {text}" for text, where in places.items())
+def _covered(numbers: AxisFilterNumbers, fitted: Fit | None) -> str:
+    """The largest term beside white noise and walk that N or K covers, e.g. "resonance 2 mg"."""
+    shares: dict[str, float] = {}
+    for notice in numbers.notices:
+        if notice.code in _COVERED:
+            for label, share in notice.values.items():
+                shares[label] = max(share, shares.get(label, 0.0))
+    if not shares:
+        return ""
+    label = max(shares, key=lambda each: shares[each])
+    labels = fitted.model.term_labels() if fitted is not None else ()
+    if fitted is None or label not in labels:
+        return label
+    term = fitted.model.terms[labels.index(label)]
+    size, tau = term.linear_parameter, term.values.get("tau")
+    text = label.rstrip(" 0123456789")
+    if size is not None:
+        units = field_units(size.unit, numbers.quantity)
+        scale, unit = (units[0].per_si, units[0].unit) if units else (1.0, numbers.unit)
+        text += f" {brief((term.values[size.name] or 0.0) * scale)} {unit}"
+    return f"{text}, {brief(tau)} s" if tau else text
 
 
 def _topic(calibrations: Sequence[Calibration]) -> str:

@@ -10,18 +10,13 @@ from typing import Any, ClassVar
 
 from gmwm._core import checks
 from gmwm._core.files import write_text
+from gmwm.calibration import Calibration
 from gmwm.errors import InputError
-from gmwm.export.comments import above, below, comment, wrapped
+from gmwm.export.comments import comment, notes, purpose, wrapped
 from gmwm.export.imu import ImuNumbers
 from gmwm.export.keys import Keys
-from gmwm.export.numbers import imu_of
-from gmwm.filter_numbers import FORMS
-
-OUTAGE = 60.0
-"""s without aiding: a tunnel or an underpass for an INS/GNSS filter."""
-
-KEYFRAME = 1.0
-"""s between the keyframes or scans that visual and lidar odometry relate to each other."""
+from gmwm.export.numbers import imu_of, numbers_for
+from gmwm.filter_numbers import FORMS, usable
 
 
 class Target(ABC):
@@ -33,8 +28,8 @@ class Target(ABC):
     convention: What the values are, in N, K, sigma, tau and the rate f of the samples.
     source: Where the program's own source, or its manual, defines that.
     form: The form of the numbers that it holds.
-    horizon: Time without aiding unless another is given, s.
-    warnings: What to know before use.
+    caution: What to know before use, in a line of the file.
+    warnings: More of it, for the explanation.
     file_name: How `gmwm calibrate` calls the file; by default name.yaml.
     to_copy: Title by which reports offer the text to copy; empty where they do not.
     keys: By which the numbers are read back; None if they cannot be.
@@ -46,7 +41,7 @@ class Target(ABC):
     convention: ClassVar[str]
     source: ClassVar[str]
     form: ClassVar[str] = "N+K"
-    horizon: ClassVar[float] = OUTAGE
+    caution: ClassVar[str] = ""
     warnings: ClassVar[tuple[str, ...]] = ()
     file_name: ClassVar[str] = ""
     to_copy: ClassVar[str] = ""
@@ -64,6 +59,17 @@ class Target(ABC):
         Raises InputError if they lack something that the file needs.
         """
 
+    @abstractmethod
+    def explain(
+        self, given: Sequence[Any], horizon: float | None = None, form: str | None = None
+    ) -> str:
+        """What the values of the file are and mean; errors as of `export`."""
+
+    def about(self) -> list[str]:
+        """Name, caution, warnings and convention, as texts."""
+        texts = [self.caution, *self.warnings, f"{self.convention} ({self.source})"]
+        return [f"{self.title}, {self.file}", *filter(None, texts)]
+
     def save(
         self, path: str | os.PathLike[str], given: Sequence[Any], horizon: float | None, form: Any
     ) -> str:
@@ -74,7 +80,7 @@ class Target(ABC):
 
 
 class ImuFile(Target):
-    """Numbers of gyros and accelerometers, between comments that say what they are.
+    """Numbers of gyros and accelerometers, below comments that say what they are.
 
     shared: Whether the axes of a sensor have one value.
     one_tau: Whether all axes have one correlation time.
@@ -91,35 +97,44 @@ class ImuFile(Target):
     def body(self, imu: ImuNumbers) -> Any:
         """Lines between the comments; of files in JSON, the object."""
 
-    def above(self, imu: ImuNumbers) -> list[str]:
-        """Lines of comment above the numbers, without the mark."""
-        name = f"{self.title}, {self.file}"
-        return [*above(imu, name), *(line for text in self.warnings for line in wrapped(text))]
-
-    def below(self, imu: ImuNumbers) -> list[str]:
-        """Lines of comment below the numbers, without the mark."""
-        return below(imu, f"{self.convention} ({self.source})")
-
     def text(self, imu: ImuNumbers) -> str:
         """The whole file."""
-        first, last = (comment(each(imu), self.mark) for each in (self.above, self.below))
-        return "\n".join([*self.head, *first, *self.body(imu), "", *last]) + "\n"
+        lines = comment(notes(imu, self.title, self.caution), self.mark)
+        return "\n".join([*self.head, *lines, *self.body(imu)]) + "\n"
 
     def export(self, given: Sequence[Any], horizon: float | None, form: str | None) -> str:
+        return self.text(self._imu(given, horizon, form))
+
+    def explain(
+        self, given: Sequence[Any], horizon: float | None = None, form: str | None = None
+    ) -> str:
+        imu = self._imu(given, horizon, form)
+        parts = [
+            "\n".join(line for each in [*self.about(), *purpose(imu)] for line in wrapped(each))
+        ]
+        if self.shared:
+            parts.append("The same for all axes of a sensor, as in the file:")
+            own = [each for each in given if isinstance(each, Calibration)]
+            parts += [usable(each, self.form, imu.horizon, shared=True).text("si") for each in own]
+            parts.append("Each axis by itself, which the file does not hold:")
+        sources = numbers_for(given, self.form, horizon, self.one_tau)
+        return "\n\n".join([*parts, *(each.text("si") for each in sources)]) + "\n"
+
+    def _imu(self, given: Sequence[Any], horizon: float | None, form: str | None) -> ImuNumbers:
         if form is not None and checks.choice("form", form, FORMS) != self.form:
             raise InputError(f"form {form}: {self.title} holds {self.form} only")
         try:
-            imu = imu_of(given, self.form, horizon, self.horizon, self.shared, one_tau=self.one_tau)
+            return imu_of(given, self.form, horizon, shared=self.shared, one_tau=self.one_tau)
         except InputError as error:
             raise InputError(f"{self.title}: {error}", error.code) from None
-        return self.text(imu)
 
 
 class JsonFile(ImuFile):
     """A file in JSON, whose comments are an entry of their own at the end."""
 
     def text(self, imu: ImuNumbers) -> str:
-        return json_text({**self.body(imu), "comment": [*self.above(imu), *self.below(imu)]}) + "\n"
+        comments = notes(imu, self.title, self.caution)
+        return json_text({**self.body(imu), "comment": comments}) + "\n"
 
 
 def json_text(value: Any, indent: str = "") -> str:

@@ -6,7 +6,7 @@ never overconfident, `reduce` is right for given outages, `certify` checks numbe
 `error_budget` predicts how fast a navigation without aiding goes wrong.
 """
 
-from gmwm.filter_numbers.bound import bound as bound, judged as judged
+from gmwm.filter_numbers.bound import bound as bound
 from gmwm.filter_numbers.budget import (
     FIELD_UNITS as FIELD_UNITS,
     HORIZONTAL as HORIZONTAL,
@@ -36,3 +36,5 @@ from gmwm.filter_numbers.result import (
     FilterNumbers as FilterNumbers,
     Predicted as Predicted,
 )
+from gmwm.filter_numbers.tuning import HORIZON as HORIZON
+from gmwm.filter_numbers.usable import usable as usable

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -34,7 +33,7 @@ from gmwm.process import Model, RandomWalk, WhiteNoise
 def bound(
     source: One | Several,
     form: str = "N+K",
-    horizon: float = 60.0,
+    horizon: float = tuning.HORIZON,
     *,
     level: float | None = None,
     bias_sd: Sd = 0.0,
@@ -51,8 +50,8 @@ def bound(
     form : {"N+K", "N+GM", "N+K+GM"}
         White noise with a random walk, a Gauss-Markov process, or both.
     horizon : float, optional
-        Time without aiding for which they are to be small, s. For relative poses, the interval of
-        keyframes. They dominate at any time.
+        Time without aiding for which they are to be small, s; they dominate at any time. The
+        interval of fixes or keyframes is no horizon: see docs/filter-numbers.md.
     level : float, optional
         Of the confidence region of a fit, e.g. 0.95: all models in it are dominated. By default
         only the estimate is, and the uncertainty of its parameters is not covered.
@@ -196,14 +195,6 @@ def predicted(
         return tuple(Predicted(time, nan, nan) for time in times)
     rows = zip(times, errors.nees(), errors.tightness(), strict=True)
     return tuple(Predicted(time, float(nees), float(sd)) for time, nees, sd in rows)
-
-
-def judged(source: One | Several, numbers: AxisFilterNumbers) -> AxisFilterNumbers:
-    """The same numbers with the predictions where an error model is the truth, at their times."""
-    axis = SensorAxes.of(source, None, 0.0).axes[0]
-    times = [each.time for each in numbers.predicted]
-    found = predicted(axis, axis.chain, numbers.model, numbers.initial_sd, times)
-    return replace(numbers, predicted=found)
 
 
 def _overconfidence(axis: AxisModel, model: Model, sd: float, horizon: float) -> list[Notice]:

@@ -16,11 +16,13 @@ from gmwm._core.text import bullets, wrapped
 from gmwm._core.units import SI_UNIT, factor
 from gmwm.errors import InputError
 from gmwm.filter_numbers import tuning
-from gmwm.filter_numbers.axes import AxisModel, One, Sd, SensorAxes, Several, given_times
+from gmwm.filter_numbers.axes import SHARED, AxisModel, One, Sd, SensorAxes, Several, given_times
 from gmwm.filter_numbers.bound import bound_of
 from gmwm.filter_numbers.imperfections import Imperfections, Motion
 from gmwm.filter_numbers.propagation import Chain
 from gmwm.filter_numbers.result import AxisFilterNumbers, FilterNumbers, InUnits, shown_unit
+from gmwm.filter_numbers.spectra import KINDS
+from gmwm.filter_numbers.usable import usable
 from gmwm.ins import SensorModels, covariance_analysis, loiter_with_outages
 from gmwm.issues import Notice, notice
 from gmwm.process import Model, Process, RandomWalk, WhiteNoise, as_model
@@ -99,7 +101,7 @@ class Certificate(Document, InUnits):
     numbers : FilterNumbers
         In use.
     recommended : FilterNumbers
-        With which a filter is never overconfident about the error model.
+        Of the form in use, shared by axes where those are, as `gmwm.export` writes them.
     checks : tuple of Check
     causes : tuple of Cause
     notices : tuple of Notice
@@ -234,8 +236,11 @@ def certify(
     if known.needs_motion and moved is None:
         raise InputError("these imperfections have no effect at rest: give a motion too")
     horizon = times[-1]
-    safe = axes.numbers(lambda group: bound_of(group, "N+K", horizon, None), shared=False)
-    in_use = {a.name: _in_use(numbers, a, horizon, safe[a.name].initial_sd) for a in axes.axes}
+    in_use = {axis.name: _in_use(numbers, axis, horizon) for axis in axes.axes}
+    items: Any = source if isinstance(source, Mapping) else {axes.axes[0].name: source}
+    safe = usable(items, horizon=horizon, bias_sd=bias_sd, dt=dt, **_kind_of(numbers, in_use))
+    starts = {name: one.initial_sd for name, one in safe.items()}
+    in_use = {a.name: _in_use(numbers, a, horizon, starts[a.name]) for a in axes.axes}
     own = replace(safe, source="", axes=in_use)
     found = [check for axis in axes.axes for check in _of_axis(axis, own, times, keyframe)]
     in_flight, notices = _in_flight(axes, own, times)
@@ -247,7 +252,18 @@ def certify(
     return Certificate(own, safe, (*found, *in_flight), tuple(causes), tuple(notices))
 
 
-def _in_use(given: Given, axis: AxisModel, horizon: float, start: float) -> AxisFilterNumbers:
+def _kind_of(given: Given, in_use: Mapping[str, AxisFilterNumbers]) -> dict[str, Any]:
+    """Options of `usable` for numbers of the kind in use: as many terms, shared by as many axes."""
+    forms = {one.form for one in in_use.values()}
+    form = forms.pop() if len(forms) == 1 and forms <= set(KINDS) else "N+K"
+    taus = {one.tau for one in in_use.values()}
+    is_common = form != "N+K" and len(in_use) > 1 and len(taus) == 1
+    is_by_axis = isinstance(given, Mapping) and any(name in given for name in in_use)
+    is_shared = given.shared if isinstance(given, FilterNumbers) else not is_by_axis
+    return {"form": form, "shared": is_shared, "tau": SHARED if is_common else None}
+
+
+def _in_use(given: Given, axis: AxisModel, horizon: float, start: float = 0.0) -> AxisFilterNumbers:
     """The numbers of one axis in use; those without a horizon (s) or start (u) get the given."""
     kind = axis.quantity or axis.name
     names = [name for name in (axis.name, kind) if isinstance(given, Mapping) and name in given]

@@ -11,9 +11,9 @@ from gmwm.calibration import Calibration
 from gmwm.errors import InputError
 from gmwm.estimate import Fit
 from gmwm.export import SENSORS, TARGETS, Axis, ImuFile, Triad, axis_of, imu_of
-from gmwm.filter_numbers import bound
+from gmwm.filter_numbers import HORIZON, usable
 
-SHOWN = 60.0
+SHOWN = HORIZON
 """s: length of outages of all filter numbers on a page."""
 
 _TITLES = {name: each.to_copy for name, each in TARGETS.items() if each.to_copy}
@@ -46,7 +46,7 @@ def certified(calibration: Calibration) -> Certified:
     problem = ""
     for name, fitted in calibration.items():
         try:
-            axes[name] = axis_of(name, bound(fitted, horizon=SHOWN), float("nan"), fitted)
+            axes[name] = axis_of(name, usable({name: fitted})[name], float("nan"), fitted)
         except InputError as error:
             problem = f"{name}: {error}"
     fits = {name: calibration[name] for name in axes if calibration[name].wv.quantity in SENSORS}
@@ -57,7 +57,7 @@ def certified(calibration: Calibration) -> Certified:
     )
     texts = {}
     try:
-        imu = imu_of([replace(calibration, fits=fits)], "N+K", SHOWN, SHOWN, shared=True)
+        imu = imu_of([replace(calibration, fits=fits)], "N+K", shared=True)
         for name, title in _TITLES.items():
             target = TARGETS[name]
             if isinstance(target, ImuFile):
@@ -74,7 +74,7 @@ def triad_of(quantity: str, fits: Mapping[str, Fit]) -> Triad:
 
     Raises InputError if an axis has none.
     """
-    own, shared = (bound(fits, horizon=SHOWN, shared=each) for each in (False, True))
+    own, shared = (usable(fits, shared=each) for each in (False, True))
     axes = tuple(axis_of(name, one, own.rate, fits[name]) for name, one in own.items())
     return Triad(quantity, axes, next(iter(shared.values())))
 

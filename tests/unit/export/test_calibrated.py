@@ -4,7 +4,6 @@ import json
 import re
 import xml.etree.ElementTree as ElementTree
 from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -13,7 +12,9 @@ import yaml
 import gmwm
 import marks
 from gmwm import Channel, GaussMarkov, InputError, RandomWalk, Recording, WhiteNoise, bound, reduce
-from gmwm.export import TARGETS, axis_of
+from gmwm._core.text import brief
+from gmwm.export import TARGETS
+from gmwm.filter_numbers import usable
 from gmwm.issues import Notice
 from imu_numbers import numbers
 
@@ -42,6 +43,14 @@ def recording(gyro, accel, axes="xy", n=20_000, seed=3, dt=DT):
 
 def kalibr_text(calibration):
     return gmwm.export(calibration, "kalibr")
+
+
+def explained(given, target, horizon=None):
+    return TARGETS[target].explain([given], horizon)
+
+
+def comments_of(text):
+    return [line for line in text.splitlines() if line.startswith("#")]
 
 
 def walk_where_it_is(name):
@@ -91,13 +100,10 @@ def test_noise_density_is_that_of_the_noisiest_axis(calibration, content):
         assert low < value < high
 
 
-def test_a_walk_that_was_not_found_is_called_an_upper_bound(text):
+def test_terms_that_were_not_found_are_called_upper_limits(text):
     # Only where the model has no slow term.
-    lines = text.splitlines()
-    after = {line.partition(":")[0]: below for line, below in pairwise(lines)}
-    told = {key for key in NUMBERS if "no random walk was found: this is the" in after[key]}
-    assert told == {"accelerometer_random_walk"}
-    assert text.count("95 % upper limit") == 1
+    (line,) = [line for line in comments_of(text) if "upper limit" in line]
+    assert line.endswith("no such term was found: accel K")
 
 
 @pytest.mark.parametrize("seed", [0, marks.slow(1), marks.slow(2)])
@@ -126,7 +132,7 @@ def test_the_file(calibration, text, tmp_path):
     path = tmp_path / "imu.yaml"
     assert gmwm.export(calibration, "kalibr", path=path) == text
     assert path.read_text() == text
-    assert text.startswith("# bench.csv, 100 s static\n")
+    assert text.startswith("# Kalibr: bench.csv, 100 s static\n# N+K for outages up to 60 s")
 
 
 @pytest.mark.parametrize("source", ["", "two\nlines: of name", "a # b: {c", "x\u2028y\x00\x1b[3m"])
@@ -177,25 +183,65 @@ def slow():
 @pytest.mark.parametrize("horizon", [None, 10.0])
 def test_slow_terms_count_as_a_random_walk(slow, horizon):
     content = yaml.safe_load(gmwm.export(slow, "kalibr", horizon=horizon))
-    found = bound(slow, "N+K", horizon or 1.0, shared=True)
+    found = bound(slow, "N+K", horizon or 60.0, shared=True)
     for sensor, quantity in (("gyroscope", "gyro"), ("accelerometer", "accel")):
         one = next(iter(found.of(quantity).values()))
         assert content[f"{sensor}_noise_density"] == pytest.approx(one.N, rel=1e-6)
         assert content[f"{sensor}_random_walk"] == pytest.approx(one.K, rel=1e-6)
-        # Not below what the model itself does at high frequencies.
-        model = slow[f"{quantity}_x"].params
-        assert 0.5 * model["sigma"] * np.sqrt(2.0 / model["tau"]) < one.K
+        # At no frequency below the model.
+        f = np.geomspace(1e-4, 50.0, 60)
+        for axis in "xy":
+            model = slow[f"{quantity}_{axis}"].model
+            assert np.all(one.model.psd(f, DT) > 0.999 * model.psd(f, DT))
     text = gmwm.export(slow, "kalibr", horizon=horizon)
     assert "upper limit" not in text
 
 
-def test_comments_hold_consistency_and_other_horizons(slow):
-    text = gmwm.export(slow, "openvins")
-    assert "; NEES" in text
-    joined = " ".join(line.lstrip("# ") for line in text.splitlines())
-    for horizon in (10, 60, 600):
-        one = next(iter(bound(slow, "N+K", horizon, shared=True).of("gyro").values()))
-        assert f"{horizon} s: {one.N:.3e}, {one.K:.3e}" in joined
+def test_comments_hold_the_consistency_and_what_n_and_k_cover(slow):
+    lines = comments_of(gmwm.export(slow, "kalibr"))
+    shared = bound(slow, "N+K", 60.0, shared=True)
+    nees = [one.nees[60.0] for one in shared.of("gyro").values()]
+    (line,) = [line for line in lines if "NEES" in line]
+    assert line.startswith(f"# NEES at 60 s: gyro {min(nees):.3g} to {max(nees):.3g}, accel ")
+    gyro = max(slow.numbers, key=lambda name: bound(slow, "N+K")[name].N if name[0] == "g" else 0.0)
+    tau = slow[gyro].params["tau"]
+    (line,) = [line for line in lines if "also cover" in line]
+    assert re.search(rf"{gyro} (Gauss-Markov|GM) [\d.]+ deg/h, {brief(tau)} s", line)
+    sd = max(one.initial_sd for one in shared.of("gyro").values())
+    assert f"# start bias gyro {sd:.2e} rad/s, accel " in "\n".join(lines)
+
+
+def test_the_explanation_has_the_numbers_of_the_file_and_of_each_axis(slow):
+    text = explained(slow, "openvins")
+    assert bound(slow, shared=True).text("si") in text
+    assert bound(slow).text("si") in text
+    assert "Propagator.cpp: predict_and_compute" in " ".join(text.split())
+    of_axes = explained(slow, "basalt", 10.0)
+    assert bound(slow, horizon=10.0).text("si") in of_axes
+    assert "all axes of a sensor" not in of_axes
+
+
+YAML = ("kalibr", "vins", "orbslam3", "fastlio", "liosam", "kimera", "okvis2", "maplab")
+
+
+@pytest.mark.parametrize("source", ["bench.csv", "a long name of a file " * 20])
+@pytest.mark.parametrize("is_valid", [True, False])
+@pytest.mark.parametrize("name", sorted(TARGETS))
+def test_files_have_six_lines_of_comment_and_yaml_twelve_in_all(slow, name, is_valid, source):
+    step = () if is_valid else (Notice("step", "bad", "", "a step", {}),)
+    fits = {n: replace(f, notices=step if n[-1] == "y" else ()) for n, f in slow.items()}
+    text = gmwm.export(replace(slow, fits=fits, source=source), name)
+    marks = {"gtsam-cpp": "//", "matlab": "%"}
+    lines = text.splitlines()
+    comments = [line for line in lines if line.startswith(marks.get(name, "#"))]
+    if name == "gazebo":
+        comments = text.partition("-->")[0].splitlines()
+    if name in ("basalt", "glim", "state-space"):
+        comments = json.loads(text)["comment"]
+    assert 4 <= len([line for line in comments if "pragma" not in line]) <= 6
+    assert sum("not valid, do not use: gyro_y" in line for line in comments) == (not is_valid)
+    if name in YAML:
+        assert len(lines) <= 12
 
 
 def test_per_axis_files_have_the_bound_of_each_axis(slow):
@@ -221,19 +267,19 @@ def test_two_recordings_of_different_rates(slow):
     content = yaml.safe_load(gmwm.export([gyro, accel], "kalibr"))
     assert content["update_rate"] == 200.0
     text = gmwm.export((gyro, accel), "vins")
-    assert "gyros at 200 Hz, accelerometers at 100 Hz" in text
-    one = next(iter(bound(accel, "N+K", 1.0, shared=True).values()))
+    about = TARGETS["vins"].explain([gyro, accel])
+    assert "gyros at 200 Hz, accelerometers at 100 Hz" in about
+    one = next(iter(bound(accel, "N+K", 60.0, shared=True).values()))
     assert yaml.safe_load(text)["acc_n"] == pytest.approx(one.N * np.sqrt(400.0), rel=1e-6)
 
 
-def test_axes_of_one_sensor_in_two_calibrations_have_the_larger_numbers(slow):
-    # A bound over the axes of one of them would not be one of the other's.
+def test_axes_of_one_sensor_in_two_calibrations_share_one_bound(slow):
     parts = [replace(slow, fits={n: f for n, f in slow.items() if n[-1] == axis}) for axis in "xy"]
+    whole = yaml.safe_load(gmwm.export(slow, "kalibr"))
     for order in (parts, parts[::-1]):
         content = yaml.safe_load(gmwm.export(order, "kalibr"))
-        found = bound(slow, "N+K", 1.0).of("gyro").values()
-        assert content["gyroscope_random_walk"] == pytest.approx(max(each.K for each in found))
-        assert content["gyroscope_noise_density"] == pytest.approx(max(each.N for each in found))
+        for key in NUMBERS:
+            assert content[key] == pytest.approx(whole[key], rel=1e-5)
 
 
 def test_without_a_rate():
@@ -251,47 +297,40 @@ def test_a_walk_without_a_place_for_it_is_reduced_and_the_file_says_so(calibrati
     fits = {name: fit for name, fit in calibration.items() if name.endswith("x")}
     calibration = replace(calibration, fits=fits)
     text = gmwm.export(calibration, "kfgins", horizon=6.0)
-    joined = " ".join(line.lstrip("# ") for line in text.splitlines())
-    assert "gyro_x: a random walk, which N+GM cannot bound" in joined
-    assert "whose filter has the right errors at the horizon" in joined
+    assert "# N+GM for outages up to 6 s (reduce)" in text
+    joined = " ".join(explained(calibration, "kfgins", 6.0).split())
+    assert "consistent on average, since no N+GM bounds a random walk" in joined
     found = reduce(calibration, "N+GM", [1.0, 3.0, 6.0], tau="shared")
     content = yaml.safe_load(text)["imunoise"]
     assert np.radians(content["arw"][0]) / 60.0 == pytest.approx(found["gyro_x"].N, rel=1e-5)
     assert content["corrtime"] * 3600.0 == pytest.approx(found["gyro_x"].tau[0], rel=1e-5)
-    assert "gmwm.reduce" not in gmwm.export(calibration, "kalibr")
+    assert "gmwm.reduce" not in explained(calibration, "kalibr")
 
 
-def table_of(text):
-    """Cells of the numbers of each axis in the comments of a file."""
-    rows = (line.lstrip("# ").split() for line in text.splitlines())
-    return {row[0]: row[1:] for row in rows if row and re.fullmatch("(gyro|accel)_[xyz]", row[0])}
-
-
-def test_the_table_has_the_one_correlation_time_of_the_file_and_what_it_costs(slow):
-    text = gmwm.export(slow, "kfgins")
-    content = yaml.safe_load(text)["imunoise"]
+def test_the_file_has_the_one_correlation_time_that_costs_least(slow):
+    content = yaml.safe_load(gmwm.export(slow, "kfgins"))["imunoise"]
     found = bound(slow, "N+GM", 60.0, tau="shared")
     units = {"gyro": np.radians(1.0) / 3600.0, "accel": 1e-5}
-    for name, (N, sigma, tau, _, *nees) in table_of(text).items():
+    for name, one in found.items():
         held = content["gbstd" if name[0] == "g" else "abstd"]["xyz".index(name[-1])]
-        assert float(tau) == pytest.approx(3600.0 * content["corrtime"], rel=1e-3)
-        assert float(sigma) == pytest.approx(held * units[name[:-2]], rel=1e-3)
-        assert float(N) == pytest.approx(found[name].N, rel=1e-3)
-        expected = found[name].nees.values()
-        assert [float(v) for v in nees] == pytest.approx(list(expected), rel=0.01)
+        assert one.tau == pytest.approx((3600.0 * content["corrtime"],), rel=1e-5)
+        assert one.sigma == pytest.approx((held * units[name[:-2]],), rel=1e-5)
+    assert found.text("si") in explained(slow, "kfgins")
+
+
+def test_two_calibrations_have_one_correlation_time_too(slow):
+    parts = [replace(slow, fits={n: f for n, f in slow.items() if n[0] == q}) for q in "ga"]
+    whole, two = (yaml.safe_load(gmwm.export(each, "kfgins")) for each in (slow, parts))
+    assert two == whole
 
 
 @pytest.mark.parametrize(("form", "target"), [("N+K", "kalibr"), ("N+GM", "kfgins")])
 def test_consistency_that_saved_numbers_do_not_know(slow, form, target):
-    saved = gmwm.export(bound(slow, form, 60.0), target)
-    assert all("-" in cells or len(cells) == 4 for cells in table_of(saved).values())
-    assert "NEES is not known where the file holds other numbers" in saved
+    assert "NEES unknown" in gmwm.export(bound(slow, form, 60.0), target)
     # The calibration, and numbers that the axes share, know it.
-    known = gmwm.export(slow, target, horizon=60.0)
-    assert not any("-" in cells for cells in table_of(known).values())
-    assert "NEES is not" not in known
+    assert "NEES unknown" not in gmwm.export(slow, target)
     if form == "N+K":
-        assert "NEES is not" not in gmwm.export(bound(slow, form, 60.0, shared=True), target)
+        assert "NEES unknown" not in gmwm.export(bound(slow, form, 60.0, shared=True), target)
 
 
 @pytest.mark.parametrize(
@@ -333,66 +372,35 @@ def test_the_room_is_its_function():
     assert room(numbers("N+K"), "glim") == gmwm.export(numbers("N+K"), "glim")
 
 
-def test_a_walk_that_is_not_there_has_its_bound_at_every_horizon(calibration):
-    text = kalibr_text(calibration)
-    comments = " ".join(line.strip("# ") for line in text.splitlines() if line.startswith("#"))
-    assert ", 0.000e+00" not in comments
-    walk = float(yaml.safe_load(text)["accelerometer_random_walk"])
-    outlook = comments.partition("accel N, K for all axes by horizon:")[2].partition("gyro_x")[0]
-    assert outlook.count(f"< {walk:.3e}") == 3
+def test_a_walk_that_is_not_there_has_its_limit_at_every_horizon(calibration):
+    walk = yaml.safe_load(kalibr_text(calibration))["accelerometer_random_walk"]
+    fits = {name: fit for name, fit in calibration.items() if name[0] == "a"}
+    for horizon in (10.0, 60.0, 600.0):
+        found = usable(fits, horizon=horizon, shared=True)["accel_x"]
+        assert pytest.approx(walk, rel=1e-6) == found.K
+    assert "K is the 95 % upper limit" in explained(calibration, "kalibr")
 
 
-# -- what the comments say is true of the file ----------------------------------------------------
-
-
-def rows_of(text, mark="# "):
-    """Cells of the tables in the comments, by the name of the row and its place."""
-    lines = [line.removeprefix(mark).split() or [""] for line in text.splitlines()]
-    return [cells for cells in lines if re.fullmatch(r"shared|(gyro|accel)_\w", cells[0])]
-
-
-def test_shared_numbers_and_those_of_each_axis_have_their_own_consistency(slow):
-    text = gmwm.export(slow, "openvins")
-    own, shared = bound(slow, "N+K", 1.0), bound(slow, "N+K", 1.0, shared=True)
-    found = rows_of(text)
-    names = ["shared", "gyro_x", "gyro_y", "shared", "accel_x", "accel_y"]
-    assert [row[0] for row in found] == names
-    content = yaml.safe_load(text.partition("\n")[2])["imu0"]
-    both = [row for row in found if row[0] == "shared"]
-    for row, sensor in zip(both, ("gyroscope", "accelerometer"), strict=True):
-        N, K = (content[f"{sensor}_{what}"] for what in ("noise_density", "random_walk"))
-        assert [float(cell) for cell in row[1:3]] == pytest.approx([N, K], rel=1e-3)
-    for name, *cells in found:
-        if name != "shared":
-            values = [float(cell) for cell in cells]
-            assert values[:3] == pytest.approx(
-                [own[name].N, own[name].K, own[name].initial_sd], rel=1e-3
-            )
-            # After 1 and 10 s, each with the shared numbers and with its own.
-            pairs = zip(shared[name].nees.values(), own[name].nees.values(), strict=True)
-            assert values[3:] == pytest.approx([v for pair in pairs for v in pair], rel=5e-3)
-    assert "by axis" not in text
-
-
-def test_consistency_is_that_of_the_upper_bound_where_the_file_holds_one(calibration):
+def test_consistency_is_that_of_the_limit_where_the_file_holds_one(calibration):
     text = gmwm.export(calibration, "gtsam")
     squares = text.partition("BiasAccCovariance(np.diag([")[2]
-    walk = np.sqrt(float(squares.split(",")[0]))
-    row = next(row for row in rows_of(text) if row[0] == "accel_x")
-    assert (row[2], float(row[3])) == ("<", pytest.approx(walk, rel=1e-3))
+    found = usable(calibration)["accel_x"]
+    assert np.sqrt(float(squares.split(",")[0])) == pytest.approx(found.K, rel=1e-5)
     # More walk than none is more cautious.
-    without = bound(calibration["accel_x"], "N+K", 1.0).nees.values()
-    assert all(float(cell) < nees for cell, nees in zip(row[-2:], without, strict=True))
+    without = bound(calibration["accel_x"], "N+K", 60.0)
+    assert all(found.nees[time] < nees for time, nees in without.nees.items())
 
 
 @pytest.mark.parametrize("tau", [None, 7.0])
 def test_a_slow_process_that_was_not_found_rises_as_the_largest_walk_does(calibration, tau):
     fit = calibration["accel_x"]
-    axis = axis_of("accel_x", bound(fit, "N+GM", 60.0), 100.0, fit, tau)
-    assert (axis.tau, axis.upper) == (tau or 60.0, {"sigma"})
+    found = usable({"accel_x": fit}, "N+GM", 7.0 if tau else 60.0)["accel_x"]
+    assert found.tau == (tau or 60.0,)
+    (limit,) = (n for n in found.notices if n.code == "upper-limit")
+    assert limit.values == {"sigma": found.sigma[0]}
     walk = gmwm.calibration.upper_limit(fit, "K")
     high = np.array([1.0])
-    ratio = GaussMarkov(axis.sigma, axis.tau).psd(high, 1e-6) / RandomWalk(walk).psd(high, 1e-6)
+    ratio = found.model.terms[1].psd(high, 1e-6) / RandomWalk(walk).psd(high, 1e-6)
     assert ratio == pytest.approx(1.0, abs=1e-3)
 
 

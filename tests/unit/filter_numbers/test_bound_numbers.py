@@ -24,7 +24,7 @@ from gmwm import (
     Sinusoid,
     WhiteNoise,
 )
-from gmwm.filter_numbers import Chain, judged
+from gmwm.filter_numbers import Chain
 from gmwm.filter_numbers.spectra import (
     Estimated,
     ParameterRegion,
@@ -86,7 +86,8 @@ def test_one_correlation_time_for_all_axes_is_the_one_that_costs_least():
         other = own[name]
         wide = other.sigma[0] * np.sqrt(max(tau / other.tau[0], other.tau[0] / tau))
         wider = replace(other, model=WhiteNoise(other.N) + GaussMarkov(float(wide), tau))
-        assert judged(truths[name], wider).nees[60.0] < each.nees[60.0]
+        (check,) = gmwm.certify(truths[name], wider, outages=(60.0,)).of("free")
+        assert check.nees < each.nees[60.0]
 
     def cost(tau):
         found = gmwm.bound(truths, "N+GM", tau=tau)

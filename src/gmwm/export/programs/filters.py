@@ -12,7 +12,7 @@ from typing import Any
 from gmwm.errors import InputError
 from gmwm.export.imu import NO_RATE, Axis, ImuNumbers, Triad
 from gmwm.export.keys import ARW, DEG_H, MemoryKeys, WalkKeys
-from gmwm.export.target import KEYFRAME, ImuFile, JsonFile
+from gmwm.export.target import ImuFile, JsonFile
 
 _MGAL = 1e-5  # m/s^2
 _HOUR = 3600.0
@@ -35,7 +35,6 @@ class Ros(ImuFile):
         "diagonal of a row-major 3 x 3 matrix; slow errors have no place in it"
     )
     source = "common_interfaces/sensor_msgs/msg/Imu.msg"
-    horizon = KEYFRAME
 
     def body(self, imu: ImuNumbers) -> list[str]:
         return [
@@ -72,7 +71,6 @@ class Gtsam(ImuFile):
         "gtsam/navigation/CombinedImuFactor.cpp: PreintegratedCombinedMeasurements::"
         "integrateMeasurement; PreintegrationCombinedParams.h"
     )
-    horizon = KEYFRAME
     file_name, to_copy = "gtsam_imu.py", "Python, GTSAM"
     keys = WalkKeys(
         "gyroscopeCovariance biasOmegaCovariance accelerometerCovariance biasAccCovariance", power=2
@@ -122,9 +120,7 @@ class GtsamCpp(Gtsam):
                 f"gtsam::Vector3({values}).asDiagonal();  // {unit}"
                 for name, values, unit in self.squares(imu)
             ),
-            "  // Up to GTSAM 4.2, or its default, a gyro noise of 1 rad/s/sqrt(Hz),",
-            "  // swamps the rest:",
-            "  // params->biasAccOmegaInt.setZero();",
+            "  // params->biasAccOmegaInt.setZero();  // huge up to GTSAM 4.2",
             "  return params;",
             "}",
         ]
@@ -142,7 +138,7 @@ class KfGins(ImuFile):
     )
     form = "N+GM"
     one_tau = True
-    warnings = ("gsstd and asstd, of the scale factors, are not in a static recording: keep yours",)
+    caution = "keep your gsstd and asstd: no static recording shows scale factors"
     file_name = "kf-gins.yaml"
     keys = MemoryKeys(
         "arw gbstd corrtime vrw abstd corrtime",
@@ -178,7 +174,6 @@ class Basalt(JsonFile):
         "basalt-headers/include/basalt/calibration/calibration.hpp: Calibration; "
         "include/basalt/linearization/imu_block.hpp: ImuBlock::linearizeImu"
     )
-    horizon = KEYFRAME
     file_name = "basalt.json"
     keys = WalkKeys("gyro_noise_std gyro_bias_std accel_noise_std accel_bias_std")
 
@@ -197,9 +192,9 @@ class Glim(JsonFile):
     name, title, file = "glim", "GLIM", "sensors of config_sensors.json"
     convention = "N for all axes, continuous time"
     source = "src/glim/common/imu_integration.cpp: IMUIntegration"
-    horizon = KEYFRAME
     shared = True
     file_name = "glim.json"
+    caution = "imu_bias_noise: K of the accelerometers times sqrt(time between scans)"
     warnings = (
         "imu_bias_noise is one step for gyros (rad/s) and accelerometers (m/s^2) alike, which "
         "no K can be: with K sqrt(time between scans) of the accelerometers those are right "

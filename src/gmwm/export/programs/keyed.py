@@ -14,7 +14,7 @@ import numpy as np
 
 from gmwm.export.imu import ImuNumbers
 from gmwm.export.keys import WalkKeys
-from gmwm.export.target import KEYFRAME, OUTAGE, ImuFile
+from gmwm.export.target import ImuFile
 
 _UNITS = {
     ("gyro", "N"): "rad/s/sqrt(Hz)",
@@ -38,7 +38,6 @@ class KeyedFile(ImuFile):
     """
 
     shared = True
-    horizon = KEYFRAME
     keys: ClassVar[WalkKeys]
     units: ClassVar[Mapping[tuple[str, str], str]] = _UNITS
     template: ClassVar[str] = "{values}"
@@ -61,9 +60,6 @@ class KeyedFile(ImuFile):
             value = self.keys.written(letter, getattr(triad, letter), rate)
             unit = self.units[triad.quantity, letter]
             lines.append(self.line.format(key=key, value=value, unit=unit))
-            if triad.is_upper(letter):
-                what = "white noise" if letter == "N" else "random walk"
-                lines.append(f"#   no {what} was found: this is the largest 95 % upper limit")
         indent = self.template.partition("{values}")[0].rpartition("\n")[2]
         values = f"\n{indent}".join(lines)
         topic = imu.topic or "/imu0  # set to the topic of your bag"
@@ -210,15 +206,14 @@ class Px4(KeyedFile):
         walk=1.0,
         rate=1.0 / interval,
     )
-    horizon = OUTAGE
     line = "1\t1\t{key}\t{value:.6e}\t9"
     file_name = "px4.params"
+    caution = "LEAST VALUES, NOT FOR FLIGHT AS THEY ARE: vibration dominates in the air"
     warnings = (
-        "LEAST VALUES, NOT FOR FLIGHT AS THEY ARE: vibration, which a recording on the bench "
-        "does not hold, dominates in the air; PX4's defaults (gyro 0.015 rad/s, accelerometer "
-        "0.35 m/s^2) stand for it. Record in flight, or keep the larger of the two. PX4 takes "
-        "gyro noise of 0.0001 to 0.1 rad/s, accelerometer noise of 0.01 to 1 m/s^2, and bias "
-        "noise up to 0.01.",
+        "A recording on the bench does not hold the vibration of flight; PX4's defaults (gyro "
+        "0.015 rad/s, accelerometer 0.35 m/s^2) stand for it. Record in flight, or keep the larger "
+        "of the two. PX4 takes gyro noise of 0.0001 to 0.1 rad/s, accelerometer noise of 0.01 to 1 "
+        "m/s^2, and bias noise up to 0.01.",
     )
 
 

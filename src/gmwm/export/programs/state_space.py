@@ -20,9 +20,9 @@ from gmwm._core.typing import FloatArray
 from gmwm._core.units import SI_UNIT
 from gmwm.calibration import Calibration
 from gmwm.errors import InputError
-from gmwm.export.comments import wrapped
+from gmwm.export.comments import not_valid_line, wrapped
 from gmwm.export.imu import NO_RATE
-from gmwm.export.numbers import numbers_of
+from gmwm.export.numbers import not_valid, numbers_of, reason
 from gmwm.export.target import Target, json_text
 from gmwm.filter_numbers import FORMS, FilterNumbers
 from gmwm.process import Model, Process, StateSpace, block_diagonal
@@ -44,15 +44,22 @@ class StateSpaceFile(Target):
     )
     source = "the full model, nothing reduced"
     form = "full model"
-    warnings = ("the bias at switch-on is in no static recording: add its variance to P0",)
+    caution = "P0 does not include your turn-on bias: add its variance"
     file_name = "state-space.json"
 
     def export(self, given: Sequence[Any], horizon: float | None, form: str | None) -> str:
-        return self._text(self._channels(given, horizon, form))
+        return self._text(self._channels(given, horizon, form), given)
 
-    def _text(self, channels: dict[str, dict[str, Any]]) -> str:
-        about = (f"{self.title}: {self.convention}", *self.warnings)
-        content: dict[str, Any] = {"comment": [line for text in about for line in wrapped(text)]}
+    def explain(
+        self, given: Sequence[Any], horizon: float | None = None, form: str | None = None
+    ) -> str:
+        return "\n".join(line for text in self.about() for line in wrapped(text)) + "\n"
+
+    def _text(self, channels: dict[str, dict[str, Any]], given: Sequence[Any]) -> str:
+        lines = [line for text in (self.convention, self.caution) for line in wrapped(text)]
+        invalid = {name: reason(each) for name, each in not_valid(given).items()}
+        lines += [not_valid_line(invalid)] if invalid else []
+        content: dict[str, Any] = {"comment": lines}
         content["channels"] = {
             name: {
                 key: {k: v.tolist() for k, v in value.items()} if key in _KINDS and value else value
@@ -76,7 +83,7 @@ class StateSpaceFile(Target):
                 arrays |= {f"{name}/{kind}/{key}": v for key, v in (each[kind] or {}).items()}
         with moved_into_place(path) as temporary, open(temporary, "wb") as stream:
             np.savez(stream, **arrays)
-        return self._text(channels)
+        return self._text(channels, given)
 
     def _channels(
         self, given: Sequence[Any], horizon: float | None, form: str | None
@@ -95,7 +102,7 @@ class StateSpaceFile(Target):
                 models = {n: (f.model, f.wv.dt, f.wv.quantity or "", 0.0) for n, f in each.items()}
             else:
                 wanted = form or (each.form if isinstance(each, FilterNumbers) else "")
-                numbers = numbers_of(each, wanted, horizon, self.horizon)
+                numbers = numbers_of(each, wanted, horizon)
                 if not numbers.rate > 0.0:
                     raise InputError(NO_RATE)
                 dt = 1.0 / numbers.rate
