@@ -115,7 +115,7 @@ def test_outsiders_import_faces_only():
 LINES = {
     "": 860, "_core": 2120, "process": 3190, "readers": 5350, "plotting": 700, "variance": 4100,
     "diagnosis": 3290, "estimate": 7010, "selection": 1110, "calibration": 2220,
-    "filter_numbers": 3551, "ins": 9870, "population": 2250, "export": 1760, "report": 2400,
+    "filter_numbers": 3550, "ins": 9870, "population": 2250, "export": 1760, "report": 2400,
     "study": 1700, "cli": 2000,
 }  # fmt: skip
 """Most lines of Python of each room; they may only fall until they are those of the design."""
