@@ -53,7 +53,7 @@ def main() -> None:
         for seed in range(first, first + given.runs):
             fit = gmwm.fit(truth.opened(), truth.simulate(given.samples, DT, seed), dt=DT)
             poor += fit.goodness.is_poor
-            bad += not fit.reasons["describes_data"]
+            bad += "describes_data" in fit.reasons
         print(f"{name:8} {given.runs} fits: {poor} poor, {bad} not valid", flush=True)
 
 

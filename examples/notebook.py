@@ -41,7 +41,7 @@ def _(GaussMarkov, WhiteNoise, gmwm, hours, np, seed, sigma, tau, white):
     truth = WhiteNoise(np.radians(white.value) / 60.0) + GaussMarkov(
         np.radians(sigma.value) / 3600.0, float(tau.value)
     )
-    samples = truth.simulate(round(3600 * hours.value * rate), 1.0 / rate, seed.value)
+    samples = gmwm.simulate(truth, round(3600 * hours.value * rate), rate=rate, seed=seed.value)
     recording = gmwm.Recording.from_arrays({"gyro_x": samples}, rate, {"gyro": "rad/s"})
     return recording, truth
 
@@ -50,8 +50,9 @@ def _(GaussMarkov, WhiteNoise, gmwm, hours, np, seed, sigma, tau, white):
 def _(gmwm, mo, recording):
     # The Allan curve, and the model that it shows.
     curve = gmwm.wavelet_variance(recording["gyro_x"])
-    fit = gmwm.select(curve).fit
-    mo.hstack([fit.plot().figure, mo.plain_text(str(fit))], widths=[3, 2])
+    best = gmwm.select(curve)
+    fit = best.fit
+    mo.vstack([mo.hstack([best.plot().figure, fit], widths=[3, 2]), best])
     return (fit,)
 
 

@@ -215,7 +215,7 @@ def validity_table(own: Sequence[Calibration], how: str = "") -> str:
     lines = [f"Own models, {how}{sum(fit.valid for fit in fits)} of {len(fits)} are valid"]
     for number, calibration in zip(NUMBERS, own, strict=True):
         for name, fit in calibration.items():
-            lacks = [reason for reason, has in fit.reasons.items() if not has]
+            lacks = list(fit.reasons)
             if lacks:
                 lines.append(f"{number} {name}: {', '.join(lacks)}")
     return "\n".join([*lines, ""])

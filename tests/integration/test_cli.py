@@ -571,7 +571,7 @@ def test_channels_and_a_stretch(run, good_file, no_pages):
         (("--start", "-1"), "fewer than 64 samples"),
         (("--stop", "nan"), "fewer than 64 samples"),
         (("--start", "inf"), "fewer than 64 samples"),
-        (("--model", "N + X"), "'X' is not a term: write N, Q, B, K, R, GM, Res"),
+        (("--model", "N + X"), "'X' is not a term: write B, K, N, Q, R, AR, GM"),
         (("--model", "N - K"), "'N - K' is not a term"),
         (("--model", ""), "is not a term"),
         (("--model", "N + N"), "two WhiteNoise"),

@@ -39,7 +39,7 @@ def results():
         for method in ("gmwm", "mle", "em")
     ]
     fits.append(gmwm.fit(WhiteNoise() + RandomWalk(), drifting, 1.0, method="allan"))
-    documents = [fit.to_dict() | {"reasons": dict(fit.reasons)} for fit in fits]
+    documents = [fit.to_dict() | {"reasons": list(fit.reasons)} for fit in fits]
     for truth, seed in ((TRUTH, 5), (WhiteNoise(1.0) + GaussMarkov(0.3, 40.0), 6)):
         documents.append(gmwm.select(truth.simulate(3000, 1.0, seed), 1.0).to_dict())
     documents += [gmwm.calibrate(recording()).to_dict(), gmwm.health(recording()).to_dict()]

@@ -52,7 +52,7 @@ def test_what_is_no_number_is_refused_everywhere(value):
     refused(lambda: checks.positive("x", value), "x = ")
     refused(lambda: checks.whole("x", value, 0), "x = ")
     refused(lambda: checks.share("x", value, 0.5), "x = ")
-    refused(lambda: checks.sampling_interval(value), "dt = ")
+    refused(lambda: checks.sampling_interval(value), "dt")
     refused(lambda: checks.samples(value), "n = ")
 
 
@@ -67,7 +67,7 @@ def test_numbers_of_every_type_are_taken(value):
     ("n", "dt", "words"),
     [
         ("a", 1.0, "n = 'a': give an integer number of samples, 8 or more"), (7, 1.0, "n = 7"),
-        (100.5, 1.0, "n = 100.5"), (1e13, 1.0, "too long"), (100, None, "dt = None"),
+        (100.5, 1.0, "n = 100.5"), (1e13, 1.0, "too long"), (100, None, "rate is missing"),
         (100, "a", "dt = 'a': give a positive sampling interval"), (100, -1.0, "dt = -1.0"),
         (100, 1e300, "1e-09 to 1e+06"),
     ],
@@ -124,7 +124,7 @@ def test_options_of_a_fit(method, option, values):
 
 
 def test_start_of_a_fit():
-    refused(lambda: METHODS["mle"](start="a"), "'a' is not an error model")
+    refused(lambda: METHODS["mle"](start="a"), "'a' is not a term")
 
 
 @pytest.mark.parametrize("method", [np.ones(3), ["gmwm"], 3, "GMWM", gmwm.GMWM])
@@ -155,8 +155,13 @@ def test_level_of_an_interval(level):
     [
         ({"max_gauss_markov": "a"}, "max_gauss_markov = 'a'"),
         ({"max_gauss_markov": 1.5}, "max_gauss_markov = 1.5"),
-        ({"extra": "a"}, "extra holds 'a'"),
+        ({"extra": "a"}, "extra = 'a': give a list"),
         ({"extra": WhiteNoise()}, "extra = WhiteNoise(): give a list"),
+        ({"extra": ["a"]}, "extra = 'a': give processes"),
+        ({"candidates": "N + K"}, "give a list, as in candidates="),
+        ({"candidates": ["N + X"]}, "'X' is not a term"),
+        ({"candidates": ["R"]}, 'add one, as in "N + R"'),
+        ({"candidates": ["N"], "rule": "merge"}, "leave out extra and rule"),
     ],
 )
 def test_options_of_a_selection(options, words):
@@ -236,10 +241,10 @@ def test_recordings_that_are_none():
         (lambda: True * GaussMarkov(), "True * process"),
         (lambda: 0 * GaussMarkov(), "0 * process"),
         (lambda: "a" * GaussMarkov(), "'a' * process"),
-        (lambda: WhiteNoise() + 1, "1 is not an error process"),
-        (lambda: 1 + WhiteNoise(), "1 is not an error process"),
-        (lambda: None + WhiteNoise(), "None is not an error process"),
-        (lambda: MODEL + "a", "'a' is not an error process"),
+        (lambda: WhiteNoise() + 1, "1 is not an error model"),
+        (lambda: 1 + WhiteNoise(), "1 is not an error model"),
+        (lambda: None + WhiteNoise(), "None is not an error model"),
+        (lambda: MODEL + "a", "'a' is not a term"),
     ],
 )
 def test_what_makes_no_model(make, words):

@@ -26,7 +26,7 @@ def corrected(truth: Model) -> dict[str, float]:
     fit = gmwm.fit(truth.opened(), series, dt=0.01, method=gmwm.GMWM(weights="diagonal"))
     tau: gmwm.Estimate = fit["tau"]
     if not fit.valid or tau.upper > 1e3:
-        print(fit.message, [name for name, holds in fit.reasons.items() if not holds])
+        print(fit.message, [f"{name}: {why}" for name, why in fit.reasons.items()])
     width: float = tau.upper - tau.lower
     return {**fit.params, "width": width}
 

@@ -103,12 +103,18 @@ def samples(value: Any, least: int = 1) -> int:
     return n
 
 
-def sampling_interval(value: Any) -> float:
-    """A sampling interval ``dt`` that a sensor may have, s."""
+def sampling_interval(dt: Any, rate: Any = None) -> float:
+    """A sampling interval that a sensor may have, s, from ``dt`` (s) or ``rate`` (Hz)."""
+    if dt is None and rate is None:
+        raise InputError("the sampling rate is missing: give it in Hz, as in rate=100, or dt=0.01")
+    if rate is not None:
+        if dt is not None:
+            raise InputError(f"dt = {shown(dt)} and rate = {shown(rate)}: give only one of them")
+        dt = 1.0 / positive("rate", rate, "give a positive rate in Hz, e.g. 100")
     hint = "give a positive sampling interval in seconds"
-    dt = positive("dt", value, hint)
+    dt = positive("dt", dt, hint)
     if not SHORTEST_INTERVAL <= dt <= LONGEST_INTERVAL:
-        raise _wrong("dt", value, f"{hint}, {SHORTEST_INTERVAL:g} to {LONGEST_INTERVAL:g}")
+        raise _wrong("dt", dt, f"{hint}, {SHORTEST_INTERVAL:g} to {LONGEST_INTERVAL:g}")
     return dt
 
 

@@ -20,6 +20,7 @@ from annotated_types import Ge, Gt, Le, Lt
 
 from gmwm._core import checks
 from gmwm._core.files import opened, write_text
+from gmwm._core.pages import provided
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError, printable
 
@@ -349,6 +350,8 @@ def load_document(path: str | os.PathLike[str]) -> Any:
     Raises InputError if the file is missing, is not JSON, or holds no result of a kind known here.
     """
     content = read_json(path)
+    if Document._kind_of(content) is None:
+        provided()
     kind = Document._kind_of(content)
     if kind is None:
         known = ", ".join(sorted(Document._kinds))

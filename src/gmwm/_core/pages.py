@@ -17,8 +17,14 @@ _providers: list[Callable[[], object]] = []
 
 
 def provide(load: Callable[[], object]) -> None:
-    """Name what imports the functions; it is called when the first page is asked for."""
+    """Name what imports the functions, for `provided`."""
     _providers.append(load)
+
+
+def provided() -> None:
+    """Import what stands above, when the first page or an unknown kind of file is asked for."""
+    while _providers:
+        _providers.pop()()
 
 
 def page_of(kind: type, form: str = "page") -> Callable[[_Writer], _Writer]:
@@ -36,7 +42,6 @@ def page_of(kind: type, form: str = "page") -> Callable[[_Writer], _Writer]:
 
 def make(form: str, result: Any, *args: Any, **options: Any) -> Any:
     """What the registered function makes of a result."""
-    while _providers:
-        _providers.pop()()
+    provided()
     kind = next(kind for kind in type(result).__mro__ if (form, kind) in _writers)
     return _writers[form, kind](result, *args, **options)

@@ -13,7 +13,7 @@ from gmwm.calibration.unresolved import with_largest_walk
 from gmwm.errors import InputError
 from gmwm.estimate import Fit, estimate
 from gmwm.issues import Notice, failure, notice
-from gmwm.process import Model, Process
+from gmwm.process import Model, Process, as_model
 from gmwm.readers import Channel
 from gmwm.selection import Selection, select
 from gmwm.variance import WaveletVariance
@@ -21,7 +21,7 @@ from gmwm.variance import WaveletVariance
 LONGEST_PART = "longest-part"
 """Code of the advice for a recording with several departures from noise."""
 
-GivenModels = Process | Model | Mapping[str, Process | Model] | None
+GivenModels = Process | Model | str | Mapping[str, Process | Model | str] | None
 """Models as the user gives them."""
 
 
@@ -44,14 +44,14 @@ class ChannelModel:
         return (*(each.model for each in rivals), *([] if self.largest is None else [self.largest]))
 
 
-def model_of(name: str, model: GivenModels) -> Process | Model | None:
+def model_of(name: str, model: GivenModels) -> Model | None:
     """The model given for a channel: its own, its sensor's, or that of "" for all."""
     if not isinstance(model, Mapping):
-        return model
+        return None if model is None else as_model(model)
     for key in (name, name.partition("_")[0], ""):
         if key in model:
-            return model[key]
-    hint = "add one to the mapping"
+            return as_model(model[key])
+    hint = f"add one, as in model={{{name!r}: 'N + K'}}"
     raise InputError(
         f"no model is given for channel {name!r}", "model-missing", hint, {"channel": name}
     )

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from gmwm._core.tables import frame, plain_table
+from gmwm._core.tables import frame, html_table, plain_table
 from gmwm._core.text import Printed, brief, with_error
 from gmwm._core.typing import FloatArray
 from gmwm._core.units import shown_unit
@@ -28,6 +28,7 @@ PLATEAU = float(np.sqrt(2.0 * np.log(2.0) / np.pi))
 PROCESSES: Mapping[str, Process] = {"N": WhiteNoise(), "B": BiasInstability(), "K": RandomWalk()}
 """The process that has each sensor number as its parameter."""
 
+_KEYS = ("kind", "value", "lower", "upper", "unit", "tau")
 _TINY = np.finfo(float).tiny
 
 
@@ -99,10 +100,7 @@ class AxisNumbers:
 class SensorNumbers(Mapping[str, AxisNumbers], Printed):
     """N, B and K of every axis of a sensor: channel -> `AxisNumbers`; see `Calibration.numbers`."""
 
-    COLUMNS: ClassVar = (
-        *("channel", "number", "kind", "value"),
-        *("lower", "upper", "unit", "tau", "valid"),
-    )
+    COLUMNS: ClassVar = ("channel", "number", *_KEYS, "valid")
 
     def __init__(self, axes: Mapping[str, AxisNumbers]) -> None:
         self._axes = dict(axes)
@@ -130,6 +128,13 @@ class SensorNumbers(Mapping[str, AxisNumbers], Printed):
         units: Data-sheet units ("field"), or "si".
         invalid: Channel -> what stands in place of numbers that are not valid.
         """
+        rows = self._cells(units, invalid or {})
+        if len((table := plain_table(rows[0], rows[1:])).splitlines()) > len(rows):  # too wide
+            rows = [(name, n.replace("velocity ", ""), *others) for name, n, *others in rows]
+            table = plain_table(rows[0], rows[1:])
+        return table
+
+    def _cells(self, units: str, invalid: Mapping[str, str]) -> list[Sequence[str]]:
         rows: list[Sequence[str]] = []
         for quantity in dict.fromkeys(axis.quantity for axis in self.values()):
             own = {name: axis for name, axis in self.items() if axis.quantity == quantity}
@@ -139,12 +144,13 @@ class SensorNumbers(Mapping[str, AxisNumbers], Printed):
             for name, axis in own.items():
                 n, b, k = (axis.text(letter, units=units) for letter in "NBK")
                 b = f"{b} at {brief(axis.tau, 3)} s"
-                mark = "" if axis.valid else (invalid or {}).get(name, "not valid")
+                mark = "" if axis.valid else invalid.get(name, "not valid")
                 rows.append((name, mark or n, b if not mark else "", k if not mark else ""))
-        if len((table := plain_table(rows[0], rows[1:])).splitlines()) > len(rows):  # too wide
-            rows = [(name, n.replace("velocity ", ""), *others) for name, n, *others in rows]
-            table = plain_table(rows[0], rows[1:])
-        return table
+        return rows
+
+    def _repr_html_(self) -> str:
+        heads, *rows = self._cells("field", {})
+        return html_table("Sensor numbers", heads, rows)
 
     def rows(self, units: str = "field") -> list[dict[str, Any]]:
         """A row per channel and number, in data-sheet units or with "si" in SI."""
@@ -163,8 +169,8 @@ class SensorNumbers(Mapping[str, AxisNumbers], Printed):
         """Channel -> letter -> value with its interval, SI, in JSON types."""
         found: dict[str, Any] = {name: {"valid": axis.valid} for name, axis in self.items()}
         for row in self.rows("si"):
-            keys = ("kind", "value", "lower", "upper", "unit", "tau")[: 6 if row["tau"] else 5]
-            found[row["channel"]][row["number"]] = {key: row[key] for key in keys}
+            known = {key: row[key] for key in _KEYS if key != "tau" or row["number"] == "B"}
+            found[row["channel"]][row["number"]] = known
         return found
 
     def to_frame(self, *, units: str = "field") -> pandas.DataFrame:

@@ -88,8 +88,8 @@ def _sensors(flag: str, texts: Sequence[str]) -> str | dict[str, str]:
         roll, pitch, yaw.
     --duration NUMBER  Of the trajectory, in seconds.
     --truth FILE  calibration.json that sensor errors are drawn from.
-    --filter NAME=FILE  A filter and its calibration.json; 'truth' for the true models; repeat. The
-        others are compared with the first.
+    --filter NAME=FILE  A filter and its calibration.json, or numbers that gmwm bound or gmwm reduce
+        saved; 'truth' for the true models; repeat. The others are compared with the first.
     --outage START:LENGTH  Seconds without GNSS; repeat.
     --runs N  Number of runs.  [default: 100]
     --seed N  [default: 0]
@@ -100,7 +100,8 @@ def _sensors(flag: str, texts: Sequence[str]) -> str | dict[str, str]:
     --imu FILE  Your own data: IMU samples, with a header as for gmwm calibrate; axes forward,
         right, down.
     --gnss FILE  Fixes: time, latitude, longitude, height, on the IMU's clock.
-    --sensors [NAME=]FILE  calibration.json of the IMU; several with names are compared.
+    --sensors [NAME=]FILE  calibration.json or filter numbers of the IMU; several with names are
+        compared.
     --outages auto|SECONDS  Length of the outages that are cut into the log to compare sensors; auto
         is 30 s.  [default: auto]
     --lever-arm X,Y,Z  From the IMU to the antenna, metres: forward, right, down.
@@ -155,7 +156,7 @@ def navigate(
     Examples:
       gmwm navigate study.yaml -o out
       gmwm navigate --trajectory car --truth cal.json --filter GMWM=cal.json \\
-        --filter NK=small/calibration.json --outage 600:60 --outage 900:40
+        --filter NK=numbers.json --outage 600:60 --outage 900:40
       gmwm navigate --imu imu.csv --gnss fixes.csv --sensors out/calibration.json
       gmwm navigate --imu imu.csv --gnss fixes.csv --sensors A=a.json \\
         --sensors B=b.json --outages auto

@@ -15,11 +15,10 @@ from gmwm.errors import InputError
 from gmwm.readers import CLOCKS, NAMES as FORMATS
 
 if TYPE_CHECKING:
-    from gmwm.process import Model, Process
+    from gmwm.process import Model
     from gmwm.readers import Recording
 
 _SCREENING = ("events", "lines", "resonances", "outliers")
-_TERM = re.compile(r"\s*(?:([1-9])\s*\*?\s*)?([A-Za-z]+)\s*")
 
 Decorator = Callable[[Any], Any]
 
@@ -90,7 +89,7 @@ def _group(declared: str, settings: dict[str, dict[str, Any]]) -> list[Decorator
 def _terms() -> str:
     from gmwm.process import CATALOGUE
 
-    return ", ".join(kind.short_name for kind in CATALOGUE)
+    return ", ".join(sorted((k.short_name for k in CATALOGUE), key=lambda name: (len(name), name)))
 
 
 class _ModelOption(click.Option):
@@ -281,33 +280,15 @@ def written_models(texts: Sequence[str]) -> dict[str, Model]:
 
     Raises InputError if a text is no model, or a name has two.
     """
+    from gmwm.process import as_model
+
     given: dict[str, Model] = {}
     for text in texts:
         name, _, model = map(str.strip, text.rpartition("="))
         if name in given:
             raise InputError(f"--model {text}: {name or 'all channels'} have a model: give one")
-        given[name] = _model(model)
+        try:
+            given[name] = as_model(model)
+        except InputError as error:
+            raise InputError(f"--model {text}: {error}") from None
     return given
-
-
-def _model(text: str) -> Model:
-    """A model with free parameters.
-
-    Raises InputError if it is none.
-    """
-    from gmwm.process import CATALOGUE, Model
-
-    kinds = {name: kind for kind in CATALOGUE for name in (kind.__name__, kind.short_name)}
-    terms: list[Process] = []
-    for part in text.split("+"):
-        found = _TERM.fullmatch(part)
-        if found is None or found[2] not in kinds:
-            raise InputError(
-                f"--model {text}: {part.strip()!r} is not a term: write {_terms()} with +, "
-                "e.g. --model 'N + K + 2 GM'"
-            )
-        terms += [kinds[found[2]]() for _ in range(int(found[1] or 1))]
-    try:
-        return Model(tuple(terms))
-    except InputError as error:
-        raise InputError(f"--model {text}: {error}") from None

@@ -12,7 +12,7 @@ from annotated_types import Ge, Le
 from gmwm._core.documents import Document, NotNegative, Positive, Rate, Samples, Text
 from gmwm._core.frozen import freeze
 from gmwm._core.spool import scaled
-from gmwm._core.tables import frame
+from gmwm._core.tables import frame, html_table
 from gmwm._core.text import Printed, wrapped
 from gmwm.diagnosis import tuning
 from gmwm.errors import InputError, MissingNameError
@@ -116,8 +116,7 @@ class Health(Document, Printed):
 
     def of(self, where: str = "", code: str = "") -> tuple[Notice, ...]:
         """Notices of one channel, with one code, or both."""
-        every = self.notices
-        return tuple(n for n in every if where in ("", n.where) and code in ("", n.code))
+        return tuple(n for n in self.notices if where in ("", n.where) and code in ("", n.code))
 
     def lines(self, channel: str) -> tuple[tuple[float, float], ...]:
         """Frequency (Hz) and amplitude (u) of each periodic line, strongest first."""
@@ -182,8 +181,7 @@ class Health(Document, Printed):
                     values[start:stop] = np.nan
                 gone = int(np.count_nonzero(np.isnan(values))) - channel.missing
                 copies = "copies, " if self.of(code="rows-copied") else ""
-                values_of = {"samples": gone}
-                notices.append(notice("events-left-out", name, values_of, copies=copies))
+                notices.append(notice("events-left-out", name, {"samples": gone}, copies=copies))
                 channel = replace(channel, values=values)
             channels.append(channel)
         return replace(recording, channels=tuple(channels), notices=tuple(notices))
@@ -201,6 +199,11 @@ class Health(Document, Printed):
             if (count := sum(notice.severity == severity for notice in self.notices))
         ]
         return f"<Health of {self.source or 'a recording'}: {', '.join(counts)}>"
+
+    def _repr_html_(self) -> str:
+        rows = [(n.where or "all", n.severity, n.text, n.hint) for n in gathered(self.notices)]
+        heads = ("channel", "", "finding", "what to do")
+        return html_table(str(self).partition("\n")[0], heads, rows)
 
     def __str__(self) -> str:
         rows = [f"{self.source or 'recording'}: {self.rate:g} Hz, {self.n:,} samples a channel"]

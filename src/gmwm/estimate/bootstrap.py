@@ -124,7 +124,9 @@ def bootstrap(fit: Fit, runs: int = 200, seed: int = 0, *, full: bool = False) -
     return Bootstrap(keys, table)
 
 
-def bootstrap_test(fit: Fit, larger: Process | Model, runs: int = 200, seed: int = 0) -> float:
+def bootstrap_test(
+    fit: Fit, larger: Process | Model | str, runs: int = 200, seed: int = 0
+) -> float:
     """Probability, under a fit, of the gain that a larger model makes on the data.
 
     The chi-square test of a further term is invalid: under the smaller model its amplitude is zero,
@@ -167,7 +169,9 @@ def bootstrap_test(fit: Fit, larger: Process | Model, runs: int = 200, seed: int
 
 def _check(fit: Fit, runs: int) -> int:
     if fit.method != "gmwm":
-        raise InputError(f"a fit by {fit.method!r} has no weights to simulate: take method 'gmwm'")
+        raise InputError(
+            f"a fit by {fit.method!r} has no weights to simulate: take one by method='gmwm'"
+        )
     return checks.whole("runs", runs, 2)
 
 

@@ -16,13 +16,7 @@ from gmwm._core.tables import cell, plain_table
 from gmwm._core.text import per_cent, wrapped
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
-from gmwm.estimate.likelihood import (
-    Columns,
-    arrays_of,
-    filtered,
-    regular_inverse,
-    stacked,
-)
+from gmwm.estimate.likelihood import Columns, arrays_of, filtered, regular_inverse, stacked
 from gmwm.estimate.problem import (
     Coordinates,
     Slope,
@@ -118,7 +112,9 @@ class CramerRao(Document):
         return "\n".join([*title, size, "", plain_table(heads, rows), "", end])
 
 
-def cramer_rao(model: Process | Model, n: int, dt: float) -> CramerRao:
+def cramer_rao(
+    model: Process | Model | str, n: int, dt: float | None = None, *, rate: float | None = None
+) -> CramerRao:
     """Lower bound on the covariance of any unbiased estimate of a model's parameters.
 
     Parameters
@@ -127,8 +123,8 @@ def cramer_rao(model: Process | Model, n: int, dt: float) -> CramerRao:
         With all parameters given; all of them count as unknown.
     n : int
         Samples of the record, 8 or more.
-    dt : float
-        Sampling interval, s.
+    dt, rate : float
+        Sampling interval, s, or rate, Hz.
 
     Returns
     -------
@@ -159,9 +155,8 @@ def cramer_rao(model: Process | Model, n: int, dt: float) -> CramerRao:
     (0.00192, 0.00117)
     """
     model = as_model(model)
-    n, dt = checks.samples(n, MIN_SAMPLES), checks.sampling_interval(dt)
-    if model.is_open:
-        raise InputError(f"{model!r} has free parameters: a bound needs values")
+    n, dt = checks.samples(n, MIN_SAMPLES), checks.sampling_interval(dt, rate)
+    model.require_given()
     for item in model.parameters:
         if item.parameter.linear and not (item.value or 0.0) > 0.0:
             raise InputError(f"{item.key} is zero: leave its process out")

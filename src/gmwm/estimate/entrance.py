@@ -33,27 +33,28 @@ METHODS: dict[str, type[Method]] = {
 
 
 def fit(
-    model: Process | Model,
+    model: Process | Model | str,
     data: Data | Sequence[Data],
     dt: float | None = None,
     *,
     method: str | Method = "gmwm",
     weights: str | None = None,
     omega: str | None = None,
+    rate: float | None = None,
 ) -> Fit:
     """Estimate the open parameters of an error model from a static series.
 
     Parameters
     ----------
-    model : Process or Model
-        Parameters that are given stay as they are, open ones are estimated. No starting values
-        are needed.
+    model : Process, Model or str
+        Parameters that are given stay as they are, open ones are estimated, all of a text such as
+        "N + K + 2 GM". No starting values are needed.
     data : WaveletVariance, Channel or (n,) array_like, or a list of them
         Missing samples are NaN. The methods "mle", "whittle" and "em" need the samples, "whittle"
         all of them. Several recordings are fitted jointly by "gmwm" and "simulated", see
         `JointFit`.
-    dt : float, optional
-        Sampling interval, s; needed for an array.
+    dt, rate : float, optional
+        Sampling interval, s, or rate, Hz; one is needed for an array.
     method : str or object that holds the options of a method
         "gmwm" or `GMWM`, the Generalized Method of Wavelet Moments; "simulated" or
         `SimulatedMoments`, the same with simulated moments; "mle" or `MLE`, exact maximum
@@ -90,6 +91,8 @@ def fit(
     >>> gmwm.fit(truth.opened(), x, dt=1.0, method=gmwm.GMWM(discrepancy=0.01)).discrepancy
     0.01
     """
+    if rate is not None:
+        dt = checks.sampling_interval(dt, rate)
     found = estimate(model, data, dt, _with_options(method, weights, omega))
     if not found.valid:
         warnings.warn(f"{found!r}: {found.message}", FitWarning, stacklevel=2)
@@ -98,7 +101,7 @@ def fit(
 
 @one_blas_thread()
 def estimate(
-    model: Process | Model,
+    model: Process | Model | str,
     data: Data | Sequence[Data],
     dt: float | None = None,
     method: Method | None = None,
@@ -107,11 +110,11 @@ def estimate(
     method = method or GMWM()
     model = as_model(model)
     if not model.is_open:
-        raise InputError(f"{model!r} has no free parameter: there is nothing to estimate")
+        raise InputError(f"{model!r} has nothing to estimate: free its parameters by .opened()")
     if are_several(data):
         if not isinstance(method, GMWM):
             raise InputError(
-                f"method = {method.name!r} takes one recording at a time: take gmwm or simulated"
+                f"method = {method.name!r} takes one recording at a time: use method='gmwm'"
             )
         parts = [_variance(part, dt, method) for part in cast("Sequence[Data]", data)]
         return fit_joint(model, parts, method.estimate)
@@ -120,7 +123,8 @@ def estimate(
         return method.estimate(model, _variance(data, dt, method))
     if isinstance(data, WaveletVariance):
         raise InputError(
-            f"method = {method.name!r} needs the samples: give the series, not its variance"
+            f"method = {method.name!r} needs the samples: give the series, not its variance, as in "
+            f"fit(model, recording['gyro_x'], method={method.name!r})"
         )
     channel = data if isinstance(data, Channel) else as_channel(data, dt)
     where = f"channel {channel.name!r}" if channel.name else "the series"
@@ -144,7 +148,9 @@ def _with_options(method: Any, weights: str | None, omega: str | None) -> Method
     if weights is None:
         return method
     if not isinstance(method, GMWM):
-        raise InputError(f"method {method.name!r} has no weights: take gmwm or simulated")
+        raise InputError(
+            f"method {method.name!r} has no weights: leave them out, or use method='gmwm'"
+        )
     return replace(method, weights=weights)
 
 

@@ -17,7 +17,7 @@ from gmwm.filter_numbers.propagation import Chain
 from gmwm.filter_numbers.result import AxisFilterNumbers, FilterNumbers
 from gmwm.process import Model, Process, as_model
 
-One = Process | Model | Fit
+One = Process | Model | Fit | str
 Several = Calibration | Mapping[str, Process | Model] | Mapping[str, Fit]
 Sd = float | Mapping[str, float]
 """For every axis, or by the name of an axis or its kind (gyro, accel)."""
@@ -104,21 +104,23 @@ class SensorAxes:
     single: bool
 
     @classmethod
-    def of(cls, source: One | Several, dt: float | None, bias_sd: Sd) -> SensorAxes:
+    def of(
+        cls, source: One | Several, dt: float | None, bias_sd: Sd, rate: float | None = None
+    ) -> SensorAxes:
         """Axes of a model, a fit, a calibration or a mapping.
 
         Raises InputError if the source is something else, or a parameter is free.
         """
-        if isinstance(source, Process | Model | Fit):
+        dt = checks.sampling_interval(DT if dt is rate is None else dt, rate)
+        is_file = isinstance(source, str) and source.endswith(".json")
+        if isinstance(source, One) and not is_file:
             name = (source.wv.name or "") if isinstance(source, Fit) else ""
             axis = _axis(name, source, dt, bias_sd)
             duration = source.wv.n_all * axis.dt if isinstance(source, Fit) else float("nan")
             return cls((axis,), "", 1.0 / axis.dt, duration, True)
         if not isinstance(source, Mapping) or not source:
-            raise InputError(
-                f"{checks.shown(source)} has no error model: give a model, a fit, a calibration, "
-                "or models by channel name"
-            )
+            hint = f"or gmwm.load({source!r})" if is_file else "a calibration or models by channel"
+            raise InputError(f"{checks.shown(source)} has no error model: give a fit, {hint}")
         axes = tuple(_axis(name, item, dt, bias_sd) for name, item in source.items())
         if isinstance(source, Calibration):
             rate = source.rate if source.has_one_rate else float("nan")
@@ -185,21 +187,15 @@ def given_times(name: str, times: Sequence[float]) -> tuple[float, ...]:
     return tuple(rising)
 
 
-def _axis(name: str, item: object, dt: float | None, bias_sd: Sd) -> AxisModel:
-    if not isinstance(item, Process | Model | Fit):
+def _axis(name: str, item: object, dt: float, bias_sd: Sd) -> AxisModel:
+    if not isinstance(item, One):
         raise InputError(f"{name}: {checks.shown(item)} is not an error model")
     model = item.model if isinstance(item, Fit) else as_model(item)
-    if model.is_open:
-        missing = [key for key, value in model.params.items() if value is None]
-        raise InputError(
-            f"{name or 'the model'} has free parameters ({', '.join(missing)}): give them a "
-            "value, or estimate them with gmwm.fit"
-        )
+    model.require_given(name or "the model")
     fit = item if isinstance(item, Fit) else None
     if fit is not None:
-        step, quantity = fit.wv.dt, fit.wv.quantity or ""
+        dt, quantity = fit.wv.dt, fit.wv.quantity or ""
     else:
-        step = checks.sampling_interval(DT if dt is None else dt)
         quantity = name.partition("_")[0]
     quantity = quantity if quantity in SI_UNIT else ""
     sd = bias_sd
@@ -207,4 +203,4 @@ def _axis(name: str, item: object, dt: float | None, bias_sd: Sd) -> AxisModel:
         sd = sd.get(name, sd.get(quantity, 0.0))
     if not checks.is_number(sd) or sd < 0.0:
         raise InputError(f"bias_sd = {checks.shown(sd)}: give a number, zero or more")
-    return AxisModel(name, model, step, quantity, float(sd), fit)
+    return AxisModel(name, model, dt, quantity, float(sd), fit)

@@ -40,6 +40,7 @@ def bound(
     shared: bool = False,
     tau: float | str | None = None,
     dt: float | None = None,
+    rate: float | None = None,
 ) -> AxisFilterNumbers | FilterNumbers:
     """The smallest numbers of a form with which a linear filter is never overconfident.
 
@@ -63,8 +64,8 @@ def bound(
     tau : float or "shared", optional
         Correlation time of the Gauss-Markov process, s; "shared": the one for all axes that costs
         least over them. By default each has its own.
-    dt : float, optional
-        Sampling interval of models that are not fitted, s; 0.01 s by default.
+    dt, rate : float, optional
+        Sampling interval (s) or rate (Hz) of models that are not fitted; 100 Hz by default.
 
     Returns
     -------
@@ -89,15 +90,15 @@ def bound(
     frequencies (resonances not far above by a part of their peak too), lines not at all, and a ramp
     R is a constant of standard deviation ``|R| horizon``; notices report them.
     """
-    checks.choice("form", form, list(KINDS))
+    form = checks.choice("form", str(form).replace(" ", ""), list(KINDS))
     tau = given_tau(form, tau)
     horizon = checks.positive("horizon", horizon, "give a time without aiding in seconds")
-    axes = SensorAxes.of(source, dt, bias_sd)
+    axes = SensorAxes.of(source, dt, bias_sd, rate)
     axes.check_interval("horizon", horizon)
     if level is not None:
         level = checks.share("level", level, 0.95)
         if any(axis.fit is None for axis in axes.axes):
-            raise InputError("level needs a fit: a model has no confidence region")
+            raise InputError("level needs a fit: leave it out, a model has no confidence region")
     if isinstance(tau, str):
         problems = [_problem(group, horizon, level) for group in axes.sharing(shared)]
         tau = correlation_time(problems, form)

@@ -270,6 +270,7 @@ def error_budget(
     times: Sequence[float] = TIMES,
     *,
     dt: float | None = None,
+    rate: float | None = None,
     calibrated: bool = True,
 ) -> ErrorBudget:
     """Predicted growth of attitude, velocity and position errors without aiding.
@@ -289,8 +290,8 @@ def error_budget(
         `Fit`.
     times : sequence of float, optional
         Coasting times, s.
-    dt : float, optional
-        Sampling interval of models that are not fitted, s; 0.01 s by default.
+    dt, rate : float, optional
+        Sampling interval (s) or rate (Hz) of models that are not fitted; 100 Hz by default.
     calibrated : bool, optional
         True: the initial value of every state of the models is known, as from a filter before an
         outage; its covariance is zero. False: nothing is known, stationary processes start in their
@@ -319,7 +320,7 @@ def error_budget(
     """
     if isinstance(source, Fit):
         source = {source.wv.name or "channel": source}
-    axes = SensorAxes.of(source, dt, 0.0).axes
+    axes = SensorAxes.of(source, dt, 0.0, rate).axes
     known = [each for each in axes if _quantity(each)]
     if not known:
         raise InputError(

@@ -186,6 +186,7 @@ def certify(
     motion: str | Motion | Recording | None = None,
     bias_sd: Sd = 0.0,
     dt: float | None = None,
+    rate: float | None = None,
 ) -> Certificate:
     """How consistent a filter will be with given numbers, and what they have to cover.
 
@@ -205,8 +206,8 @@ def certify(
         With which they come: a usual one, or that of a recording.
     bias_sd : float or mapping, optional
         Standard deviation of a constant bias, such as the turn-on bias, in u; by axis or kind.
-    dt : float, optional
-        Sampling interval of models that are not fitted, s; 0.01 s by default.
+    dt, rate : float, optional
+        Sampling interval (s) or rate (Hz) of models that are not fitted; 100 Hz by default.
 
     Returns
     -------
@@ -228,7 +229,7 @@ def certify(
     """
     times = given_times("outages", outages)
     keyframe = checks.positive("keyframe", keyframe, "give the interval of keyframes in seconds")
-    axes = SensorAxes.of(source, dt, bias_sd)
+    axes = SensorAxes.of(source, dt, bias_sd, rate)
     axes.check_interval("keyframe", keyframe)
     axes.check_interval("outages", times[0])
     known = Imperfections() if imperfections is None else imperfections

@@ -50,6 +50,7 @@ def reduce(
     shared: bool = False,
     tau: float | str | None = None,
     dt: float | None = None,
+    rate: float | None = None,
     progress: Progress | None = None,
 ) -> AxisFilterNumbers | FilterNumbers:
     """The numbers of a form that make a small filter consistent, and as accurate as it can be.
@@ -67,7 +68,7 @@ def reduce(
     keyframe : float, optional
         Interval of keyframes or scans between which poses are related, s, for which they shall be
         good in place of outages.
-    bias_sd, shared, tau, dt : optional
+    bias_sd, shared, tau, dt, rate : optional
         As in `gmwm.bound`.
     progress : callable, optional
         Called as ``progress(done, total, channel)``.
@@ -94,12 +95,12 @@ def reduce(
     since the last fix too, as `gmwm.certify` judges both. `gmwm.ins.reduce` does it in a whole
     navigation filter on a trajectory, by the same search.
     """
-    checks.choice("form", form, FORMS)
+    form = checks.choice("form", str(form).replace(" ", ""), FORMS)
     tau = given_tau(form, tau)
     if keyframe is not None:
         outages = (checks.positive("keyframe", keyframe, "give the interval of keyframes in s"),)
     times = given_times("outages", outages)
-    axes = SensorAxes.of(source, dt, bias_sd)
+    axes = SensorAxes.of(source, dt, bias_sd, rate)
     axes.check_interval("outages" if keyframe is None else "keyframe", times[0])
     search = _Search(form, times, keyframe is not None)
     time = search.correlation_time(axes.sharing(shared)) if isinstance(tau, str) else tau

@@ -121,7 +121,7 @@ def _of_channel(unit: Unit, name: str, fit: Fit, structure: Structure) -> Iterat
     notices = [*fit.notices, *(n for n in unit.result.notices if n.where in ("", name))]
     is_valid = unit.name in structure.usable
     is_common = is_valid and unit.name not in structure.own
-    reasons = [] if is_valid else [reason for reason, is_met in fit.reasons.items() if not is_met]
+    reasons = [] if is_valid else list(fit.reasons)
     own = {
         "channel": name,
         "quantity": fit.wv.quantity,

@@ -202,13 +202,6 @@ class Process:
             return self
         return self.with_values(**{linear.name: amplitude ** (1.0 / linear.power)})
 
-    def _require_given(self) -> None:
-        missing = [name for name, value in self.values.items() if value is None]
-        if missing:
-            raise InputError(
-                f"{self!r} has free parameters ({', '.join(missing)}): give them a value first"
-            )
-
     # -- primitives -----------------------------------------------------------------------------
 
     @classmethod
@@ -239,7 +232,7 @@ class Process:
         name = type(self).__name__
         if type(self).draw is Process.draw:
             raise InputError(f"{name} gives neither psd nor draw: define one of them")
-        raise InputError(f'{name} can only be simulated: fit it with method = "simulated"')
+        raise InputError(f'{name} can only be simulated: fit it with method="simulated"')
 
     def lines(self) -> tuple[tuple[float, float], ...]:
         """Spectral lines as (frequency in Hz, amplitude in u)."""
@@ -362,7 +355,7 @@ class Process:
             If a parameter is open, ``n`` or ``dt`` is not positive or too large, or ``draw`` of a
             subclass gives no series.
         """
-        self._require_given()
+        self._alone().require_given()
         n = checks.samples(n)
         dt = checks.positive("dt", dt, "give a positive sampling interval in seconds")
         where = f"draw of {type(self).__name__}"
@@ -434,8 +427,10 @@ class Process:
     def __rmul__(self, times: int) -> Model:
         return times * self._alone()
 
+    __mul__ = __rmul__
+
     def __repr__(self) -> str:
-        given = ", ".join(f"{k}={v:.12g}" for k, v in self.values.items() if v is not None)
+        given = ", ".join(f"{k}={v:.4g}" for k, v in self.values.items() if v is not None)
         return f"{type(self).__name__}({given})"
 
     def __eq__(self, other: object) -> bool:

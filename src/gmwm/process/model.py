@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -17,6 +18,8 @@ from gmwm.errors import InputError
 from gmwm.process.base import Process
 from gmwm.process.parameter import Parameter
 from gmwm.process.state_space import StateSpace, numbered_names
+
+_TERM = re.compile(r"\s*(?:([1-9])\s*\*?\s*)?(\w+)\s*(?:\(\s*\))?\s*")
 
 
 @dataclass(frozen=True)
@@ -122,7 +125,7 @@ class Model:
 
     def psd(self, f: FloatArray, dt: float) -> FloatArray:
         """Two-sided spectral density (u^2/Hz) at ``f`` (Hz), without lines; see `Process.psd`."""
-        self._require_given()
+        self.require_given()
         f = np.asarray(f, dtype=float)
         return np.sum([term.psd(f, dt) for term in self.terms], axis=0, dtype=float)
 
@@ -149,13 +152,13 @@ class Model:
 
     def component_variances(self, tau: FloatArray, dt: float, wavelet: str = "haar") -> FloatArray:
         """Wavelet variance of each term, shape (terms,) + tau.shape, in u^2."""
-        self._require_given()
+        self.require_given()
         tau = np.asarray(tau, dtype=float)
         return np.stack([term.wavelet_variance(tau, dt, wavelet) for term in self.terms])
 
     def autocovariance(self, lag: FloatArray, dt: float) -> FloatArray:
         """Autocovariance (u^2) at lags in samples, of stationary models."""
-        self._require_given()
+        self.require_given()
         return np.sum([term.autocovariance(lag, dt) for term in self.terms], axis=0)
 
     def state_space(self, dt: float) -> StateSpace:
@@ -166,19 +169,24 @@ class Model:
         self, n: int, dt: float, seed: int | np.random.Generator | None = None
     ) -> FloatArray:
         """Draw ``n`` samples, in u; see `Process.simulate`."""
-        self._require_given()
+        self.require_given()
         rng = checks.generator(seed)
         total = self.terms[0].simulate(n, dt, rng)
         for term in self.terms[1:]:
             total += term.simulate(n, dt, rng)
         return total
 
-    def _require_given(self) -> None:
+    def require_given(self, where: str = "the model") -> None:
+        """Raise InputError if a parameter is open; its message shows how to give it."""
         missing = [key for key, value in self.params.items() if value is None]
         if missing:
+            written = " + ".join(
+                f"{type(term).__name__}({', '.join(f'{name}=...' for name in term.values)})"
+                for term in self.terms
+            )
             raise InputError(
-                f"the model {self!r} has free parameters ({', '.join(missing)}): "
-                "give them a value, or estimate them with gmwm.fit"
+                f"{where} {self!r} has free parameters ({', '.join(missing)}): estimate them with "
+                f"gmwm.fit, or give values, {written}"
             )
 
     @classmethod
@@ -195,26 +203,24 @@ class Model:
         return numbered_names([term.title() for term in self.terms])
 
     def __add__(self, other: Any) -> Model:
-        if isinstance(other, Process):
-            return Model((*self.terms, other))
-        if isinstance(other, Model):
-            return Model((*self.terms, *other.terms))
-        raise InputError(_no_term(other))
+        return Model((*self.terms, *as_model(other).terms))
 
     def __radd__(self, other: Any) -> Model:
         # sum([...]) starts from 0
         if isinstance(other, int) and other == 0:
             return self
-        raise InputError(_no_term(other))
+        return as_model(other) + self
 
     def __rmul__(self, times: int) -> Model:
         if not isinstance(times, int | np.integer) or isinstance(times, bool) or times < 1:
             raise InputError(f"{times!r} * process: the number of terms must be 1 or more, whole")
         return Model(self.terms * int(times))
 
+    __mul__ = __rmul__
+
     def __repr__(self) -> str:
-        counts = Counter(repr(term) for term in self.terms)
-        return " + ".join(f"{n} * {text}" if n > 1 else text for text, n in counts.items())
+        counts = Counter(self.terms)
+        return " + ".join(f"{n} * {term!r}" if n > 1 else repr(term) for term, n in counts.items())
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Model) and self.terms == other.terms
@@ -223,22 +229,35 @@ class Model:
         return hash(self.terms)
 
 
-def _no_term(other: Any) -> str:
-    return f"{other!r} is not an error process: add processes, like WhiteNoise() + GaussMarkov()"
+def as_model(model: Process | Model | str) -> Model:
+    """A model as it is, of a process, or of a text such as "N + K + 2 GM".
 
-
-def as_model(model: Process | Model) -> Model:
-    """A model of one term from a process; a model as it is.
-
-    Raises InputError for anything else.
+    A text has short names or class names, of the user's own processes too; InputError otherwise.
     """
-    if isinstance(model, Model):
-        return model
-    if isinstance(model, Process):
-        return Model((model,))
-    raise InputError(
-        f"{model!r} is not an error model: build one like WhiteNoise() + 2 * GaussMarkov()"
-    )
+    if isinstance(model, Model | Process):
+        return model if isinstance(model, Model) else Model((model,))
+    if not isinstance(model, str):
+        raise InputError(f"{checks.shown(model)} is not an error model: write one like 'N + 2 GM'")
+    kinds, terms = _kinds(), []
+    for part in model.split("+"):
+        found = _TERM.fullmatch(part)
+        if found is None or found[2] not in kinds:
+            known = {kind.short_name for kind in kinds.values() if kind.short_name[0] != "_"}
+            names = ", ".join(sorted(known, key=lambda name: (len(name), name)))
+            raise InputError(
+                f"{checks.shown(part.strip())} is not a term: write {names} with +, e.g. "
+                "'N + K + 2 GM'"
+            )
+        terms += [{"process": found[2]}] * int(found[1] or 1)
+    return model_from_list(terms)
+
+
+def _kinds() -> dict[str, type[Process]]:
+    """Every process defined so far by short name and class name; the latest of a name."""
+    kinds = [Process]
+    for kind in kinds:
+        kinds += kind.__subclasses__()
+    return {name: kind for kind in kinds[1:] for name in (kind.short_name, kind.__name__)}
 
 
 def model_from_list(content: Sequence[Mapping[str, Any]]) -> Model:
@@ -247,12 +266,7 @@ def model_from_list(content: Sequence[Mapping[str, Any]]) -> Model:
     Raises InputError for a process that is neither built in nor defined in a module imported so
         far, or parameters it does not have.
     """
-    kinds, found = {}, Process.__subclasses__()
-    while found:
-        kind = found.pop()
-        kinds[kind.__name__] = kind
-        found += kind.__subclasses__()
-    terms = []
+    kinds, terms = _kinds(), []
     for item in content:
         arguments = dict(item)
         name = arguments.pop("process", None)
@@ -285,7 +299,12 @@ def _check_distinct(terms: tuple[Process, ...]) -> None:
 
 
 def simulate(
-    model: Process | Model, n: int, dt: float, seed: int | np.random.Generator | None = None
+    model: Process | Model | str,
+    n: int,
+    dt: float | None = None,
+    seed: int | np.random.Generator | None = None,
+    *,
+    rate: float | None = None,
 ) -> FloatArray:
     """Draw ``n`` samples of an error model, in u.
 
@@ -294,8 +313,8 @@ def simulate(
     model : Process or Model
         With all parameters given.
     n : int
-    dt : float
-        Sampling interval, s.
+    dt, rate : float
+        Sampling interval, s, or rate, Hz.
     seed : int or numpy.random.Generator, optional
 
     Returns
@@ -306,6 +325,6 @@ def simulate(
     Raises
     ------
     InputError
-        If a parameter is open, or ``n`` or ``dt`` is not positive.
+        If a parameter is open, or ``n``, ``dt`` or ``rate`` is not positive.
     """
-    return as_model(model).simulate(n, dt, seed)
+    return as_model(model).simulate(n, checks.sampling_interval(dt, rate), seed)

@@ -15,12 +15,7 @@ import numpy as np
 
 from gmwm._core.typing import FloatArray
 from gmwm.estimate.moments import Design, Profile, dictionary, dictionary_fit
-from gmwm.estimate.problem import (
-    Scales,
-    objectives_with,
-    solve_nonnegative,
-    weight_root,
-)
+from gmwm.estimate.problem import Scales, objectives_with, solve_nonnegative, weight_root
 from gmwm.process import (
     BUTTERWORTH,
     AveragedNoise,

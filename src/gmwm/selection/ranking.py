@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
@@ -55,11 +56,13 @@ class Choices:
     max_gauss_markov: Largest number of Gauss-Markov terms.
     extra: Further terms of open amplitude and given shape, each of which a candidate may have.
     bandwidth: The sensor's own low-pass, where the finest levels show one.
+    models: The only candidates, where they are given; the other choices do not matter then.
     """
 
     max_gauss_markov: int = MAX_GAUSS_MARKOV
     extra: tuple[Process, ...] = ()
     bandwidth: Bandwidth | None = None
+    models: tuple[Model, ...] = ()
 
     def __post_init__(self) -> None:
         most = self.max_gauss_markov
@@ -69,32 +72,46 @@ class Choices:
                 f"{MAX_GAUSS_MARKOV}"
             )
         for process in self.extra:
-            if not isinstance(process, Process):
+            given = process.values if isinstance(process, Process) else {}
+            linear = getattr(process, "linear_parameter", None)
+            if linear is None or [k for k, v in given.items() if v is None] != [linear.name]:
                 raise InputError(
-                    f"extra holds {checks.shown(process)}: give processes, as in "
-                    "[Sinusoid(frequency=0.5)]"
+                    f"extra = {checks.shown(process)}: give processes of fixed shape and free "
+                    "amplitude, as in [Sinusoid(frequency=0.5)]"
                 )
-            linear = process.linear_parameter
-            shape = [process.values[p.name] for p in process.shape_parameters]
-            if linear is None or process.values[linear.name] is not None or None in shape:
-                raise InputError(
-                    f"extra = {process!r}: fix its shape and leave its amplitude free, as in "
-                    "Sinusoid(frequency=0.5)"
-                )
+        if any(all(term.is_drift for term in model.terms) for model in self.models):
+            raise InputError('the candidate R is no noise: add one, as in "N + R"')
 
     def seeing(self, wv: WaveletVariance) -> Choices:
         """The choices with the sensor's low-pass, if these wavelet variances show one."""
-        return replace(self, bandwidth=sensor_bandwidth(wv, self.extra, penalty(wv.n)))
+        return replace(self, bandwidth=sensor_bandwidth(wv, self.given, penalty(wv.n)))
 
     @property
     def given(self) -> tuple[Process, ...]:
-        """All terms of given shape besides the textbook processes."""
-        return self.extra if self.bandwidth is None else (*self.extra, self.bandwidth.given)
+        """All terms besides the textbook processes, those of the sensor's low-pass last."""
+        own = tuple(term for model in self.noise_models for term in model.terms)
+        return (*self.extra, *own, *([] if self.bandwidth is None else [self.bandwidth.given]))
+
+    @property
+    def noise_models(self) -> list[Model]:
+        """The given models without their ramps."""
+        noise = [tuple(t for t in model.terms if not t.is_drift) for model in self.models]
+        return [Model(terms) for terms in dict.fromkeys(noise)]
+
+    @property
+    def has_ramp(self) -> bool:
+        """Whether one of the given models has a ramp."""
+        return any(term.is_drift for model in self.models for term in model.terms)
+
+    def among(self, ranking: Iterable[Candidate]) -> list[Candidate]:
+        """The candidates that are given, all where none are."""
+        terms = [Counter(model.terms) for model in self.models]
+        return [item for item in ranking if not terms or Counter(item.model.terms) in terms]
 
     def opened(self, candidate: Candidate, n: int) -> Candidate:
         """A candidate with the low-pass as it is to be fitted; its shape costs parameters."""
         found = self.bandwidth
-        if found is None or found.given not in candidate.model.terms:
+        if self.models or found is None or found.given not in candidate.model.terms:
             return candidate
         terms = (found.free if term == found.given else term for term in candidate.model.terms)
         return replace(
@@ -107,8 +124,8 @@ class Choices:
 
     @property
     def with_flicker(self) -> Choices | None:
-        """The choices with flicker noise; None if it is one already."""
-        if any(process.is_flicker for process in self.extra):
+        """The choices with flicker noise; None if it is one already, or models are given."""
+        if self.models or any(process.is_flicker for process in self.extra):
             return None
         return replace(self, extra=(*self.extra, _FLICKER))
 
@@ -167,14 +184,16 @@ def rank(wv: WaveletVariance, choices: Choices) -> tuple[list[Candidate], Slope 
     except InputError:  # samples missing all over leave none to be seen
         slope = None
     if slope is None:
+        if choices.has_ramp:
+            raise InputError("a ramp needs one recording without gaps all over: leave R out")
         found, rival = ([candidate for candidate, _ in each] for each in (plain, flicker))
         return _with_rival(found, rival), None
     without = slope.value**2 / slope.variance
     ramped: list[Candidate] = []
     ambiguous = None
-    if without > tuning.RAMP_PLAUSIBLE:
+    if without > tuning.RAMP_PLAUSIBLE or choices.has_ramp:
         target, drift_free, slope = _drift_free(wv, slope, choices)
-        if slope_p_value(wv, drift_free.mixture.psd) < tuning.RAMP_P:
+        if choices.has_ramp or slope_p_value(wv, drift_free.mixture.psd) < tuning.RAMP_P:
             if drift_free.discrepancy < allowed:
                 # Both kinds must be compared under the same allowance.
                 allowed = drift_free.discrepancy
@@ -184,7 +203,7 @@ def rank(wv: WaveletVariance, choices: Choices) -> tuple[list[Candidate], Slope 
             ramped = [_with_ramp(candidate, penalty(wv.n)) for candidate, _ in drifting]
         elif slope.value**2 / slope.variance > penalty(wv.n) + tuning.RAMP_MARGIN:
             ambiguous = slope  # a ramp would have won but for the walk
-    ranking = sorted(_without_ramp(plain, wv, without) + ramped, key=rank_key)
+    ranking = sorted(choices.among(_without_ramp(plain, wv, without) + ramped), key=rank_key)
     return _with_rival(ranking, _without_ramp(flicker, wv, without)), ambiguous
 
 
@@ -302,9 +321,12 @@ class _CommonWeights:
 def _candidates(
     wv: WaveletVariance, common: _CommonWeights, choices: Choices
 ) -> list[tuple[Candidate, Point]]:
-    """All sums whose terms come out positive; white noise where there are none."""
+    """The given models, or all sums whose terms come out positive; else white noise."""
+    if choices.models:
+        return [_at_best(wv, common, model) for model in choices.noise_models]
     found = list(_sums(wv, common, choices, choices.bases()))
-    return found or [_fallback(wv, common)]
+    white = next(kind for kind in TEXTBOOK if kind.is_white)
+    return found or [_at_best(wv, common, Model((white,)))]
 
 
 def _flicker(
@@ -353,10 +375,9 @@ def _sums(
             yield choices.opened(common.candidate(design, point), wv.n), point
 
 
-def _fallback(wv: WaveletVariance, common: _CommonWeights) -> tuple[Candidate, Point]:
-    """White noise alone, for records too short for anything else."""
-    white = next(kind for kind in TEXTBOOK if kind.is_white)
-    design = Design(Model((white,)), Scales.of(wv))
+def _at_best(wv: WaveletVariance, common: _CommonWeights, model: Model) -> tuple[Candidate, Point]:
+    """A model at its best point."""
+    design = Design(model, Scales.of(wv))
     point = search(Profile(design, common.target, common.root))
     return common.candidate(design, point), point
 

@@ -7,15 +7,18 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar, Self, cast
 
+import numpy as np
+
 from gmwm._core import checks
 from gmwm._core.documents import Document
 from gmwm._core.jobs import one_blas_thread
-from gmwm._core.tables import frame
-from gmwm._core.text import Printed, wrapped
+from gmwm._core.tables import frame, html_table, plain_table
+from gmwm._core.text import Printed, bullets
+from gmwm._core.units import shown_unit
 from gmwm.errors import InputError
 from gmwm.estimate import Data, Fit, are_several, estimate
-from gmwm.estimate.result import fit_joint
-from gmwm.process import GaussMarkov, Model, Process, WhiteNoise
+from gmwm.estimate.result import dense_curves, fit_joint
+from gmwm.process import GaussMarkov, Model, Process, WhiteNoise, as_model
 from gmwm.selection import tuning
 from gmwm.selection.ranking import (
     MAX_GAUSS_MARKOV,
@@ -30,6 +33,7 @@ from gmwm.variance import PooledVariance, WaveletVariance, as_wavelet_variance
 
 if TYPE_CHECKING:
     import pandas
+    from matplotlib.axes import Axes
 
 RULES = ("criterion", "merge")
 _SHOWN = 12
@@ -102,9 +106,8 @@ class Selection(Document, Printed):
     def ranges(self, level: float = 0.95) -> dict[str, tuple[float, float]]:
         """Range of each parameter over all models that fit equally well: their intervals joined.
 
-        A parameter of the chosen model is found in another by its name, those of Gauss-Markov terms
-        by the nearest correlation time, one to one. Where the other model has no such term, the
-        range of its amplitude begins at zero. At most five rivals are fitted, the best.
+        Gauss-Markov terms of two models belong together by their correlation times, one to one.
+        Where another model has no such term, the range of its amplitude begins at zero.
 
         Parameters
         ----------
@@ -116,13 +119,22 @@ class Selection(Document, Printed):
         dict
             Key -> (lower, upper) in SI units, for every estimated parameter of the chosen model;
             `Fit.interval` where no other model fits equally well.
-
-        Raises
-        ------
-        InputError
-            If ``level`` is not between 0 and 1.
         """
         return ranges(self.fit, self.rivals, checks.share("level", level, 0.95))
+
+    def plot(self, ax: Axes | None = None, *, units: str = "field") -> Axes:
+        """`Fit.plot` of the chosen model with the models that fit equally well; returns the axes.
+
+        In data-sheet units (deg/h, ug), or in SI if ``units`` is "si".
+        """
+        axes = self.fit.plot(ax, units=units)
+        factor = shown_unit(self.fit.wv.quantity, self.fit.wv.unit, units)[1]
+        for rival in self.rivals:
+            tau, curves = dense_curves(rival)
+            total = factor * np.sqrt(np.sum([curve**2 for curve in curves.values()], axis=0))
+            axes.plot(tau, total, ":k", label=f"fits equally well: {rival.model.title()}")
+        axes.legend(fontsize="small")
+        return axes
 
     def __iter__(self) -> Iterator[Candidate]:
         return iter(self.ranking)
@@ -133,8 +145,13 @@ class Selection(Document, Printed):
     def __getitem__(self, index: int) -> Candidate:
         return self.ranking[index]
 
+    @property
+    def _shown(self) -> list[Candidate]:
+        """The chosen candidate, then the others, best first."""
+        return [self.chosen, *(item for item in self.ranking if item is not self.chosen)]
+
     def to_frame(self) -> pandas.DataFrame:
-        """A table of the candidates, best first; needs pandas."""
+        """A table of the candidates, the chosen one first; needs pandas."""
         names = ("criterion", "objective", "chi_square", "n_parameters", "dof", "p_value")
         ties = self.ties
         rows = [
@@ -142,7 +159,7 @@ class Selection(Document, Printed):
             | {name: getattr(item, name) for name in names}
             | {"chosen": item is self.chosen, "tie": item in ties}
             | {"compared_only": item.compared_only}
-            for item in self.ranking
+            for item in self._shown
         ]
         return frame(rows, ("model", *names, "chosen", "tie", "compared_only"))
 
@@ -160,35 +177,29 @@ class Selection(Document, Printed):
     def __repr__(self) -> str:
         return f"<Selection of {self.fit.model!r} among {len(self.ranking)}>"
 
+    def _repr_html_(self) -> str:
+        return html_table(f"{self.fit.wv.name or 'series'}: {len(self)} models", *self._table())
+
     def __str__(self) -> str:
-        best = self.ranking[0].criterion
-        ties = self.ties
-        lines = [f"{'':2}{'difference':>10} {'objective':>10} {'p-value':>8} {'param.':>6}  model"]
-        for item in self.ranking[:_SHOWN]:
-            mark = ">" if item is self.chosen else "~" if item.compared_only else " "
-            tie = "=" if len(ties) > 1 and item in ties else " "
-            row = (
-                f"{mark}{tie}{item.criterion - best:>10.4g} {item.objective:>10.4g} "
-                f"{item.p_value:>8.2g} {item.n_parameters:>6}  "
-            )
-            lines += wrapped(item.model.title(), first=row, indent=len(row))
-        if len(self.ranking) > _SHOWN:
-            lines.append(f"  and {len(self.ranking) - _SHOWN} more")
-        if len(ties) > 1:
-            lines.append("= these fit equally well: the simplest is preferred")
+        heads, rows, notes = self._table()
+        return "\n".join([plain_table(heads, rows), *bullets(notes)])
+
+    def _table(self) -> tuple[Sequence[str], list[Sequence[str]], list[str]]:
+        """Heads, rows and notes of the printed table."""
+        rows: list[Sequence[str]] = []
+        for item in self._shown[:_SHOWN]:
+            mark = "chosen" if item is self.chosen else "compared only" * item.compared_only
+            mark = mark or "fits equally well" * (item in self.ties)
+            numbers = f"{item.criterion - self.ranking[0].criterion:.4g}", f"{item.p_value:.2g}"
+            rows.append((item.model.title(), mark, *numbers, str(item.n_parameters)))
+        notes = [f"{len(self) - _SHOWN} more models fit less well"] * (len(self) > _SHOWN)
         if any(item.compared_only for item in self.ranking):
-            lines += wrapped(
-                "flicker noise is compared but not chosen: extra=[BiasInstability()] allows it",
-                first="~ ",
-                indent=2,
+            notes.append(
+                "flicker noise is compared but not chosen: extra=[BiasInstability()] allows it"
             )
-        if self.chosen not in ties:
-            lines += wrapped(
-                "chosen: simpler, fits equally well under its own weights",
-                first="> ",
-                indent=2,
-            )
-        return "\n".join(lines)
+        if self.chosen not in self.ties:
+            notes.append("chosen: simpler, or the best whose terms the data support")
+        return ("model", "", "difference", "p-value", "parameters"), rows, notes
 
 
 @one_blas_thread()
@@ -199,6 +210,8 @@ def select(
     max_gauss_markov: int = MAX_GAUSS_MARKOV,
     extra: Sequence[Process] = (),
     rule: str = "criterion",
+    candidates: Sequence[Process | Model | str] | None = None,
+    rate: float | None = None,
 ) -> Selection:
     """Rank the candidate models of a series and fit the best one.
 
@@ -206,8 +219,8 @@ def select(
     ----------
     data : WaveletVariance, Channel or (n,) array_like, or a list of them
         Several recordings have one model; see `gmwm.JointFit`.
-    dt : float, optional
-        Sampling interval, s; needed for an array.
+    dt, rate : float, optional
+        Sampling interval, s, or rate, Hz; one is needed for an array.
     max_gauss_markov : int, optional
         Largest number of Gauss-Markov terms.
     extra : sequence of Process, optional
@@ -217,6 +230,8 @@ def select(
         "merge" is the way of Stebler et al. (2012): white noise (and ``extra``) with as many
         Gauss-Markov processes as allowed, one less while two do not differ significantly or one is
         redundant. The ranking then holds the models on that way, each under its own weights.
+    candidates : sequence of Process, Model or str, optional
+        Rank only these models, such as ``["N + K", "N + GM"]``.
 
     Returns
     -------
@@ -229,33 +244,21 @@ def select(
 
     Notes
     -----
-    All candidates are compared under the same weights, those of a rich mixture fitted to the
-    wavelet variances, with the discrepancy that this mixture shows. The criterion is the chi-square
-    on cube roots (see `gmwm.estimate.problem.chi_square`) with the penalty ``2 c p ln ln
-    n``, c = 1.5, of Hannan & Quinn (1979, *JRSS B* 41, 190-195), consistent for moment selection
-    (Andrews 1999, *Econometrica* 67, 543-564). A rate ramp adds one moment, its slope, so a model
-    without one pays the squared slope over its variance; it must win by a margin of 6, and its
-    slope must be no accident of a walk that the record does not resolve
-    (`gmwm.estimate.problem.ramp.slope_p_value`). Terms that come out as zero
-    make a model equal to a smaller one, and it is left out of the ranking. Models within 2 of the
-    best fit equally well, and the smallest of them wins. The first of the best candidates is chosen
-    whose own fit finds all of its terms identifiable and misses no averaging time by far
-    (`Goodness.is_excluded`). The mixture follows coarse levels that are low by chance and gives
-    them small errors, so that a random walk may look worse than a Gauss-Markov process of long
-    correlation time: a simpler candidate that is as good by its own fit, under the weights that it
-    implies itself, is preferred.
-
-    The best candidate with flicker noise is in the ranking where it is as good as the best of the
-    others, and among the rivals, but is not chosen unless ``extra`` has a `BiasInstability`, which
-    takes a filter many states. Where it wins by far, predictions of the chosen model beyond a tenth
-    of the record are doubtful.
+    All candidates are compared under the weights of a rich mixture fitted to the wavelet variances,
+    by their chi-square with the penalty ``3 p ln ln n`` of Hannan & Quinn (1979, *JRSS B* 41,
+    190-195), consistent for moment selection (Andrews 1999, *Econometrica* 67, 543-564). Models
+    within 2 of the best fit equally well, and the smallest of them wins. The first is chosen whose
+    own fit finds all of its terms identifiable and misses no averaging time by far. What rate
+    ramps, flicker noise and low-passes need is in docs/method.md, "Which model".
     """
-    if not isinstance(extra, Iterable):
-        raise InputError(
-            f"extra = {checks.shown(extra)}: give a list of processes, as in "
-            "[Sinusoid(frequency=0.5)]"
-        )
-    choices = Choices(max_gauss_markov, tuple(extra))
+    extra = _listed("extra", extra, "[Sinusoid(frequency=0.5)]")
+    listed = _listed("candidates", candidates, '["N + K", "N + GM"]')
+    models = [as_model(each) for each in listed]
+    choices = Choices(max_gauss_markov, extra, models=tuple(dict.fromkeys(models)))
+    if models and (extra or rule != RULES[0]):
+        raise InputError("candidates are whole models: leave out extra and rule")
+    if rate is not None:
+        dt = checks.sampling_interval(dt, rate)
     if are_several(data):
         parts = [as_wavelet_variance(part, dt) for part in cast("Sequence[Data]", data)]
         wv: WaveletVariance = PooledVariance.of(parts)
@@ -265,7 +268,8 @@ def select(
         return _by_merging(wv, choices)
     ranked, slope = rank(wv, choices.seeing(wv))
     ranking = tuple(ranked)
-    chosen, fitted = _choose([item for item in ranking if not item.compared_only], wv)
+    may_be_chosen = [item for item in ranking if not item.compared_only]
+    chosen, fitted = _choose(may_be_chosen, wv, is_closed=bool(choices.models))
     if chosen not in ranking:
         ranking = tuple(sorted((*ranking, chosen), key=rank_key))
     if slope is not None and not _has_ramp(chosen.model):
@@ -273,8 +277,21 @@ def select(
     return Selection(ranking, chosen, _of_each(chosen, fitted, wv))
 
 
-def _choose(ranking: Sequence[Candidate], wv: WaveletVariance) -> tuple[Candidate, Fit]:
-    """The best of a ranking that the data support, and its fit."""
+def _listed(name: str, given: Any, example: str) -> tuple[Any, ...]:
+    if given is None:
+        return ()
+    if isinstance(given, str) or not isinstance(given, Iterable) or (name[0] == "c" and not given):
+        raise InputError(f"{name} = {checks.shown(given)}: give a list, as in {name}={example}")
+    return tuple(given)
+
+
+def _choose(
+    ranking: Sequence[Candidate], wv: WaveletVariance, *, is_closed: bool = False
+) -> tuple[Candidate, Fit]:
+    """The best of a ranking that the data support, and its fit.
+
+    is_closed: Whether no other model may be chosen.
+    """
     limit = rank_key(ranking[0]) + tuning.TIE
     tried: list[tuple[Candidate, Fit]] = []
     found: tuple[Candidate, Fit] | None = None
@@ -294,7 +311,7 @@ def _choose(ranking: Sequence[Candidate], wv: WaveletVariance) -> tuple[Candidat
             break
         if found is None or found[1].goodness.loses_to(fitted.goodness):
             smaller = _supported_part(ranking, candidate, fitted, wv)
-            if smaller is None:
+            if smaller is None or (is_closed and smaller[0] not in ranking):
                 continue
             if found is None or found[1].goodness.loses_to(smaller[1].goodness):
                 return smaller

@@ -176,6 +176,7 @@ def deviations(
     tau: str | Sequence[float] | FloatArray = "octave",
     *,
     confidence: float = 0.95,
+    rate: float | None = None,
 ) -> Deviations:
     """Allan deviation and its relatives, by allantools (``pip install 'gmwm[allan]'``).
 
@@ -183,8 +184,8 @@ def deviations(
     ----------
     data : Channel or (n,) array_like
         At least 8 samples, none missing.
-    dt : float, optional
-        Sampling interval, s; needed for an array.
+    dt, rate : float, optional
+        Sampling interval, s, or rate, Hz; one is needed for an array.
     kinds : sequence of {"overlapping", "modified", "hadamard", "total"}, optional
         Overlapping Allan, modified Allan, overlapping Hadamard and total deviation.
     tau : {"octave", "decade"} or sequence of float, optional
@@ -219,7 +220,7 @@ def deviations(
             "these deviations are computed by allantools, which is not installed: install it with "
             "pip install 'gmwm[allan]'"
         ) from None
-    channel = as_channel(data, dt)
+    channel = as_channel(data, dt, rate)
     values, runs, _ = checked_samples(channel)
     if not runs.is_complete:
         raise InputError(

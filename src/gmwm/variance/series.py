@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -33,6 +33,7 @@ def wavelet_variance(
     efficiency: float = 0.6,
     data_covariance: str | None = None,
     confidence: float = 0.95,
+    rate: float | None = None,
 ) -> WaveletVariance:
     """MODWT wavelet variance of a channel or an array.
 
@@ -46,8 +47,8 @@ def wavelet_variance(
     ----------
     data : Channel or (n,) array_like
         At least 8 samples without a gap between them.
-    dt : float, optional
-        Sampling interval, s; needed for an array.
+    dt, rate : float, optional
+        Sampling interval, s, or rate, Hz; one is needed for an array.
     wavelet : str, optional
         A Daubechies filter, as PyWavelets names it: "haar", "db2" ... "db10", "sym4", "coif2".
     robust : bool, optional
@@ -72,7 +73,7 @@ def wavelet_variance(
     Stebler et al. (2012). The Haar variance of averaging time tau is half the overlapping Allan
     variance.
     """
-    channel = as_channel(data, dt)
+    channel = as_channel(data, dt, rate)
     values, runs, mean = checked_samples(channel)
     confidence = checks.share("confidence", confidence, 0.95)
     efficiency = checks.share("efficiency", efficiency, 0.6)
@@ -219,21 +220,26 @@ def as_wavelet_variance(
     if not isinstance(data, WaveletVariance):
         return wavelet_variance(data, dt, data_covariance=data_covariance)
     if dt is not None:
-        raise InputError("a wavelet variance has its own sampling interval: leave dt out")
+        raise InputError("a wavelet variance has its own rate: leave dt and rate out")
     return data
 
 
-def as_channel(data: Channel | FloatArray | Sequence[float], dt: float | None) -> Channel:
-    """A channel as it is, or one without a name from an array and its sampling interval (s).
+def as_channel(
+    data: Channel | FloatArray | Sequence[float], dt: float | None, rate: float | None = None
+) -> Channel:
+    """A channel as it is, or one without a name from an array and its interval (s) or rate (Hz).
 
     Raises InputError if either is not usable.
     """
     if isinstance(data, Channel):
         return data
-    if dt is None:
-        raise InputError("an array has no sampling interval: give it in seconds, e.g. dt=0.01")
-    interval = checks.sampling_interval(dt)
-    return Channel("", checks.real_numbers(data, "the series"), interval)
+    if isinstance(data, str | Mapping):
+        source = f"gmwm.read({data!r})" if isinstance(data, str) else "recording"
+        raise InputError(
+            f"{checks.shown(data)} is not one series: give {source}['gyro_x'], or calibrate all "
+            f"channels by gmwm.calibrate({source})"
+        )
+    return Channel("", checks.real_numbers(data, "the series"), checks.sampling_interval(dt, rate))
 
 
 WINDOWS = ("none", "octave")

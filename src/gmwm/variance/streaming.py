@@ -162,8 +162,8 @@ class StreamingVariance:
 
     Parameters
     ----------
-    dt : float
-        Sampling interval, s.
+    dt, rate : float
+        Sampling interval, s, or rate, Hz.
     channels : sequence of str, or mapping of str to str, optional
         Names of the channels that blocks have as columns, or names -> SI units (``"rad/s"``,
         ``"m/s^2"``). By default a block is one series.
@@ -186,12 +186,13 @@ class StreamingVariance:
 
     def __init__(
         self,
-        dt: float,
+        dt: float | None = None,
         channels: Sequence[str] | Mapping[str, str] | None = None,
         *,
         confidence: float = 0.95,
+        rate: float | None = None,
     ):
-        self.dt = checks.sampling_interval(dt)
+        self.dt = checks.sampling_interval(dt, rate)
         self.confidence = checks.share("confidence", confidence, 0.95)
         if isinstance(channels, str):
             channels = (channels,)

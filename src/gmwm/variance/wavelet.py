@@ -21,7 +21,7 @@ from gmwm._core.documents import (
     Text,
     check_covariance,
 )
-from gmwm._core.tables import frame, plain_table
+from gmwm._core.tables import frame, html_table, plain_table
 from gmwm._core.text import Printed
 from gmwm._core.typing import FloatArray
 from gmwm._core.units import shown_unit
@@ -269,6 +269,13 @@ class WaveletVariance(Printed, Document):
         )
 
     def __str__(self) -> str:
+        return self.text()
+
+    def _repr_html_(self) -> str:
+        return html_table(str(self).partition("\n")[0], *self._table("field"))
+
+    def text(self, units: str = "field") -> str:
+        """The text of `print`: Allan deviations in data-sheet units or, with "si", in SI."""
         head = f"{self.name or 'series'}: {self.n:,} samples at {1.0 / self.dt:g} Hz"
         if self.gaps is not None:
             head += f", {self.gaps.missing:,} of them missing"
@@ -276,15 +283,17 @@ class WaveletVariance(Printed, Document):
             head += f", {self.wavelet}"
         if self.efficiency < 1.0:
             head += f", robust, efficiency {self.efficiency:g}"
-        interval = f"{100 * self.confidence:g} % interval"
-        low, high = np.sqrt(2.0 * self.lower), np.sqrt(2.0 * self.upper)
-        columns = zip(self.tau, self.allan_deviation, low, high, self.dof, strict=True)
+        return f"{head}\n{plain_table(*self._table(units))}"
+
+    def _table(self, units: str) -> tuple[list[str], list[list[str]]]:
+        unit, factor = shown_unit(self.quantity, self.unit, units)
+        curves = (factor * np.sqrt(2.0 * each) for each in (self.variance, self.lower, self.upper))
         rows = [
-            [f"{tau:.6g}", f"{dev:.5g}", f"{a:.5g} .. {b:.5g}", f"{dof:.3g}"]
-            for tau, dev, a, b, dof in columns
+            [f"{tau:.6g}", f"{deviation:.5g}", f"{low:.5g} .. {high:.5g}", f"{dof:.3g}"]
+            for tau, deviation, low, high, dof in zip(self.tau, *curves, self.dof, strict=True)
         ]
-        heads = ["tau [s]", f"Allan dev. [{self.unit}]", interval, "dof"]
-        return f"{head}\n{plain_table(heads, rows)}"
+        interval = f"{100 * self.confidence:g} % interval"
+        return ["tau [s]", f"Allan dev. [{unit}]", interval, "dof"], rows
 
     def check_content(self) -> None:
         size, complete = self.tau.size, self._complete_levels
@@ -306,12 +315,17 @@ class WaveletVariance(Printed, Document):
         if self.data_covariance is not None:
             check_covariance(self.data_covariance.tolist(), size, "data_covariance")
 
-    def to_frame(self) -> pandas.DataFrame:
-        """A table of the levels, one a row, in SI units; needs pandas."""
-        names = ("tau", "variance", "lower", "upper", "allan_deviation", "dof")
-        columns = [getattr(self, name) for name in names]
-        rows = (dict(zip(names, row, strict=True)) for row in zip(*columns, strict=True))
-        return frame(rows, names)
+    def to_frame(self, *, units: str = "field") -> pandas.DataFrame:
+        """A table of the levels, one a row; needs pandas.
+
+        ``unit`` is that of the deviation, in data-sheet units or, with "si", in SI.
+        """
+        unit, factor = shown_unit(self.quantity, self.unit, units)
+        powers = {"variance": 2, "lower": 2, "upper": 2, "allan_deviation": 1}
+        columns = {"tau": self.tau} | {k: factor**n * getattr(self, k) for k, n in powers.items()}
+        columns |= {"dof": self.dof, "unit": np.full(self.tau.size, unit)}
+        rows = (dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True))
+        return frame(rows, tuple(columns))
 
     def plot(self, ax: Axes | None = None, *, units: str = "field") -> Axes:
         """Allan deviation with error bars against averaging time; returns the axes.

@@ -2,6 +2,8 @@
 
 import re
 import sys
+from dataclasses import replace
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -31,24 +33,30 @@ def results(recording):
 
 
 def test_levels(results):
-    table = results["wv"].to_frame()
-    np.testing.assert_array_equal(table["tau"], results["wv"].tau)
-    np.testing.assert_array_equal(table["allan_deviation"], results["wv"].allan_deviation)
-    assert np.all(table["lower"] < table["upper"])
+    wv = results["wv"]
+    si, field = wv.to_frame(units="si"), wv.to_frame()
+    np.testing.assert_array_equal(si["tau"], wv.tau)
+    np.testing.assert_array_equal(si["allan_deviation"], wv.allan_deviation)
+    assert np.all(si["lower"] < si["upper"])
+    assert (si["unit"][0], field["unit"][0]) == ("rad/s", "deg/h")
+    per_si = np.degrees(3600.0)
+    np.testing.assert_allclose(field["allan_deviation"], per_si * wv.allan_deviation)
+    np.testing.assert_allclose(field["variance"], per_si**2 * wv.variance)
 
 
 def test_parameters(results):
-    table = results["fit"].to_frame(units="si").set_index("key")
-    assert list(table.index) == ["N", "K"]
-    assert table.loc["N", "value"] == results["fit"].params["N"]
-    assert table.loc["N", "unit"] == "rad/s/sqrt(Hz)"
+    si, field = (results["fit"].to_frame(units=units).set_index("key") for units in ("si", "field"))
+    assert list(si.index) == ["N", "K"]
+    assert si.loc["N", "value"] == results["fit"].params["N"]
+    assert (si.loc["N", "unit"], field.loc["N", "unit"]) == ("rad/s/sqrt(Hz)", "deg/sqrt(h)")
+    assert field.loc["N", "value"] == pytest.approx(np.degrees(si.loc["N", "value"]) * 60.0)
 
 
 def test_candidates(results):
     table = results["selection"].to_frame()
     assert len(table) == len(results["selection"])
     assert table["model"][table["chosen"]].item() == results["selection"].model.title()
-    assert table["tie"][0]
+    assert table["tie"][0] and table["chosen"][0]
 
 
 def test_channels(results):
@@ -90,3 +98,27 @@ def test_looks(results, name):
     assert "\n" not in repr(result)
     assert len(repr(result)) < 120
     assert re.match(r"<(pre|p)>", result._repr_html_())
+
+
+@pytest.mark.parametrize("name", ["wv", "fit", "selection", "health", "numbers"])
+def test_notebooks_show_a_table(results, name):
+    result = results["calibration"].numbers if name == "numbers" else results[name]
+    root = ElementTree.fromstring(f"<div>{result._repr_html_()}</div>")
+    rows = root.findall("table/tr")
+    assert len(rows) > 1 and len({len(row) for row in rows}) == 1
+    assert all(row.tag == "tr" for row in rows) and rows[0].findall("th")
+
+
+def test_verdicts_are_marked(results):
+    with pytest.warns(gmwm.FitWarning):
+        bad = gmwm.fit("N + 3 GM", results["wv"])
+    assert "\u2713 valid" in results["fit"]._repr_html_() or not results["fit"].valid
+    assert "\u2717 not valid" in bad._repr_html_()
+    assert "\u2713 chosen" in results["selection"]._repr_html_()
+    limits = [each for each in bad.estimates if each.kind == "bound"]
+    assert bad._repr_html_().count("95 % upper limit") == len(limits)
+
+
+def test_a_name_cannot_bring_markup(results):
+    named = replace(results["wv"], name="<script>")
+    assert "<script>" not in named._repr_html_()

@@ -100,7 +100,7 @@ def test_stationary_noise_has_departures_in_one_of_a_hundred_records_at_most(mod
     found = [x for x in records if departures(free, gmwm.wavelet_variance(x, dt=DT))]
     assert len(found) <= binom.isf(1e-3, runs, 0.01)
     fits = [gmwm.calibrate(recording(x), screening=())["gyro_x"] for x in found]
-    assert sum(not fit.reasons["stationary"] for fit in fits) <= binom.isf(0.01, runs, 0.005)
+    assert sum("stationary" in fit.reasons for fit in fits) <= binom.isf(0.01, runs, 0.005)
 
 
 @pytest.mark.parametrize(("size", "is_valid"), [(0.11, True), (0.13, False)])
@@ -110,7 +110,7 @@ def test_a_fit_is_not_valid_from_an_evidence_of_1000_on(size, is_valid):
     fit = gmwm.calibrate(recording(x), WhiteNoise() + RandomWalk(), screening=())["gyro_x"]
     (step,) = [each for each in fit.notices if each.code == "step"]
     assert step.values["share"] > 0.5
-    assert fit.reasons["stationary"] is is_valid is (step.severity == "warning")
+    assert ("stationary" not in fit.reasons) is is_valid is (step.severity == "warning")
     assert (100.0 < step.values["evidence"] < 1000.0) is is_valid
 
 
@@ -220,7 +220,7 @@ def test_a_calibration_reports_it_by_the_channel_and_it_can_be_taken_off(tmp_pat
     fit = found["gyro_x"]
     assert not fit.valid
     assert not found.valid
-    assert not fit.reasons["stationary"]
+    assert "stationary" in fit.reasons
     (notice,) = [one for one in fit.notices if one.code == "step"]
     assert notice.severity == "bad"
     assert notice.values["lower"] < SAMPLE < notice.values["upper"]
@@ -243,7 +243,7 @@ def test_a_calibration_reports_it_by_the_channel_and_it_can_be_taken_off(tmp_pat
     np.testing.assert_array_equal(same["gyro_x"].values, clean["gyro_x"].values)
     better = gmwm.calibrate(clean)["gyro_x"]
     assert better.valid
-    assert better.reasons["stationary"]
+    assert "stationary" not in better.reasons
     low, high = better.interval(0.99)["K"]
     assert low < 2e-6 < high
 
@@ -375,7 +375,7 @@ def test_a_level_that_changes_five_times_is_noise_of_the_sensor():
     fit = gmwm.calibrate(recording(x), WhiteNoise(), remove_departures=True)["gyro_x"]
     (notice,) = [one for one in fit.notices if one.code == "departures-many"]
     assert notice.values["removed"] >= 5
-    assert not fit.reasons["stationary"]
+    assert "stationary" in fit.reasons
 
 
 def test_a_tenth_of_the_deviation_makes_a_fit_invalid():
@@ -387,4 +387,4 @@ def test_a_tenth_of_the_deviation_makes_a_fit_invalid():
         for notice in (each for each in fit.notices if each.code == "transient"):
             is_sure = notice.values["evidence"] >= 1000.0
             assert (notice.severity == "bad") is (is_sure and notice.values["share"] > 0.19)
-            assert fit.reasons["stationary"] is (notice.severity != "bad")
+            assert ("stationary" in fit.reasons) is (notice.severity == "bad")

@@ -97,11 +97,11 @@ def test_a_spoilt_channel_is_not_valid_and_the_others_are(kind):
     found = calibrated(values)
     fit = found["gyro_x"]
     assert not fit.valid
-    assert not fit.reasons[reason]
+    assert reason in fit.reasons
     assert [n.code for n in found.notices if n.where == "gyro_x" and n.severity == "bad"] == [code]
     assert trust("gyro_x", fit, found)[0] is False
     assert found["gyro_y"].valid
-    assert all(found["gyro_y"].reasons.values())
+    assert not found["gyro_y"].reasons
 
 
 @pytest.mark.parametrize(("share", "step"), [(0.05, 0.0), (0.2, 0.0), (0.1, 0.15)])
@@ -120,7 +120,7 @@ def test_samples_of_lost_packets_are_left_out(share, step):
 def test_lost_packets_that_are_left_in_spoil_the_channel():
     rec = gmwm.Recording.from_arrays({"gyro_x": held(0.1)}, 100.0, {"gyro": "rad/s"})
     found = gmwm.calibrate(rec, WhiteNoise(), screening=("lines",))
-    assert not found["gyro_x"].reasons["samples_measured"]
+    assert "samples_measured" in found["gyro_x"].reasons
 
 
 RNG = np.random.default_rng(7)

@@ -50,7 +50,9 @@ def test_help_and_errors_name_every_term_that_a_model_may_have():
 
     names = [kind.short_name for kind in CATALOGUE]
     assert [type(written_models([each])[""].terms[0]) for each in names] == list(CATALOGUE)
-    with pytest.raises(gmwm.InputError, match=", ".join(names)):
+    with pytest.raises(gmwm.InputError) as error:
         written_models(["low-pass noise"])
-    shown = CliRunner().invoke(cli, ["calibrate", "--help"]).output
-    assert ", ".join(names) in " ".join(shown.split())
+    listed = str(error.value).partition(": write ")[2].partition(" with +")[0].split(", ")
+    assert {*names} <= {*listed}  # and processes that other tests define
+    shown = " ".join(CliRunner().invoke(cli, ["calibrate", "--help"]).output.split())
+    assert ", ".join(name for name in listed if name in names) in shown

@@ -218,7 +218,7 @@ def test_an_accelerometer_that_wanders_is_no_slow_tilt(record, seed):
 def test_what_moved_is_calibrated_from_its_stretches_at_rest(moved):
     recording = moved(turn(12_000, 40, 80, 60.0, (0, 0, 1)))
     cal = gmwm.calibrate(recording, WhiteNoise())
-    assert all(fit.reasons["recording_static"] for fit in cal.values())
+    assert not any("recording_static" in fit.reasons for fit in cal.values())
     (notice,) = [each for each in cal.notices if each.code == "still-stretches"]
     assert notice.values["total"] == pytest.approx(80.0, abs=2.0)
     cal = gmwm.calibrate(recording, WhiteNoise(), still=False)
@@ -227,7 +227,7 @@ def test_what_moved_is_calibrated_from_its_stretches_at_rest(moved):
 
 def test_fits_of_what_was_tilted_are_not_valid(moved):
     cal = gmwm.calibrate(moved(turn(30_000, 150, 151, 5.0, (1, 0, 0))), WhiteNoise())
-    kept = {name: fit.reasons["attitude_kept"] for name, fit in cal.items()}
+    kept = {name: "attitude_kept" not in fit.reasons for name, fit in cal.items()}
     assert kept == {name: name.startswith("gyro") for name in cal}
     again = gmwm.calibration.Calibration.from_content(cal.content())
     assert [fit.valid for fit in again.values()] == [fit.valid for fit in cal.values()]

@@ -252,7 +252,7 @@ def test_text_is_readable_at_80_columns():
         (WhiteNoise(1.0) + RandomWalk(0.0), 100, 1.0, "K is zero"),
         (WhiteNoise(1.0) + Sinusoid(1.0, 0.1), 100, 1.0, "Sinusoid"),
         (RateRamp(1.0), 100, 1.0, "no noise process"),
-        ("white", 100, 1.0, "not an error model"),
+        ("white", 100, 1.0, "'white' is not a term"),
     ],
 )
 def test_bad_input_is_one_sentence(model, n, dt, words):

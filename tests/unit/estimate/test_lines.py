@@ -268,7 +268,7 @@ def test_a_bad_region_is_refused_before_there_are_data(region):
 @pytest.mark.parametrize("option", ["omega", "weights"])
 def test_weights_of_a_method_that_has_none_are_refused(corner, option):
     for method in ("allan", gmwm.AllanLines(), "em", gmwm.MLE()):
-        with pytest.raises(InputError, match="has no weights: take gmwm or simulated"):
+        with pytest.raises(InputError, match="has no weights: leave them out"):
             gmwm.fit(WhiteNoise(), corner, method=method, **{option: "model"})
 
 

@@ -259,7 +259,7 @@ def test_a_term_of_zero_is_in_the_table_but_not_drawn():
 REFUSED = {
     "free parameters": (lambda: error_budget({"gyro_x": WhiteNoise()}, dt=DT), "free parameters"),
     "no quantity": (lambda: error_budget({"temp": GYRO}, dt=DT), "a gyro or an accelerometer"),
-    "no channels": (lambda: error_budget({}, dt=DT), "models by channel name"),
+    "no channels": (lambda: error_budget({}, dt=DT), "models by channel"),
     "a model alone": (lambda: error_budget(GYRO, dt=DT), "a gyro or an accelerometer"),
     "no model": (lambda: error_budget({"gyro_x": 3}, dt=DT), "is not an error model"),
     "interval of NaN": (lambda: error_budget({"gyro_x": GYRO}, dt=np.nan), "dt = nan"),

@@ -391,7 +391,7 @@ def test_models_are_given_by_channel_or_sensor(lot):
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ({"model": "N"}, "'N'"),
+        ({"model": "N + X"}, "'X' is not a term"),
         ({"screening": ("shocks",)}, "screening = 'shocks'"),
         ({"still": "yes"}, "still = 'yes'"),
         ({"limits": 3}, "limits of '' = 3: give them in SI"),

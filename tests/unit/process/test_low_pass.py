@@ -58,7 +58,7 @@ def test_a_band_at_or_above_half_the_rate_is_white():
 
 def test_the_exact_likelihood_refuses_it():
     x = np.random.default_rng(0).normal(size=500)
-    with pytest.raises(gmwm.InputError, match='use method = "gmwm" or "whittle"'):
+    with pytest.raises(gmwm.InputError, match='use method="gmwm" or "whittle"'):
         gmwm.fit(LowPassNoise(order=2.0, damping=0.7), x, dt=1.0, method="mle")
 
 

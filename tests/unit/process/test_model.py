@@ -91,7 +91,8 @@ def test_moments_of_a_sum_are_sums_of_moments():
         (lambda: (WhiteNoise() + RandomWalk()).psd(np.ones(1), 1.0), "free parameters .N, K."),
         (lambda: (WhiteNoise() + RandomWalk()).with_params({"Z": 1.0}), "no parameter 'Z'"),
         (lambda: ARIMA([0.1], 2, 0, 1.0).haar_variance(np.ones(1), 1.0), "one integration"),
-        (lambda: gmwm.simulate("noise", 5, 1.0), "not an error model"),
+        (lambda: gmwm.simulate("noise", 5, 1.0), "'noise' is not a term"),
+        (lambda: gmwm.simulate([WhiteNoise(1.0)], 5, 1.0), "not an error model: write one like"),
         (lambda: model_from_list([{"process": "Nonsense"}]), "unknown process 'Nonsense'"),
     ],
 )
@@ -149,3 +150,64 @@ def test_a_value_more_than_a_process_has_parameters_is_refused(kind):
 def test_a_parameter_too_many_is_refused_with_those_that_there_are(make):
     with pytest.raises(gmwm.InputError, match=r"its parameters are sigma, tau$"):
         make()
+
+
+# -- models as text -------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("kind", CATALOGUE, ids=lambda kind: kind.__name__)
+def test_a_text_has_short_names_and_class_names(kind):
+    assert as_model(kind.short_name) == as_model(kind.__name__) == as_model(kind())
+
+
+@pytest.mark.parametrize(
+    ("text", "model"),
+    [
+        ("N + K + 2 GM", WhiteNoise() + RandomWalk() + 2 * GaussMarkov()),
+        ("2GM+N", 2 * GaussMarkov() + WhiteNoise()),
+        ("WhiteNoise() + 2 * GaussMarkov()", WhiteNoise() + 2 * GaussMarkov()),
+    ],
+)
+def test_a_text_is_a_model(text, model):
+    assert as_model(text) == model == as_model(repr(model))
+
+
+def test_the_latest_process_of_a_name_of_ones_own_is_meant():
+    def defined(power):
+        class Coloured(gmwm.Process):
+            level: float = gmwm.parameter("u", role="scale")
+
+            def psd(self, f, dt):
+                return self.level**2 * f**power
+
+        return Coloured
+
+    first, second = defined(-0.5), defined(-1.0)
+    model = as_model("N + 1 Coloured")
+    assert type(model.terms[1]) is second is not first
+    with pytest.raises(gmwm.InputError, match=r"write .*, Coloured, "):
+        as_model("N + Colored")
+
+
+@pytest.mark.parametrize("text", ["", "N +", "N - K", "0 N", "N + X", "N(1)", "2 * N * K"])
+def test_a_text_that_is_none_names_the_terms(text):
+    with pytest.raises(
+        gmwm.InputError, match=r"is not a term: write B, K, N, Q, R, AR, GM, .* GM'$"
+    ):
+        as_model(text)
+
+
+def test_open_parameters_are_shown_as_they_are_given():
+    with pytest.raises(gmwm.InputError) as error:
+        gmwm.simulate("N + GM", n=10, rate=100)
+    written = str(error.value).partition("give values, ")[2]
+    scope = {"WhiteNoise": WhiteNoise, "GaussMarkov": GaussMarkov}
+    assert not eval(written.replace("...", "1.0"), scope).is_open
+
+
+def test_a_repr_has_four_digits_and_a_document_all():
+    model = WhiteNoise(1 / 3) + GaussMarkov(2 / 3, 1e5 / 3) + AR([1 / 3], 1 / 7)
+    assert repr(model.terms[0]) == "WhiteNoise(N=0.3333)"
+    assert repr(model.terms[1]) == "GaussMarkov(sigma=0.6667, tau=3.333e+04)"
+    assert repr(model.terms[2]) == "AR(ar=[0.3333], sigma2=0.1429)"
+    assert model_from_list([term.to_dict() for term in model.terms]) == model

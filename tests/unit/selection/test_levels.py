@@ -50,7 +50,7 @@ def test_ramp_or_walk_names_the_slow_term(tau):
     assert "too slow" in ramp_or_walk(fit, Slope(1e-7, 1e-16)).text
 
 
-@pytest.mark.parametrize(("unit", "shown"), [("V", "V/s or slow"), ("", "u/s or slow")])
+@pytest.mark.parametrize(("unit", "shown"), [("V", "V/s from slow"), ("", "u/s from slow")])
 def test_ramp_or_walk_has_the_unit_of_the_samples(unit, shown):
     x = WhiteNoise(1e-3).simulate(2000, 0.1, 1)
     fit = gmwm.fit(WhiteNoise(), gmwm.Channel("level", x, 0.1, None, unit))

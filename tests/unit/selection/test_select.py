@@ -1,6 +1,7 @@
 """Model choice: the right size where the data can tell, nothing invented where they cannot."""
 
 import json
+from collections import Counter
 from itertools import pairwise
 
 import numpy as np
@@ -54,10 +55,10 @@ def test_ranking_is_sorted_and_printed():
     criteria = [item.criterion for item in selection if "ramp" not in item.model.title()]
     assert criteria == sorted(criteria)
     lines = str(selection).splitlines()
-    assert lines[0].split() == ["difference", "objective", "p-value", "param.", "model"]
-    assert sum(line.startswith(">") for line in lines) == 1
+    assert lines[0].split() == ["model", "difference", "p-value", "parameters"]
+    assert "chosen" in lines[1] and not any("chosen" in line for line in lines[2:])
     assert max(map(len, lines)) <= 80
-    assert any(line[1] == "=" for line in lines[1:]) == (len(selection.ties) > 1)
+    assert any("fits equally well" in line for line in lines) == (len(selection.ties) > 1)
     assert selection[0].model in [item.model for item in selection]
 
 
@@ -91,7 +92,7 @@ def test_a_line_is_taken_where_there_is_one():
 def test_an_extra_term_must_have_a_shape():
     x = gmwm.simulate(WhiteNoise(1.0), 100, 1.0, 1)
     for extra in (Sinusoid(), Sinusoid(1.0, 0.1), RateRamp()):
-        with pytest.raises(gmwm.InputError, match="leave its amplitude free"):
+        with pytest.raises(gmwm.InputError, match="free amplitude, as in"):
             gmwm.select(x, dt=1.0, extra=[extra])
 
 
@@ -208,3 +209,60 @@ def test_samples_missing_all_over_leave_a_model_without_a_ramp():
     best = gmwm.select(gmwm.wavelet_variance(x, dt=0.01)).fit
     assert list(best.params) == ["N"]
     assert best.params["N"] == pytest.approx(1e-3, rel=4.0 / np.sqrt(2.0 * 14_000))
+
+
+# -- candidates that are given --------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def walking():
+    truth = WhiteNoise(1.0) + RandomWalk(0.01)
+    return gmwm.wavelet_variance(gmwm.simulate(truth, 100_000, 1.0, seed=1), 1.0)
+
+
+def test_only_the_candidates_are_ranked(walking):
+    texts = ["N + GM", "K + N", "N", "N + 2 GM"]
+    found = gmwm.select(walking, candidates=texts)
+    models = [gmwm.process.as_model(text) for text in texts]
+
+    assert found.chosen.model == models[1]
+    assert {item.model for item in found} == set(models)
+    free = gmwm.select(walking)
+    for item in found:  # the same criterion as among all
+        terms = Counter(item.model.terms)
+        for each in free:
+            if Counter(each.model.terms) == terms:
+                assert each.criterion == pytest.approx(item.criterion, abs=0.5)
+
+
+def test_a_candidate_is_chosen_though_another_model_is_better(walking):
+    found = gmwm.select(walking, candidates=["N + 2 GM", "N + 3 GM"])
+    assert found.chosen in found.ranking and len(found) == 2
+
+
+def test_a_ramp_is_a_candidate_of_one_recording(walking):
+    rng = np.random.default_rng(1)
+    x = rng.normal(size=100_000) + 1e-4 * np.arange(100_000)
+    found = gmwm.select(x, rate=1.0, candidates=["N + K", "R + N", "N + K + R"])
+    assert found.chosen.model == RateRamp() + WhiteNoise() or found.model.title().endswith("ramp")
+    assert found.fit.params["R"] == pytest.approx(1e-4, abs=4 * found.fit.stderr["R"])
+    with pytest.raises(gmwm.InputError, match="leave R out"):
+        gmwm.select([walking, walking], candidates=["N + R", "N"])
+
+
+def test_the_chosen_model_comes_first(walking):
+    found = gmwm.select(walking)
+    moved = gmwm.Selection(found.ranking, found[1], gmwm.fit(found[1].model, walking))
+
+    before, _, after = str(moved).partition(" chosen ")
+    assert "parameters" in before and "fits equally well" in after
+    table = moved.to_frame()
+    assert list(table["chosen"]) == [True] + [False] * (len(found) - 1)
+    assert "chosen" in moved._repr_html_().split("</tr>")[1]
+
+
+def test_a_plot_has_the_chosen_model_and_its_rivals(walking):
+    found = gmwm.select(walking)
+    labels = found.plot().get_legend_handles_labels()[1]
+    rivals = [f"fits equally well: {rival.model.title()}" for rival in found.rivals]
+    assert rivals and "model" in labels and {*rivals} <= {*labels}

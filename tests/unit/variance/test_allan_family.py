@@ -236,7 +236,7 @@ GAPS = np.where(np.arange(100) % 40 == 7, np.nan, noise(100))
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        ((noise(100),), "an array has no sampling interval: give it in seconds, e.g. dt=0.01"),
+        ((noise(100),), "the sampling rate is missing: give it in Hz, as in rate=100, or dt=0.01"),
         ((noise(100), 0.0), "dt = 0.0: give a positive sampling interval"),
         ((noise(7), 1.0), "shape (7,): give one series of 8 samples or more"),
         ((np.ones((100, 2)), 1.0), "shape (100, 2): give one series"),

@@ -144,7 +144,7 @@ def test_a_series_that_changes_within_its_gaps_only_has_no_noise():
 @pytest.mark.parametrize("entrance", [gmwm.wavelet_variance, lambda x: gmwm.fit(TRUTH.opened(), x)])
 def test_an_array_needs_a_sampling_interval_wherever_it_goes_in(entrance):
     with pytest.raises(
-        gmwm.InputError, match=r"^an array has no .*: give it in seconds, e\.g\. dt="
+        gmwm.InputError, match=r"^the sampling rate is missing: give it in Hz, as in rate=100"
     ):
         entrance(np.ones(100))
 

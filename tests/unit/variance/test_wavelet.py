@@ -89,7 +89,7 @@ def test_intervals_cover(process):
         (np.array([1.0] * 50 + [np.inf] * 50), 1.0, "infinite"),
         (np.zeros((10, 10)), 1.0, "one series"),
         (["a"] * 100, 1.0, "not a number"),
-        (np.arange(100.0), None, "sampling interval"),
+        (np.arange(100.0), None, "sampling rate is missing"),
         (np.arange(100.0), 0.0, "positive sampling interval"),
         (np.arange(100.0), float("nan"), "positive sampling interval"),
     ],

@@ -102,7 +102,7 @@ class EM:
                     f'method = "em" does not support {term!r}: it takes WhiteNoise, RandomWalk, '
                     'RateRamp and GaussMarkov; "mle" supports the others, "gmwm" a Sinusoid too'
                 )
-        series = Series.of(model, channel, self.start, gaps=True)
+        series = Series.of(model, channel, self.start, exact=True)
         iteration = Iteration(series, self.drift == "state")
         return _conclude(series, iteration, *iteration.run(self))
 

@@ -30,12 +30,20 @@ from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.estimate import tuning
 from gmwm.estimate.likelihood.kalman import Space, whiten
-from gmwm.estimate.moments import GMWM
-from gmwm.estimate.problem import Coordinates, Slope, density, keys_by_term
+from gmwm.estimate.moments import GMWM, dictionary
+from gmwm.estimate.problem import (
+    Coordinates,
+    Scales,
+    Slope,
+    density,
+    keys_by_term,
+    solve_nonnegative,
+)
 from gmwm.estimate.result import Fit
 from gmwm.process import Model, Process, StateSpace, as_model
 from gmwm.readers import Channel
 from gmwm.variance import MIN_SAMPLES, Runs, WaveletVariance, wavelet_variance
+from gmwm.variance.covariance import dyadic_levels
 
 LogLikelihood = Callable[[Sequence[Process]], float]
 Objective = Callable[[FloatArray], float]
@@ -153,9 +161,36 @@ def arrays_of(space: StateSpace) -> Space:
     return Space(space.transition, noise, h, space.measurement_noise, first)
 
 
+def have_states(processes: Sequence[Process]) -> bool:
+    """Whether all processes have a state space."""
+    return all(type(process).state_space is not Process.state_space for process in processes)
+
+
+def with_states(columns: Columns, processes: Sequence[Process]) -> Sequence[Process]:
+    """The processes, those without a state space as sums of textbook processes near them.
+
+    Such a sum whitens a series nearly as well, and the spectral likelihood makes up for the rest.
+    """
+    if have_states(processes):
+        return processes
+    scales = Scales(dyadic_levels(columns.n) * columns.dt, columns.dt, columns.n)
+    design, atoms, curves = dictionary(scales)
+    found: list[Process] = []
+    for process in processes:
+        if have_states([process]):
+            found.append(process)
+        elif np.any(curve := scales.curve(process)):
+            x = solve_nonnegative(curves / curve[:, None], np.ones(curve.size))[0]
+            parts = [design.at_shape(*atom) for atom in atoms]
+            found += [
+                p.with_amplitude(v) for p, v in zip(parts, x.tolist(), strict=True) if v > 0.0
+            ]
+    return found
+
+
 def whitened(columns: Columns, processes: Sequence[Process]) -> tuple[FloatArray, float, int]:
     """`gmwm.estimate.likelihood.kalman.whiten` of the columns under a sum of processes."""
-    return whiten(arrays_of(stacked(processes, columns.dt)), columns.matrix)
+    return whiten(arrays_of(stacked(with_states(columns, processes), columns.dt)), columns.matrix)
 
 
 class KalmanLikelihood:
@@ -178,7 +213,7 @@ class WhittleLikelihood:
     columns : Columns
         Without missing samples.
     filters : sequence of Process
-        Processes with a state space, close to the noise, that whiten the series.
+        Processes close to the noise, that whiten the series.
 
     Notes
     -----
@@ -189,6 +224,7 @@ class WhittleLikelihood:
     """
 
     def __init__(self, columns: Columns, filters: Sequence[Process]) -> None:
+        filters = with_states(columns, filters)
         innovations, log_variance, _ = whitened(columns, filters)
         products = innovations.T @ innovations
         self.regression = Regression.of(products)
@@ -292,19 +328,20 @@ class Series:
 
     @classmethod
     def of(
-        cls, model: Model, channel: Channel, start: Process | Model | None, *, gaps: bool
+        cls, model: Model, channel: Channel, start: Process | Model | None, *, exact: bool
     ) -> Series:
         """Check the samples and find starting values.
 
-        Raises InputError if the samples are no series of numbers, if some are missing and ``gaps``
-            are not allowed, or if ``start`` is not the same model.
+        exact: Whether for an exact likelihood, which needs state spaces and copes with gaps.
+        Raises InputError if the samples are no series of numbers, if a likelihood that is not exact
+            lacks some, or if ``start`` is not the same model.
         """
         coordinates = Coordinates(model)
         for term in coordinates.noise:
-            if type(term).state_space is Process.state_space:
+            if exact and not have_states([term]):
                 raise InputError(
-                    f"{type(term).__name__} has no state-space form, which a likelihood needs: "
-                    'use method = "gmwm"'
+                    f"{type(term).__name__} has no state-space form, which an exact likelihood "
+                    'needs: use method="whittle"'
                 )
         values = np.asarray(channel.values, dtype=float)
         # The wavelet variance reports what is no series.
@@ -316,10 +353,10 @@ class Series:
                 f"{where} has {values.size - missing} samples that are not missing: give "
                 f"{MIN_SAMPLES} or more"
             )
-        if missing and not gaps:
+        if missing and not exact:
             raise InputError(
                 f"{missing:,} samples are missing, but a Fourier transform needs all: use "
-                'method = "mle" or "gmwm"'
+                'method="mle"'
             )
         bridged, is_bridged = channel, False
         if missing:

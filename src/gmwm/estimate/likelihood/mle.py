@@ -30,6 +30,7 @@ from gmwm.estimate.likelihood.likelihood import (
     Series,
     WhittleLikelihood,
     defined,
+    have_states,
     objective_of,
     whitened,
 )
@@ -82,15 +83,15 @@ class MLE:
         if any(term.is_line and term.is_open for term in model.terms):
             raise InputError(
                 'method = "mle" does not support an open Sinusoid (its amplitude and frequency are '
-                'not parameters of a spectrum): give it values, or use method = "gmwm"'
+                'not parameters of a spectrum): give it values, or use method="gmwm"'
             )
         for term in model.terms:
             if term.is_band_limited:
                 raise InputError(
                     f'method = "mle" does not support {type(term).__name__}, which has no '
-                    'exact state-space form: use method = "gmwm" or "whittle"'
+                    'exact state-space form: use method="gmwm" or "whittle"'
                 )
-        series = Series.of(model, channel, self.start, gaps=True)
+        series = Series.of(model, channel, self.start, exact=True)
         columns = series.columns
         likelihood = KalmanLikelihood(columns)
 
@@ -120,8 +121,8 @@ class Whittle(MLE):
     def estimate(self, model: Model, channel: Channel) -> Fit:
         """Fit the open parameters of a model to samples, all of which must exist."""
         if any(term.is_line for term in model.terms):
-            raise InputError('method = "whittle" does not support a Sinusoid: use method = "gmwm"')
-        series = Series.of(model, channel, self.start, gaps=False)
+            raise InputError('method = "whittle" does not support a Sinusoid: use method="gmwm"')
+        series = Series.of(model, channel, self.start, exact=False)
 
         def climb(coordinates: Coordinates, first: tuple[Process, ...]) -> Top:
             return _climb_whittle(series.columns, coordinates, first)
@@ -146,9 +147,11 @@ def _climb_whittle(columns: Columns, coordinates: Coordinates, first: tuple[Proc
             whittle.regression.beta
         )
         part = Columns.without_regressors(residual, columns.dt)
-        exact = objective_of(KalmanLikelihood(part), coordinates, processes)
-        spectral = objective_of(WhittleLikelihood(part, processes), coordinates, processes)
-        tilt = gradient(exact, origin, alone) - gradient(spectral, origin, alone)
+        tilt = np.zeros_like(origin)
+        if have_states(processes):
+            exact = objective_of(KalmanLikelihood(part), coordinates, processes)
+            spectral = objective_of(WhittleLikelihood(part, processes), coordinates, processes)
+            tilt = gradient(exact, origin, alone) - gradient(spectral, origin, alone)
         objective = _tilted(objective_of(whittle, coordinates, processes), origin, tilt)
         found = maximise(objective, origin, information)
         reached = coordinates.processes(found.z, processes)

@@ -17,12 +17,7 @@ from scipy.optimize import leastsq
 from gmwm._core.typing import FloatArray
 from gmwm.estimate import tuning
 from gmwm.estimate.moments.design import MOST_SHAPES, Design
-from gmwm.estimate.moments.kernels import (
-    Weighted,
-    linearized,
-    profiled,
-    projected,
-)
+from gmwm.estimate.moments.kernels import Weighted, linearized, profiled, projected
 from gmwm.estimate.problem import Scales, objectives_with, shape_of, solve_nonnegative
 from gmwm.process import GaussMarkov, Shape, WhiteNoise
 

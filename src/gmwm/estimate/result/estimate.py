@@ -108,23 +108,23 @@ class Estimate:
             return self.field[0]
         return InUnit(self.value, self.lower, self.upper, self.unit)
 
-    @property
-    def cells(self) -> tuple[str, ...]:
-        """Of the table of ``str(fit)``: key, estimate, standard error, 95 % interval and unit."""
-        error, value = "", f"{self.value:.5g}"
+    def cells(self, units: str = "field") -> tuple[str, ...]:
+        """Of the table of ``print(fit)``: key, estimate, standard error, 95 % interval and unit."""
+        shown, error = self.in_units(units), ""
+        value = f"{shown.value:.5g}"
         if self.kind == "undefined":
             value, interval = "-", "term has no amplitude"
         elif self.kind == "fixed":
             interval = "fixed"
         elif self.kind == "bound":
-            interval = f"< {self.upper:.4g}"
+            interval = f"<= {shown.upper:.4g}"
         else:
-            interval = f"{self.lower:.4g} .. {self.upper:.4g}"
-            error = f"{self.stderr:.2g}"
-        return self.key, value, error, interval, self.unit
+            interval = f"{shown.lower:.4g} .. {shown.upper:.4g}"
+            error = f"{self.to_dict(units)['stderr']:.2g}"
+        return self.key, value, error, interval, shown.unit
 
     def __str__(self) -> str:
-        return "  ".join(filter(None, self.cells))
+        return "  ".join(filter(None, self.cells()))
 
     def to_dict(self, units: str = "si") -> dict[str, Any]:
         """The columns of `Fit.to_frame`, in JSON types; in SI, or in data-sheet units ("field")."""

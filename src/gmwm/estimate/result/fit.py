@@ -14,7 +14,7 @@ from gmwm._core import checks
 from gmwm._core.distributions import chi2, norm
 from gmwm._core.documents import Array, Document, OrInfinity, OrNaN, Text, check_covariance
 from gmwm._core.frozen import freeze, frozen
-from gmwm._core.tables import frame, plain_table
+from gmwm._core.tables import frame, html_table, plain_table
 from gmwm._core.text import Printed, bullets, per_cent, wrapped
 from gmwm._core.typing import FloatArray
 from gmwm._core.units import shown_unit
@@ -28,7 +28,7 @@ from gmwm.estimate.result.estimate import (
     slope_name,
 )
 from gmwm.estimate.result.goodness import Goodness
-from gmwm.issues import CATALOGUE, Notice
+from gmwm.issues import Notice
 from gmwm.process import Model
 from gmwm.variance import WaveletVariance
 
@@ -46,6 +46,7 @@ METHOD_NAMES = {
 }
 """Names of the methods in tables."""
 
+_HEADS = ("parameter", "estimate", "std. error", "95 % interval", "unit")
 _LARGEST_DISCREPANCY = 1000.0  # a model that is off by more describes nothing
 _PER_OCTAVE = 12  # points of a curve: with one, a line and a resonance look broken
 
@@ -130,11 +131,14 @@ class Fit(Document, Printed):
         return not any(notice.severity == "bad" for notice in self.notices)
 
     @property
-    def reasons(self) -> Mapping[str, bool]:
-        """Conditions of a valid fit by name, and whether this one meets them."""
-        lacking = {notice.issue.lacks for notice in self.notices if notice.severity == "bad"}
-        names = (issue.lacks for issue in CATALOGUE.values() if issue.lacks)
-        result: Mapping[str, bool] = frozen({name: name not in lacking for name in names})
+    def reasons(self) -> Mapping[str, str]:
+        """Property of a valid fit that this one lacks -> sentence; empty for a valid fit."""
+        found: dict[str, str] = {}
+        for each in self.notices:
+            if each.severity == "bad":
+                name = each.issue.lacks or each.code
+                found[name] = f"{found.get(name, '')} {each.sentence}".lstrip()
+        result: Mapping[str, str] = frozen(found)
         return result
 
     @property
@@ -355,6 +359,15 @@ class Fit(Document, Printed):
         return f"<{type(self).__name__} {self.model!r}, {METHOD_NAMES[self.method]}, {verdict}>"
 
     def __str__(self) -> str:
+        return self.text()
+
+    def _repr_html_(self) -> str:
+        title = f"{self.wv.name or 'series'}: {self.model.title()}"
+        notes, mark = [self.goodness.sentence, *self.notices], "not " * (not self.valid) + "valid"
+        return html_table(title, _HEADS, [each.cells() for each in self.estimates], notes, mark)
+
+    def text(self, units: str = "field") -> str:
+        """The text of `print`: estimates in data-sheet units or, with "si", in SI."""
         lines = wrapped(f"{self.wv.name or 'series'}: {self.model.title()}", indent=2)
         how = METHOD_NAMES[self.method]
         if self.weights:
@@ -362,8 +375,7 @@ class Fit(Document, Printed):
         elif self.trace:
             how += f", {len(self.trace)} iterations"
         lines += wrapped(f"{self._size()}, {self.wv.tau.size} levels; {how}", indent=2)
-        heads = ["parameter", "estimate", "std. error", "95 % interval", "unit"]
-        lines += ["", plain_table(heads, [each.cells for each in self.estimates]), ""]
+        lines += ["", plain_table(_HEADS, [each.cells(units) for each in self.estimates]), ""]
         fitness = f"objective {self.objective:.4g} on {self.dof} degrees of freedom"
         if np.isfinite(self.p_value):
             fitness += f", p = {self.p_value:.2g}"

@@ -56,15 +56,20 @@ class JointFit(Fit):
         super().__post_init__()
         freeze(self, "spread")
 
-    def __str__(self) -> str:
+    def text(self, units: str = "field") -> str:
         positive, rows = _positive(self.model), []
         for key in self.keys:
             spread = self.spread.get(key)
-            scale, unit = (100.0, " %") if key in positive and spread is not None else (1.0, "")
-            values = "  ".join(cell(part.params.get(key)) for part in self.parts)
-            rows.append([key, cell(spread, 3, scale) + unit, values])
-        table = plain_table(["parameter", "spread", "of each recording"], rows)
-        return "\n".join([super().__str__(), "", self.agreement, table])
+            is_relative = key in positive and spread is not None
+            unit = self[key].in_units(units).unit
+            scale = (
+                100.0 if is_relative else self[key].in_units(units).value / (self[key].value or 1.0)
+            )
+            shown = cell(spread, 3, scale) + " %" * is_relative
+            values = "  ".join(cell(part[key].in_units(units).value) for part in self.parts)
+            rows.append([key, shown, values, unit])
+        table = plain_table(["parameter", "spread", "of each recording", "unit"], rows)
+        return "\n".join([super().text(units), "", self.agreement, table])
 
     def _size(self) -> str:
         pooled = f"{len(self.parts)} recordings, {self.wv.n_all:,} samples in all"

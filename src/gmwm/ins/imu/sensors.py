@@ -55,11 +55,11 @@ class SensorModels:
 
         Parameters
         ----------
-        source : SensorModels, Calibration or mapping
+        source : SensorModels, Calibration, FilterNumbers or mapping
             A mapping has models by axis (``"gyro_x"``) or by kind (``"gyro"`` and ``"accel"``, the
             same for its three axes); an axis goes before its kind.
         bias_sd : mapping of str to float, optional
-            By axis or kind, in rad/s and m/s^2.
+            By axis or kind, in rad/s and m/s^2; by default those of filter numbers, or none.
         """
         if isinstance(source, SensorModels):
             if bias_sd is None:
@@ -74,6 +74,10 @@ class SensorModels:
                 f"sensor models: {checks.shown(source)}: give a calibration, or models as in "
                 '{"gyro": WhiteNoise(1e-4), "accel": WhiteNoise(1e-3)}'
             )
+        if all(hasattr(each, "initial_sd") for each in source.values()):  # filter numbers
+            known: dict[str, Any] = {name: each for name, each in source.items() if name in AXES}
+            bias_sd = bias_sd or {name: each.initial_sd for name, each in known.items()}
+            source = {name: each.model for name, each in known.items()}
         given = _by_axis(source, "models")
         for axis in AXES:
             if axis not in given:
@@ -147,15 +151,10 @@ def _by_axis(given: Mapping[str, Any], what: str) -> dict[str, Any]:
 
 
 def _model(axis: str, given: Any) -> Model:
-    if not isinstance(given, (Process, Model)):
+    if not isinstance(given, (Process, Model, str)):
         raise InputError(f"sensor models: {axis} is {checks.shown(given)}: give a process or model")
     model = as_model(given)
-    missing = [key for key, value in model.params.items() if value is None]
-    if missing:
-        raise InputError(
-            f"sensor models: {axis} has free parameters ({', '.join(missing)}): give them a value, "
-            "or estimate them with gmwm.fit"
-        )
+    model.require_given(f"sensor models: {axis}")
     return model
 
 

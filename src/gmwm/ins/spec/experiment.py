@@ -137,7 +137,7 @@ _Truth = Annotated[
 _Filter = Annotated[
     OfFile | Annotated[ReducedSpec, Tag(REDUCED)] | OfTerms,
     Discriminator(form_of),
-    written("a calibration.json, models, or truth"),
+    written("a calibration.json, models, truth, or a file of gmwm bound or reduce"),
 ]
 _Span = Annotated[tuple[Seconds, Seconds], written("[start, length] in seconds")]
 

@@ -315,9 +315,11 @@ def form_of(given: Any) -> str | None:
 OfFile = Annotated[FileName, Tag(FILE)]
 OfTerms = Annotated[ModelsSpec, Tag(MODELS)]
 Models = Annotated[
-    OfFile | OfTerms, Discriminator(form_of), written("a calibration.json, or models")
+    OfFile | OfTerms,
+    Discriminator(form_of),
+    written("a calibration.json, models, or a file of gmwm bound or reduce"),
 ]
-"""Sensor models, or the name of a calibration.json that has them."""
+"""Sensor models, or the name of a calibration.json or of filter numbers that have them."""
 
 
 def sensor_models(given: Mapping[str, Any], where: str) -> SensorModels:
@@ -326,13 +328,13 @@ def sensor_models(given: Mapping[str, Any], where: str) -> SensorModels:
 
 
 def read_models(where: str, given: str | ModelsSpec, folder: Path) -> SensorModels:
-    """Sensor models from what was written, or from a calibration.json relative to a folder."""
+    """Sensor models from what was written, or from a file relative to a folder."""
     if isinstance(given, ModelsSpec):
         return given.models()
     place = f"{where}: "
     try:
-        calibration = load(folder / given)
+        found = load(folder / given)
         place = f"{where}, {given}: "
-        return SensorModels.of(calibration)
+        return SensorModels.of(found)
     except InputError as error:
         raise InputError(f"{place}{error}") from None

@@ -78,11 +78,6 @@ class ARIMA(Process):
                 raise InputError(f"{self!r} is not {what}: its polynomial has a root within 1")
 
     @property
-    def is_autoregression(self) -> bool:
-        """Whether it has autoregressive coefficients only."""
-        return self.orders[0] > 0 and self.orders[1] == 0 and self.d == 0
-
-    @property
     def ar(self) -> tuple[Any, ...]:
         """Autoregressive coefficients, ``None`` where open."""
         return tuple(self.values[f"ar_{i + 1}"] for i in range(self.orders[0]))
@@ -116,12 +111,12 @@ class ARIMA(Process):
         parts = []
         for name, value in self._arguments(self.values).items():
             if isinstance(value, list) and any(c is not None for c in value):
-                listed = ", ".join("None" if c is None else f"{c:.12g}" for c in value)
+                listed = ", ".join("None" if c is None else f"{c:.4g}" for c in value)
                 parts.append(f"{name}=[{listed}]")
             elif isinstance(value, list) and value:
                 parts.append(f"{name}={len(value)}")
             elif not isinstance(value, list) and value is not None:
-                parts.append(f"{name}={value:.12g}")
+                parts.append(f"{name}={value:.4g}")
         return f"{type(self).__name__}({', '.join(parts)})"
 
     def __eq__(self, other: object) -> bool:
@@ -163,7 +158,7 @@ class ARIMA(Process):
 
     def state_space(self, dt: float) -> StateSpace:
         """Harvey's form (1989, *Forecasting, Structural Time Series Models*, sec. 3.3)."""
-        self._require_given()
+        self._alone().require_given()
         size = max(self.orders[0], self.orders[1] + 1)
         transition = np.eye(size, k=1)
         transition[: self.orders[0], 0] = self.ar

@@ -25,6 +25,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from gmwm._core import checks
 from gmwm._core.compiled import compiled
 from gmwm._core.typing import FloatArray, IntArray
 from gmwm.process import PSD, Panels, evaluated, haar_gain, in_hertz, quadrature, resolved_share
@@ -298,23 +299,27 @@ def mean_covariance(psd: PSD, n: int, dt: float) -> FloatArray:
     return result
 
 
-def haar_covariance(psd: PSD, n: int, dt: float) -> FloatArray:
+def haar_covariance(
+    psd: PSD | Any, n: int, dt: float | None = None, *, rate: float | None = None
+) -> FloatArray:
     """Covariance of the Haar wavelet variance estimates of a Gaussian series.
 
     Parameters
     ----------
-    psd : callable
-        ``psd(f, dt)``, two-sided, in u^2/Hz.
+    psd : callable or Model
+        ``psd(f, dt)``, two-sided, in u^2/Hz; or a model that has one.
     n : int
         Number of samples.
-    dt : float
-        Sampling interval, s.
+    dt, rate : float
+        Sampling interval, s, or rate, Hz.
 
     Returns
     -------
     (J, J) ndarray
         In u^4, for the levels of `dyadic_levels`.
     """
+    dt = checks.sampling_interval(dt, rate)
+    psd = getattr(psd, "psd", psd)
     m = dyadic_levels(n)
     counts = haar_counts(n, m)
     covariance = integrals(psd, dt, m) / np.maximum.outer(counts, counts)

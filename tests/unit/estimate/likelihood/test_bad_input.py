@@ -22,7 +22,8 @@ X = WhiteNoise(1.0).simulate(100, 1.0, 1)
         (WhiteNoise(0.2) + GaussMarkov(0.5), "does not give every term"),
         (WhiteNoise(0.2) + GaussMarkov(0.5, 20.0) + RandomWalk(0.1), "RandomWalk"),
         (WhiteNoise(0.0) + GaussMarkov(0.5, 20.0), "N must be positive"),
-        ("mle", "not an error model"),
+        ("mle", "is not a term"),
+        (3, "not an error model"),
     ],
     ids=repr,
 )
@@ -34,7 +35,7 @@ def test_a_start_that_is_not_the_model_is_refused(method, start, said):
 def test_whittle_needs_every_sample():
     x = X.copy()
     x[17] = np.nan
-    with pytest.raises(InputError, match=r'1 samples are missing.* use method = "mle"'):
+    with pytest.raises(InputError, match=r'1 samples are missing.* use method="mle"'):
         gmwm.fit(WhiteNoise(), x, dt=1.0, method="whittle")
 
 
@@ -45,7 +46,7 @@ def test_series_that_hold_no_noise_are_refused(method):
         (np.r_[np.ones(99), np.inf], "infinite"),
         (np.arange(5.0), "8 samples"),
         (np.ones((10, 10)), "one series"),
-        ("abc", "not a number"),
+        ("abc", "not one series"),
     ):
         with pytest.raises(InputError, match=said):
             gmwm.fit(WhiteNoise(), x, dt=1.0, method=method)
@@ -63,11 +64,11 @@ def test_a_series_of_gaps_is_refused(method):
         gmwm.fit(WhiteNoise(), np.full(100, np.nan), dt=1.0, method=method)
 
 
-class Pink(gmwm.Process):
+class Drawn(gmwm.Process):
     level: float = gmwm.parameter("u", role="scale")
 
-    def psd(self, f, dt):
-        return self.level**2 * dt * (2.0 * f * dt) ** -0.5
+    def draw(self, n, dt, rng):
+        return self.level * rng.standard_normal(n)
 
 
 @pytest.mark.parametrize("method", OF_SAMPLES)
@@ -75,7 +76,7 @@ class Pink(gmwm.Process):
     ("arguments", "said"),
     [
         ({"data": gmwm.wavelet_variance(X, 1.0)}, "give the series"),
-        ({"model": Pink()}, r"state-space form|does not support"),
+        ({"model": Drawn()}, r"use method=.whittle|does not support|can only be simulated"),
         ({"model": WhiteNoise() + Sinusoid()}, r"support .*Sinusoid.*gmwm"),
         ({"weights": "model"}, "has no weights"),
         ({"model": WhiteNoise(1.0)}, "nothing to estimate"),

@@ -35,7 +35,11 @@ def test_models_pass_through_and_take_another_bias():
     ("given", "bias", "words"),
     [
         ({"gyro": WhiteNoise(1e-4)}, None, "accel_x has none"),
-        ({**PLAIN, "accel_y": GaussMarkov()}, None, r"accel_y has free parameters \(sigma, tau\)"),
+        (
+            {**PLAIN, "accel_y": GaussMarkov()},
+            None,
+            r"accel_y GaussMarkov\(\) has free parameters \(sigma, tau\)",
+        ),
         ({**PLAIN, "gyro_q": WhiteNoise(1.0)}, None, "'gyro_q' is not a sensor"),
         ({**PLAIN, "gyro": 1e-4}, None, "gyro_x is 0.0001: give a process or model"),
         ({**PLAIN, "gyro_z": None}, None, "gyro_z is None"),

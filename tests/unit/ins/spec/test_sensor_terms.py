@@ -1,12 +1,16 @@
+import subprocess
+import sys
 from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
+import gmwm
 from gmwm import BiasInstability, GaussMarkov, QuantizationNoise, RandomWalk, RateRamp, WhiteNoise
 from gmwm.errors import InputError
-from gmwm.ins.spec import sensor_models
+from gmwm.ins.imu import SensorModels
+from gmwm.ins.spec import read_models, sensor_models
 from gmwm.ins.spec.fields import value
 
 ACCEL = {"N": 1e-2}
@@ -102,3 +106,30 @@ def test_an_axis_goes_before_its_kind() -> None:
 def test_what_is_no_model(given: Any, message: str) -> None:
     with pytest.raises(InputError, match=message):
         sensor_models(given, "x")
+
+
+def test_filter_numbers_are_sensor_models(tmp_path):
+    truth = {"gyro": WhiteNoise(1e-4) + RandomWalk(1e-6), "accel": WhiteNoise(1e-3)}
+    axes = {f"{kind}_{axis}": truth[kind] for kind in truth for axis in "xyz"}
+    numbers = gmwm.bound(axes, "N+K+GM", bias_sd=0.01)
+    path = numbers.save(tmp_path / "numbers.json")
+
+    models = read_models("filters", path.name, tmp_path)
+    assert models.models == {name: each.model for name, each in numbers.items()}
+    assert models.bias_sd == {name: each.initial_sd for name, each in numbers.items()}
+    assert SensorModels.of(numbers) == models
+    given = SensorModels.of(numbers, {"gyro": 0.5})
+    assert (given.bias_sd["gyro_x"], given.bias_sd["accel_x"]) == (0.5, 0.0)
+
+
+def test_numbers_of_one_axis_are_not_enough(tmp_path):
+    path = gmwm.bound(WhiteNoise(1.0) + RandomWalk(0.1)).save(tmp_path / "one.json")
+    with pytest.raises(InputError, match=r"one.json: sensor models"):
+        read_models("filters", path.name, tmp_path)
+
+
+def test_a_new_session_loads_what_another_saved(tmp_path):
+    path = gmwm.bound(WhiteNoise(1.0) + RandomWalk(0.1)).save(tmp_path / "one.json")
+    code = f"import gmwm; print(type(gmwm.load({str(path)!r})).__name__)"
+    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert found.stdout.split() == ["AxisFilterNumbers"]
