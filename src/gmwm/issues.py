@@ -498,7 +498,7 @@ _CALIBRATION = (
     Issue("unsteady", "the slow noise changes during the recording: {quiet_part} it has {less} "
         "times the deviation of the whole record, {loud_part} {more} times; the model is an "
         "average", "calibrate the part that matches how the sensor is used", severity="bad",
-        lacks="noise_steady", reason="slow noise changes"),
+        lacks="noise_steady", reason="slow noise not constant"),
 )  # fmt: skip
 
 _ESTIMATE = (

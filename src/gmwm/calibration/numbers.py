@@ -192,8 +192,8 @@ def axis_numbers(fit: Fit, rivals: Sequence[Model] = ()) -> AxisNumbers:
 
     rivals: Models that fit equally well; the interval of B covers them.
     """
-    bias, tau = _bias_instability(fit, rivals)
     n, k = (random_walk(fit, letter) for letter in "NK")
+    bias, tau = _bias_instability(fit, rivals, k)
     return AxisNumbers(n, bias, k, tau, fit.valid, fit.wv.quantity or "")
 
 
@@ -261,10 +261,11 @@ def _limit(fit: Fit, process: Process, key: str) -> float:
     return float(again.interval()[key][1])
 
 
-def _bias_instability(fit: Fit, rivals: Sequence[Model]) -> tuple[Estimate, float]:
+def _bias_instability(fit: Fit, rivals: Sequence[Model], walk: Estimate) -> tuple[Estimate, float]:
     """B from the lowest fitted Allan deviation at averaging times with data, and that time.
 
-    Where the model runs below the 95 % interval of the data, its lower end counts.
+    Where the model runs below the 95 % interval of the data, its lower end counts. An upper limit
+    allows for a random walk that the record only limits.
     """
     at, wv = fit.goodness, fit.wv
     known = np.sqrt(np.array([wv.lower, wv.upper]) / np.maximum(wv.variance, _TINY))
@@ -272,6 +273,8 @@ def _bias_instability(fit: Fit, rivals: Sequence[Model]) -> tuple[Estimate, floa
     deviation, highest = (np.fmax(each, at.data * known[0]) for each in (fitted, high))
     if np.argmin(deviation) == wv.tau.size - 1:
         # The lowest is no higher than any of them.
+        if walk.kind == "bound":
+            highest = np.hypot(highest, walk.upper * np.sqrt(wv.tau / 3.0))
         lowest = int(np.argmin(highest))
         limit = float(highest[lowest]) / PLATEAU
         found = Estimate.of(PROCESSES["B"], "bound", 0.0, None, (0.0, limit), wv)

@@ -158,7 +158,7 @@ def length_sentence(calibration: Calibration, horizon: float) -> str:
             f"long enough for {horizon:g} s outages: {worst} is known to +-{share} there; {text} "
             f"would give +-{100.0 * _AIM:g} %"
         )
-    why = f" ({worst} is known to {share})" if error > _AIM else ""
+    why = f" ({worst} at {horizon:g} s: +-{share})" if error > _AIM else ""
     return f"too short for {horizon:g} s outages: record {text}{why}"
 
 

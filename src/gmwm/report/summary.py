@@ -23,6 +23,7 @@ _ACTIONS = 3  # notices that matter most
 _FEWEST = 4  # lines of them
 _NAME, _SOURCE, _TEXT = 16, 40, 60  # characters; longer ones are shortened
 _LEAST = 0.1  # smallest number without an exponent
+_LEGEND = "+-, (a to b): 95 % interval. <=: 95 % upper limit. B: lowest deviation / 0.664"
 _DEPARTURES = {
     "step": "a bias step",
     "transient": "a transient at the start",
@@ -108,8 +109,8 @@ def _sensor(calibration: Calibration, most: int) -> list[str]:
         lines = _table(calibration, names)
         missing = len(calibration) - len(names)
         lines += [f"and {missing} more channels"] if missing else []
-        if len(lines) + len(skipped) <= most or len(names) == 1:
-            return lines + skipped
+        if len(lines) + len(skipped) < most or len(names) == 1:
+            return [*lines, *skipped, _LEGEND]
         names.pop()
 
 
@@ -141,7 +142,7 @@ def reason(name: str, calibration: Calibration) -> str:
     steps = [n for n in fit.notices if n.code == "step" and n.severity in ("bad", "warning")]
     if cause is not None or all(n.severity != "bad" for n in steps):
         return cause.issue.reason if cause else trust(name, fit, calibration)[1]
-    times = [f"{time:.4g} s" for time in sorted(n.values.get("time", 0.0) for n in steps)]
+    times = [f"{time:.0f} s" for time in sorted(n.values.get("time", 0.0) for n in steps)]
     return f"bias step{'s' if times[1:] else ''} at {_listed(times)}"
 
 
@@ -159,7 +160,7 @@ def _filter(calibration: Calibration) -> list[str]:
             lines += _of_sensor(quantity, fits)
         except InputError as error:
             lines += wrapped(f"no filter numbers: {error}", f"{quantity:<6} ", 7)[:2]
-    title = f"For your filter, outages up to {SHOWN:g} s (start: initial bias sd; add turn-on bias)"
+    title = f"For your filter, outages up to {SHOWN:g} s (add your turn-on bias to the start bias)"
     return [title, *lines] if lines else []
 
 
@@ -169,9 +170,9 @@ def _of_sensor(quantity: str, fits: Mapping[str, Fit]) -> list[str]:
     values = {"N": ("u/sqrt(Hz)", triad.N), "K": ("u/s/sqrt(Hz)", triad.K)}
     for key, (unit, value) in (values | {"start": ("u", triad.initial_sd)}).items():
         limit = "<= " if key in values and triad.is_upper(key) else ""
-        row += f" {key} {limit}{short(value)} {si_parameter_unit(unit, quantity)} "
-    about = unusable(fits) or covers(fits)
-    return wrapped(row.rstrip(), indent=7) + wrapped(about, first=" " * 7, indent=7)
+        row += f" {key} {limit}{short(value)} {si_parameter_unit(unit, quantity)} " if value else ""
+    about = (each for text in (covers(fits), unusable(fits)) for each in wrapped(text, " " * 7, 7))
+    return [*wrapped(row.rstrip(), indent=7), *about]
 
 
 def short(value: float) -> str:
@@ -206,10 +207,10 @@ def _covered(fits: Mapping[str, Fit]) -> Iterator[tuple[float, str, str, str]]:
             if term.is_band_limited or term.is_white or size is None:
                 continue
             text = quantity_text(term.values[size.name] or 0.0, size.unit, fit)["field"]
-            text = f"a {label.rstrip(' 0123456789')} term of {text}"
+            text = f"{label.rstrip(' 0123456789')}, {text}"
             text += f", {brief(tau)} s" if tau else ""
-            word = "covers" if len(by_letter) == 1 else "cover"
-            letters = f"{' and '.join(sorted(by_letter, reverse=True))} also {word}"
+            word = "exceeds" if len(by_letter) == 1 else "exceed"
+            letters = f"{', '.join(sorted(by_letter, key='NK'.index))} {word} the sensor's:"
             yield max(by_letter.values()), text, name, letters
 
 
@@ -276,7 +277,7 @@ def _action(group: Sequence[Notice], cut: str, calibration: Calibration) -> str:
         verb = "inflates" if len(group) == 1 else "inflate"
         text, hint = f"{' and '.join(kinds)} {verb} B and K", cut or hint
     elif len({notice.text for notice in group}) > 1:
-        text = first.issue.reason or (f"e.g. {text}" if len(said) > 1 else f"{text}, and more")
+        text = first.issue.reason or f"{text}, and more"
     if not hint and first.severity == "bad":
         hint = "look at the plot in the report"
     return "; ".join(filter(None, [f"{where}: {text}" if where else text, hint]))
