@@ -59,7 +59,7 @@ def test_a_data_sheet_and_an_exported_file(report, run, tmp_path):
     assert page.count('"name":"data sheet"') == 2
     # Nothing is looked for, and what is copied is what was written.
     assert "The recording was not checked for defects." in text
-    _, written, _ = run("export", "out/calibration.json", "--to", "kalibr", "--horizon", "60")
+    _, written, _ = run("export", "out/calibration.json", "--to", "kalibr", "--force")
     copied = re.findall("<pre[^>]*>(.*?)</pre>", page, flags=re.DOTALL)
     values = [line for line in written.splitlines() if line[:1] not in ("", "#")]
     assert values in [

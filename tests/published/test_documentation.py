@@ -49,6 +49,10 @@ def test_what_a_page_shows_runs_with_what_is_slow(tmp_path, name):
     pages.Runner(tmp_path, slow=True).run(PAGES[name])
 
 
+def test_the_first_page_is_short():
+    assert len((REPOSITORY / "README.md").read_text().splitlines()) <= 120
+
+
 def test_a_block_that_fails_is_named(tmp_path):
     page = tmp_path / "a.md"
     page.write_text("# Page\n\n```python\nx = 1\n```\n\n```python\nx + y\n```\n")

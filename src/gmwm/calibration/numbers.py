@@ -275,6 +275,7 @@ def _bias_instability(fit: Fit, rivals: Sequence[Model], walk: Estimate) -> tupl
         # The lowest is no higher than any of them.
         if walk.kind == "bound":
             highest = np.hypot(highest, walk.upper * np.sqrt(wv.tau / 3.0))
+            highest = np.fmin(highest, np.fmax(high, at.data * known[1]))
         lowest = int(np.argmin(highest))
         limit = float(highest[lowest]) / PLATEAU
         found = Estimate.of(PROCESSES["B"], "bound", 0.0, None, (0.0, limit), wv)

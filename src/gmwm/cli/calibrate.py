@@ -298,5 +298,5 @@ def write_files(
     quoted = shlex.quote(str(document))
     after = f"gmwm export {quoted} --to openvins" if has_imu else f"gmwm bound {quoted}"
     after = after if all(fit.valid for fit in result.values()) else f"1. above, then {after}"
-    last = "+-: 95 % interval, <=: 95 % upper limit; error model and all notices: -v"
+    last = "error model and all notices: -v"
     return [*wrapped(f"wrote {', '.join(written)}", indent=2), *lines, f"next: {after}", last]

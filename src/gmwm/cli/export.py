@@ -6,7 +6,6 @@ from pathlib import Path
 
 import click
 
-from gmwm._core import checks
 from gmwm._core.tables import plain_table
 from gmwm.cli.hints import with_option
 from gmwm.cli.options import FILE_TO_WRITE, PATH, options
@@ -64,6 +63,7 @@ def export(
         usage = "gmwm export calibration.json --to NAME (names: gmwm export --list)"
         raise InputError(f"gmwm export needs files and a program: {usage}")
     from gmwm import export as written, load
+    from gmwm._core import checks
 
     checks.choice("--to", target, tuple(TARGETS))
     given = [load(file) for file in files]

@@ -239,7 +239,9 @@ def certify(
     horizon = times[-1]
     in_use = {axis.name: _in_use(numbers, axis, horizon) for axis in axes.axes}
     items: Any = source if isinstance(source, Mapping) else {axes.axes[0].name: source}
-    safe = usable(items, horizon=horizon, bias_sd=bias_sd, dt=dt, **_kind_of(numbers, in_use))
+    safe = usable(
+        items, horizon=horizon, bias_sd=bias_sd, dt=dt, rate=rate, **_kind_of(numbers, in_use)
+    )
     starts = {name: one.initial_sd for name, one in safe.items()}
     in_use = {a.name: _in_use(numbers, a, horizon, starts[a.name]) for a in axes.axes}
     own = replace(safe, source="", axes=in_use)

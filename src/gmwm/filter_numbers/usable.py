@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 
@@ -27,18 +28,20 @@ def usable(
     tau: float | str | None = None,
     bias_sd: Sd = 0.0,
     dt: float | None = None,
+    rate: float | None = None,
 ) -> FilterNumbers:
     """Numbers of `bound`, with 95 % upper limits in place of terms that no axis has.
 
     The notice "upper-limit" has them by letter. No stationary process bounds a random walk: N+GM
     of models with one are of `reduce`. Parameters and errors are those of `bound`.
     """
-    axes = SensorAxes.of(source, dt, bias_sd)
-    if form == "N+GM" and any(term.is_walk for each in axes.axes for term in each.model.terms):
-        times = [share * horizon for share in tuning.OUTAGES]
-        found = reduce(source, form, times, bias_sd=bias_sd, shared=shared, tau=tau, dt=dt)
+    axes = SensorAxes.of(source, dt, bias_sd, rate)
+    terms = (term for each in axes.axes for term in each.model.terms)
+    options: Any = {"bias_sd": bias_sd, "shared": shared, "tau": tau, "dt": dt, "rate": rate}
+    if form == "N+GM" and any(term.is_walk or term.is_flicker for term in terms):
+        found = reduce(source, form, [share * horizon for share in tuning.OUTAGES], **options)
     else:
-        found = bound(source, form, horizon, bias_sd=bias_sd, shared=shared, tau=tau, dt=dt)
+        found = bound(source, form, horizon, **options)
     if form not in ("N+K", "N+GM") or any(each.fit is None for each in axes.axes):
         return found
     slow = (each.tau[0] for each in found.values() if tau is not None and each.sigma[0] > 0.0)

@@ -227,7 +227,6 @@ def test_a_calibration_reports_it_by_the_channel_and_it_can_be_taken_off(tmp_pat
     assert notice.values["time"] == pytest.approx(4300.0, abs=30.0)
     assert notice.values["evidence"] > 100.0
     assert "remove_departures" in notice.hint
-    assert "or --start" in with_option(notice).hint
     assert "--remove-departures" in with_option(notice).hint
     again = gmwm.load(found.save(tmp_path / "cal.json"))
     assert again["gyro_x"].notices == fit.notices
@@ -303,8 +302,8 @@ def test_several_steps_have_one_remedy_for_the_whole_recording():
     assert (advice.values["start"], advice.values["stop"]) == pytest.approx(kept[1:])
     assert {n.hint for n in steps} == {"leave it out with the others, or subtract them"}
     hint = with_option(advice).hint
-    assert hint.endswith("or --remove-departures, which subtracts them")
-    assert f"--start {kept[1]:.6g}" in hint or f"--stop {kept[2]:.6g}" in hint
+    assert "--remove-departures" in hint
+    assert f"--start {np.ceil(kept[1]):g}" in hint or f"--stop {np.floor(kept[2]):g}" in hint
     assert with_option(steps[0]) == steps[0]
 
 

@@ -83,10 +83,10 @@ def test_B_is_the_plateau_of_flicker_noise():
 def test_B_is_an_upper_limit_where_the_deviation_falls_to_the_end():
     fit = fitted(WhiteNoise(1.0))
     numbers = axis_numbers(fit)
-    last = fit.wv.tau[-1]
     assert numbers.B.kind == "bound"
-    assert numbers.tau == last
-    assert 1.0 < numbers.B.upper / (1.0 / np.sqrt(last) / PLATEAU) < 1.1
+    white = 1.0 / np.sqrt(numbers.tau)
+    walk = numbers.K.upper * np.sqrt(numbers.tau / 3.0)
+    assert white < numbers.B.upper * PLATEAU < 1.1 * np.hypot(white, walk)
 
 
 def test_what_the_model_lacks_has_an_upper_limit():

@@ -173,6 +173,6 @@ def test_the_command_line_names_the_channel_once(tmp_path):
     )  # fmt: skip
     assert done.exit_code == 0, done.output
     text = " ".join(done.output.split())
-    assert text.count("times as often as") == 1
+    assert text.count("one value too frequent") == 1
     assert "not valid" in text
     assert "one value too frequent" in (tmp_path / "out" / "report.html").read_text()

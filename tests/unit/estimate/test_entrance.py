@@ -205,7 +205,14 @@ def test_the_interval_of_a_deviation_reaches_over_models_that_tie():
 def test_plot_shows_data_model_and_components():
     axes = example_fit().plot()
     labels = [text.get_text() for text in axes.get_legend().get_texts()]
-    assert labels == ["white noise", "Gauss-Markov", "rate ramp", "model", "data, 95 % interval"]
+    assert labels == [
+        "white noise",
+        "Gauss-Markov",
+        "rate ramp",
+        "model",
+        "95 % band",
+        "data, 95 % interval",
+    ]
     assert axes.get_xscale() == axes.get_yscale() == "log"
     assert axes.get_xlabel() == "averaging time [s]"
     plt.close(axes.figure)

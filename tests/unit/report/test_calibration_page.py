@@ -497,7 +497,7 @@ def test_what_filter_numbers_cover_is_said(calibration):
     one = replace(calibration, fits={"gyro_x": fit}, rivals={})
     found = first_screen(one, certified(one))
     assert re.fullmatch(
-        r"N and K also cover a Gauss-Markov term of \d+ deg/h, \d+ s \(gyro_x\)",
+        r"N, K exceed the sensor's: Gauss-Markov, \d+ deg/h, \d+ s \(gyro_x\)",
         found["filter"][0]["covers"],
     )
     assert found["by_axis"][0]["covers"] == found["filter"][0]["covers"].removesuffix(" (gyro_x)")
@@ -693,7 +693,7 @@ def test_every_reason_why_a_channel_is_not_valid_is_a_finding(calibration):
         # What is a finding of the recording is not said twice.
         assert sum("moved" in text for _, text in rows) == 1
         shown = page(spoilt)
-        assert '<a href="#health">the model misses the data</a>' in shown
+        assert '<a href="#health">the sensor moved</a>' in shown
         assert ["severe", "gyro_x The model misses the data by 40 %", "Add a term"] in Page(
             shown
         ).cells
