@@ -117,10 +117,16 @@ def printed(calibration):
     return stream.getvalue()
 
 
-def test_all_places_show_the_same_digits(two):
+def test_all_places_show_the_same_digits(two, tmp_path):
     """The terminal, `print`, the table, the document and the page of N, B and K."""
     frame = two.to_frame().set_index(["channel", "number"])
+    page = two.report(tmp_path / "page.html").read_text(encoding="utf-8")
     for name, axis in two.numbers.items():
+        (own,) = re.findall(rf'<a href="#{name}">{name}</a></th>(.*?)</tr>', page)
+        shown = re.findall(r'<span class="field">(.*?)</span>', own.replace("≤", "<="))
+        assert [each.replace("±", "+-").partition(" at ")[0] for each in shown] == [
+            axis.text(letter) for letter in "NBK"
+        ]
         (row,) = re.findall(rf"^{name} +(.*)$", printed(two), re.MULTILINE)
         assert re.findall(rf"^{name} +(.*)$", str(two), re.MULTILINE) == [row]
         cells = re.split(r"  +", row)
