@@ -53,12 +53,17 @@ _HORIZONTAL_CHANNELS = ("gyro_x", "gyro_y", "accel_x", "accel_y")
 class ErrorRow:
     """Error of one quantity by one term of one channel's model.
 
-    component: Label of the term in its model.
-    quantity: {"attitude", "velocity", "position"}.
-    unit: "rad", "m/s" or "m".
-    values: Standard deviation at each of the budget's ``times``; the absolute value for a rate
-        ramp.
-    curve: The same at each time of its ``grid``.
+    Attributes
+    ----------
+    channel : str
+    component : str
+        Label of the term in its model.
+    quantity : {"attitude", "velocity", "position"}
+    unit : {"rad", "m/s", "m"}
+    values : tuple of float
+        Standard deviation at the budget's ``times``; the absolute value for a rate ramp.
+    curve : tuple of float
+        The same at each time of its ``grid``.
     """
 
     channel: str

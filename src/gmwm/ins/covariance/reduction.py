@@ -233,11 +233,19 @@ def loiter_with_outages(
 ) -> Scenario:
     """A loiter with one GNSS position a second of 1 m (vertical 1.5 m), and outages.
 
-    lengths: Of the outages, s, with two minutes before each.
-    dt: Sampling interval of the IMU of the loiter, s.
-    trajectory: Another motion than a loiter of a fixed-wing aircraft.
-    Raises InputError if a length is not positive, or not a multiple of ``dt``, or the trajectory is
-        too short.
+    Parameters
+    ----------
+    lengths : sequence of float
+        Of the outages, s, with two minutes before each.
+    dt : float, optional
+        Sampling interval of the IMU of the loiter, s.
+    trajectory : Trajectory, optional
+        Another motion than a loiter of a fixed-wing aircraft.
+
+    Raises
+    ------
+    InputError
+        If a length is not positive or not a multiple of ``dt``, or the trajectory is too short.
     """
     outages, start = list[Outage](), tuning.SETTLING
     for length in lengths:
