@@ -160,7 +160,7 @@ def _filter(calibration: Calibration) -> list[str]:
             lines += _of_sensor(quantity, fits)
         except InputError as error:
             lines += wrapped(f"no filter numbers: {error}", f"{quantity:<6} ", 7)[:2]
-    title = f"For your filter, outages up to {SHOWN:g} s (add your turn-on bias to the start bias)"
+    title = f"For your filter, outages up to {SHOWN:g} s (bias0: initial bias sd; add turn-on bias)"
     return [title, *lines] if lines else []
 
 
@@ -168,7 +168,7 @@ def _of_sensor(quantity: str, fits: Mapping[str, Fit]) -> list[str]:
     triad = triad_of(quantity, fits)
     row = f"{quantity:<6}"
     values = {"N": ("u/sqrt(Hz)", triad.N), "K": ("u/s/sqrt(Hz)", triad.K)}
-    for key, (unit, value) in (values | {"start": ("u", triad.initial_sd)}).items():
+    for key, (unit, value) in (values | {"bias0": ("u", triad.initial_sd)}).items():
         limit = "<= " if key in values and triad.is_upper(key) else ""
         row += f" {key} {limit}{short(value)} {si_parameter_unit(unit, quantity)} " if value else ""
     about = (each for text in (covers(fits), unusable(fits)) for each in wrapped(text, " " * 7, 7))
@@ -208,9 +208,8 @@ def _covered(fits: Mapping[str, Fit]) -> Iterator[tuple[float, str, str, str]]:
                 continue
             text = quantity_text(term.values[size.name] or 0.0, size.unit, fit)["field"]
             text = f"{label.rstrip(' 0123456789')}, {text}"
-            text += f", {brief(tau)} s" if tau else ""
-            word = "exceeds" if len(by_letter) == 1 else "exceed"
-            letters = f"{', '.join(sorted(by_letter, key='NK'.index))} {word} the sensor's:"
+            text += f", tau {brief(tau)} s" if tau else ""
+            letters = f"{', '.join(sorted(by_letter, key='NK'.index))} raised to cover"
             yield max(by_letter.values()), text, name, letters
 
 
