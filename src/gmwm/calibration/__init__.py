@@ -19,4 +19,3 @@ from gmwm.calibration.numbers import (
 from gmwm.calibration.removal import without_departures as without_departures
 from gmwm.calibration.screening import SCREENING as SCREENING
 from gmwm.calibration.stages import Stopwatch as Stopwatch, stage as stage
-from gmwm.calibration.unresolved import left_open as left_open

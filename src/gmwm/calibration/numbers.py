@@ -122,19 +122,18 @@ class SensorNumbers(Mapping[str, AxisNumbers], Printed):
     def __str__(self) -> str:
         return self.text()
 
-    def text(self, *, units: str = "field", invalid: Mapping[str, str] | None = None) -> str:
+    def text(self, *, units: str = "field") -> str:
         """A table of the numbers with their 95 % intervals.
 
         units: Data-sheet units ("field"), or "si".
-        invalid: Channel -> what stands in place of numbers that are not valid.
         """
-        rows = self._cells(units, invalid or {})
+        rows = self._cells(units)
         if len((table := plain_table(rows[0], rows[1:])).splitlines()) > len(rows):  # too wide
             rows = [(name, n.replace("velocity ", ""), *others) for name, n, *others in rows]
             table = plain_table(rows[0], rows[1:])
         return table
 
-    def _cells(self, units: str, invalid: Mapping[str, str]) -> list[Sequence[str]]:
+    def _cells(self, units: str) -> list[Sequence[str]]:
         rows: list[Sequence[str]] = []
         for quantity in dict.fromkeys(axis.quantity for axis in self.values()):
             own = {name: axis for name, axis in self.items() if axis.quantity == quantity}
@@ -144,12 +143,11 @@ class SensorNumbers(Mapping[str, AxisNumbers], Printed):
             for name, axis in own.items():
                 n, b, k = (axis.text(letter, units=units) for letter in "NBK")
                 b = f"{b} at {brief(axis.tau, 3)} s"
-                mark = "" if axis.valid else invalid.get(name, "not valid")
-                rows.append((name, mark or n, b if not mark else "", k if not mark else ""))
+                rows.append((name, n, b, k) if axis.valid else (name, "not valid", "", ""))
         return rows
 
     def _repr_html_(self) -> str:
-        heads, *rows = self._cells("field", {})
+        heads, *rows = self._cells("field")
         return html_table("Sensor numbers", heads, rows)
 
     def rows(self, units: str = "field") -> list[dict[str, Any]]:
@@ -231,7 +229,8 @@ def random_walk(fit: Fit, key: str) -> Estimate:
         return np.array([fast_density(model, fit.wv.dt)])
 
     total = float(density(fit.model)[0]) if key == "N" else own**2
-    if own > 0.0 and total <= (1.0 + tuning.NO_OTHER) * own**2:
+    is_alone = total <= (1.0 + tuning.NO_OTHER) * own**2
+    if is_alone and (own > 0.0 or key in fit.upper_bounds):
         return fit[key]
     if total > 0.0:
         error = 0.5 * float(fit.logarithmic_error(density)[0]) * total**0.5
@@ -255,6 +254,8 @@ def upper_limit(fit: Fit, key: str) -> float:
 
 
 def _limit(fit: Fit, process: Process, key: str) -> float:
+    if key in fit.upper_bounds:
+        return float(fit.upper_bounds[key])
     # Given shapes, such as that of a line or of a low-pass, stay as they are.
     opened = fit.model.with_params(dict.fromkeys([*fit.keys, *fit.upper_bounds]))
     again = estimate(opened if key in fit.params else opened + process, fit.wv)

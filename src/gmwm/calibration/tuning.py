@@ -19,7 +19,7 @@ SAME_FREQUENCY = 0.02  # relative; lines of engines wander by about as much (doc
 
 # -- sensor numbers -------------------------------------------------------------------------------
 
-REFERENCE_TIME, LOW_FREQUENCY = 1.0, 0.01  # s; 1/s
+REFERENCE_TIME = 1.0  # s at which white noise is read from an Allan plot (IEEE Std 952)
 FAST = 0.1  # s: correlation times up to this average out before a filter corrects its bias
 LOW, FLAT = 0.01, 0.8  # of the corner frequency; share of the density there at half of that
 WHITE_RATIO = 0.6  # of wavelet variances at an averaging time and half of it; white noise has 0.5

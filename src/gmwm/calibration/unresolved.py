@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from gmwm._core.text import brief
@@ -14,9 +12,6 @@ from gmwm.errors import InputError
 from gmwm.estimate import Fit, estimate
 from gmwm.issues import Notice, notice
 from gmwm.process import Model, RandomWalk
-
-if TYPE_CHECKING:
-    from gmwm.calibration.calibration import Calibration
 
 UNRESOLVED = "unresolved-walk"
 """Code of the notice that a walk may be there that the model lacks."""
@@ -46,22 +41,12 @@ def with_largest_walk(fitted: Fit) -> Model | None:
 def unresolved_notice(name: str, fitted: Fit, largest: Model) -> Notice:
     """Say how large the walk and its effect may be."""
     walk, tau = largest.params["K"] or 0.0, _time(fitted)
-    value, unit = _shown(walk, fitted)
+    unit, per_si = customary_unit("u/s/sqrt(Hz)", fitted.wv.quantity, fitted.wv.unit)
     growth = _growth(fitted, largest)
     values = {"K": walk, "tau": tau, "growth": growth}
-    return notice(UNRESOLVED, name, values, shown=f"{value:.2g} {unit}", times=brief(growth))
-
-
-def left_open(calibration: Calibration) -> dict[str, tuple[float, str]]:
-    """By channel whose model has no walk, the largest K that the record leaves open; its unit."""
-    open_walks = (notice for notice in calibration.notices if notice.code == UNRESOLVED)
-    return {each.where: _shown(each.values["K"], calibration[each.where]) for each in open_walks}
-
-
-def _shown(walk: float, fitted: Fit) -> tuple[float, str]:
-    """K in its data-sheet unit, or SI."""
-    unit, per_si = customary_unit("u/s/sqrt(Hz)", fitted.wv.quantity, fitted.wv.unit)
-    return walk * per_si, unit
+    return notice(
+        UNRESOLVED, name, values, shown=f"{walk * per_si:.2g} {unit}", times=brief(growth)
+    )
 
 
 def _time(fitted: Fit) -> float:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from gmwm.calibration import upper_limit
+from gmwm.estimate import Fit
 from gmwm.filter_numbers import tuning
 from gmwm.filter_numbers.axes import AxisModel, Sd, SensorAxes, Several
 from gmwm.filter_numbers.bound import bound, predicted
@@ -58,12 +59,15 @@ def _filled(
     axis: AxisModel, group: Sequence[AxisModel], numbers: AxisFilterNumbers, tau: float
 ) -> AxisFilterNumbers:
     """The numbers of an axis without zeros; ``group``: axes with the same numbers."""
-    upper = {}
+    upper, fits = {}, [each.fit for each in group if each.fit is not None]
+
+    def largest(letter: str) -> float:
+        return max(_limit(fit, letter) for fit in fits)
 
     def positive(letter: str, value: float) -> float:
         if value > 0.0:
             return value
-        upper[letter] = max(_limit(each, letter) for each in group)
+        upper[letter] = largest(letter)
         return upper[letter]
 
     N = positive("N", numbers.N)
@@ -73,7 +77,7 @@ def _filled(
         model = WhiteNoise(N) + GaussMarkov(numbers.sigma[0], numbers.tau[0])
     else:
         # At high frequencies this process rises as a random walk of that K does.
-        upper["sigma"] = max(_limit(each, "K") for each in group) * float(np.sqrt(tau / 2.0))
+        upper["sigma"] = largest("K") * float(np.sqrt(tau / 2.0))
         model = WhiteNoise(N) + GaussMarkov(upper["sigma"], tau)
     if not upper:
         return numbers
@@ -84,7 +88,6 @@ def _filled(
 
 
 @lru_cache(maxsize=64)
-def _limit(axis: AxisModel, letter: str) -> float:
-    """95 % upper limit of a term that the fit lacks."""
-    assert axis.fit is not None
-    return upper_limit(axis.fit, letter)
+def _limit(fit: Fit, letter: str) -> float:
+    """`upper_limit`, which takes a fit of its own."""
+    return upper_limit(fit, letter)

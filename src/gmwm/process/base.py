@@ -303,13 +303,6 @@ class Process:
         """`unit_haar_variance` as a function of the shape alone."""
         return lambda shape: self.unit_haar_variance(shape, tau, dt)
 
-    def unit_haar_slopes(self, shape: Shape, tau: FloatArray, dt: float) -> FloatArray | None:
-        """Derivative of `unit_haar_variance` by the coordinates of `shape_to_free`, (J, s).
-
-        ``None`` where no closed form is known: the estimator takes differences then.
-        """
-        return None
-
     def autocovariance(self, lag: FloatArray, dt: float) -> FloatArray:
         """Autocovariance in u^2 at lags in samples (non-negative integers).
 

@@ -126,7 +126,7 @@ def with_temperature(part: Part, table: Table) -> Part:
     try:
         arrays = table.load(columns)
     except InputError as error:
-        told = notice("columns-unreadable", what=f"temperature ({error})")
+        outcome = notice("columns-unreadable", what=f"temperature ({error})")
     else:
         stamps = arrays.pop(time) * (meaning(table.names[time]).seconds or 1.0)
         order = np.argsort(stamps, kind="stable")
@@ -137,6 +137,6 @@ def with_temperature(part: Part, table: Table) -> Part:
             channels.append(Channel(name, values, recording.dt, "temperature", "degC"))
         names, first = ", ".join(channel.name for channel in channels), recording.names[0]
         count = {"count": stamps.size}
-        told = notice("temperature-interpolated", "", count, listed=names, first=first)
-    wider, notices = (*recording.channels, *channels), (*recording.notices, told)
+        outcome = notice("temperature-interpolated", "", count, listed=names, first=first)
+    wider, notices = (*recording.channels, *channels), (*recording.notices, outcome)
     return replace(part, recording=replace(recording, channels=wider, notices=notices))

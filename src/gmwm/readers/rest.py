@@ -181,7 +181,7 @@ def _gyro_unit(rate: _Sensor) -> Notice:
         for unit, ratio in ratios.items()
         if ratio < 0.9 and _is_plausible(rate.density * ratio, rate.size * ratio)
     ]
-    # Units that differ by less than gyros do cannot be told apart.
+    # Units whose ratio is smaller than that between gyros cannot be distinguished.
     first, apart = ratios[likely[0]] if likely else 1.0, math.log(tuning.UNITS_APART)
     near = [unit for unit in likely if abs(math.log(ratios[unit] / first)) < apart]
     values: dict[str, object] = {"density": rate.density, "mean": rate.size, "unit": rate.unit}

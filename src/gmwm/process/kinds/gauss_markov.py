@@ -80,9 +80,6 @@ class GaussMarkov(Process):
     def unit_haar_variance(self, shape: Shape, tau: FloatArray, dt: float) -> FloatArray:
         return real_haar(dt / shape[0], np.ravel(tau) / dt).reshape(np.shape(tau))
 
-    def unit_haar_slopes(self, shape: Shape, tau: FloatArray, dt: float) -> FloatArray:
-        return real_slope(dt / shape[0], np.asarray(tau, dtype=float) / dt)
-
     def autocovariance(self, lag: FloatArray, dt: float) -> FloatArray:
         return self.sigma**2 * np.exp(-np.asarray(lag) * dt / self.tau)
 

@@ -238,8 +238,8 @@ def open_bag(path: Path, wanted: Wanted) -> tuple[BagTable, ...]:
         sensors = topic.sensors or frozenset(SI_UNIT)
         names = [name for name in IMU.columns if name.partition("_")[0] in sensors]
         tables.append(table(topic, IMU, names))
-        told = " and ".join(sorted(sensors))
-        tables[-1].notices.append(notice("topic", "", {"topic": topic.name}, sensors=told))
+        listed = " and ".join(sorted(sensors))
+        tables[-1].notices.append(notice("topic", "", {"topic": topic.name}, sensors=listed))
     for name, count in warmth.items():
         # By the topic if there are several.
         prefix = "" if len(warmth) == 1 else name.strip("/").replace("/", "_") + "_"

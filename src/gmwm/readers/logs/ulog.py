@@ -82,8 +82,8 @@ def _tables(path: Path, wanted: Wanted) -> tuple[ArrayTable, ...]:
             found.append((Topic("thermometers", stamps.size), columns))
     tables: list[ArrayTable] = []
     for topic, columns in found:
-        told, origin = () if tables else notices, f"the definition of {topic.name}"
-        tables.append(topic_table(path.name, topic, columns, origin, told))
+        reported, origin = () if tables else notices, f"the definition of {topic.name}"
+        tables.append(topic_table(path.name, topic, columns, origin, reported))
     return tuple(tables)
 
 

@@ -33,7 +33,7 @@ def blocks(
     itself. If a compression is cut off, the whole lines before that are given.
 
     offset, line: Bytes (after decompression) that are left out, and the line that begins there.
-    say: Is told that the compression is cut off, and may raise an error.
+    say: Called with a message if the compression is cut off; may raise an error.
     Yields: number of the first line, counted from 1; whole lines (``\n``, ``\r\n`` or ``\r``).
     """
     with _open(path) as stream:
