@@ -296,7 +296,7 @@ def _choose(
     tried: list[tuple[Candidate, Fit]] = []
     found: tuple[Candidate, Fit] | None = None
     for candidate in _simplest_of_ties(ranking)[: tuning.FITS]:
-        if found is not None and rank_key(candidate) > limit:
+        if found is not None and found[1].valid and rank_key(candidate) > limit:
             break
         fitted = estimate(candidate.model, wv)
         if not _is_supported(fitted):

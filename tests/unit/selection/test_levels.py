@@ -30,6 +30,15 @@ def test_a_walk_that_predictions_of_minutes_feel_is_not_the_simpler_choice():
     assert fit.valid and set(fit.params) == {"N", "sigma", "tau"}
 
 
+@pytest.mark.parametrize("seed", [8, 14, 16, 33])
+def test_a_valid_model_is_chosen_although_one_that_is_not_has_the_better_criterion(seed):
+    """White noise alone wins by 3 to 5, and misses a level that the slow term describes."""
+    x = WhiteNoise(1e-4).simulate(60_000, 0.02, 900 + seed)
+    x += GaussMarkov(2e-5, 10.0).simulate(60_000, 0.02, seed)
+    chosen = gmwm.select(x, dt=0.02)
+    assert chosen.fit.valid and chosen.chosen is not chosen.ranking[0]
+
+
 def test_a_slope_that_a_walk_explains_as_well_is_reported_with_both_numbers():
     # 8 standard errors of a slope under white noise alone: K of 3.5e-6 does the same in an hour.
     slope = 8.0 * np.sqrt(12e-6 / 3600.0**3)
