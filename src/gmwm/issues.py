@@ -609,8 +609,6 @@ _FILTER_NUMBERS = (
 )  # fmt: skip
 
 _INS = (
-    _navigation("aligned-in-motion", "aligned in motion: roll {roll:.2f}, pitch {pitch:.2f}, yaw "
-        "{yaw:.2f} deg, 1 sigma {tilt_deg:.2g} deg of tilt and {heading_deg:.2g} of heading"),
     _navigation("attitude-given", "roll, pitch and yaw as given: {degrees} deg, 1 sigma "
         "{sd_deg:.2g} deg"),
     _navigation("axis-signs", "the sign of {wrong} is wrong{unseen}", "use the same axes forward, "

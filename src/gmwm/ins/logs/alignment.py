@@ -24,7 +24,7 @@ from gmwm.ins.imu import AXES, Imu, SensorModels
 from gmwm.ins.logs import tuning
 from gmwm.ins.logs.attitude import (
     Heading,
-    attitude_in_motion,
+    acceleration,
     gyrocompass,
     heading_from_course,
     positions_of,
@@ -60,44 +60,35 @@ class Alignment:
 def align(measured: Measured) -> Alignment:
     """Find an initial state in the data.
 
-    The heading is the given one, the course of GNSS once the vehicle moves, or that of the Earth's
-    rotation if the gyros show it. A vehicle without a given attitude is levelled while steady; if
-    it never is, the attitude follows from changes of its velocity.
+    A vehicle without a given attitude is levelled while it is steady, at rest or where GNSS shows
+    no acceleration. The heading is the given one, the course of GNSS once the vehicle moves, or
+    that of the Earth's rotation if the gyros show it.
 
-    Raises InputError if there is no fix, no steady stretch or acceleration to level by, or no way
-        to know the heading.
+    Raises InputError if there is no fix, no steady stretch, or no way to know the heading.
     """
-    imu, models, attitude = measured.imu, measured.sensors, measured.attitude
-    stretch = steady(imu) if attitude is None else None
-    if stretch is not None:
-        return _levelled(measured, stretch)
-    fix, epoch = _first_fix(measured)
+    imu, aiding, attitude = measured.imu, measured.aiding, measured.attitude
     if attitude is not None:
+        fix, epoch = _first_fix(measured)
         values = {"attitude": list(attitude), "sd": measured.attitude_sd}
         degrees = ", ".join(f"{each:.2f}" for each in np.degrees(attitude))
         sd_deg = np.degrees(measured.attitude_sd)
         how = notice("attitude-given", values=values, degrees=degrees, sd_deg=sd_deg)
-        C, tilt_sd = matrix_from_rpy(np.asarray(attitude)), measured.attitude_sd
-        yaw_sd = tilt_sd
-    else:
-        gyro_sd, accel_sd = (
-            biased_sd(models, kind, tuning.MOTION_LEAST, imu.dt) for kind in ("gyro", "accel")
-        )
-        place = positions_of(measured.aiding).value[fix]
-        C, sd = attitude_in_motion(imu, measured.aiding, epoch, place, (gyro_sd, accel_sd))
-        tilt_sd, yaw_sd = float(np.max(sd[:2])), float(sd[2])
-        roll, pitch, yaw = np.degrees(rpy_from_matrix(C))
-        how = notice(
-            "aligned-in-motion",
-            values={"tilt": tilt_sd, "heading": yaw_sd},
-            roll=roll,
-            pitch=pitch,
-            yaw=yaw % 360.0,
-            tilt_deg=np.degrees(tilt_sd),
-            heading_deg=np.degrees(yaw_sd),
-        )
-    state = _state(measured, fix, C, InitialSd(tilt=tilt_sd, heading=yaw_sd))
-    return Alignment(epoch, *state, np.zeros(3), None, (how,))
+        sd = InitialSd(tilt=measured.attitude_sd, heading=measured.attitude_sd)
+        state = _state(measured, fix, matrix_from_rpy(np.asarray(attitude)), sd)
+        return Alignment(epoch, *state, np.zeros(3), None, (how,))
+    for stretch in steady(imu):
+        rest_sd, tilt = velocity_at_rest(aiding, imu.dt, *stretch), 0.0
+        if rest_sd is None:
+            slope = acceleration(aiding, imu.dt, *stretch) / STANDARD_GRAVITY
+            tilt = max(slope, tuning.TILT_MOVING)
+        if tilt <= tuning.TILT_MOST:
+            return _levelled(measured, stretch, rest_sd, tilt)
+    raise InputError(
+        f"the attitude cannot be known: in the first {tuning.SEARCHED:g} s the vehicle neither "
+        f"stands still nor moves at constant velocity for {tuning.STEADY_LEAST:g} s: give the "
+        "attitude, or begin the record where it does",
+        "attitude-unknown",
+    )
 
 
 def _first_fix(measured: Measured, first: int = 0) -> tuple[int, int]:
@@ -143,12 +134,17 @@ def _velocity(aiding: Aiding, fix: int, now: float, dt: float) -> tuple[FloatArr
     return way.value[0], float(np.hypot(np.sqrt(np.mean(way.sd[0] ** 2)), faster))
 
 
-def _levelled(measured: Measured, stretch: tuple[int, int]) -> Alignment:
-    """A start that is levelled on a steady stretch, with a given heading or one from the data."""
+def _levelled(
+    measured: Measured, stretch: tuple[int, int], rest_sd: float | None, moving: float
+) -> Alignment:
+    """A start that is levelled on a steady stretch, with a given heading or one from the data.
+
+    rest_sd: Standard deviation of the velocity at rest; ``None`` in motion.
+    moving: Tilt error by the accelerations of the motion, rad.
+    """
     imu, aiding, models = measured.imu, measured.aiding, measured.sensors
     first, last = stretch
     length = (last - first) * imu.dt
-    rest_sd = velocity_at_rest(aiding, imu.dt, first, last)
     still = rest_sd is not None
     rate, force = (np.mean(e[first:last], axis=0) / imu.dt for e in (imu.rotation, imu.velocity))
     bias = rate if still else np.zeros(3)
@@ -162,9 +158,8 @@ def _levelled(measured: Measured, stretch: tuple[int, int]) -> Alignment:
     body = turned(imu, bias, matrix_from_rpy(level), levelled, epoch)
     gyro_sd, biased = (each(models, "gyro", length, imu.dt) for each in (mean_sd, biased_sd))
     drift = gyro_sd if still else float(np.hypot(biased, RATE))
-    tilt_sd = float(
-        np.hypot(_tilt_sd(models, length, imu.dt, still), drift * (epoch - levelled) * imu.dt)
-    )
+    turn = drift * (epoch - levelled) * imu.dt
+    tilt_sd = float(np.linalg.norm([_tilt_sd(models, length, imu.dt), moving, turn]))
     if measured.heading is not None:
         heading = Heading(measured.heading, measured.heading_sd, "heading as given")
     else:
@@ -223,15 +218,14 @@ def biased_sd(models: SensorModels, kind: str, length: float, dt: float) -> floa
     return float(np.hypot(_bias(models, kind), mean_sd(models, kind, length, dt)))
 
 
-def _tilt_sd(models: SensorModels, length: float, dt: float, still: bool) -> float:
-    """Standard deviation of the tilt of levelling, rad."""
+def _tilt_sd(models: SensorModels, length: float, dt: float) -> float:
+    """Standard deviation of the tilt of levelling at rest, rad."""
     errors = []
     for axis in (axis for axis in AXES if axis.startswith("accel")):
         form = models.models[axis].state_space(dt)
         errors.append(float(np.sqrt(form.output @ form.initial_covariance @ form.output)))
     error = np.hypot(max(errors), biased_sd(models, "accel", length, dt))
-    sd = np.hypot(error / STANDARD_GRAVITY, tuning.TILT_FLOOR)
-    return float(sd if still else np.hypot(sd, tuning.TILT_MOVING))
+    return float(np.hypot(error / STANDARD_GRAVITY, tuning.TILT_FLOOR))
 
 
 def started(measured: Measured, alignment: Alignment) -> tuple[Imu, Aiding]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -14,8 +15,6 @@ from gmwm.errors import InputError
 from gmwm.ins.filter import Aiding, Fixes
 from gmwm.ins.geometry import (
     RATE,
-    STANDARD_GRAVITY,
-    gravity,
     matrix_from_rpy,
     ned_difference,
     rpy_from_matrix,
@@ -45,8 +44,8 @@ def velocities_between(position: Fixes) -> Fixes:
     return Fixes("velocity", between[near], (way / step)[near], (sd / step)[near])
 
 
-def steady(imu: Imu) -> tuple[int, int] | None:
-    """First and last sample of the first steady stretch, at rest or in motion; ``None`` without."""
+def steady(imu: Imu) -> Iterator[tuple[int, int]]:
+    """First and last sample of each steady stretch, at rest or in motion."""
     size = max(round(tuning.STEADY_WINDOW / imu.dt), 1)
     count = min(imu.n, round(tuning.SEARCHED / imu.dt)) // size
     increments = np.hstack([each[: count * size] for each in (imu.rotation, imu.velocity)])
@@ -74,9 +73,8 @@ def steady(imu: Imu) -> tuple[int, int] | None:
                 break
             end += 1
         if end - begin >= least:
-            return begin * size, end * size
+            yield begin * size, end * size
         begin = end
-    return None
 
 
 def velocity_at_rest(aiding: Aiding, dt: float, first: int, last: int) -> float | None:
@@ -84,16 +82,12 @@ def velocity_at_rest(aiding: Aiding, dt: float, first: int, last: int) -> float 
 
     Fixes show it: velocities near zero, or positions at one place.
     """
-
-    def inside(fixes: Fixes) -> Fixes:
-        return fixes.part((fixes.time >= (first - 0.5) * dt) & (fixes.time <= (last + 0.5) * dt))
-
     velocity = aiding.of("velocity")
-    part = None if velocity is None else inside(velocity)
+    part = None if velocity is None else _inside(velocity, dt, first, last)
     if part is not None and part.time.size:
         mean, sd = np.mean(part.value, axis=0), np.mean(part.sd, axis=0) / np.sqrt(part.time.size)
     else:
-        part = inside(positions_of(aiding))
+        part = _inside(positions_of(aiding), dt, first, last)
         if part.time.size < 2:
             return None
         between = part.time[-1] - part.time[0]
@@ -104,13 +98,32 @@ def velocity_at_rest(aiding: Aiding, dt: float, first: int, last: int) -> float 
     return max(float(np.max(sd)), tuning.STILL_VELOCITY_SD)
 
 
+def acceleration(aiding: Aiding, dt: float, first: int, last: int) -> float:
+    """Size of the acceleration in a stretch as GNSS shows it, and its standard deviation, m/s^2.
+
+    By the line of least squares through the velocities; infinite with fewer than two.
+    """
+    velocity = aiding.of("velocity") or velocities_between(positions_of(aiding))
+    part = _inside(velocity, dt, first, last)
+    if part.time.size < 2:
+        return np.inf
+    time = part.time - np.mean(part.time)
+    squares = np.sum(time**2)
+    slope = time @ part.value / squares
+    return float(np.linalg.norm(slope) + np.max(part.sd) / np.sqrt(squares))
+
+
+def _inside(fixes: Fixes, dt: float, first: int, last: int) -> Fixes:
+    return fixes.part((fixes.time >= (first - 0.5) * dt) & (fixes.time <= (last + 0.5) * dt))
+
+
 def standstills(imu: Imu, aiding: Aiding, sd: float) -> Fixes | None:
     """Standstills where the IMU is as quiet as at the start, with a velocity of ``sd`` (m/s).
 
     Motion as quiet as that counts as rest too; the filter rejects what contradicts it. ``None`` if
     the vehicle is not at rest at the start.
     """
-    stretch = steady(imu)
+    stretch = next(steady(imu), None)
     if stretch is None or velocity_at_rest(aiding, imu.dt, *stretch) is None:
         return None
     quieter, length = tuning.ZERO_VELOCITY
@@ -245,83 +258,3 @@ def gyrocompass(
     if sd > tuning.COMPASS_SD:
         return None
     return Heading(float(np.arctan2(-east, north)), sd, "heading from the Earth's rotation")
-
-
-# -- in motion ------------------------------------------------------------------------------------
-
-
-def attitude_in_motion(
-    imu: Imu, aiding: Aiding, epoch: int, place: FloatArray, constant_sd: tuple[float, float]
-) -> tuple[FloatArray, FloatArray]:
-    """Attitude at an epoch, C_bn, and its standard deviations about north, east and down.
-
-    The specific force, turned into the body's axes of the start by the gyros, and the change of the
-    velocity less the one by gravity are one vector in two frames, interval by interval. The
-    rotation between them that fits best is Wahba's problem, solved by singular values (Markley
-    1988, *J. Astronaut. Sci.* 36, 245-258; Wu & Pan 2013, *IEEE Trans. Aerosp. Electron. Syst.* 49,
-    1006-1025).
-
-    place: (3,), latitude, longitude, height.
-    constant_sd: Standard deviations of constant errors of gyros and accelerometers, rad/s, m/s^2.
-    Raises InputError if no stretch of up to `gmwm.ins.logs.tuning.MOTION_MOST` s shows the heading.
-    """
-    start = epoch * imu.dt
-    velocity = aiding.of("velocity") or velocities_between(positions_of(aiding))
-    after = velocity.part(velocity.time >= start)
-    best: tuple[FloatArray, FloatArray] | None = None
-    for length in np.arange(tuning.MOTION_LEAST, tuning.MOTION_MOST + 1.0, tuning.MOTION_LEAST):
-        part = after.part(after.time <= start + length)
-        last = round((start + length) / imu.dt)
-        if last > imu.n or part.time.size < 3:
-            break
-        body = _velocity_in_body_axes(imu, epoch, last, part.time, np.asarray(aiding.lever_arm))
-        found = _rotation(part, body, place, constant_sd)
-        if best is None or found[1][2] < best[1][2]:
-            best = found
-    if best is None or best[1][2] > tuning.MOTION_SD:
-        raise InputError(
-            "the attitude cannot be known: the IMU is steady nowhere in the first "
-            f"{tuning.SEARCHED:g} s, and GNSS shows too little acceleration to find it from: give "
-            "the attitude, or begin the record where the vehicle stands still",
-            "attitude-unknown",
-        )
-    return best
-
-
-def _velocity_in_body_axes(
-    imu: Imu, epoch: int, last: int, times: FloatArray, lever: FloatArray
-) -> FloatArray:
-    """Velocity of the antenna that the IMU measures since an epoch, in the body's axes there."""
-    turns = np.tile(np.eye(3), (last - epoch + 1, 1, 1))
-    _carry(np.eye(3), imu.rotation[epoch:last], turns[1:])
-    # Half of a sample's turn has happened when its force is resolved.
-    middle = 0.5 * (turns[1:] + turns[:-1])
-    force = np.einsum("kij,kj->ki", middle, imu.velocity[epoch:last])
-    summed = np.vstack([np.zeros(3), np.cumsum(force, axis=0)])
-    rates = imu.rotation[np.clip(np.arange(epoch, last + 1), 0, imu.n - 1)] / imu.dt
-    # The antenna swings about the IMU.
-    antenna = summed + np.einsum("kij,kj->ki", turns, np.cross(rates, lever))
-    samples, at = (times - epoch * imu.dt) / imu.dt, np.arange(len(summed))
-    return np.stack([np.interp(samples, at, each) for each in antenna.T], axis=1)
-
-
-def _rotation(
-    velocity: Fixes, body: FloatArray, place: FloatArray, constant_sd: tuple[float, float]
-) -> tuple[FloatArray, FloatArray]:
-    """The rotation from velocities in body axes to those of the fixes, and its deviations."""
-    time = velocity.time - velocity.time[0]
-    level = velocity.value - np.outer(time, [0.0, 0.0, float(gravity(place[0], place[2]))])
-    a, b = level - level.mean(axis=0), body - body.mean(axis=0)
-    left, _, right = np.linalg.svd(a.T @ b)
-    C = left @ np.diag([1.0, 1.0, np.linalg.det(left) * np.linalg.det(right)]) @ right
-    # Scatter about the fit: noise of the fixes, and the bend by the gyros' drift.
-    rest = a - b @ C.T
-    noise = max(float(np.mean(velocity.sd**2)), float(np.sum(rest**2)) / (3.0 * len(a) - 6.0))
-    information = (np.sum(a**2) * np.eye(3) - a.T @ a) / noise
-    gyro_sd, accel_sd = constant_sd
-    drift = gyro_sd * 0.5 * float(time[-1])
-    variances = np.diag(np.linalg.inv(information)) + drift**2
-    # A constant error of the accelerometers tilts, and turns by its share of the acceleration.
-    turning = np.sqrt(np.mean(np.gradient(velocity.value, time, axis=0)[:, :2] ** 2))
-    ratio = accel_sd / np.array([STANDARD_GRAVITY, STANDARD_GRAVITY, max(turning, 1e-3)])
-    return C, np.sqrt(variances + ratio**2)

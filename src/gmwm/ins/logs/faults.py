@@ -9,7 +9,6 @@ import numpy as np
 
 from gmwm._core.text import per_cent
 from gmwm.errors import InputError
-from gmwm.ins.imu import Imu
 from gmwm.ins.logs import tuning
 from gmwm.ins.logs.hypotheses import (
     LEVEL,
@@ -17,7 +16,6 @@ from gmwm.ins.logs.hypotheses import (
     constant_errors,
     cost,
     far_heading,
-    fitted,
     outliers,
     wrong_signs,
 )
@@ -45,23 +43,23 @@ class Faults:
     def of(cls, whole: Replay, measured: Measured | None = None) -> Faults:
         """Look for faults.
 
-        measured: The log as it was, to be aligned anew where the filter is lost.
+        measured: The log as it was, to be aligned anew without leap seconds where the filter is
+            lost: the start is as wrong as the stamps.
         """
         span = tuning.LARGEST_OFFSET + tuning.OFFSET_MARGIN, tuning.DIAGNOSED
         base = whole.within(*span)
         near = cls._near(base)
-        offsets = [abs(each.values.get("time offset", 0.0)) for each in near.found]
-        is_suspected = base.is_lost or max(offsets, default=0.0) >= tuning.LARGEST_OFFSET
-        far = far_offset(measured) if measured is not None and is_suspected else None
-        if far is None:
+        if measured is None or near.explained or not base.is_lost:
             return near
-
-        def effort(each: Faults) -> tuple[bool, int, float]:
-            fixes = max(each.replay.standard.shape[0], 1)  # the two may leave others out
-            return not each.explained, len(each.found), -each.replay.log_likelihood / fixes
-
-        offset, replay = far
-        return min(near, cls._near(replay.within(*span))._with_offset(offset), key=effort)
+        for offset in (tuning.LEAP_SECONDS, -tuning.LEAP_SECONDS):
+            try:
+                replay = Replay.of(_earlier(measured, offset)).within(*span)
+            except InputError:  # no fix or no heading is left
+                continue
+            far = cls._near(replay)
+            if far.explained:
+                return far._with_offset(offset)
+        return near
 
     @classmethod
     def _near(cls, base: Replay) -> Faults:
@@ -86,13 +84,11 @@ class Faults:
     def _with_offset(self, offset: float) -> Faults:
         """The offset as the first fault, then these."""
         near = [each for each in self.found if each.code == "time-offset"]
-        # A standstill counts even where it is not a fault itself.
-        left = near or fitted(self.replay, self.replay, ("time-offset",))
-        values = {"time offset": offset + sum(each.values["time offset"] for each in left)}
-        error = left[0].errors if left else {"time offset": self.resolution["time offset"]}
+        name = "time offset"
+        values = {name: offset + sum(each.values[name] for each in near)}
+        error = near[0].errors if near else {name: self.resolution[name]}
         first = Fault("time-offset", "", self.replay, np.inf, cost(1), values, error)
-        rest = tuple(each for each in self.found if each not in near)
-        return replace(self, found=(first, *rest))
+        return replace(self, found=(first, *(each for each in self.found if each not in near)))
 
 
 def contradicted(replay: Replay, level: float = LEVEL) -> bool:
@@ -101,42 +97,6 @@ def contradicted(replay: Replay, level: float = LEVEL) -> bool:
         return True
     tests = [replay.test(kind) for kind in replay.kinds]
     return any(each.nis.p_value <= level or each.whiteness <= level for each in tests)
-
-
-def far_offset(measured: Measured) -> tuple[float, Replay] | None:
-    """Delay of stamps by many seconds, as of GPS time for UTC, s, and the log without it.
-
-    The start is as wrong as the stamps, so that the innovations show no way: the filter is aligned
-    and run with offsets all over, then nearer and nearer to the best. ``None`` if no offset makes
-    the innovations small.
-    """
-    imu = measured.imu
-    n = min(imu.n, round(tuning.DIAGNOSED / imu.dt))
-    part = replace(measured, imu=Imu(imu.dt, imu.rotation[:n], imu.velocity[:n]))
-    part = _earlier(part, 0.0)
-    fixes = sum(each.time.size for each in part.aiding.fixes if each.kind != "standstill")
-
-    def size(offset: float) -> float:
-        """Mean square of the innovations, robust to outliers; infinite if the filter fails."""
-        try:
-            replay = Replay.of(_earlier(part, offset)).within(0.0, tuning.DIAGNOSED)
-        except InputError:
-            return np.inf
-        is_short = replay.standard.shape[0] < tuning.FAR_LEFT * fixes
-        if is_short or not np.isfinite(replay.log_likelihood):
-            return np.inf
-        return float(np.expm1(np.nanmean(np.log1p(replay.standard**2))))
-
-    step, most = tuning.FAR_STEP, tuning.FARTHEST_OFFSET
-    sizes = {offset: size(offset) for offset in np.arange(-most, most + step, step).tolist()}
-    best = min(sizes, key=sizes.__getitem__)
-    while step > tuning.FAR_NEAR:
-        step *= 0.5
-        sizes |= {each: size(each) for each in (best - step, best + step)}
-        best = min(sizes, key=sizes.__getitem__)
-    if not sizes[best] < min(tuning.FAR_BETTER * sizes[0.0], tuning.LOST):
-        return None  # as lost as before, or nearly
-    return best, Replay.of(_earlier(part, best))
 
 
 def _earlier(measured: Measured, offset: float) -> Measured:

@@ -33,13 +33,11 @@ STEADY_WINDOW = 0.5  # s, of averages: longer than a vibration, shorter than a m
 STEADY_LEAST, STEADY_MOST = 2.0, 30.0  # s to level by: fewer are noise, more let biases drift
 STEADY = (0.01, 0.15)  # rad/s (0.6 deg/s), m/s^2 (1 deg of tilt): change of a steady average
 SEARCHED = 300.0  # s from the start in which steady motion and a course are looked for
-# s of motion to find an attitude by: less has little change of velocity, more lets gyros drift.
-MOTION_LEAST, MOTION_MOST = 10.0, 120.0
-MOTION_SD = math.radians(10.0)  # beyond it a heading is not found: a filter is linear up to there
 ATTITUDE_SD = math.radians(1.0)  # of a given attitude without one
 SIGMAS = 5.0  # within which a mean or velocity counts as zero: one false in two million
 TILT_FLOOR = math.radians(0.05)  # mounting and uneven ground
-TILT_MOVING = math.radians(1.0)  # accelerations of steady motion
+TILT_MOVING = math.radians(1.0)  # accelerations of steady motion that GNSS does not show
+TILT_MOST = math.radians(3.0)  # tilt error by acceleration, beyond which a stretch is not used
 STILL_VELOCITY_SD = 0.02  # m/s, the least of a vehicle at rest
 COURSE_RATIO = 20.0  # speed over its standard deviation: a course is then known to 3 deg
 CRAB_SD = math.radians(2.0)  # between the course and the forward axis
@@ -63,12 +61,6 @@ SUSPECTED = 0.01  # p-value below which wrong axes are looked for; a fault has t
 TRACK_STEP = 1.0  # s, of a track between whose points only noise of the IMU is expected
 LARGEST_OFFSET = 1.5  # s, of a time offset found from the innovations: with more, no fix is near
 OFFSET_MARGIN = 0.1  # s beside it, for fixes left out at both ends
-# s, of larger time offsets, which are tried where the filter is lost: the farthest (TAI is ahead of
-# UTC by 37 s), the steps in which all are tried (a vehicle does not turn much faster), and the last
-# step: a start that is as much off must not make the heading a fault.
-FARTHEST_OFFSET, FAR_STEP, FAR_NEAR = 60.0, 2.0, 0.0625
-FAR_BETTER = 0.5  # square of the innovations over that of the given stamps, worth a closer look
-FAR_LEFT = 0.75  # share of the fixes that must be in the time of the IMU with another offset
 LARGEST_ARM = 5.0  # m, usual length of a lever arm that was left out, 1 sigma
 HEADINGS = 8  # directions that are tried where the filter is lost: 45 deg apart
 ROUGH_HEADING = math.radians(15.0)  # 1 sigma of each: the nearest is up to 22.5 deg off

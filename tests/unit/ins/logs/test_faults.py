@@ -7,8 +7,8 @@ import pytest
 
 from gmwm.ins import Measured, Navigated, Straight, emulate, gnss, perform
 from gmwm.ins.filter import InitialSd
-from gmwm.ins.logs import Fault, Faults, Replay, fault_notice, tuning
-from gmwm.ins.logs.faults import far_offset, resolution_notice
+from gmwm.ins.logs import Fault, Faults, Replay, fault_notice
+from gmwm.ins.logs.faults import resolution_notice
 from gmwm.study.emulated_logs import LEVER_ARM, emulated_log, sensors
 from marks import slow
 
@@ -78,36 +78,6 @@ def test_leap_seconds_and_an_outlier():
     times = navigated.measured.aiding.of("position").time
     truth = times[times.size // 2] - 18.0  # on the IMU's clock
     assert outlier.values["time"] == pytest.approx(truth, abs=0.2)
-
-
-@pytest.mark.parametrize("offset", [slow(1.7), -2.2, slow(7.3)])
-def test_stamps_that_are_off_by_seconds_in_circles(offset):
-    """Nothing near tells the way: a lever arm of 40 m, or a clock that drifts, was named."""
-    log, _ = emulated_log(212, "loiter", duration=DURATION, rate=10.0)
-    fixes = tuple(
-        replace(each, time=each.time + offset).part(
-            (each.time > -offset) & (each.time < DURATION - offset)
-        )
-        for each in log.aiding.fixes
-    )
-    late = replace(log, aiding=replace(log.aiding, fixes=fixes))
-    (fault,) = Navigated.of(late).fault_notices
-    assert fault.code == "time-offset"
-    assert within(fault, "time offset", offset) < 0.3
-
-
-def test_the_offset_is_looked_for_at_the_beginning_of_a_long_log(monkeypatch):
-    """Fixes after that part do not count as missing."""
-    log, _ = emulated_log(1, duration=300.0, rate=5.0, faults=("leap seconds",))
-    monkeypatch.setattr(tuning, "DIAGNOSED", 120.0)
-    offset, replay = far_offset(log)
-    assert offset == pytest.approx(18.0, abs=0.2)
-    assert replay.imu.n * log.imu.dt <= 120.0
-
-
-def test_right_stamps_have_no_other_offset():
-    log, _ = emulated_log(1, duration=60.0, rate=5.0)
-    assert far_offset(log) is None
 
 
 def test_circles_at_constant_speed_do_not_tell_stamps_from_a_lever_arm():

@@ -297,21 +297,16 @@ def test_files_of_two_clocks_are_refused_with_both_spans(tmp_path):
         Measured.of(content(), tmp_path)
 
 
-def test_an_imu_that_is_shaken_all_the_time_is_aligned_by_how_its_velocity_changes(tmp_path):
+def test_an_imu_that_is_shaken_all_the_time_needs_an_attitude(tmp_path):
     truth = drive(tmp_path)
-    assert truth.duration == 160.0
     rows = np.genfromtxt(tmp_path / "imu.csv", delimiter=",", skip_header=1)
     rows[:, 4] += 3.0 * np.sin(2.0 * np.pi * 0.37 * rows[:, 0])
     table(tmp_path / "imu.csv", IMU_HEADER, [rows])
-    found = filtered(tmp_path)
-    assert found.alignment.notices[0].code == "aligned-in-motion"
-    assert np.all(np.abs(standardised(found, truth)[0, 6:]) < 4.0)
-    # Where GNSS shows no acceleration either, nothing is known.
-    for name, count in (("imu.csv", int(18 * RATE)), ("fixes.csv", 17)):
-        path = tmp_path / name
-        path.write_text("\n".join(path.read_text().splitlines()[: 1 + count]) + "\n")
-    with pytest.raises(InputError, match="the attitude cannot be known"):
+    with pytest.raises(InputError, match="give the attitude") as caught:
         filtered(tmp_path)
+    assert caught.value.code == "attitude-unknown"
+    rpy = truth.rpy[int(RATE)].tolist()
+    assert filtered(tmp_path, attitude=rpy).alignment.notices[0].code == "attitude-given"
 
 
 def test_misfits_of_two_kinds_do_not_make_each_other_good(tmp_path):
