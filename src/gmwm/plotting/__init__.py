@@ -20,7 +20,6 @@ from gmwm.plotting.navigation import (
     growth as growth,
     innovations as innovations,
     literal as literal,
-    measured_outage as measured_outage,
     measured_track as measured_track,
     outages_compared as outages_compared,
     track as track,

@@ -214,53 +214,14 @@ def measured_track(track: FloatArray, fixes: FloatArray, without: FloatArray) ->
     """
     figure, axes = _panels(1, 1, (6.4, 5.2))
     ax = axes[0, 0]
-    _draw_solution(ax, track, fixes, without, "longest time without fixes", 3)
-    _legend_above(figure, ax)
-    return figure
-
-
-def _draw_solution(
-    ax: Axes, track: FloatArray, fixes: FloatArray, without: FloatArray, label: str, size: int
-) -> None:
-    (points,) = ax.plot(*fixes.T, ".", color=DATA_COLOUR, markersize=size, label="fixes")
+    (points,) = ax.plot(*fixes.T, ".", color=DATA_COLOUR, markersize=3, label="fixes")
+    label = "longest time without fixes"
     ax.plot(*without.T, color=COMPONENT_COLOURS[1], linewidth=3.5, label=label)
     (line,) = ax.plot(*track.T, color=COMPONENT_COLOURS[0], linewidth=1.1, label="solution")
     points.set_rasterized(len(fixes) > _DENSE)
     line.set_rasterized(len(track) > _DENSE)
     _map(ax)
-
-
-def measured_outage(
-    *,
-    track: FloatArray,
-    without: FloatArray,
-    fixes: FloatArray,
-    time: FloatArray,
-    sd: FloatArray,
-    fix_time: FloatArray,
-    error: FloatArray,
-) -> Figure:
-    """A time without fixes: its track, and errors of three components with their bands.
-
-    track, without, fixes: (n, 2), (j, 2), (k, 2), east and north, m: of the solution, of its part
-        without fixes, and of the fixes.
-    time: (n,), of the solution, s.
-    sd: (n, 3), predicted standard deviations to the north, east and down, m.
-    fix_time: (e,), s.
-    error: (e, 3), fixes less where they were expected, m.
-    """
-    figure, axes = _panels(2, 2, (7.4, 5.6))
-    _draw_solution(axes[0, 0], track, fixes, without, "without fixes", 4)
-    axes[0, 0].legend(fontsize="x-small")
-    band = {"color": _BAND, "linewidth": 0, "label": "1 sigma predicted"}
-    dots = {"color": COMPONENT_COLOURS[1], "markersize": 5, "label": "fix less expected"}
-    for i, (ax, name) in enumerate(zip(axes.flat[1:], _COMPONENTS, strict=True)):
-        ax.fill_between(time, -sd[:, i], sd[:, i], **band)
-        ax.plot(fix_time, error[:, i], ".", **dots)
-        ax.set_title(f"{name} [m]", fontsize="medium")
-        ax.set_xlabel("s since the last fix")
-        _plain(ax)
-    axes[0, 1].legend(fontsize="x-small", loc="upper left")
+    _legend_above(figure, ax)
     return figure
 
 

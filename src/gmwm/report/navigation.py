@@ -162,7 +162,6 @@ def write_navigated_report(navigated: Navigated, path: str | os.PathLike[str]) -
         n=navigated,
         length=(imu.n - alignment.epoch) * imu.dt,
         track=svg(navigated.plot_track()),
-        outages=[(title, svg(figure)) for title, figure in navigated.plot_outages()],
         innovations=svg(navigated.plot_innovations()),
         tests=[(kind, navigated.test(kind)) for kind in navigated.kinds],
         models=[

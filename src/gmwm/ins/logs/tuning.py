@@ -53,7 +53,6 @@ COMPASS_SD = math.radians(5.0)  # beyond which the Earth's rotation gives no hea
 LOST = 5.0  # innovations over their expected size above which a filter is lost
 MOSTLY_FINE = 1.5  # NIS by the median, below which a few outliers make the mean large
 MILD = 1.5  # factor on assumed deviations of fixes up to which the solution may still be used
-OUTAGES_SHOWN = 6  # longest times without fixes that a report draws
 
 # -- faults of a log ------------------------------------------------------------------------------
 

@@ -326,26 +326,6 @@ def test_coloured_noise_of_the_fixes_is_a_state(log, tmp_path):
     assert found.solution.state_names[-3:] == ("GNSS north", "GNSS east", "GNSS down")
 
 
-def test_each_outage_is_drawn_with_its_band_and_what_the_next_fix_showed(tmp_path):
-    import matplotlib.pyplot as plt
-
-    outages = [Outage(40.0, 12.0), Outage(70.0, 25.0)]
-    log = Log(car_drive(duration=110.0, dt=1.0 / RATE), 6, outages=outages)
-    log.imu(tmp_path)
-    log.fixes(tmp_path)
-    pictures = navigated(tmp_path).plot_outages()
-    assert [title.split(" s ")[0] for title, _ in pictures] == ["25", "12"]
-    for (_, figure), length in zip(pictures, (25.0, 12.0), strict=True):
-        track, north, *_ = figure.axes
-        assert track.get_legend() is not None
-        (band,) = north.collections
-        width = np.ptp(band.get_paths()[0].vertices[:, 1])
-        assert 1.0 < width < 200.0
-        time = north.lines[0].get_xdata()
-        assert length in np.round(time, 6) and not np.any((time > 0.1) & (time < length - 0.1))
-        plt.close(figure)
-
-
 def test_the_options_of_the_command(underway, tmp_path):
     log = Log(underway, 2)
     log.imu(tmp_path, stamped=False, names=("a", "b", "c", "d", "e", "f"))
