@@ -12,6 +12,7 @@ import numpy as np
 from gmwm._core.spool import Spool, is_spooled, release, windows
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
+from gmwm.ins import tuning
 from gmwm.ins.filter import Aiding, InitialSd
 from gmwm.ins.geometry import (
     RATE,
@@ -21,7 +22,6 @@ from gmwm.ins.geometry import (
     rpy_from_matrix,
 )
 from gmwm.ins.imu import AXES, Imu, SensorModels
-from gmwm.ins.logs import tuning
 from gmwm.ins.logs.attitude import (
     Heading,
     acceleration,

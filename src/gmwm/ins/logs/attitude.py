@@ -12,6 +12,7 @@ from gmwm._core.distributions import chi2
 from gmwm._core.spool import release
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
+from gmwm.ins import tuning
 from gmwm.ins.filter import Aiding, Fixes
 from gmwm.ins.geometry import (
     RATE,
@@ -21,7 +22,6 @@ from gmwm.ins.geometry import (
     turn_body,
 )
 from gmwm.ins.imu import Imu
-from gmwm.ins.logs import tuning
 
 _WINDOWS = 1024  # looked at together: a few MB
 

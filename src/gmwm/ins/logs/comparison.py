@@ -18,10 +18,10 @@ from gmwm._core.tables import plain_table
 from gmwm._core.text import bullets, wrapped
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
+from gmwm.ins import tuning
 from gmwm.ins.filter import Outage
 from gmwm.ins.geometry import ned_difference
 from gmwm.ins.imu import SensorModels
-from gmwm.ins.logs import tuning
 from gmwm.ins.logs.measured import LogSpec, Measured
 from gmwm.ins.logs.replay import Replay
 from gmwm.ins.logs.smoother import Smoothed, smooth
@@ -84,9 +84,9 @@ class Paired:
     ratio, lower, upper : float
         Ratio of the root mean squares and its 95 % interval.
     p_value : float
-        p-value of errors that differ by no more than `gmwm.ins.logs.tuning.TIE_RATIO`.
+        p-value of errors that differ by no more than `gmwm.ins.tuning.TIE_RATIO`.
     score, score_p_value : float
-        Mean difference, and the p-value of no more than `gmwm.ins.logs.tuning.TIE_SCORE`.
+        Mean difference, and the p-value of no more than `gmwm.ins.tuning.TIE_SCORE`.
     error : float
         Standard error of the logarithm of the ratio.
     """

@@ -9,7 +9,7 @@ import numpy as np
 
 from gmwm._core.text import per_cent
 from gmwm.errors import InputError
-from gmwm.ins.logs import tuning
+from gmwm.ins import tuning
 from gmwm.ins.logs.hypotheses import (
     LEVEL,
     Fault,

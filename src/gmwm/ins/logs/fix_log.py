@@ -15,9 +15,9 @@ import numpy as np
 from gmwm._core.files import existing_file
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
+from gmwm.ins import tuning
 from gmwm.ins.filter import Aiding, Fixes
 from gmwm.ins.geometry import ned_difference
-from gmwm.ins.logs import tuning
 from gmwm.ins.trajectory import POSITION_WORDS, LogColumns, is_time, words_of
 from gmwm.issues import Notice, notice
 from gmwm.readers import DATE, TIME

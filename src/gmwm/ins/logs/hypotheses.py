@@ -16,8 +16,8 @@ import numpy as np
 
 from gmwm._core.distributions import chi2
 from gmwm._core.typing import BoolArray, FloatArray
+from gmwm.ins import tuning
 from gmwm.ins.filter import KINDS
-from gmwm.ins.logs import tuning
 from gmwm.ins.logs.replay import Replay
 
 TESTS = 13

@@ -14,9 +14,9 @@ from gmwm._core.files import existing_file
 from gmwm._core.spool import Spool, is_spooled, release, windows
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
+from gmwm.ins import tuning
 from gmwm.ins.geometry import STANDARD_GRAVITY
 from gmwm.ins.imu import AXES, Imu
-from gmwm.ins.logs import tuning
 from gmwm.ins.trajectory import is_time
 from gmwm.issues import Notice, notice
 from gmwm.readers import CsvTable, Recording, bare, is_text, load_columns, read
@@ -68,7 +68,7 @@ def read_imu(
     Raises
     ------
     InputError
-        If the file cannot be used, an axis or more than `gmwm.ins.logs.tuning.LONGEST_FILLED` of
+        If the file cannot be used, an axis or more than `gmwm.ins.tuning.LONGEST_FILLED` of
         samples is missing, or the specific force is far from gravity: most often a wrong unit.
     """
     return read_imu_log(path, channels, time, start, rate=rate, units=units, **reading).imu

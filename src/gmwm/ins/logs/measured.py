@@ -12,9 +12,9 @@ from pydantic import BeforeValidator, Field
 
 from gmwm._core.units import SI_UNIT
 from gmwm.errors import InputError
+from gmwm.ins import tuning
 from gmwm.ins.filter import Aiding, Fixes
 from gmwm.ins.imu import AXES, Imu, SensorModels
-from gmwm.ins.logs import tuning
 from gmwm.ins.logs.attitude import standstills
 from gmwm.ins.logs.fix_log import read_fix_log, read_heights
 from gmwm.ins.logs.imu_log import ImuLog, read_imu_log

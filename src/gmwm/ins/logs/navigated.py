@@ -17,9 +17,9 @@ from gmwm._core.pages import make
 from gmwm._core.text import brief, bullets, wrapped
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
+from gmwm.ins import tuning
 from gmwm.ins.filter import KINDS, Solution
 from gmwm.ins.geometry import ned_difference
-from gmwm.ins.logs import tuning
 from gmwm.ins.logs.alignment import Alignment, align
 from gmwm.ins.logs.faults import Faults, fault_notice, resolution_notice
 from gmwm.ins.logs.hypotheses import LEVEL

@@ -9,10 +9,10 @@ import numpy as np
 
 from gmwm._core.distributions import norm
 from gmwm._core.typing import BoolArray, FloatArray
+from gmwm.ins import tuning
 from gmwm.ins.filter import KINDS, Aiding, FilterInnovations, Fixes, InitialSd, Solution, navigate
 from gmwm.ins.geometry import gravity_at, matrix_from_rpy, offset
 from gmwm.ins.imu import AXES, Imu, SensorModels
-from gmwm.ins.logs import tuning
 from gmwm.ins.logs.alignment import Alignment, align, started
 from gmwm.ins.logs.measured import Measured
 from gmwm.ins.simulation import InnovationTest, chi_square_ratio, lag_one

@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gmwm._core.typing import FloatArray, IntArray
+from gmwm.ins import tuning
 from gmwm.ins.filter import (
     NAVIGATION,
     Events,
@@ -29,7 +30,6 @@ from gmwm.ins.filter import (
     transition,
 )
 from gmwm.ins.geometry import offset
-from gmwm.ins.logs import tuning
 from gmwm.ins.logs.replay import Replay
 
 

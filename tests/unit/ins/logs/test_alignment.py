@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 
 from gmwm import GaussMarkov, RandomWalk, WhiteNoise
+from gmwm.ins import tuning
 from gmwm.ins.filter import Aiding, Fixes
 from gmwm.ins.geometry import RATE, gravity, matrix_from_rpy, ned_difference, offset
 from gmwm.ins.imu import Imu, SensorModels
-from gmwm.ins.logs import Measured, align, tuning
+from gmwm.ins.logs import Measured, align
 
 DT, N, LLA = 0.1, 300, np.array([0.8, 0.2, 300.0])
 RPY = np.array([0.02, -0.03, 1.1])

@@ -9,9 +9,9 @@ import pytest
 from scipy import stats
 
 from gmwm.errors import InputError
-from gmwm.ins import Comparison, Outage, Paired, compare
+from gmwm.ins import Comparison, Outage, Paired, compare, tuning
 from gmwm.ins.geometry import ned_difference
-from gmwm.ins.logs import Replay, align, paired, smooth, tuning
+from gmwm.ins.logs import Replay, align, paired, smooth
 from gmwm.ins.simulation import Ratio
 from gmwm.study.emulated_logs import emulated_log, sensors
 

@@ -7,8 +7,8 @@ import pytest
 
 from gmwm._core.spool import is_spooled
 from gmwm.errors import InputError
-from gmwm.ins import Imu, read_imu
-from gmwm.ins.logs import read_imu_log, tuning
+from gmwm.ins import Imu, read_imu, tuning
+from gmwm.ins.logs import read_imu_log
 
 DT = 0.02
 MOST = round(tuning.LONGEST_FILLED / DT)

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from gmwm.ins import tuning
 from gmwm.ins.filter import Aiding, Fixes
 from gmwm.ins.geometry import (
     RATE,
@@ -12,7 +13,7 @@ from gmwm.ins.geometry import (
     rpy_from_matrix,
 )
 from gmwm.ins.imu import Imu
-from gmwm.ins.logs import standstills, steady, tuning
+from gmwm.ins.logs import standstills, steady
 from gmwm.ins.logs.attitude import (
     gyrocompass,
     heading_from_course,
