@@ -9,15 +9,13 @@ from gmwm.ins.logs.comparison import (
     compare as compare,
     paired as paired,
 )
-from gmwm.ins.logs.faults import Faults as Faults, fault_notice as fault_notice
+from gmwm.ins.logs.faults import Fault as Fault, Faults as Faults, fault_notice as fault_notice
 from gmwm.ins.logs.fix_log import (
     read_fix_log as read_fix_log,
     read_fixes as read_fixes,
     read_heights as read_heights,
 )
-from gmwm.ins.logs.hypotheses import Fault as Fault
 from gmwm.ins.logs.imu_log import read_imu as read_imu, read_imu_log as read_imu_log
 from gmwm.ins.logs.measured import LogSpec as LogSpec, Measured as Measured
 from gmwm.ins.logs.navigated import Navigated as Navigated
-from gmwm.ins.logs.replay import Replay as Replay
-from gmwm.ins.logs.smoother import Smoothed as Smoothed, smooth as smooth
+from gmwm.ins.logs.replay import Replay as Replay, Smoothed as Smoothed, smooth as smooth

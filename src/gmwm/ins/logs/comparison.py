@@ -23,8 +23,7 @@ from gmwm.ins.filter import Outage
 from gmwm.ins.geometry import ned_difference
 from gmwm.ins.imu import SensorModels
 from gmwm.ins.logs.measured import LogSpec, Measured
-from gmwm.ins.logs.replay import Replay
-from gmwm.ins.logs.smoother import Smoothed, smooth
+from gmwm.ins.logs.replay import Replay, Smoothed, smooth
 from gmwm.ins.simulation import InnovationTest, Ratio, mean_ratio
 from gmwm.ins.spec import read_models
 from gmwm.issues import Notice, notice

@@ -1,27 +1,267 @@
-"""The faults that a log shows: looked for before the sensor models are blamed."""
+"""The faults that a log shows, looked for before the sensor models are blamed.
+
+Time offset, lever arm, heading, axis signs, outliers: each is a filter that allows for it, with the
+parameters under which the fixes are most probable. Constant errors are estimated by least squares
+from the innovations and their derivatives (Friedland 1969, *IEEE Trans. Autom. Control* 14,
+359-367).
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Collection, Iterator
+from dataclasses import dataclass, field, replace
+from functools import partial
+from itertools import product
 from typing import Any
 
 import numpy as np
 
+from gmwm._core.distributions import chi2
 from gmwm._core.text import per_cent
+from gmwm._core.typing import BoolArray, FloatArray
 from gmwm.errors import InputError
 from gmwm.ins import tuning
-from gmwm.ins.logs.hypotheses import (
-    LEVEL,
-    Fault,
-    constant_errors,
-    cost,
-    far_heading,
-    outliers,
-    wrong_signs,
-)
+from gmwm.ins.filter import KINDS
 from gmwm.ins.logs.measured import Measured
 from gmwm.ins.logs.replay import Replay
 from gmwm.issues import Notice, notice
+
+TESTS = 13
+"""Tests of a log: size of the innovations of three kinds and of all, whiteness, time offset, lever
+arm, heading, the first two together, directions, signs of both sensors, outliers."""
+
+LEVEL = tuning.CONTRADICTED / TESTS
+"""Level of each test: right models are blamed with ``tuning.CONTRADICTED`` at most (Bonferroni)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Fault:
+    """A fault that a filter allows for.
+
+    code, where: What is wrong, and with what.
+    replay: The log under the changed assumption.
+    gain: Increase of the log-likelihood of the fixes, over the size of the innovations that are
+        left: where something else is wrong too, everything explains a part of it.
+    cost: Gain that chance exceeds with the probability of a false alarm.
+    values, errors: Estimates, in SI units, and standard errors.
+    """
+
+    code: str
+    where: str
+    replay: Replay
+    gain: float
+    cost: float
+    values: dict[str, float] = field(default_factory=dict)
+    errors: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def excess(self) -> float:
+        """Gain beyond chance."""
+        return self.gain - self.cost
+
+
+def cost(parameters: int, among: int = 1) -> float:
+    """Gain of a right model by chance, with its share of the probability of a false alarm."""
+    return float(0.5 * chi2.isf(LEVEL / among, parameters))
+
+
+def difference(replay: Replay, base: Replay) -> float:
+    """Gain of the log-likelihood; -inf if the filter diverges."""
+    if not np.isfinite(replay.log_likelihood):
+        return -np.inf
+    return replay.log_likelihood - base.log_likelihood
+
+
+def relative_gain(gain: float, replay: Replay) -> float:
+    """A gain over the mean square of the innovations that are left, where that is above one."""
+    return gain / max(1.0, float(np.nanmean(replay.standard**2)))
+
+
+# -- outliers and axes ----------------------------------------------------------------------------
+
+
+def outliers(base: Replay) -> list[Fault]:
+    """Few fixes that are far off: a gate rejects them when they come.
+
+    Where it rejects the first one, the fix that made the initial state may be the outlier.
+    """
+    starts = [base]
+    if np.sum(base.standard[:1] ** 2) > 2.0 * cost(3, max(base.innovations.kind.size, 1)):
+        starts.append(base.anywhere())
+    return [each for start in starts if (each := _rejected(base, start))]
+
+
+def _rejected(base: Replay, start: Replay) -> Fault | None:
+    """Fixes that a gate rejects as outliers, and the first fix if the start is not the base's."""
+    gate = LEVEL / max(start.innovations.kind.size, 1)
+    gated = replace(start, aiding=replace(start.aiding, gate=gate)).innovations
+    total, first = gated.kind.size, int(start is not base)
+    count = int(np.count_nonzero(~gated.used)) + first
+    if not 0 < count <= tuning.MOST_OUTLIERS * total + 1.0:
+        return None
+    rejected = {kind: ~gated.used[gated.kind == KINDS[kind]] for kind in base.kinds}
+    here = start.without(rejected)
+    # As if each error were a parameter: an outlier costs no density, but for its size.
+    log_sd = float(np.nansum(np.log(gated.sd[~gated.used])))
+    most = max(rejected, key=lambda kind: np.count_nonzero(rejected[kind]))
+    values = {
+        "count": float(count),
+        "fraction": float(np.mean(rejected[most])),
+        "time": base.start + (0.0 if first else float(gated.time[~gated.used][0])),
+    }
+    gain = relative_gain(here.log_likelihood - log_sd - base.log_likelihood, here)
+    return Fault("outliers", most, here, gain, count * cost(3, total), values)
+
+
+def far_heading(base: Replay) -> tuple[Fault, ...]:
+    """A heading that is wrong by much, as of an IMU that is mounted rotated."""
+    angles = np.arange(1, tuning.HEADINGS) * (2.0 * np.pi / tuning.HEADINGS)
+    tried = [base.turned_by(float(angle), tuning.ROUGH_HEADING) for angle in angles]
+    best = int(np.argmax([each.log_likelihood for each in tried]))
+    if not difference(tried[best], base) > cost(1):
+        return ()
+    angle = float(angles[best])
+    return fitted(base, base.turned_by(angle, tuning.FINE_HEADING), ("heading",), angle)
+
+
+def wrong_signs(base: Replay) -> Iterator[Fault]:
+    """Axes of the gyros or of the accelerometers that point the other way.
+
+    Two of both kinds are a mounting and no fault; of one kind they are axes of another body. A sign
+    that the motion does not show is zero.
+    """
+    ways = np.array(list(product((1.0, -1.0), repeat=3)))
+    for kind in ("gyro", "accel"):
+        tried = [base.with_signs(kind, signs) for signs in ways]
+        likelihoods = np.array([each.log_likelihood for each in tried])
+        here, most = tried[int(np.argmax(likelihoods))], np.max(likelihoods)
+        alike = ways[likelihoods >= most - tuning.AMBIGUOUS]
+        shown = np.where(np.all(alike == alike[0], axis=0), alike[0], 0.0)
+        values = dict(zip(("x", "y", "z"), shown.tolist(), strict=True))
+        gain = relative_gain(difference(here, base), here)
+        yield Fault("axis-signs", kind, here, gain, cost(1, len(ways)), values)
+
+
+# -- constant errors ------------------------------------------------------------------------------
+
+# Name -> code, step of its derivatives, usual size.
+_CONSTANTS = {"time offset": ("time-offset", 0.05, tuning.LARGEST_OFFSET)}
+_CONSTANTS |= dict.fromkeys(("forward", "right", "down"), ("lever-arm", 0.5, tuning.LARGEST_ARM))
+_CONSTANTS |= {"heading": ("heading", 0.01, 0.5 * np.pi)}
+_NAMES = np.array(list(_CONSTANTS))
+_CODES = np.array([code for code, _, _ in _CONSTANTS.values()])
+_STEPS, _USUAL = np.array([sizes for _, *sizes in _CONSTANTS.values()], dtype=float).T
+# Stamps that are farther off leave no fix near.
+_MOST = np.where(_CODES == "time-offset", _USUAL, np.inf)
+_TOGETHER = (("time-offset",), ("lever-arm",), ("heading",), ("time-offset", "lever-arm"))
+"""Errors that are tried. Along a straight track at constant speed a time offset is a lever arm, so
+that one of the two alone takes up the other; both together are right."""
+
+
+def changed(replay: Replay, errors: FloatArray, is_smooth: bool = False) -> Replay:
+    """A log without constant errors, (5,): of stamps (s), antenna (m) and heading (rad).
+
+    is_smooth: Allow for late stamps less exactly, but with the same noise between two fixes.
+    """
+    offset, arm, heading = errors[0], errors[1:4], errors[4]
+    if offset:
+        replay = replay.along(-offset) if is_smooth else replay.later(-offset)
+    if np.any(arm):
+        replay = replay.with_arm_longer(arm)
+    return replay.turned_by(float(heading)) if heading else replay
+
+
+def constant_errors(
+    base: Replay, known: Collection[str] = ()
+) -> tuple[list[tuple[Fault, ...]], dict[str, float]]:
+    """Stamps, antenna, heading, and the first two together, but for the known ones.
+
+    Returns also the standard error of each from this motion, whether it is there or not.
+    """
+    none = np.zeros(_CODES.size)
+    columns = _columns(base, partial(changed, base), none, none == 0.0)
+    found, errors = [], dict[str, float]()
+    for codes in _TOGETHER:
+        own = np.isin(_CODES, codes)
+        _, covariance, gain = gauss_newton(base, columns[:, own], none[own], own)
+        # Of stamps and antenna the errors of both together: one could be taken for the other.
+        errors |= zip(_NAMES[own].tolist(), np.sqrt(np.diag(covariance)).tolist(), strict=True)
+        if gain > cost(1) and not any(code in known for code in codes):
+            found.append(fitted(base, base, codes))
+    return found, errors
+
+
+def fitted(
+    base: Replay, here: Replay, codes: tuple[str, ...], start: float = 0.0
+) -> tuple[Fault, ...]:
+    """Constant errors by Gauss-Newton, one fault each; ``start`` is in ``here`` already."""
+    own = np.isin(_CODES, codes)
+    theta, covariance, of = np.zeros(_CODES.size), np.empty(0), partial(changed, here)
+    for _ in range(tuning.ROUNDS):
+        columns = _columns(here, of, theta, own)
+        move, covariance, promised = gauss_newton(here, columns, theta[own], own)
+        tried = theta.copy()
+        tried[own] = np.clip(theta[own] + move, -_MOST[own], _MOST[own])
+        new = of(tried)
+        if not new.log_likelihood > here.log_likelihood:
+            break
+        theta, here = tried, new
+        if promised < tuning.SETTLED_GAIN:
+            break
+    if not np.any(theta) and start == 0.0:
+        return ()
+    # Of two errors each has to earn its own: one that explains all names no other.
+    price = sum(cost(int(np.count_nonzero(code == _CODES))) for code in codes)
+    # An unusually large error is improbable, however little the data contradict it.
+    unusual = 0.5 * float(np.sum((theta / _USUAL) ** 2))
+    gain = difference(here, base) - unusual
+    if "time-offset" in codes and np.isfinite(base.log_likelihood):
+        # With the same noise between fixes, which has a gain by chance.
+        along = changed(base, theta, is_smooth=True)
+        regular = difference(along, base)
+        if len(codes) == 1:  # beside the antenna, the less exact one would tell them apart
+            columns = _columns(along, partial(changed, base, is_smooth=True), theta, own)
+            covariance = gauss_newton(along, columns, theta[own], own)[1]
+        # The gain of the stamps is the exact one; it counts if it does not come of other noise.
+        gain = gain if regular > price + unusual else min(gain, regular - unusual)
+    gain, errors = relative_gain(gain, here), np.zeros(_CODES.size)
+    errors[own] = np.sqrt(np.diag(covariance))
+    if start != 0.0:
+        theta[-1] = (theta[-1] + start + np.pi) % (2.0 * np.pi) - np.pi
+    found = []
+    for part in (code == _CODES for code in codes):
+        values, spread = (
+            dict(zip(_NAMES[part].tolist(), each[part].tolist(), strict=True))
+            for each in (theta, errors)
+        )
+        found.append(Fault(str(_CODES[part][0]), "", here, gain, price, values, spread))
+    return tuple(found)
+
+
+def _columns(
+    here: Replay, of: Callable[[FloatArray], Replay], theta: FloatArray, own: BoolArray
+) -> FloatArray:
+    """Derivatives of the innovations in their standard deviations by some errors, (3 E, p)."""
+    steps = np.diag(_STEPS)[own]
+    moved = [(of(theta + step).standard - here.standard) / np.sum(step) for step in steps]
+    return np.stack([each.ravel() for each in moved], axis=1)
+
+
+def gauss_newton(
+    here: Replay, J: FloatArray, theta: FloatArray, own: BoolArray
+) -> tuple[FloatArray, FloatArray, float]:
+    """A Gauss-Newton step, the covariance after it, and the gain that it promises."""
+    information = _USUAL[own] ** -2.0  # before the data
+    z = here.standard.ravel()
+    seen = np.isfinite(z) & np.all(np.isfinite(J), axis=1)
+    J, z = J[seen], z[seen]
+    score = J.T @ z + information * theta
+    covariance: FloatArray = np.asarray(np.linalg.inv(J.T @ J + np.diag(information)), float)
+    move = -covariance @ score
+    return move, covariance, float(-0.5 * score @ move)
+
+
+# -- the search -----------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, eq=False)

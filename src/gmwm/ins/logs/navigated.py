@@ -21,8 +21,7 @@ from gmwm.ins import tuning
 from gmwm.ins.filter import KINDS, Solution
 from gmwm.ins.geometry import ned_difference
 from gmwm.ins.logs.alignment import Alignment, align
-from gmwm.ins.logs.faults import Faults, fault_notice, resolution_notice
-from gmwm.ins.logs.hypotheses import LEVEL
+from gmwm.ins.logs.faults import LEVEL, Faults, fault_notice, resolution_notice
 from gmwm.ins.logs.measured import Measured
 from gmwm.ins.logs.replay import Replay, innovation_sizes
 from gmwm.ins.simulation import InnovationTest
