@@ -19,8 +19,12 @@ from .filter.filter import (
     navigate as navigate,
 )
 from .filter.mechanization import integrate as integrate
-from .imu.emulation import Imu as Imu, emulate as emulate
-from .imu.preintegration import Preintegration as Preintegration, preintegrate as preintegrate
+from .imu.increments import (
+    Imu as Imu,
+    Preintegration as Preintegration,
+    emulate as emulate,
+    preintegrate as preintegrate,
+)
 from .imu.sensors import (
     Recorded as Recorded,
     SensorErrors as SensorErrors,
