@@ -128,6 +128,9 @@ def reduce(
 ) -> Reduction:
     """The reduced model that makes a small filter consistent, and as accurate as it can be.
 
+    Raises InputError if the form is unknown, there is no outage, or the trajectory is too short
+    for them.
+
     Parameters
     ----------
     models : SensorModels, Calibration or mapping
@@ -143,11 +146,6 @@ def reduce(
         of 1 m (vertical 1.5 m). By default a loiter, which a notice reports.
     dt : float, optional
         Sampling interval of the IMU in the default scenario, s.
-
-    Raises
-    ------
-    InputError
-        If the form is unknown, there is no outage, or the trajectory is too short for them.
 
     Notes
     -----
@@ -233,6 +231,9 @@ def loiter_with_outages(
 ) -> Scenario:
     """A loiter with one GNSS position a second of 1 m (vertical 1.5 m), and outages.
 
+    Raises InputError if a length is not positive or not a multiple of ``dt``, or the trajectory
+    is too short.
+
     Parameters
     ----------
     lengths : sequence of float
@@ -241,11 +242,6 @@ def loiter_with_outages(
         Sampling interval of the IMU of the loiter, s.
     trajectory : Trajectory, optional
         Another motion than a loiter of a fixed-wing aircraft.
-
-    Raises
-    ------
-    InputError
-        If a length is not positive or not a multiple of ``dt``, or the trajectory is too short.
     """
     outages, start = list[Outage](), tuning.SETTLING
     for length in lengths:

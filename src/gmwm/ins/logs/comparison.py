@@ -167,6 +167,8 @@ class Comparison:
     def of(cls, content: Mapping[str, Any], folder: Path = Path()) -> Comparison:
         """Read what a file or options describe, and compare.
 
+        Raises InputError if something is missing, unknown or cannot be used.
+
         Parameters
         ----------
         content : mapping
@@ -174,11 +176,6 @@ class Comparison:
             place of ``sensors``; and ``outages``, see `compare`.
         folder : Path, optional
             Folder that paths are relative to.
-
-        Raises
-        ------
-        InputError
-            If something is missing, unknown or cannot be used.
         """
         rest = dict(content)
         named, outages = rest.pop("compare"), rest.pop("outages", "auto")
@@ -353,6 +350,9 @@ def compare(
     uncorrelated with the difference of the filter from it: covariances subtract, and the mean
     square of the true error is the sum of the two.
 
+    Raises InputError if there are fewer than two models, the log is too short, or a filter
+    diverges.
+
     Parameters
     ----------
     measured : Measured
@@ -366,11 +366,6 @@ def compare(
     Returns
     -------
     Comparison
-
-    Raises
-    ------
-    InputError
-        If there are fewer than two models, the log is too short, or a filter diverges.
     """
     if len(sensors) < 2:
         raise InputError("a comparison needs two sensor models or more: give each a name")

@@ -93,6 +93,9 @@ def read_fixes(
 ) -> Aiding:
     """Read GNSS fixes.
 
+    Raises InputError if the file cannot be used; the message names the line, or if positions
+    and velocities agree only with two columns exchanged, a sign or another unit.
+
     Parameters
     ----------
     path : str or path
@@ -112,12 +115,6 @@ def read_fixes(
     Returns
     -------
     Aiding
-
-    Raises
-    ------
-    InputError
-        If the file cannot be used; the message names the line.
-        If positions and velocities agree only with two columns exchanged, a sign or another unit.
     """
     return read_fix_log(path).aiding(start, position_sd, velocity_sd, lever_arm)
 

@@ -48,6 +48,10 @@ def read_imu(
     A sample is the mean over the sampling interval that ends at its time stamp, so that the first
     epoch is one interval before the first stamp.
 
+    Raises InputError if the file cannot be used, an axis or more than
+    `gmwm.ins.tuning.LONGEST_FILLED` of samples is missing, or the specific force is far from
+    gravity: most often a wrong unit.
+
     Parameters
     ----------
     path : str or path
@@ -64,12 +68,6 @@ def read_imu(
     Returns
     -------
     Imu
-
-    Raises
-    ------
-    InputError
-        If the file cannot be used, an axis or more than `gmwm.ins.tuning.LONGEST_FILLED` of
-        samples is missing, or the specific force is far from gravity: most often a wrong unit.
     """
     return read_imu_log(path, channels, time, start, rate=rate, units=units, **reading).imu
 

@@ -140,17 +140,14 @@ class Measured:
     def of(cls, content: Mapping[str, Any], folder: Path = Path()) -> Measured:
         """Read what a file or options describe.
 
+        Raises InputError if something is missing, unknown or cannot be used.
+
         Parameters
         ----------
         content : mapping
             imu, gnss_fixes and sensors, and what else is known; see the documentation.
         folder : Path, optional
             Folder that paths are relative to.
-
-        Raises
-        ------
-        InputError
-            If something is missing, unknown or cannot be used.
         """
         spec = LogSpec.parse(content)
         if spec.attitude is not None and spec.heading is not None:

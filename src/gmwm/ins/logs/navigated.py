@@ -76,16 +76,13 @@ class Navigated:
     def of(cls, measured: Measured, interval: float = 1.0) -> Navigated:
         """Align and filter.
 
+        Raises InputError if the initial state cannot be known, or no fix follows it.
+
         Parameters
         ----------
         measured : Measured
         interval : float, optional
             Of the solution, s.
-
-        Raises
-        ------
-        InputError
-            If the initial state cannot be known, or no fix follows it.
         """
         alignment = align(measured)
         replay = Replay.of(measured, alignment)
@@ -321,10 +318,7 @@ class Navigated:
     def write_solution(self, path: Path) -> Path:
         """Write the solution as a CSV file.
 
-        Raises
-        ------
-        InputError
-            If it cannot be written.
+        Raises InputError if it cannot be written.
         """
         kept = ~self.solution.before
         solution, sd = self.solution, self.solution.sd[kept]
