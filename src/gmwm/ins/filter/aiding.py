@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
@@ -16,7 +15,7 @@ from gmwm.ins import tuning
 from gmwm.ins.filter.measurements import IS_INFERRED, KINDS, MEASUREMENTS, Instrument, Measurement
 from gmwm.ins.filter.records import Events
 from gmwm.ins.imu import Imu
-from gmwm.ins.trajectory import Trajectory
+from gmwm.ins.trajectory import Trajectory, three_numbers
 
 _SAME_TIME = 1e-6  # s: sums of sampling intervals are not exact
 _STANDSTILL = 1e-3  # m/s, below which the vehicle of a simulated trajectory stands
@@ -142,7 +141,7 @@ class Aiding:
 
     def __post_init__(self) -> None:
         for name in ("lever_arm", "coloured_sd"):
-            object.__setattr__(self, name, _three(name, getattr(self, name)))
+            object.__setattr__(self, name, three_numbers(name, getattr(self, name)))
         if np.any(np.asarray(self.coloured_sd) < 0.0):
             raise InputError("coloured_sd: give 0 or more metres to the north, east and down")
         checks.positive("coloured_tau", self.coloured_tau, "give seconds above zero")
@@ -252,7 +251,10 @@ def gnss(
     imu : Imu, optional
         Error-free, for the antenna's velocity about the IMU; needed with a lever arm and velocity.
     """
-    arm, given = _three("lever_arm", lever_arm), {"position": position_sd, "velocity": velocity_sd}
+    arm, given = (
+        three_numbers("lever_arm", lever_arm),
+        {"position": position_sd, "velocity": velocity_sd},
+    )
     fixes = tuple(
         _along(kind, trajectory, interval, sd, arm, imu)
         for kind, sd in given.items()
@@ -290,17 +292,10 @@ def _along(
             f"interval = {interval:g} s: give a multiple of the trajectory's {trajectory.dt:g} s"
         )
     given = checks.real_numbers(sd, "standard deviation")
-    each = _three("standard deviation", np.full(3, given) if given.ndim == 0 else given)
+    each = three_numbers("standard deviation", np.full(3, given) if given.ndim == 0 else given)
     if np.any(each <= 0.0):
         raise InputError(f"standard deviation = {checks.shown(sd)}: give positive numbers")
     index = np.arange(round(stride), trajectory.n + 1, round(stride))
     where = Instrument(trajectory, index, np.asarray(arm), imu)
     value = MEASUREMENTS[KINDS[kind]].along(where)
     return Fixes(kind, trajectory.time[index], value, np.tile(each, (index.size, 1)))
-
-
-def _three(name: str, values: Any) -> FloatArray:
-    array = checks.real_numbers(values, name)
-    if array.shape != (3,) or not np.all(np.isfinite(array)):
-        raise InputError(f"{name} = {checks.shown(values)}: give three finite numbers")
-    return array

@@ -69,10 +69,9 @@ class Imu:
     def __post_init__(self) -> None:
         object.__setattr__(self, "dt", checks.sampling_interval(self.dt))
         hint = "rotation and velocity one row of 3 numbers for each interval"
-        rotation = finite_rows(self.rotation, "rotation", hint)
-        object.__setattr__(self, "rotation", rotation)
-        velocity = finite_rows(self.velocity, "velocity", hint, n=len(rotation))
-        object.__setattr__(self, "velocity", velocity)
+        for name in ("rotation", "velocity"):
+            rows = finite_rows(getattr(self, name), name, hint, n=len(self.rotation))
+            object.__setattr__(self, name, rows)
 
     @property
     def n(self) -> int:

@@ -201,10 +201,6 @@ def _levelled(
     return replace(found, gyro_bias=bias - earth, gyro_bias_sd=bias_sd, stood=length)
 
 
-def _bias(models: SensorModels, kind: str) -> float:
-    return max(models.bias_sd[axis] for axis in AXES if axis.startswith(kind))
-
-
 def mean_sd(models: SensorModels, kind: str, length: float, dt: float) -> float:
     """Standard deviation of a later error less its mean over a time, s; the worst axis."""
     own, tau = [axis for axis in AXES if axis.startswith(kind)], np.array([length])
@@ -215,7 +211,8 @@ def mean_sd(models: SensorModels, kind: str, length: float, dt: float) -> float:
 
 def biased_sd(models: SensorModels, kind: str, length: float, dt: float) -> float:
     """The same with the turn-on bias."""
-    return float(np.hypot(_bias(models, kind), mean_sd(models, kind, length, dt)))
+    bias = max(models.bias_sd[axis] for axis in AXES if axis.startswith(kind))
+    return float(np.hypot(bias, mean_sd(models, kind, length, dt)))
 
 
 def _tilt_sd(models: SensorModels, length: float, dt: float) -> float:

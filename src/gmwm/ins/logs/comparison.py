@@ -362,10 +362,6 @@ def compare(
         ``measured``.
     outages : "auto" or float, optional
         Length of each outage, s.
-
-    Returns
-    -------
-    Comparison
     """
     if len(sensors) < 2:
         raise InputError("a comparison needs two sensor models or more: give each a name")

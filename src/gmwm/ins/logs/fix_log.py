@@ -111,10 +111,6 @@ def read_fixes(
         To the north, east and down, where the file has none, m and m/s.
     lever_arm : three floats, optional
         From the IMU to the antenna, body axes, m.
-
-    Returns
-    -------
-    Aiding
     """
     return read_fix_log(path).aiding(start, position_sd, velocity_sd, lever_arm)
 

@@ -64,10 +64,6 @@ def read_imu(
         Time of the first sample, s, of a record without time stamps.
     **reading
         ``format``, ``layout`` and ``damaged``; see `gmwm.read`.
-
-    Returns
-    -------
-    Imu
     """
     return read_imu_log(path, channels, time, start, rate=rate, units=units, **reading).imu
 

@@ -6,7 +6,7 @@ import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Protocol, TypedDict, Unpack
+from typing import Any, TypedDict, Unpack
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from gmwm.errors import InputError
 from gmwm.ins import tuning
 from gmwm.ins.filter import Aiding, Filter, InitialSd, Outage, Outputs, Solution
 from gmwm.ins.geometry import matrix_from_rotation_vector, matrix_from_rpy, offset, rpy_from_matrix
-from gmwm.ins.imu import Imu, SensorErrors, SensorModels, emulate
+from gmwm.ins.imu import Imu, Recorded, SensorErrors, SensorModels, emulate
 from gmwm.ins.simulation.filter_errors import (
     PER_RUN,
     QUANTITIES,
@@ -31,17 +31,6 @@ from gmwm.issues import Notice, notice
 _SAME_TIME = 1e-6  # s
 _KEPT_EPOCHS = 300  # whose errors are kept, besides outages: a figure shows no more
 _OUTAGE_EPOCHS = 1.0  # s between epochs that are kept in an outage
-
-
-class ErrorSource(Protocol):
-    """Where sensor errors come from: models, or a real recording."""
-
-    @property
-    def available(self) -> int | None:
-        """Number of independent runs; ``None`` for any number."""
-
-    def draw(self, run: int, n: int, dt: float, rng: np.random.Generator) -> SensorErrors:
-        """Errors of one run."""
 
 
 @dataclass(frozen=True)
@@ -63,6 +52,10 @@ class Simulated:
     def draw(self, run: int, n: int, dt: float, rng: np.random.Generator) -> SensorErrors:
         """Errors of one run; see `SensorModels.simulate`."""
         return self.models.simulate(n, dt, rng)
+
+
+ErrorSource = Simulated | Recorded
+"""Where sensor errors come from."""
 
 
 @dataclass(frozen=True, eq=False)

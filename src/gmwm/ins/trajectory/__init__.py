@@ -12,6 +12,7 @@ from gmwm.ins.trajectory.trajectory import (
     coefficients as coefficients,
     finite_numbers as finite_numbers,
     finite_rows as finite_rows,
+    three_numbers as three_numbers,
     unwrapped_angles as unwrapped_angles,
     unwrapped_longitudes as unwrapped_longitudes,
 )

@@ -20,7 +20,7 @@ from gmwm._core.compiled import compiled
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.ins.geometry import RATE, gravity_along, ned_difference, radii_at
-from gmwm.ins.trajectory.trajectory import Trajectory, check_latitudes, finite_numbers, finite_rows
+from gmwm.ins.trajectory.trajectory import Trajectory, check_latitudes, finite_rows, three_numbers
 
 Lla = Sequence[float] | FloatArray
 """Latitude, longitude, rad, and height, m."""
@@ -242,9 +242,7 @@ def perform(
         points where it goes.
     """
     dt, ramp = sampling_interval(dt), positive("ramp", ramp)
-    origin = finite_numbers(start, "start")
-    if origin.shape != (3,):
-        raise InputError(f"start = {shown(start)}: give latitude, longitude in rad, height in m")
+    origin = three_numbers("start", start)
     check_latitudes(origin[None, :], "start")
     _check_speed("speed", speed)
     _check_number("heading", heading, "rad")

@@ -105,10 +105,7 @@ class NavState:
 
     def __post_init__(self) -> None:
         for name in ("lla", "velocity", "rpy"):
-            values = finite_numbers(getattr(self, name), name)
-            if values.shape != (3,):
-                raise InputError(f"{name} has shape {values.shape}: give 3 numbers")
-            object.__setattr__(self, name, values)
+            object.__setattr__(self, name, three_numbers(name, getattr(self, name)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -258,6 +255,14 @@ def finite_numbers(values: object, name: str) -> FloatArray:
             row = part.start + int(np.argwhere(~np.isfinite(array[part]))[0][0])
             raise InputError(f"{name} is not finite at index {row}: give a number for every epoch")
         release(array)
+    return array
+
+
+def three_numbers(name: str, values: object) -> FloatArray:
+    """An array of three finite numbers."""
+    array = real_numbers(values, name)
+    if array.shape != (3,) or not np.all(np.isfinite(array)):
+        raise InputError(f"{name} = {shown(values)}: give three finite numbers")
     return array
 
 
