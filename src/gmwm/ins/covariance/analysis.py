@@ -162,12 +162,12 @@ class Course:
             np.empty((kept.epoch.size, *J.shape)),
         )
         about = JointFilter(
-            table.table,
+            ready.settings,
             joint.table,
-            np.where(ready.noise_states >= 0, ready.noise_states + n, -1),
-            np.where(real.noise_states >= 0, real.noise_states + m, -1),
-            ready.lever_arm,
-            ready.second_order,
+            *(
+                np.where(each.settings.noise_states >= 0, each.settings.noise_states + first, -1)
+                for each, first in ((ready, n), (real, m))
+            ),
         )
         run_jointly(self.track, self.events, about, P, J, out)
         velocity = scenario.trajectory.velocity[kept.epoch]

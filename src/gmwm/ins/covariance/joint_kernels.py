@@ -22,6 +22,7 @@ from gmwm.ins.filter import (
     Events,
     Kinematics,
     SensorTable,
+    Settings,
     excess,
     measurement_update,
     new_transition,
@@ -63,19 +64,15 @@ class Track(NamedTuple):
 class JointFilter(NamedTuple):
     """A navigation filter beside the truth.
 
-    table, joint: Sensor states of the filter, and of the joint vector.
+    joint: Sensor states of the joint vector.
     estimate, truth: (kinds, 3), places in the joint vector of the estimated and the true slow noise
         of each measurement; -1 for none.
-    lever: (3,), m.
-    second_order: Whether products of errors are allowed for.
     """
 
-    table: SensorTable
+    settings: Settings
     joint: SensorTable
     estimate: IntArray
     truth: IntArray
-    lever: FloatArray
-    second_order: bool
 
 
 class KeptCovariances(NamedTuple):
@@ -181,7 +178,7 @@ def run_jointly(
     kept: KeptCovariances,
 ) -> None:  # fmt: skip
     """Propagate P and J of a navigation filter along a trajectory."""
-    change, h = new_transition(), np.zeros(9)
+    change, h, settings = new_transition(), np.zeros(9), about.settings
     gain, x = np.zeros(P.shape[0]), np.zeros(P.shape[0])
     event = out = 0
     gathered = j_gathered = 0.0
@@ -191,17 +188,17 @@ def run_jointly(
             middle = Kinematics(track.middle.C[s], track.middle.v[s], track.middle.lla[s])
             step = count * track.dt
             transition(middle, step, change)
-            propagate(P, change, about.table, count)
+            propagate(P, change, settings.table, count)
             propagate(J, change, about.joint, count)
-            if about.second_order:
+            if settings.second_order:
                 g = gravity(middle.lla[0], middle.lla[2])
                 gathered = tilt_squared(P, g, step, gathered)
                 j_gathered = tilt_squared(J, g, step, j_gathered)
         while out < kept.epoch.size and kept.epoch[out] == epoch and kept.before[out] == 1:
             kept.P[out], kept.J[out] = P, J
             out += 1
-        attitude = P[6, 6] + P[7, 7] + P[8, 8] if about.second_order else 0.0
-        j_attitude = J[6, 6] + J[7, 7] + J[8, 8] if about.second_order else 0.0
+        attitude = P[6, 6] + P[7, 7] + P[8, 8] if settings.second_order else 0.0
+        j_attitude = J[6, 6] + J[7, 7] + J[8, 8] if settings.second_order else 0.0
         end = Kinematics(track.end.C[s], track.end.v[s], track.end.lla[s])
         while event < events.epoch.size and events.epoch[event] == epoch:
             kind, value = events.kind[event], events.value[event]
@@ -209,7 +206,7 @@ def run_jointly(
                 sd = events.sd[event, component]
                 if not sd > 0.0:
                     continue
-                observe(kind, component, value, end, track.rate[s], about.lever, h)
+                observe(kind, component, value, end, track.rate[s], settings.lever, h)
                 estimate, truth = about.estimate[kind, component], about.truth[kind, component]
                 expected = sd * sd + excess(P, h, attitude)
                 measurement_update(P, h, estimate, expected, 0.0, x, gain)

@@ -24,6 +24,7 @@ from gmwm.ins.filter.records import (
     Events as Events,
     Kinematics as Kinematics,
     SensorTable as SensorTable,
+    Settings as Settings,
     Transition as Transition,
     new_transition as new_transition,
 )

@@ -193,22 +193,11 @@ class Filter:
     at every epoch that has a measurement or a result.
 
     dt: Sampling interval of the IMU, s.
-    stride: Samples per step of the covariance.
-    noise_states: (kinds, 3) of int, sensor state of the slow noise of each component of each kind
-        of measurement; -1 for none.
-    lever_arm: (3,), m.
-    second_order: Whether products of errors are allowed for. Without it the filter is linear: too
-        sure of its vertical channel where gyros are poor and accelerometers good, and of what
-        precise fixes say after a long outage; see `tilt_squared` and `excess` of
-        `gmwm.ins.filter.covariance_kernels`.
     """
 
     states: SensorStates
     dt: float
-    stride: int
-    noise_states: IntArray
-    lever_arm: FloatArray
-    second_order: bool = True
+    settings: Settings
 
     @classmethod
     def of(
@@ -232,7 +221,8 @@ class Filter:
         noise_states = np.full((len(MEASUREMENTS), 3), -1, dtype=np.int64)
         for state, place in enumerate(places, states.m - len(places)):
             noise_states[place] = state
-        return cls(states, dt, stride, noise_states, np.asarray(aiding.lever_arm), second_order)
+        arm = np.asarray(aiding.lever_arm)
+        return cls(states, dt, Settings(states.table, noise_states, arm, second_order, stride))
 
     @property
     def size(self) -> int:
@@ -261,8 +251,7 @@ class Filter:
         samples = Samples(imu.rotation, imu.velocity, imu.dt)
         place, rejected = np.zeros(4, dtype=np.int64), np.zeros(len(KINDS), dtype=np.int64)
         where, stopped = RunPlace(place, rejected, np.zeros(7)), PAUSED
-        options = (self.noise_states, self.lever_arm, self.second_order, self.stride)
-        settings = Settings(self.states.table, *options)
+        settings = self.settings
         for part in (*windows(imu.n), slice(imu.n, imu.n)):
             if stopped == PAUSED:
                 stopped = run(samples, settings, estimate, events, found, kept, where, part.stop)
@@ -389,7 +378,7 @@ def navigate(
     ready = Filter.of(SensorModels.of(sensors), aiding, imu.dt, **options)
     events = aiding.events(imu.dt, imu.n)
     position = KINDS["position"]
-    slow = np.any(ready.noise_states[position] >= 0)
+    slow = np.any(ready.settings.noise_states[position] >= 0)
     if slow and aiding.fixes and not np.any(events.kind == position):
         raise InputError("coloured_sd without position fixes: set it to zero")
     outputs = Outputs.every(interval, imu.dt, imu.n, before)

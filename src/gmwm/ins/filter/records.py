@@ -94,7 +94,16 @@ class FilterState(NamedTuple):
 
 
 class Settings(NamedTuple):
-    """How a filter is set up; see `Filter`."""
+    """How a filter is set up.
+
+    noise_states: (kinds, 3), sensor state of the slow noise of each component of each kind of
+        measurement; -1 for none.
+    lever: (3,), m.
+    second_order: Whether products of errors are allowed for. Without it the filter is linear: too
+        sure of its vertical channel where gyros are poor and accelerometers good, and of what
+        precise fixes say after a long outage; see `tilt_squared` and `excess`.
+    stride: Samples per step of the covariance.
+    """
 
     table: SensorTable
     noise_states: IntArray

@@ -340,7 +340,7 @@ class _Forward:
 
     def strides(self, before: int, epoch: int) -> list[tuple[int, int]]:
         """First epoch and number of samples of each step of the covariance between two epochs."""
-        stride = self.ready.stride
+        stride = self.ready.settings.stride
         return [(k, min(stride, epoch - k)) for k in range(before, epoch, stride)]
 
     def nominal(self, epoch: float) -> tuple[FloatArray, FloatArray, FloatArray, int]:
@@ -384,7 +384,7 @@ class _Forward:
             lever = np.asarray(self.replay.aiding.lever_arm)
             observe(kind, component, self.events.value[event], at, rate, lever, h)
             row[:NAVIGATION] = h
-            state = int(self.ready.noise_states[kind, component])
+            state = int(self.ready.settings.noise_states[kind, component])
             if state >= 0:
                 state += NAVIGATION
                 row[state] = -1.0
