@@ -109,9 +109,8 @@ def main() -> None:
             ready.run(noisy, truth.state(0), InitialSd(), events, outputs)
             times.append(process_time() - start)
         best = min(times[1:])
-        print(
-            f"{ready.size:6} {step:9g} {ready.settings.stride:8} {best:9.3f} {imu.n / best / 1e6:10.2f}"
-        )
+        stride = ready.settings.stride
+        print(f"{ready.size:6} {step:9g} {stride:8} {best:9.3f} {imu.n / best / 1e6:10.2f}")
     _peer(noisy, truth, aiding.noisy(rng))
     sensors, cores = _sensors(3, 2), os.cpu_count() or 1
     if runs == 0:

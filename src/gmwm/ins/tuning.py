@@ -93,7 +93,7 @@ MOST_OUTLIERS = 0.1  # fraction of the fixes, above which the filter and not the
 ANYWHERE = 100.0
 SEEN = 5.0  # standard errors of a constant error that is found at the level of the tests
 # Constant errors that a motion must show, or it is reported not to: larger ones are rare.
-UNSEEN = {"s": 0.5, "m": 3.0, "heading": math.radians(10.0)}
+UNSEEN = {"s": 0.5, "m": 3.0, "deg": math.radians(10.0)}
 
 # -- own logs: comparisons on a log ---------------------------------------------------------------
 

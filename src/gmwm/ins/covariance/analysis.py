@@ -198,13 +198,7 @@ class Course:
 def covariance_analysis(
     scenario: Scenario, truth: SensorModels, believed: SensorModels
 ) -> Analysis:
-    """True error covariance of a filter whose sensor models are not the truth.
-
-    Parameters
-    ----------
-    scenario : Scenario
-    truth, believed : SensorModels
-        Of the sensors, and in the filter.
+    """True error covariance of a filter that has the models ``believed`` of sensors ``truth``.
 
     Notes
     -----

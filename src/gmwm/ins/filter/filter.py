@@ -133,12 +133,7 @@ class Solution:
     def errors(self, truth: Trajectory) -> FloatArray:
         """Estimate less truth, (K, 9), in the order of ``covariance``.
 
-        Raises InputError if it ends before the solution.
-
-        Parameters
-        ----------
-        truth : Trajectory
-            From the same first epoch on.
+        The truth has the same first epoch. Raises InputError if it ends before the solution.
         """
         index = np.rint(self.time / truth.dt).astype(int)
         if index.size and index[-1] > truth.n:

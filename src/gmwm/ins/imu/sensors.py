@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -96,15 +95,7 @@ class SensorModels:
         return (notice("fit-not-valid", axes, variant="filter", hint=hint, count=count, are=are),)
 
     def simulate(self, n: int, dt: float, rng: np.random.Generator) -> SensorErrors:
-        """Draw the errors of all axes over ``n`` samples; constant biases are drawn too.
-
-        Parameters
-        ----------
-        n : int
-        dt : float
-            Sampling interval, s.
-        rng : numpy.random.Generator
-        """
+        """Draw errors of all axes, n samples of ``dt`` (s); constant biases are drawn too."""
         total, slow = np.empty((n, 6)), np.zeros((n, 6))
         for i, axis in enumerate(AXES):
             filtered = np.zeros(n)
@@ -182,7 +173,7 @@ class Recorded:
         of its bias when it starts anywhere in the recording.
     """
 
-    stretches: tuple[FloatArray, ...]
+    stretches: tuple[FloatArray, ...] = field(repr=False)
     dt: float
     source: str
     bias_sd: dict[str, float]
@@ -230,16 +221,6 @@ class Recorded:
     def available(self) -> int | None:
         """Number of independent stretches."""
         return len(self.stretches)
-
-    def __repr__(self) -> str:
-        size = self.stretches[0].shape[0]
-        digest = hashlib.sha256()
-        for each in self.stretches:
-            digest.update(np.ascontiguousarray(each).tobytes())
-        return (
-            f"Recorded({self.source!r}, {len(self.stretches)} x {size}, dt={self.dt!r}, "
-            f"sha256={digest.hexdigest()})"
-        )
 
     def draw(self, run: int, n: int, dt: float, rng: np.random.Generator) -> SensorErrors:
         """The stretch of a run.

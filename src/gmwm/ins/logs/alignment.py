@@ -14,13 +14,7 @@ from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.ins import tuning
 from gmwm.ins.filter import Aiding, InitialSd
-from gmwm.ins.geometry import (
-    RATE,
-    STANDARD_GRAVITY,
-    matrix_from_rpy,
-    offset,
-    rpy_from_matrix,
-)
+from gmwm.ins.geometry import RATE, STANDARD_GRAVITY, matrix_from_rpy, offset, rpy_from_matrix
 from gmwm.ins.imu import AXES, Imu, SensorModels
 from gmwm.ins.logs.attitude import (
     Heading,

@@ -87,7 +87,7 @@ def outliers(base: Replay) -> list[Fault]:
     """
     starts = [base]
     if np.sum(base.standard[:1] ** 2) > 2.0 * cost(3, max(base.innovations.kind.size, 1)):
-        starts.append(base.anywhere())
+        starts.append(replace(base, sd=replace(base.sd, position=tuning.ANYWHERE)))
     return [each for start in starts if (each := _rejected(base, start))]
 
 
@@ -394,19 +394,14 @@ def _arm_words(fault: Fault) -> dict[str, Any]:
     parts = ", ".join(f"{values[name]:.2f} m {name} ({errors[name]:.1g})" for name in values)
     # A part that the motion does not show stays as it was: an estimate of it is mostly error.
     unseen = [name for name in values if tuning.SEEN * errors[name] > tuning.UNSEEN["m"]]
+    known = [0.0 if name in unseen else values[name] for name in values]
+    arm = np.asarray(fault.replay.aiding.lever_arm) - list(values.values()) + known
+    hint = f"give the lever arm {','.join(f'{each:.2f}' for each in arm)}, or measure it"
+    if unseen:
+        also = f"and measure it {' and '.join(unseen)}, which this motion does not show and"
+        hint = hint.replace("or measure it", f"{also} is left as it was")
     if len(unseen) == len(values):
         hint = "measure it: this motion does not show any of its parts well enough"
-        return {"parts": parts, "hint": hint}
-    arm = ",".join(
-        f"{each - (values[name] if name in unseen else 0.0):.2f}"
-        for name, each in zip(values, np.asarray(fault.replay.aiding.lever_arm), strict=True)
-    )
-    hint = f"give the lever arm {arm}, " + (
-        f"and measure it {' and '.join(unseen)}, which this motion does not show and is left as it "
-        "was"
-        if unseen
-        else "or measure it"
-    )
     return {"parts": parts, "hint": hint}
 
 
@@ -422,16 +417,12 @@ _MOTION = {
 def resolution_notice(faults: Faults) -> Notice:
     """The smallest constant errors that this motion shows, and the ones that it does not show."""
     seen, unseen = [], []
-    values: dict[str, float] = {}
     for name, (what, unit, factor) in _MOTION.items():
-        if name not in faults.resolution:
-            continue
-        values[name] = faults.resolution[name]
-        least = tuning.SEEN * values[name]
-        if least > tuning.UNSEEN["heading" if name == "heading" else unit]:
+        least = tuning.SEEN * faults.resolution[name]
+        if least > tuning.UNSEEN[unit]:
             unseen.append(what)
         else:
             seen.append(f"{what} of {least * factor:.2g} {unit}")
     shown = "from here on: " + "; ".join(seen) if seen else "no constant error"
     missing = "; it would not show " + ", ".join(unseen) if unseen else ""
-    return notice("resolution", values=values, shown=shown, missing=missing)
+    return notice("resolution", values=dict(faults.resolution), shown=shown, missing=missing)

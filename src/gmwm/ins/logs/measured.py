@@ -142,12 +142,8 @@ class Measured:
 
         Raises InputError if something is missing, unknown or cannot be used.
 
-        Parameters
-        ----------
-        content : mapping
-            imu, gnss_fixes and sensors, and what else is known; see the documentation.
-        folder : Path, optional
-            Folder that paths are relative to.
+        content: imu, gnss_fixes and sensors, and what else is known; see the documentation.
+        folder: That paths are relative to.
         """
         spec = LogSpec.parse(content)
         if spec.attitude is not None and spec.heading is not None:

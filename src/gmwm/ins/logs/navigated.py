@@ -57,15 +57,7 @@ class LongestOutage:
 
 @dataclass(frozen=True, eq=False)
 class Navigated:
-    """A solution of real data.
-
-    Attributes
-    ----------
-    measured : Measured
-    alignment : Alignment
-    solution : Solution
-    longest_outage : LongestOutage
-    """
+    """A solution of real data."""
 
     measured: Measured
     alignment: Alignment
@@ -74,15 +66,9 @@ class Navigated:
 
     @classmethod
     def of(cls, measured: Measured, interval: float = 1.0) -> Navigated:
-        """Align and filter.
+        """Align and filter; the solution is kept every ``interval`` (s).
 
         Raises InputError if the initial state cannot be known, or no fix follows it.
-
-        Parameters
-        ----------
-        measured : Measured
-        interval : float, optional
-            Of the solution, s.
         """
         alignment = align(measured)
         replay = Replay.of(measured, alignment)
@@ -105,13 +91,7 @@ class Navigated:
         return cls(measured, alignment, solution, outage)
 
     def test(self, kind: str | None = None) -> InnovationTest:
-        """Size and whiteness of the innovations.
-
-        Parameters
-        ----------
-        kind : {"position", "velocity"}, optional
-            By default both together.
-        """
+        """Size and whiteness of the innovations of one of `kinds`, by default of all."""
         return innovation_sizes(self.solution.innovations, kind)
 
     @cached_property

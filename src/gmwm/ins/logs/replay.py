@@ -207,10 +207,6 @@ class Replay:
         imu = replace(self.imu, velocity=self.imu.velocity * signs)
         return replace(self, imu=imu, state=replace(self.state, rpy=rpy))
 
-    def anywhere(self) -> Replay:
-        """A start that the first fix does not show: it is an outlier."""
-        return replace(self, sd=replace(self.sd, position=tuning.ANYWHERE))
-
     def without(self, rejected: dict[str, BoolArray]) -> Replay:
         """Without some fixes; a mask for each kind."""
         fixes = tuple(

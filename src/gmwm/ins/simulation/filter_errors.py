@@ -206,15 +206,9 @@ def _sizes(error: FloatArray) -> dict[str, FloatArray]:
 
 
 def spread(runs: FilterErrors, time: float) -> dict[str, ErrorSizes]:
-    """Errors before the first fix after an outage.
+    """Errors before the first fix after an outage that ends at ``time`` (s).
 
     Raises InputError if the filter diverged in every run.
-
-    Parameters
-    ----------
-    runs : FilterErrors
-    time : float
-        End of the outage, s.
     """
     predicted, result = _sizes(runs.sd[:, runs.index(time)]), {}
     for name, values in sizes(runs, time).items():

@@ -35,12 +35,7 @@ _OUTAGE_EPOCHS = 1.0  # s between epochs that are kept in an outage
 
 @dataclass(frozen=True)
 class Simulated:
-    """Sensor errors drawn from models.
-
-    Attributes
-    ----------
-    models : SensorModels
-    """
+    """Sensor errors drawn from models."""
 
     models: SensorModels
 
@@ -280,12 +275,14 @@ class _Task:
         truth = scenario.trajectory
         fixes = [part for f in aiding.fixes for part in (f.kind, f.time, f.value, f.sd)]
         slow = (aiding.coloured_sd, aiding.coloured_tau, aiding.barometer_sd, aiding.barometer_tau)
-        drawn = _exactly(source.models) if isinstance(source, Simulated) else source
+        drawn = [_exactly(source.models)] if isinstance(source, Simulated) else [source]
+        if isinstance(source, Recorded):
+            drawn += source.stretches
         start = (scenario.initial_sd, scenario.step, scenario.second_order, scenario.interval)
         return {
             "seed": self.seed,
             "filters": {name: _digest(_exactly(each)) for name, each in self.filters.items()},
-            "sensor errors": _digest(drawn),
+            "sensor errors": _digest(*drawn),
             "trajectory": _digest(truth.dt, truth.lla, truth.velocity, truth.rpy),
             "fixes": _digest(aiding.lever_arm, *slow, aiding.gate, *fixes),
             "outages": _digest(scenario.outages),

@@ -46,13 +46,7 @@ _SHORT = {"horizontal": "hor.", "vertical": "vert."}
 
 @dataclass(frozen=True, eq=False)
 class Validation:
-    """How filters with different sensor models navigated.
-
-    Attributes
-    ----------
-    experiment : Experiment
-    study : MonteCarlo
-    """
+    """How filters with different sensor models navigated."""
 
     experiment: Experiment
     study: MonteCarlo

@@ -100,10 +100,7 @@ def car_drive(
 ) -> Trajectory:
     """A car: streets with right-angled turns and stops at lights, then a winding open road.
 
-    Parameters
-    ----------
-    duration, dt, start, heading : optional
-        See `helicopter_mapping`.
+    The arguments are those of `helicopter_mapping`.
     """
 
     def manoeuvres() -> Iterator[Manoeuvre]:

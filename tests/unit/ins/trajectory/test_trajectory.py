@@ -88,5 +88,5 @@ def test_different_lengths_are_refused() -> None:
         Trajectory.from_arrays(0.1, np.zeros((5, 3)), np.zeros((4, 3)))
     with pytest.raises(InputError, match="dt = -1"):
         Trajectory.from_arrays(-1, np.zeros((5, 3)), np.zeros((5, 3)))
-    with pytest.raises(InputError, match="velocity = .*: give three finite numbers"):
+    with pytest.raises(InputError, match=r"velocity = .*: give three finite numbers"):
         NavState(np.zeros(3), np.zeros(2), np.zeros(3))
