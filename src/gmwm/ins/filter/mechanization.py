@@ -123,21 +123,11 @@ def _run(
 def integrate(imu: Imu, initial: NavState) -> Trajectory:
     """Free inertial navigation: nothing but an IMU and where it started.
 
-    The height of an unaided navigator is unstable: an error grows by a factor e in about 570 s.
+    The n increments give n + 1 epochs; roll and yaw are within [-pi, pi], the longitude runs on
+    past 180 deg. The height of an unaided navigator is unstable: an error grows by a factor e in
+    about 570 s.
 
     Raises InputError if it starts closer than 1 deg to a pole, where north cannot be steered by.
-
-    Parameters
-    ----------
-    imu : Imu
-        n increments.
-    initial : NavState
-        At the first epoch.
-
-    Returns
-    -------
-    Trajectory
-        n + 1 epochs; roll and yaw within [-pi, pi], the longitude runs on past 180 deg.
     """
     check_latitudes(initial.lla[None, :], "initial")
     lla, velocity = np.empty((imu.n + 1, 3)), np.empty((imu.n + 1, 3))

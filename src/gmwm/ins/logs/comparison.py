@@ -167,15 +167,10 @@ class Comparison:
     def of(cls, content: Mapping[str, Any], folder: Path = Path()) -> Comparison:
         """Read what a file or options describe, and compare.
 
-        Raises InputError if something is missing, unknown or cannot be used.
+        The content is that of `Measured.of`, but with ``compare``, a mapping of names to sensor
+        models, in place of ``sensors``; and with ``outages``, see `compare`.
 
-        Parameters
-        ----------
-        content : mapping
-            As for `Measured.of`, but with ``compare``, a mapping of names to sensor models, in
-            place of ``sensors``; and ``outages``, see `compare`.
-        folder : Path, optional
-            Folder that paths are relative to.
+        Raises InputError if something is missing, unknown or cannot be used.
         """
         rest = dict(content)
         named, outages = rest.pop("compare"), rest.pop("outages", "auto")

@@ -140,10 +140,10 @@ class Measured:
     def of(cls, content: Mapping[str, Any], folder: Path = Path()) -> Measured:
         """Read what a file or options describe.
 
-        Raises InputError if something is missing, unknown or cannot be used.
+        The content has imu, gnss_fixes and sensors, and what else is known; see the documentation.
+        Paths are relative to a folder.
 
-        content: imu, gnss_fixes and sensors, and what else is known; see the documentation.
-        folder: That paths are relative to.
+        Raises InputError if something is missing, unknown or cannot be used.
         """
         spec = LogSpec.parse(content)
         if spec.attitude is not None and spec.heading is not None:

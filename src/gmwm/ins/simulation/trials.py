@@ -275,14 +275,13 @@ class _Task:
         truth = scenario.trajectory
         fixes = [part for f in aiding.fixes for part in (f.kind, f.time, f.value, f.sd)]
         slow = (aiding.coloured_sd, aiding.coloured_tau, aiding.barometer_sd, aiding.barometer_tau)
-        drawn = [_exactly(source.models)] if isinstance(source, Simulated) else [source]
-        if isinstance(source, Recorded):
-            drawn += source.stretches
+        stretches = source.stretches if isinstance(source, Recorded) else ()
+        drawn = _exactly(source.models) if isinstance(source, Simulated) else source
         start = (scenario.initial_sd, scenario.step, scenario.second_order, scenario.interval)
         return {
             "seed": self.seed,
             "filters": {name: _digest(_exactly(each)) for name, each in self.filters.items()},
-            "sensor errors": _digest(*drawn),
+            "sensor errors": _digest(drawn, *stretches),
             "trajectory": _digest(truth.dt, truth.lla, truth.velocity, truth.rpy),
             "fixes": _digest(aiding.lever_arm, *slow, aiding.gate, *fixes),
             "outages": _digest(scenario.outages),

@@ -165,14 +165,10 @@ class ExperimentSpec(Spec):
 def experiment_from(content: Mapping[str, Any], folder: Path = Path()) -> Experiment:
     """An experiment from the content of a file.
 
-    Raises InputError if something is missing, unknown or cannot be used.
+    The content has trajectory, truth and filters, and what else is not as usual; see the
+    documentation. Paths are relative to a folder.
 
-    Parameters
-    ----------
-    content : mapping
-        trajectory, truth and filters, and what else is not as usual; see the documentation.
-    folder : Path, optional
-        That paths are relative to.
+    Raises InputError if something is missing, unknown or cannot be used.
     """
     spec = ExperimentSpec.parse(content)
     trajectory = _trajectory(spec, folder)

@@ -217,14 +217,9 @@ class Trajectory:
         return NavState(self.lla[index], self.velocity[index], self.rpy[index])
 
     def segment(self, start: float, end: float) -> Trajectory:
-        """The part between two times.
+        """The part between two times, s since the first epoch: the nearest epochs, both included.
 
         Raises InputError if they are not in order or outside the trajectory.
-
-        Parameters
-        ----------
-        start, end : float
-            s since the first epoch; the nearest epochs are taken, both included.
         """
         inside = is_number(start) and is_number(end)
         first, last = (round(start / self.dt), round(end / self.dt)) if inside else (0, 0)
