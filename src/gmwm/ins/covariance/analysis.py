@@ -187,11 +187,8 @@ class Course:
             tilt = max(tilts)
             if tilt > tuning.LINEAR_TILT or heading > tuning.LINEAR_HEADING:
                 values = {"time": end, "tilt": tilt, "heading": heading}
-                words: dict[str, Any] = {
-                    "tilt_deg": math.degrees(tilt),
-                    "heading_deg": math.degrees(heading),
-                }
-                notices.append(notice("outside-linearity", "", values, **words))
+                t, h = math.degrees(tilt), math.degrees(heading)
+                notices.append(notice("outside-linearity", "", values, tilt_deg=t, heading_deg=h))
         return replace(found, notices=tuple(notices))
 
 

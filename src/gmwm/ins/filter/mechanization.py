@@ -35,14 +35,8 @@ def step(
 
     Coning and sculling are corrected with the increments of the interval before, as if rate and
     specific force changed linearly; on the first interval, give its own increments as those before.
+    Returns the integral of the specific force over the interval, m/s, north, east and down.
 
-    Returns
-    -------
-    north, east, down : float
-        Integral of the specific force over the interval in the navigation frame, m/s.
-
-    Notes
-    -----
     Savage (1998), Strapdown inertial navigation integration algorithm design, J. Guid. Control
     Dyn. 21: coning from Part 1, rotation and sculling of the velocity from Part 2, both with the
     interval before instead of subintervals. Rotation of the frame, Coriolis and gravity are those

@@ -78,9 +78,9 @@ def align(measured: Measured) -> Alignment:
         if tilt <= tuning.TILT_MOST:
             return _levelled(measured, stretch, rest_sd, tilt)
     raise InputError(
-        f"the attitude cannot be known: in the first {tuning.SEARCHED:g} s the vehicle neither "
-        f"stands still nor moves at constant velocity for {tuning.STEADY_LEAST:g} s: give the "
-        "attitude, or begin the record where it does",
+        f"the attitude cannot be known: the fixes of the first {tuning.SEARCHED:g} s show the "
+        f"vehicle neither at rest nor at constant velocity for {tuning.STEADY_LEAST:g} s: give the "
+        "attitude, or begin the record where it is",
         "attitude-unknown",
     )
 
@@ -102,7 +102,7 @@ def _state(
     now = np.rint(positions.time[fix] / dt) * dt
     velocity = np.zeros(3)
     if not is_at_rest:
-        velocity, velocity_sd = _velocity(measured.aiding, fix, now, dt)
+        velocity, velocity_sd = _velocity(measured.aiding, now, dt)
         sd = replace(sd, velocity=velocity_sd)
     later = velocity * (now - positions.time[fix])
     lla = offset(positions.value[fix], later - C @ np.asarray(measured.aiding.lever_arm))
@@ -110,22 +110,15 @@ def _state(
     return NavState(lla, velocity, rpy_from_matrix(C)), sd
 
 
-def _velocity(aiding: Aiding, fix: int, now: float, dt: float) -> tuple[FloatArray, float]:
-    """Velocity and its standard deviation: of a fix, or of the way to the next position."""
-    velocity = aiding.of("velocity")
-    if velocity is not None:
-        i = int(np.argmin(np.abs(velocity.time - now)))
-        if abs(velocity.time[i] - now) < dt:
-            return velocity.value[i], float(np.sqrt(np.mean(velocity.sd[i] ** 2)))
-    positions = positions_of(aiding)
-    since = positions.time - positions.time[fix]
-    near = positions.part((since >= 0.0) & (since <= tuning.CHORD))
-    way = velocities_between(near)
-    if not way.time.size:
+def _velocity(aiding: Aiding, now: float, dt: float) -> tuple[FloatArray, float]:
+    """Velocity and its standard deviation: of the next fix, or of the way to the next position."""
+    velocity = aiding.of("velocity") or velocities_between(positions_of(aiding))
+    after = velocity.part((velocity.time > now - dt) & (velocity.time <= now + tuning.CHORD))
+    if not after.time.size:
         raise InputError("no other fix near the first position fix: start where fixes are frequent")
-    # The vehicle may speed up by 1 m/s^2 on the way.
-    faster = 0.5 * float(near.time[1] - near.time[0])
-    return way.value[0], float(np.hypot(np.sqrt(np.mean(way.sd[0] ** 2)), faster))
+    # The vehicle may speed up by 1 m/s^2 until then.
+    sd = np.hypot(np.sqrt(np.mean(after.sd[0] ** 2)), after.time[0] - now)
+    return after.value[0], float(sd)
 
 
 def _levelled(

@@ -95,11 +95,11 @@ def velocity_at_rest(aiding: Aiding, dt: float, first: int, last: int) -> float 
 def acceleration(aiding: Aiding, dt: float, first: int, last: int) -> float:
     """Size of the acceleration in a stretch as GNSS shows it, and its standard deviation, m/s^2.
 
-    By the line of least squares through the velocities; infinite with fewer than two.
+    By the line of least squares through the velocities; infinite where there are none at two times.
     """
     velocity = aiding.of("velocity") or velocities_between(positions_of(aiding))
     part = _inside(velocity, dt, first, last)
-    if part.time.size < 2:
+    if not part.time.size or part.time[0] == part.time[-1]:
         return np.inf
     time = part.time - np.mean(part.time)
     squares = np.sum(time**2)

@@ -107,8 +107,8 @@ class Navigated:
     @property
     def kinds(self) -> tuple[str, ...]:
         """Kinds of fixes that were used."""
-        fixes = [each for each in self.measured.aiding.fixes if each.time.size]
-        return tuple(each.kind for each in fixes if each.kind != "standstill")
+        fixes = self.measured.aiding.fixes
+        return tuple(e.kind for e in fixes if e.time.size and e.kind != "standstill")
 
     @property
     def rejections(self) -> tuple[Notice, ...]:

@@ -100,13 +100,11 @@ def at_epoch(runs: FilterErrors, index: int) -> Consistency:
 
 
 def over_time(runs: FilterErrors, start: float = 0.0, end: float = np.inf) -> Consistency:
-    """Consistency over a time, averaged run by run: bands from the scatter between the runs.
+    """Consistency over a time, s, averaged run by run: bands from the scatter between the runs.
 
     The errors of one run are correlated, so that a run counts as one draw; Student's t.
 
     Raises InputError if no errors were kept in that time.
-
-    start, end: s.
     """
     epochs = np.flatnonzero((runs.time >= start) & (runs.time <= end) & ~runs.before)
     if not epochs.size:

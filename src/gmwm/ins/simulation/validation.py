@@ -181,8 +181,7 @@ class Validation:
 
     def report(self, path: str | os.PathLike[str]) -> Path:
         """Write the page."""
-        written: Path = make("page", self, path)
-        return written
+        return Path(make("page", self, path))
 
     def plot_track(self) -> Figure:
         """The track with its outages and each filter's first run (Figure 7 of the paper)."""
