@@ -354,7 +354,7 @@ def navigate(
     ----------
     imu : Imu
     initial : NavState
-        FilterState at the first epoch.
+        At the first epoch.
     sensors : SensorModels, Calibration or mapping
         See `SensorModels.of`.
     aiding : Aiding

@@ -97,9 +97,7 @@ class Scenario:
                 )
 
     def outputs(self) -> Outputs:
-        """Epochs that are kept: evenly spaced, every second of an outage, and its end before the
-        first fix.
-        """
+        """Epochs kept: evenly spaced, every second of an outage, its end before the first fix."""
         dt, n = self.trajectory.dt, self.trajectory.n
         interval = self.interval or float(max(np.ceil(n * dt / _KEPT_EPOCHS), dt))
         within = [np.arange(o.start, o.end, max(_OUTAGE_EPOCHS, dt)) for o in self.outages]
@@ -109,18 +107,9 @@ class Scenario:
 
 @dataclass(frozen=True, eq=False)
 class Experiment:
-    """Filters that navigate on the same errors.
+    """Filters, by name, that navigate on the same errors.
 
-    Attributes
-    ----------
-    scenario : Scenario
-    source : ErrorSource
-    filters : dict
-        Name -> `SensorModels`.
-    truth : SensorModels or None
-        The models that errors are drawn from; ``None`` for real ones.
-    runs, seed : int
-    title : str
+    ``truth`` has the models that errors are drawn from; it is ``None`` for real ones.
     """
 
     scenario: Scenario
@@ -134,17 +123,9 @@ class Experiment:
 
 @dataclass(frozen=True, eq=False)
 class MonteCarlo:
-    """Errors of some filters over the same runs.
+    """Errors of some filters, by name, over the same runs.
 
-    Attributes
-    ----------
-    filters : dict
-        Name -> `FilterErrors`.
-    outages : tuple of Outage
-    example : dict
-        Name -> `Solution` of the first run, once a second.
-    truth : Trajectory
-    notices : tuple of Notice
+    ``example`` has the solutions of the first run, once a second.
     """
 
     filters: dict[str, FilterErrors]
