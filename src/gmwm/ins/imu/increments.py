@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -35,15 +36,12 @@ from gmwm.process import block_diagonal
 
 Start = Literal["known", "stationary"]
 
-
-def _gauss_legendre(points: int) -> tuple[FloatArray, FloatArray]:
-    """Nodes and weights on [0, 1]: exact for polynomials of degree 2 points - 1."""
-    nodes, weights = np.polynomial.legendre.leggauss(points)
-    return 0.5 * (nodes + 1.0), 0.5 * weights
-
-
-_NODES, _WEIGHTS = _gauss_legendre(3)
-_FIVE_NODES, _FIVE_WEIGHTS = _gauss_legendre(5)  # to rounding for turns of a radian a step
+# Gauss-Legendre rules on [0, 1]: of three points for splines, exact for polynomials of degree 5; of
+# five for turns of a radian a step, exact to rounding.
+_NODES = (0.5 - math.sqrt(0.15), 0.5, 0.5 + math.sqrt(0.15))
+_WEIGHTS = (5.0 / 18.0, 8.0 / 18.0, 5.0 / 18.0)
+_FIVE_NODES, _FIVE_WEIGHTS = np.polynomial.legendre.leggauss(5)
+_FIVE_NODES, _FIVE_WEIGHTS = 0.5 * (_FIVE_NODES + 1.0), 0.5 * _FIVE_WEIGHTS
 _ROWS = 4096  # at a time: all that is computed of them stays in the processor's cache
 _INCREMENTS = tuple(f"{what} {x}" for what in ("rotation", "velocity", "position") for x in "xyz")
 
