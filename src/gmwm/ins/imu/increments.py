@@ -67,9 +67,10 @@ class Imu:
     def __post_init__(self) -> None:
         object.__setattr__(self, "dt", checks.sampling_interval(self.dt))
         hint = "rotation and velocity one row of 3 numbers for each interval"
-        for name in ("rotation", "velocity"):
-            rows = finite_rows(getattr(self, name), name, hint, n=len(self.rotation))
-            object.__setattr__(self, name, rows)
+        rotation = finite_rows(self.rotation, "rotation", hint)
+        velocity = finite_rows(self.velocity, "velocity", hint, n=len(rotation))
+        object.__setattr__(self, "rotation", rotation)
+        object.__setattr__(self, "velocity", velocity)
 
     @property
     def n(self) -> int:
