@@ -21,7 +21,10 @@ from gmwm.calibration.channel import (
     ChannelTask,
     GivenModels,
     advise_cut,
+    current,
     model_of,
+    stage,
+    unresolved_notice,
     with_validity,
 )
 from gmwm.calibration.screening import (
@@ -31,8 +34,6 @@ from gmwm.calibration.screening import (
     stretches_at_rest,
     with_outcomes,
 )
-from gmwm.calibration.stages import current, stage
-from gmwm.calibration.unresolved import unresolved_notice
 from gmwm.diagnosis import first_in_common, thinned
 from gmwm.errors import InputError
 from gmwm.issues import Notice, notice

@@ -10,8 +10,7 @@ from typing import Any
 import click
 
 from gmwm._core.files import folder_to_fill, write_text
-from gmwm.cli.console import print_result, progress_bar
-from gmwm.cli.hints import with_option
+from gmwm.cli.console import print_result, progress_bar, with_option
 from gmwm.cli.options import PATH, READING, arguments_of_read, folder_to_write, numbers, options
 from gmwm.errors import InputError
 

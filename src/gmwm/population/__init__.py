@@ -7,8 +7,14 @@ from gmwm.population.comparison import (
     SensorComparison as SensorComparison,
 )
 from gmwm.population.curves import Difference as Difference, Equality as Equality
-from gmwm.population.fleet import Fleet as Fleet, fleet as fleet
-from gmwm.population.limits import FAIL as FAIL, NONE as NONE, PASS as PASS, in_words as in_words
+from gmwm.population.fleet import (
+    FAIL as FAIL,
+    NONE as NONE,
+    PASS as PASS,
+    Fleet as Fleet,
+    fleet as fleet,
+    in_words as in_words,
+)
 from gmwm.population.spread import (
     Spread as Spread,
     needed_units as needed_units,
