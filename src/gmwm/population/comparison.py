@@ -26,8 +26,7 @@ from gmwm.filter_numbers import AxisFilterNumbers
 from gmwm.issues import Notice, worst_first
 from gmwm.population import tuning
 from gmwm.population.curves import Difference, Equality
-from gmwm.population.structure import Structure
-from gmwm.population.unit import LETTERS
+from gmwm.population.unit import LETTERS, Structure
 
 if TYPE_CHECKING:
     import pandas

@@ -28,10 +28,17 @@ from gmwm.estimate import Fit
 from gmwm.issues import Notice, notice
 from gmwm.population import tuning
 from gmwm.population.spread import Spread, needed_units, spreads_of
-from gmwm.population.store import Index, Listed, Store, opened_store
-from gmwm.population.structure import Choice, Structure
-from gmwm.population.task import OUTPUTS, Paths, Task, recordings
-from gmwm.population.unit import LETTERS, SCHEMA, Number, Row, Unit, rows_of
+from gmwm.population.task import (
+    OUTPUTS,
+    Index,
+    Listed,
+    Paths,
+    Store,
+    Task,
+    opened_store,
+    recordings,
+)
+from gmwm.population.unit import LETTERS, SCHEMA, Choice, Number, Row, Structure, Unit, rows_of
 from gmwm.process import Model, Process
 
 if TYPE_CHECKING:
