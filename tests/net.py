@@ -32,6 +32,7 @@ from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import fields, is_dataclass
 from functools import partial
+from itertools import islice
 from pathlib import Path
 from shlex import split
 from typing import Any
@@ -39,23 +40,8 @@ from typing import Any
 import numpy as np
 
 import gmwm
-from gmwm import (
-    AR,
-    ARIMA,
-    ARMA,
-    MA,
-    AveragedNoise,
-    BiasInstability,
-    GaussMarkov,
-    LowPassNoise,
-    QuantizationNoise,
-    RandomWalk,
-    RateRamp,
-    Resonance,
-    Sinusoid,
-    WhiteNoise,
-    ins,
-)
+from gmwm import GaussMarkov, RandomWalk, Sinusoid, WhiteNoise, ins
+from gmwm.process import as_model
 
 SI = {"gyro": "rad/s", "accel": "m/s^2"}
 TEXTS = {"comment", "text", "hint", "action", "sentence", "message", "prose"}
@@ -68,10 +54,12 @@ ADIS_ROWS = {1: (0, 100_000), 2: (400_000, 100_000), 3: (900_000, 100_000), 4: (
 PER_KIND = {"document": 40, "text": 40, "study": 5, "field": 5, "odd": 8, "fleet": 4}
 """Damaged files of a kind; of the others 15."""
 
-PARTS: dict[str, Callable[[], Iterator[tuple[str, Callable[[], Any]]]]] = {}
+Cases = Iterator[tuple[str, Callable[[], Any]]]
+"""Names of cases, and what is done in each."""
+PARTS: dict[str, Callable[[], Cases]] = {}
 
 
-def part(make: Callable[[], Iterator[tuple[str, Callable[[], Any]]]]) -> Any:
+def part(make: Callable[[], Cases]) -> Any:
     PARTS[make.__name__.rstrip("_")] = make
     return make
 
@@ -124,22 +112,12 @@ def array(values: np.ndarray) -> Any:
 
 
 def recording(given: Any) -> Any:
-    return {
-        "rate": given.rate,
-        "jitter": given.jitter,
-        "notices": given.notices,
-        "channels": {
-            each.name: [
-                each.n,
-                each.dt,
-                each.quantity,
-                each.unit,
-                each.missing,
-                array(np.asarray(each.values, float)),
-            ]
-            for each in given.channels
-        },
+    channels = {
+        c.name: [c.n, c.dt, c.quantity, c.unit, c.missing, array(np.asarray(c.values, float))]
+        for c in given.channels
     }
+    whole = {name: getattr(given, name) for name in ("rate", "jitter", "notices")}
+    return {**whole, "channels": channels}
 
 
 def outcome(act: Callable[[], Any]) -> Any:
@@ -177,30 +155,21 @@ NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
 def tokens(text: str) -> list[Any]:
     """Words and numbers of each line, without comments."""
     text = re.sub(r'"""[\s\S]*?"""|<!--[\s\S]*?-->|/\*[\s\S]*?\*/', "", text)
-    lines = []
-    for line in text.splitlines():
-        line = re.sub(r"(^|\s)(#|//|%).*", "", line).strip()
-        if line:
-            words = re.split(rf"({NUMBER.pattern})", line)
-            lines.append(
-                [
-                    float(each) if NUMBER.fullmatch(each) else each.strip()
-                    for each in words
-                    if each.strip()
-                ]
-            )
-    return lines
+    lines = [re.sub(r"(^|\s)(#|//|%).*", "", line).strip() for line in text.splitlines()]
+    words = [re.split(rf"({NUMBER.pattern})", line) for line in lines if line]
+    return [
+        [float(each) if NUMBER.fullmatch(each) else each.strip() for each in line if each.strip()]
+        for line in words
+    ]
 
 
 # -- inputs ---------------------------------------------------------------------------------------
 
 
 def shared() -> Path | None:
-    """Folder of the real recordings: beside the repository, or above."""
-    for folder in Path(os.environ["NET_HOME"]).parents:
-        if (folder / "shared" / "data" / "adis16405").exists():
-            return folder / "shared" / "data"
-    return None
+    """Folder of real recordings: beside the repository, or above."""
+    places = [each / "shared/data/adis16405" for each in Path(os.environ["NET_HOME"]).parents]
+    return next((each for each in places if each.exists()), None)
 
 
 def made(name: str, make: Callable[[Path], Any]) -> Path:
@@ -238,6 +207,28 @@ def mems(seed: int = 1) -> Path:
     return made(f"mems_{seed}.csv", lambda path: csv(path, mems_series(seed)))
 
 
+def arrays(name: str, make: Callable[[], Any]) -> Any:
+    """Arrays of a file of the inputs, made where it is absent."""
+
+    def written(path: Path) -> None:
+        values = make()
+        with path.open("wb") as stream:
+            np.savez(stream, **values) if isinstance(values, dict) else np.save(stream, values)
+
+    return np.load(made(name, written))
+
+
+def walk() -> np.ndarray:
+    model = WhiteNoise(1.0) + RandomWalk(0.1)
+    return arrays("walk.npy", lambda: gmwm.simulate(model, 20_000, 0.01, seed=3))
+
+
+def series() -> Mapping[str, np.ndarray]:
+    """Of each of `MODELS`."""
+    simulated = partial(gmwm.simulate, n=6000, dt=0.1, seed=5)
+    return arrays("series.npz", lambda: {name: simulated(each) for name, each in MODELS.items()})
+
+
 def faulty() -> Path:
     """A recording in which much is wrong."""
 
@@ -257,19 +248,14 @@ def faulty() -> Path:
 
 def adis(number: int) -> Path | None:
     """Some rows of a real recording."""
-    folder = shared()
-    name = f"adis_{number}.csv"
+    folder, name = shared(), f"adis_{number}.csv"
     if not Path(name).exists() and folder is None:
         return None
 
     def make(path: Path) -> None:
         first, n = ADIS_ROWS[number]
-        with gzip.open(folder / "adis16405" / f"adis16405_{number}.csv.gz", "rt") as stream:
-            lines = [next(stream)]
-            for i, line in enumerate(stream):
-                if first <= i < first + n:
-                    lines.append(line)
-        path.write_text("".join(lines))
+        with gzip.open(folder / f"adis16405_{number}.csv.gz", "rt") as stream:
+            path.write_text("".join([next(stream), *islice(stream, first, first + n)]))
 
     return made(name, make)
 
@@ -299,7 +285,7 @@ def calibrations() -> list[str]:
 
 
 @part
-def readers() -> Iterator[tuple[str, Callable[[], Any]]]:
+def readers() -> Cases:
     for name, path in {"drive": drive() / "imu.csv", "mems": mems(), "faulty": faulty()}.items():
         yield name, partial(_recorded, path)
     for number in ADIS_ROWS:
@@ -308,8 +294,8 @@ def readers() -> Iterator[tuple[str, Callable[[], Any]]]:
             yield f"adis_{number}", partial(_recorded, path, **given)
     yield "imu", lambda: ins.read_imu(drive() / "imu.csv")
     yield "fixes", lambda: ins.read_fixes(drive() / "fixes.csv")
-    columns = {"gyro_x": 1, "accel_z": 6}
-    yield "columns", partial(_recorded, mems(), channels=columns, units=SI, time=0)
+    columns = {"channels": {"gyro_x": 1, "accel_z": 6}, "units": SI, "time": 0}
+    yield "columns", partial(_recorded, mems(), **columns)
     yield "part", lambda: recording(gmwm.read(faulty()).part(50.0, 150.0))
     for path in made("formats", _make_formats).iterdir():
         files = [each for each in sorted(path.iterdir()) if each.name != "layout"]
@@ -327,10 +313,10 @@ def _make_formats(folder: Path) -> None:
     formats = importlib.import_module("fuzz_formats")
     for variant in range(8):
         originals = {
-            "ulog": formats.ulog(variant),
-            "ardupilot": formats.ardupilot(variant),
-            "mat": formats.mat(variant),
-            "hdf5": formats.hdf5(variant),
+            **{
+                kind: getattr(formats, kind)(variant)
+                for kind in ("ulog", "ardupilot", "mat", "hdf5")
+            },
             "mat73": formats.hdf5(variant, is_mat=True),
             **{kind: formats.arrow(kind, variant) for kind in ("parquet", "feather")},
             **{f"bag{kind}": formats.bag(kind, variant) for kind in ("1", "SQLITE3", "MCAP")},
@@ -343,8 +329,8 @@ def _make_formats(folder: Path) -> None:
 
 
 @part
-def variance() -> Iterator[tuple[str, Callable[[], Any]]]:
-    x = np.load(made("walk.npy", _make_walk))
+def variance() -> Cases:
+    x = walk()
     holes = x.copy()
     holes[3000:3200] = holes[7000] = np.nan
     for wavelet in ("haar", "db2", "sym4", "coif1"):
@@ -365,22 +351,15 @@ def variance() -> Iterator[tuple[str, Callable[[], Any]]]:
     yield "live", _live
 
 
-def _make_walk(path: Path) -> None:
-    values = gmwm.simulate(WhiteNoise(1.0) + RandomWalk(0.1), 20_000, 0.01, seed=3)
-    with path.open("wb") as stream:
-        np.save(stream, values)
-
-
 def _live() -> Any:
-    x = np.load("walk.npy")
     stream = gmwm.StreamingVariance(0.01)
-    for piece in np.array_split(x, 7):
+    for piece in np.array_split(walk(), 7):
         stream.update(piece)
     return stream.results()
 
 
 @part
-def diagnosis() -> Iterator[tuple[str, Callable[[], Any]]]:
+def diagnosis() -> Cases:
     files = {"mems": mems(), "faulty": faulty(), "drive": drive() / "imu.csv"}
     for name, path in files.items():
         yield name, partial(command, "health", path, "--json")
@@ -392,67 +371,61 @@ def diagnosis() -> Iterator[tuple[str, Callable[[], Any]]]:
 
 MODELS = {
     "N": WhiteNoise(1.0),
-    "Q+N": QuantizationNoise(0.05) + WhiteNoise(1.0),
-    "N+B": WhiteNoise(1.0) + BiasInstability(0.5),
+    "Q+N": gmwm.QuantizationNoise(0.05) + WhiteNoise(1.0),
+    "N+B": WhiteNoise(1.0) + gmwm.BiasInstability(0.5),
     "N+K": WhiteNoise(1.0) + RandomWalk(0.1),
-    "N+R": WhiteNoise(1.0) + RateRamp(0.02),
+    "N+R": WhiteNoise(1.0) + gmwm.RateRamp(0.02),
     "N+GM": WhiteNoise(1.0) + GaussMarkov(1.0, 5.0),
     "N+2GM": WhiteNoise(1.0) + GaussMarkov(1.0, 2.0) + GaussMarkov(1.0, 50.0),
     "N+line": WhiteNoise(1.0) + Sinusoid(1.0, 0.5),
-    "N+resonance": WhiteNoise(1.0) + Resonance(2.0, 1.0, 0.05),
-    "lowpass": LowPassNoise(1.0, 2.0, 1.0, 0.7) + RandomWalk(0.1),
-    "averaged": AveragedNoise(1.0, 0.5) + RandomWalk(0.1),
-    "AR": AR([0.9], 1.0),
-    "MA": MA([0.4], 1.0),
-    "ARMA": ARMA([0.8], [0.3], 1.0),
-    "ARIMA": ARIMA([0.5], 1, [0.3], 1.0) + WhiteNoise(3.0),
+    "N+resonance": WhiteNoise(1.0) + gmwm.Resonance(2.0, 1.0, 0.05),
+    "lowpass": gmwm.LowPassNoise(1.0, 2.0, 1.0, 0.7) + RandomWalk(0.1),
+    "averaged": gmwm.AveragedNoise(1.0, 0.5) + RandomWalk(0.1),
+    "AR": gmwm.AR([0.9], 1.0),
+    "MA": gmwm.MA([0.4], 1.0),
+    "ARMA": gmwm.ARMA([0.8], [0.3], 1.0),
+    "ARIMA": gmwm.ARIMA([0.5], 1, [0.3], 1.0) + WhiteNoise(3.0),
 }
 METHODS = ("gmwm", "mle", "whittle", "em", "allan", "simulated")
 WEIGHTS = ("model", "data", "diagonal", "identity")
 
 
-def _make_series(path: Path) -> None:
-    values = {name: gmwm.simulate(model, 6000, 0.1, seed=5) for name, model in MODELS.items()}
-    with path.open("wb") as stream:
-        np.savez(stream, **values)
-
-
 @part
-def process() -> Iterator[tuple[str, Callable[[], Any]]]:
+def process() -> Cases:
     tau, f = 0.1 * 2.0 ** np.arange(12), np.geomspace(1e-3, 5.0, 30)
     for name, model in MODELS.items():
-        model = model if isinstance(model, gmwm.Model) else gmwm.Model((model,))
-        yield name, partial(_laws, model, tau, f)
+        yield name, partial(_laws, as_model(model), tau, f)
     for each in ("WhiteNoise", "GaussMarkov", "Resonance", "LowPassNoise", "ARMA", "Sinusoid"):
         for values in ((-1.0,), (0.0,), (float("nan"),), (1.0, -1.0), (1.0, 1.0, 1.0, 1.0)):
             yield f"{each}{values}", lambda e=each, v=values: str(getattr(gmwm, e)(*v))
 
 
 def _laws(model: gmwm.Model, tau: np.ndarray, f: np.ndarray) -> dict[str, Any]:
-    return {
-        "params": model.params,
-        "keys": [each.key for each in model.parameters],
-        "terms": [each.to_dict() for each in model.terms],
-        "labels": model.term_labels(),
-        "haar": outcome(lambda: model.haar_variance(tau, 0.1)),
-        "db2": outcome(lambda: model.wavelet_variance(tau, 0.1, "db2")),
-        "psd": outcome(lambda: model.psd(f, 0.1)),
-        "autocovariance": outcome(lambda: model.autocovariance(np.arange(5), 0.1)),
-        "states": outcome(lambda: model.state_space(0.1)),
-        "drawn": outcome(lambda: model.simulate(500, 0.1, seed=2)),
-        "white": model.white_density(),
-        "drift": model.drift_rate(),
-        "lines": model.lines(),
+    laws = {
+        "params": lambda: model.params,
+        "keys": lambda: [each.key for each in model.parameters],
+        "terms": lambda: [each.to_dict() for each in model.terms],
+        "labels": model.term_labels,
+        "haar": lambda: model.haar_variance(tau, 0.1),
+        "db2": lambda: model.wavelet_variance(tau, 0.1, "db2"),
+        "psd": lambda: model.psd(f, 0.1),
+        "autocovariance": lambda: model.autocovariance(np.arange(5), 0.1),
+        "states": lambda: model.state_space(0.1),
+        "drawn": lambda: model.simulate(500, 0.1, seed=2),
+        "white": model.white_density,
+        "drift": model.drift_rate,
+        "lines": model.lines,
     }
+    return {name: outcome(law) for name, law in laws.items()}
 
 
 @part
-def estimate() -> Iterator[tuple[str, Callable[[], Any]]]:
-    series = np.load(made("series.npz", _make_series))
+def estimate() -> Cases:
+    given_series = series()
     for name, model in MODELS.items():
-        free = (model if isinstance(model, gmwm.Model) else gmwm.Model((model,))).opened()
-        wv = gmwm.wavelet_variance(series[name], 0.1)
-        octave = gmwm.wavelet_variance(series[name], 0.1, data_covariance="octave")
+        free, own = as_model(model).opened(), given_series[name]
+        wv = gmwm.wavelet_variance(own, 0.1)
+        octave = gmwm.wavelet_variance(own, 0.1, data_covariance="octave")
         for weights in WEIGHTS:
             given = octave if weights == "data" else wv
             yield f"{name}_{weights}", partial(gmwm.fit, free, given, weights=weights)
@@ -460,13 +433,12 @@ def estimate() -> Iterator[tuple[str, Callable[[], Any]]]:
             if method == "em" and name not in ("N+K", "N+GM", "N+R"):
                 continue
             n = 1500 if method in ("mle", "em") else 6000
-            yield f"{name}_{method}", partial(gmwm.fit, free, series[name][:n], 0.1, method=method)
-    model = MODELS["N+K"]
-    x = series["N+K"]
+            yield f"{name}_{method}", partial(gmwm.fit, free, own[:n], 0.1, method=method)
+    model, x = MODELS["N+K"], given_series["N+K"]
     halves = [gmwm.wavelet_variance(each, 0.1) for each in np.split(x, 2)]
     yield "joint", lambda: gmwm.fit(model.opened(), halves)
     yield "robust", lambda: gmwm.fit(model.opened(), gmwm.wavelet_variance(x, 0.1, robust=True))
-    yield "fixed", lambda: gmwm.fit(WhiteNoise() + GaussMarkov(tau=5.0), series["N+GM"], 0.1)
+    yield "fixed", lambda: gmwm.fit(WhiteNoise() + GaussMarkov(tau=5.0), given_series["N+GM"], 0.1)
     yield "bootstrap", lambda: gmwm.bootstrap(gmwm.fit(model.opened(), x, 0.1), 8, seed=1)
     white = gmwm.fit(WhiteNoise(), x[:1000], 0.1)
     yield "test", lambda: gmwm.bootstrap_test(white, WhiteNoise() + RandomWalk(), 8)
@@ -476,29 +448,23 @@ def estimate() -> Iterator[tuple[str, Callable[[], Any]]]:
 
 
 def _parts_of(fit: Any) -> Any:
-    return [
-        fit.interval(0.9),
-        fit.error_growth,
-        fit.needed_length(),
-        fit.deviation_interval(fit.wv.tau),
-        [each.to_dict() for each in fit.estimates],
-        fit.reasons,
-        fit.implied,
-    ]
+    texts = [each.to_dict() for each in fit.estimates]
+    numbers = [fit.interval(0.9), fit.error_growth, fit.needed_length()]
+    return [*numbers, fit.deviation_interval(fit.wv.tau), texts, fit.reasons, fit.implied]
 
 
 @part
-def selection() -> Iterator[tuple[str, Callable[[], Any]]]:
-    series = np.load(made("series.npz", _make_series))
+def selection() -> Cases:
+    given = series()
     for name in ("N", "N+K", "N+2GM", "N+B", "Q+N", "N+R", "lowpass", "AR"):
-        yield name, partial(gmwm.select, series[name], 0.1)
-    yield "validity", lambda: gmwm.select(series["N+GM"], 0.1, max_gauss_markov=2, rule="validity")
+        yield name, partial(gmwm.select, given[name], 0.1)
+    yield "validity", lambda: gmwm.select(given["N+GM"], 0.1, max_gauss_markov=2, rule="validity")
     line = {"max_gauss_markov": 1, "extra": [Sinusoid()]}
-    yield "extra", partial(gmwm.select, series["N+line"], 0.1, **line)
+    yield "extra", partial(gmwm.select, given["N+line"], 0.1, **line)
 
 
 @part
-def calibration_() -> Iterator[tuple[str, Callable[[], Any]]]:
+def calibration_() -> Cases:
     out = ("--jobs", 1, "--json", "-o", tempfile.mkdtemp())
     for name, files, options in (
         ("mems", [mems()], ""),
@@ -524,7 +490,7 @@ def _loaded(found: Any) -> Any:
 
 
 @part
-def filter_numbers() -> Iterator[tuple[str, Callable[[], Any]]]:
+def filter_numbers() -> Cases:
     for name in calibrations():
         path = calibration(name)
         for form in ("N+K", "N+GM", "N+K+GM", "N+2GM"):
@@ -584,14 +550,9 @@ def _study(**changes: Any) -> Any:
 def _validation() -> Any:
     own = _study()
     found = ins.monte_carlo(own.scenario, own.source, own.filters, own.runs, own.seed)
-    return {
-        "filters": {name: _errors(each) for name, each in found.filters.items()},
-        "notices": found.notices,
-    }
-
-
-def _errors(each: Any) -> Any:
-    return [each.time, each.error, each.sd, each.nees, each.nis, each.sensor_error, each.diverged]
+    names = ("time", "error", "sd", "nees", "nis", "sensor_error", "diverged")
+    filters = {k: [getattr(each, name) for name in names] for k, each in found.filters.items()}
+    return {"filters": filters, "notices": found.notices}
 
 
 def _analysis() -> Any:
@@ -601,7 +562,7 @@ def _analysis() -> Any:
 
 
 @part
-def ins_() -> Iterator[tuple[str, Callable[[], Any]]]:
+def ins_() -> Cases:
     log = ("navigate", f"--imu={drive() / 'imu.csv'}", f"--gnss={drive() / 'fixes.csv'}")
     out = ("--json", "-o", tempfile.mkdtemp())
     cal, other = (f"{calibration(f'mems_{k}')}" for k in (1, 2))
@@ -624,15 +585,12 @@ def ins_() -> Iterator[tuple[str, Callable[[], Any]]]:
 
 
 def _reduction(found: Any) -> Any:
-    models = {
-        name: [each.to_dict() for each in model.terms]
-        for name, model in found.models.models.items()
-    }
+    models = {k: [each.to_dict() for each in m.terms] for k, m in found.models.models.items()}
     return [found.form, models, found.inflation, found.errors, found.notices]
 
 
 @part
-def population() -> Iterator[tuple[str, Callable[[], Any]]]:
+def population() -> Cases:
     paths = [calibration(name) for name in ("mems_1", "mems_2")]
     yield "compare", lambda: command("compare", *paths, "--json", "-o", _new("compare.html"))
     if Path("adis_1.csv").exists():
@@ -664,7 +622,7 @@ TARGETS = tuple(importlib.import_module("gmwm.export").TARGETS)
 
 
 @part
-def export() -> Iterator[tuple[str, Callable[[], Any]]]:
+def export() -> Cases:
     for name in calibrations():
         found = gmwm.load(calibration(name))
         for target in TARGETS:
@@ -735,7 +693,7 @@ def _make_corpus(folder: Path) -> None:
 
 
 @part
-def fuzz() -> Iterator[tuple[str, Callable[[], Any]]]:
+def fuzz() -> Cases:
     corpus = made("fuzz", _make_corpus)
     importlib.import_module("gmwm.filter_numbers"), importlib.import_module("gmwm.report")
     for kind in (*READ, *USES):
@@ -760,20 +718,11 @@ def record(folder: Path, only: list[str], inputs: Path | None) -> None:
     try:
         os.chdir(inputs)
         for name in only or PARTS:
-            start, found = time.process_time(), {}
-            for case, act in PARTS[name]():
-                begin = time.process_time()
-                found[case] = outcome(act)
-                if (seconds := time.process_time() - begin) > 4.0:
-                    print(f"  {name}/{case}: {seconds:.1f} s", flush=True)
-            failed = [
-                case for case, each in found.items() if isinstance(each, dict) and "failed" in each
-            ]
-            print(
-                f"{name}: {len(found)} cases, {time.process_time() - start:.0f} s"
-                + (f"; failed: {', '.join(failed[:20])}" if failed else ""),
-                flush=True,
-            )
+            start = time.process_time()
+            found = {case: outcome(act) for case, act in PARTS[name]()}
+            seconds = time.process_time() - start
+            failed = [k for k, each in found.items() if isinstance(each, dict) and "failed" in each]
+            print(f"{name}: {len(found)} cases, {seconds:.0f} s; failed: {failed}", flush=True)
             text = json.dumps(found, indent=0, sort_keys=True)
             (folder / f"{name}.json").write_text(text, encoding="utf-8")
     finally:

@@ -8,6 +8,7 @@ from functools import cache
 from importlib.metadata import packages_distributions
 from pathlib import Path
 
+from gmwm.issues import CATALOGUE
 from places import REPOSITORY
 
 ROOT = REPOSITORY / "src" / "gmwm"
@@ -217,3 +218,10 @@ def test_what_was_found_does_not_change():
         if decorator.startswith("dataclass") and "frozen=True" not in decorator
     ]
     assert thawed == []
+
+
+def test_every_issue_stands_once():
+    text = (ROOT / "issues.py").read_text()
+    codes = re.findall(r'^    (?:Issue|_[a-z]+)\("([a-z0-9-]+)"', text, re.MULTILINE)
+    assert len(codes) > 100
+    assert sorted(codes) == sorted(CATALOGUE)
