@@ -192,10 +192,8 @@ def _tasks(
     tasks = []
     for name, parts in alive.items():
         extra = next((e.extra[name] for e in treated if e.extra.get(name)), ())
-        task = ChannelTask(
-            name, parts, sources[name], models[name], extra, name in robust, removals
-        )
-        tasks.append(task)
+        about = (sources[name], models[name], extra, name in robust, removals)
+        tasks.append(ChannelTask(name, parts, *about))
     return tasks, dead
 
 

@@ -271,28 +271,20 @@ def with_largest_walk(fitted: Fit) -> Model | None:
         ).model
     except InputError:  # of a record so short that nothing bounds it
         return None
-    return largest if _growth(fitted, largest) > tuning.OPEN else None
+    return largest if _growth(fitted, largest)[1] > tuning.OPEN else None
 
 
 def unresolved_notice(name: str, fitted: Fit, largest: Model) -> Notice:
     """Say how large the walk and its effect may be."""
-    walk, tau = largest.params["K"] or 0.0, _time(fitted)
+    walk, (tau, growth) = largest.params["K"] or 0.0, _growth(fitted, largest)
     unit, per_si = customary_unit("u/s/sqrt(Hz)", fitted.wv.quantity, fitted.wv.unit)
-    growth = _growth(fitted, largest)
     values = {"K": walk, "tau": tau, "growth": growth}
-    return notice(
-        UNRESOLVED, name, values, shown=f"{walk * per_si:.2g} {unit}", times=brief(growth)
-    )
+    shown = f"{walk * per_si:.2g} {unit}"
+    return notice(UNRESOLVED, name, values, shown=shown, times=brief(growth))
 
 
-def _time(fitted: Fit) -> float:
-    return max(tuning.OPEN_AT, fitted.wv.dt)
-
-
-def _growth(fitted: Fit, largest: Model) -> float:
-    """Ratio of the deviations of two models at the time that is looked at."""
-    tau = np.array([_time(fitted)])
-    there, least = (
-        float(model.haar_variance(tau, fitted.wv.dt)[0]) for model in (largest, fitted.model)
-    )
-    return float(np.sqrt(there / least)) if least > 0.0 else float("inf")
+def _growth(fitted: Fit, largest: Model) -> tuple[float, float]:
+    """The time that is looked at, s, and the ratio of the deviations of two models there."""
+    tau, dt = max(tuning.OPEN_AT, fitted.wv.dt), fitted.wv.dt
+    there, least = (float(m.haar_variance(np.array([tau]), dt)[0]) for m in (largest, fitted.model))
+    return tau, float(np.sqrt(there / least)) if least > 0.0 else float("inf")

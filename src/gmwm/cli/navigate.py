@@ -40,10 +40,6 @@ def _absolute(_: str, path: str | Path) -> str:
     return str(Path(path).absolute())  # paths of a study are relative to its file
 
 
-def _lever_arm(flag: str, text: str) -> list[float]:
-    return numbers(flag, text, "X,Y,Z in metres, e.g. 0.5,0,-1.2", 3)
-
-
 def _sd(flag: str, text: str) -> list[float] | float:
     found = numbers(flag, text, "one number, or NORTH,EAST,DOWN, e.g. 0.1,0.1,0.15", 1, 3)
     return found if len(found) == 3 else found[0]
@@ -128,7 +124,7 @@ def _sensors(flag: str, texts: Sequence[str]) -> str | dict[str, str]:
     gnss=_key(_absolute, name="gnss_fixes"),
     sensors=_key(_sensors, multiple=True),
     outages=_key(_outages),
-    lever_arm=_key(_lever_arm),
+    lever_arm=_key(lambda flag, arm: numbers(flag, arm, "X,Y,Z in metres, e.g. 0.5,0,-1.2", 3)),
     heading=_key(lambda _, angle: f"{angle!r} deg"),
     attitude=_key(_attitude),
     barometer=_key(_absolute),

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gmwm._core.files import written
+from gmwm._core.files import write_text
 from gmwm._core.typing import Progress
 from gmwm.calibration import Calibration, calibrate
 from gmwm.errors import InputError
@@ -263,8 +263,5 @@ def reproduce_figure(
         "fig8": validation.plot_errors,
         "fig9": validation.plot_growth,
     }
-    text = str(validation)
-    target = folder / f"{figure}.txt"
-    with written(target) as stream:
-        stream.write(text + "\n")
-    return text, [target, *saved(draw[figure](), folder / figure)]
+    text, stem = str(validation), folder / figure
+    return text, [write_text(stem.with_suffix(".txt"), text), *saved(draw[figure](), stem)]
