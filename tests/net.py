@@ -41,6 +41,7 @@ import numpy as np
 
 import gmwm
 from gmwm import GaussMarkov, RandomWalk, Sinusoid, WhiteNoise, ins
+from gmwm.export import TARGETS, read_numbers
 from gmwm.process import as_model
 
 SI = {"gyro": "rad/s", "accel": "m/s^2"}
@@ -79,12 +80,12 @@ def plain(value: Any) -> Any:
         return "<text>" if len(value.split()) >= SENTENCE else value
     if callable(value):
         return "<callable>"
-    if value is None or isinstance(value, bool | np.bool_):
-        return value if value is None else bool(value)
-    if isinstance(value, int | np.integer):
-        return int(value)
-    if isinstance(value, float | np.floating):
-        return float(value) if np.isfinite(value) else str(float(value))
+    if isinstance(value, np.generic):
+        value = value.item()
+    if isinstance(value, float) and not math.isfinite(value):
+        return str(value)
+    if value is None or isinstance(value, bool | int | float):
+        return value
     if isinstance(value, np.ndarray) and value.dtype.kind in "biuf":
         return array(value)
     if isinstance(value, set | frozenset):
@@ -308,15 +309,15 @@ def _recorded(path: Path, **given: Any) -> Any:
     return recording(gmwm.read(path, **given))
 
 
+LOGS = ("ulog", "ardupilot", "mat", "hdf5")
+
+
 def _make_formats(folder: Path) -> None:
     """Whole files of all formats."""
     formats = importlib.import_module("fuzz_formats")
     for variant in range(8):
         originals = {
-            **{
-                kind: getattr(formats, kind)(variant)
-                for kind in ("ulog", "ardupilot", "mat", "hdf5")
-            },
+            **{name: getattr(formats, name)(variant) for name in LOGS},
             "mat73": formats.hdf5(variant, is_mat=True),
             **{kind: formats.arrow(kind, variant) for kind in ("parquet", "feather")},
             **{f"bag{kind}": formats.bag(kind, variant) for kind in ("1", "SQLITE3", "MCAP")},
@@ -618,9 +619,6 @@ def _make_lot(folder: Path) -> None:
     (folder / "unit_9.csv").write_text("no,numbers\nat,all\n")
 
 
-TARGETS = tuple(importlib.import_module("gmwm.export").TARGETS)
-
-
 @part
 def export() -> Cases:
     for name in calibrations():
@@ -662,9 +660,7 @@ USES: dict[str, Callable[[Path, int], Any]] = {
         gmwm.health(gmwm.read(path, units=SI)),
         gmwm.calibrate(gmwm.read(path, units=SI), WhiteNoise() + RandomWalk(), jobs=1),
     ],
-    "numbers": lambda path, case: importlib.import_module("gmwm.export").read_numbers(
-        path, 100.0 if case % 2 else None
-    ),
+    "numbers": lambda path, case: read_numbers(path, 100.0 if case % 2 else None),
     "datasheet": lambda path, case: gmwm.report.read_datasheet(
         path, {"gyro_x": "gyro", "accel_x": "accel"}
     ),
@@ -695,7 +691,7 @@ def _make_corpus(folder: Path) -> None:
 @part
 def fuzz() -> Cases:
     corpus = made("fuzz", _make_corpus)
-    importlib.import_module("gmwm.filter_numbers"), importlib.import_module("gmwm.report")
+    importlib.import_module("gmwm.report")
     for kind in (*READ, *USES):
         for own in sorted((corpus / kind).iterdir(), key=lambda path: int(path.name)):
             use, case = USES.get(kind, _read), int(own.name)
@@ -729,26 +725,25 @@ def record(folder: Path, only: list[str], inputs: Path | None) -> None:
         os.chdir(home)
 
 
-def differences(a: Any, b: Any, tolerance: float, path: str = "") -> Iterator[tuple[str, Any, Any]]:
-    """Place and both values wherever they are not the same."""
+def differences(
+    a: Any, b: Any, tolerance: float, path: str = "", scale: float = 0.0
+) -> Iterator[tuple[str, Any, Any]]:
+    """Place and both values wherever they are not the same.
+
+    scale: Of the numbers beside these: a thousandth of it is the least that is compared with.
+    """
     if isinstance(a, dict) and isinstance(b, dict):
         for key in sorted({*a, *b}):
-            if key not in a or key not in b:
-                yield f"{path}/{key}", a.get(key, "(none)"), b.get(key, "(none)")
-            else:
-                yield from differences(a[key], b[key], tolerance, f"{path}/{key}")
+            one, other = a.get(key, "(none)"), b.get(key, "(none)")
+            yield from differences(one, other, tolerance, f"{path}/{key}")
     elif _is_number(a) and _is_number(b):
         floor = ROUND_OFF.get(path.rsplit("/", 1)[-1], 0.0)
-        if abs(a - b) > max(tolerance * max(abs(a), abs(b)), floor):
+        if abs(a - b) > max(tolerance * max(abs(a), abs(b), 1e-3 * scale), floor):
             yield path, a, b
     elif isinstance(a, list) and isinstance(b, list) and len(a) == len(b):
-        scale = max((abs(each) for each in (*a, *b) if _is_number(each)), default=0.0)
-        for i, (one, other) in enumerate(zip(a, b, strict=True)):
-            if _is_number(one) and _is_number(other):
-                if abs(one - other) > tolerance * max(abs(one), abs(other), 1e-3 * scale):
-                    yield f"{path}/{i}", one, other
-            else:
-                yield from differences(one, other, tolerance, f"{path}/{i}")
+        largest = max((abs(each) for each in (*a, *b) if _is_number(each)), default=0.0)
+        for i, pair in enumerate(zip(a, b, strict=True)):
+            yield from differences(*pair, tolerance, f"{path}/{i}", largest)
     elif a != b:
         yield path, a, b
 
@@ -781,21 +776,19 @@ def compare(before: Path, after: Path, tolerance: float, most: int) -> int:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    commands = parser.add_subparsers(dest="command", required=True)
-    recorder = commands.add_parser("record")
-    recorder.add_argument("folder", type=Path)
-    recorder.add_argument("--only", type=lambda text: text.split(","), default=[])
-    recorder.add_argument("--inputs", type=Path)
-    comparer = commands.add_parser("compare")
-    comparer.add_argument("before", type=Path)
-    comparer.add_argument("after", type=Path)
-    comparer.add_argument("--tolerance", type=float, default=1e-9)
-    comparer.add_argument("--most", type=int, default=4, help="examples of each group")
+    parser.add_argument("command", choices=("record", "compare"))
+    parser.add_argument("folders", type=Path, nargs="+")
+    parser.add_argument("--only", type=lambda text: text.split(","), default=[])
+    parser.add_argument("--inputs", type=Path)
+    parser.add_argument("--tolerance", type=float, default=1e-9)
+    parser.add_argument("--most", type=int, default=4, help="examples of each group")
     given = parser.parse_args()
+    if len(given.folders) != 1 + (given.command == "compare"):
+        parser.error("give a folder to record into, or two to compare")
     if given.command == "record":
-        record(given.folder, given.only, given.inputs)
+        record(*given.folders, given.only, given.inputs)
     else:
-        sys.exit(compare(given.before, given.after, given.tolerance, given.most) > 0)
+        sys.exit(compare(*given.folders, given.tolerance, given.most) > 0)
 
 
 if __name__ == "__main__":

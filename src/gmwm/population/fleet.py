@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import os
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from contextlib import closing, nullcontext
 from dataclasses import dataclass
 from functools import cached_property
@@ -16,7 +16,7 @@ import pyarrow.parquet as pq
 
 from gmwm._core import checks
 from gmwm._core.files import moved_together, replaceable
-from gmwm._core.frozen import freeze
+from gmwm._core.frozen import ByName, freeze
 from gmwm._core.jobs import results
 from gmwm._core.pages import make
 from gmwm._core.tables import cell, frame, plain_table
@@ -99,7 +99,7 @@ def in_words(verdicts: Mapping[str, str]) -> str:
 
 
 @dataclass(frozen=True, repr=False)
-class Fleet(Mapping[str, Calibration | Notice]):
+class Fleet(ByName[Calibration | Notice]):
     """Units of a sensor: a mapping of paths to a `Calibration`, or to a `Notice` of why not.
 
     Attributes
@@ -116,6 +116,8 @@ class Fleet(Mapping[str, Calibration | Notice]):
         Which units have no calibration, and what makes units unlike each other.
     """
 
+    _held = "units"
+
     units: Mapping[str, Unit]
     structures: tuple[Structure, ...]
     options: Mapping[str, Any]
@@ -129,12 +131,6 @@ class Fleet(Mapping[str, Calibration | Notice]):
         if path not in self.units:
             raise MissingNameError(f"the fleet has no recording {checks.shown(path)}")
         return self.units[path].result
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self.units)
-
-    def __len__(self) -> int:
-        return len(self.units)
 
     @property
     def done(self) -> dict[str, Calibration]:
