@@ -35,7 +35,7 @@ from gmwm.ins import (
     loiter_with_outages,
     monte_carlo,
 )
-from gmwm.study.sensor_tables import TABLE_6
+from gmwm.study.navigation import TABLE_6
 
 DT = 0.01
 ONE = WhiteNoise(8e-5) + GaussMarkov(4e-5, 60.0)

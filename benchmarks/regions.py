@@ -19,7 +19,7 @@ from gmwm.filter_numbers import Chain
 from gmwm.filter_numbers.spectra import ParameterRegion
 from gmwm.ins import SensorModels, covariance_analysis, loiter_with_outages, monte_carlo
 from gmwm.ins.simulation import Simulated
-from gmwm.study.sensor_tables import TABLE_6
+from gmwm.study.navigation import TABLE_6
 
 LEVEL, DRAWS, SEED = 0.95, 200, 99
 HORIZON, DT = 60.0, 0.1

@@ -23,7 +23,7 @@ import numpy as np
 
 import gmwm
 from gmwm import BiasInstability, GaussMarkov, Model, QuantizationNoise, RandomWalk, WhiteNoise
-from gmwm.filter_numbers.integrals import integral_rms
+from gmwm.filter_numbers.propagation import integral_rms
 from gmwm.study.choice import TRUTHS
 
 TIMES = (60.0, 600.0)

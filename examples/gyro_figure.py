@@ -11,7 +11,7 @@ matplotlib.use("Agg")
 
 import gmwm
 from gmwm.study.demo import simulated_imu
-from gmwm.study.sensor_tables import TABLE_6
+from gmwm.study.navigation import TABLE_6
 
 recording, truth = simulated_imu(4 * 3600.0, seed=1, sensors=TABLE_6)
 found = gmwm.calibrate(gmwm.Recording((recording["gyro_x"],)))

@@ -32,6 +32,7 @@ from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import fields, is_dataclass
 from functools import partial
+from itertools import islice
 from pathlib import Path
 from shlex import split
 from typing import Any
@@ -39,23 +40,9 @@ from typing import Any
 import numpy as np
 
 import gmwm
-from gmwm import (
-    AR,
-    ARIMA,
-    ARMA,
-    MA,
-    AveragedNoise,
-    BiasInstability,
-    GaussMarkov,
-    LowPassNoise,
-    QuantizationNoise,
-    RandomWalk,
-    RateRamp,
-    Resonance,
-    Sinusoid,
-    WhiteNoise,
-    ins,
-)
+from gmwm import GaussMarkov, RandomWalk, Sinusoid, WhiteNoise, ins
+from gmwm.export import TARGETS, read_numbers
+from gmwm.process import as_model
 
 SI = {"gyro": "rad/s", "accel": "m/s^2"}
 TEXTS = {"comment", "text", "hint", "action", "sentence", "message", "prose"}
@@ -68,10 +55,12 @@ ADIS_ROWS = {1: (0, 100_000), 2: (400_000, 100_000), 3: (900_000, 100_000), 4: (
 PER_KIND = {"document": 40, "text": 40, "study": 5, "field": 5, "odd": 8, "fleet": 4}
 """Damaged files of a kind; of the others 15."""
 
-PARTS: dict[str, Callable[[], Iterator[tuple[str, Callable[[], Any]]]]] = {}
+Cases = Iterator[tuple[str, Callable[[], Any]]]
+"""Names of cases, and what is done in each."""
+PARTS: dict[str, Callable[[], Cases]] = {}
 
 
-def part(make: Callable[[], Iterator[tuple[str, Callable[[], Any]]]]) -> Any:
+def part(make: Callable[[], Cases]) -> Any:
     PARTS[make.__name__.rstrip("_")] = make
     return make
 
@@ -91,12 +80,12 @@ def plain(value: Any) -> Any:
         return "<text>" if len(value.split()) >= SENTENCE else value
     if callable(value):
         return "<callable>"
-    if value is None or isinstance(value, bool | np.bool_):
-        return value if value is None else bool(value)
-    if isinstance(value, int | np.integer):
-        return int(value)
-    if isinstance(value, float | np.floating):
-        return float(value) if np.isfinite(value) else str(float(value))
+    if isinstance(value, np.generic):
+        value = value.item()
+    if isinstance(value, float) and not math.isfinite(value):
+        return str(value)
+    if value is None or isinstance(value, bool | int | float):
+        return value
     if isinstance(value, np.ndarray) and value.dtype.kind in "biuf":
         return array(value)
     if isinstance(value, set | frozenset):
@@ -124,22 +113,12 @@ def array(values: np.ndarray) -> Any:
 
 
 def recording(given: Any) -> Any:
-    return {
-        "rate": given.rate,
-        "jitter": given.jitter,
-        "notices": given.notices,
-        "channels": {
-            each.name: [
-                each.n,
-                each.dt,
-                each.quantity,
-                each.unit,
-                each.missing,
-                array(np.asarray(each.values, float)),
-            ]
-            for each in given.channels
-        },
+    channels = {
+        c.name: [c.n, c.dt, c.quantity, c.unit, c.missing, array(np.asarray(c.values, float))]
+        for c in given.channels
     }
+    whole = {name: getattr(given, name) for name in ("rate", "jitter", "notices")}
+    return {**whole, "channels": channels}
 
 
 def outcome(act: Callable[[], Any]) -> Any:
@@ -177,30 +156,21 @@ NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
 def tokens(text: str) -> list[Any]:
     """Words and numbers of each line, without comments."""
     text = re.sub(r'"""[\s\S]*?"""|<!--[\s\S]*?-->|/\*[\s\S]*?\*/', "", text)
-    lines = []
-    for line in text.splitlines():
-        line = re.sub(r"(^|\s)(#|//|%).*", "", line).strip()
-        if line:
-            words = re.split(rf"({NUMBER.pattern})", line)
-            lines.append(
-                [
-                    float(each) if NUMBER.fullmatch(each) else each.strip()
-                    for each in words
-                    if each.strip()
-                ]
-            )
-    return lines
+    lines = [re.sub(r"(^|\s)(#|//|%).*", "", line).strip() for line in text.splitlines()]
+    words = [re.split(rf"({NUMBER.pattern})", line) for line in lines if line]
+    return [
+        [float(each) if NUMBER.fullmatch(each) else each.strip() for each in line if each.strip()]
+        for line in words
+    ]
 
 
 # -- inputs ---------------------------------------------------------------------------------------
 
 
 def shared() -> Path | None:
-    """Folder of the real recordings: beside the repository, or above."""
-    for folder in Path(os.environ["NET_HOME"]).parents:
-        if (folder / "shared" / "data" / "adis16405").exists():
-            return folder / "shared" / "data"
-    return None
+    """Folder of real recordings: beside the repository, or above."""
+    places = [each / "shared/data/adis16405" for each in Path(os.environ["NET_HOME"]).parents]
+    return next((each for each in places if each.exists()), None)
 
 
 def made(name: str, make: Callable[[Path], Any]) -> Path:
@@ -238,6 +208,28 @@ def mems(seed: int = 1) -> Path:
     return made(f"mems_{seed}.csv", lambda path: csv(path, mems_series(seed)))
 
 
+def arrays(name: str, make: Callable[[], Any]) -> Any:
+    """Arrays of a file of the inputs, made where it is absent."""
+
+    def written(path: Path) -> None:
+        values = make()
+        with path.open("wb") as stream:
+            np.savez(stream, **values) if isinstance(values, dict) else np.save(stream, values)
+
+    return np.load(made(name, written))
+
+
+def walk() -> np.ndarray:
+    model = WhiteNoise(1.0) + RandomWalk(0.1)
+    return arrays("walk.npy", lambda: gmwm.simulate(model, 20_000, 0.01, seed=3))
+
+
+def series() -> Mapping[str, np.ndarray]:
+    """Of each of `MODELS`."""
+    simulated = partial(gmwm.simulate, n=6000, dt=0.1, seed=5)
+    return arrays("series.npz", lambda: {name: simulated(each) for name, each in MODELS.items()})
+
+
 def faulty() -> Path:
     """A recording in which much is wrong."""
 
@@ -257,19 +249,14 @@ def faulty() -> Path:
 
 def adis(number: int) -> Path | None:
     """Some rows of a real recording."""
-    folder = shared()
-    name = f"adis_{number}.csv"
+    folder, name = shared(), f"adis_{number}.csv"
     if not Path(name).exists() and folder is None:
         return None
 
     def make(path: Path) -> None:
         first, n = ADIS_ROWS[number]
-        with gzip.open(folder / "adis16405" / f"adis16405_{number}.csv.gz", "rt") as stream:
-            lines = [next(stream)]
-            for i, line in enumerate(stream):
-                if first <= i < first + n:
-                    lines.append(line)
-        path.write_text("".join(lines))
+        with gzip.open(folder / f"adis16405_{number}.csv.gz", "rt") as stream:
+            path.write_text("".join([next(stream), *islice(stream, first, first + n)]))
 
     return made(name, make)
 
@@ -299,7 +286,7 @@ def calibrations() -> list[str]:
 
 
 @part
-def readers() -> Iterator[tuple[str, Callable[[], Any]]]:
+def readers() -> Cases:
     for name, path in {"drive": drive() / "imu.csv", "mems": mems(), "faulty": faulty()}.items():
         yield name, partial(_recorded, path)
     for number in ADIS_ROWS:
@@ -308,8 +295,8 @@ def readers() -> Iterator[tuple[str, Callable[[], Any]]]:
             yield f"adis_{number}", partial(_recorded, path, **given)
     yield "imu", lambda: ins.read_imu(drive() / "imu.csv")
     yield "fixes", lambda: ins.read_fixes(drive() / "fixes.csv")
-    columns = {"gyro_x": 1, "accel_z": 6}
-    yield "columns", partial(_recorded, mems(), channels=columns, units=SI, time=0)
+    columns = {"channels": {"gyro_x": 1, "accel_z": 6}, "units": SI, "time": 0}
+    yield "columns", partial(_recorded, mems(), **columns)
     yield "part", lambda: recording(gmwm.read(faulty()).part(50.0, 150.0))
     for path in made("formats", _make_formats).iterdir():
         files = [each for each in sorted(path.iterdir()) if each.name != "layout"]
@@ -322,15 +309,15 @@ def _recorded(path: Path, **given: Any) -> Any:
     return recording(gmwm.read(path, **given))
 
 
+LOGS = ("ulog", "ardupilot", "mat", "hdf5")
+
+
 def _make_formats(folder: Path) -> None:
     """Whole files of all formats."""
     formats = importlib.import_module("fuzz_formats")
     for variant in range(8):
         originals = {
-            "ulog": formats.ulog(variant),
-            "ardupilot": formats.ardupilot(variant),
-            "mat": formats.mat(variant),
-            "hdf5": formats.hdf5(variant),
+            **{name: getattr(formats, name)(variant) for name in LOGS},
             "mat73": formats.hdf5(variant, is_mat=True),
             **{kind: formats.arrow(kind, variant) for kind in ("parquet", "feather")},
             **{f"bag{kind}": formats.bag(kind, variant) for kind in ("1", "SQLITE3", "MCAP")},
@@ -343,8 +330,8 @@ def _make_formats(folder: Path) -> None:
 
 
 @part
-def variance() -> Iterator[tuple[str, Callable[[], Any]]]:
-    x = np.load(made("walk.npy", _make_walk))
+def variance() -> Cases:
+    x = walk()
     holes = x.copy()
     holes[3000:3200] = holes[7000] = np.nan
     for wavelet in ("haar", "db2", "sym4", "coif1"):
@@ -365,22 +352,15 @@ def variance() -> Iterator[tuple[str, Callable[[], Any]]]:
     yield "live", _live
 
 
-def _make_walk(path: Path) -> None:
-    values = gmwm.simulate(WhiteNoise(1.0) + RandomWalk(0.1), 20_000, 0.01, seed=3)
-    with path.open("wb") as stream:
-        np.save(stream, values)
-
-
 def _live() -> Any:
-    x = np.load("walk.npy")
     stream = gmwm.StreamingVariance(0.01)
-    for piece in np.array_split(x, 7):
+    for piece in np.array_split(walk(), 7):
         stream.update(piece)
     return stream.results()
 
 
 @part
-def diagnosis() -> Iterator[tuple[str, Callable[[], Any]]]:
+def diagnosis() -> Cases:
     files = {"mems": mems(), "faulty": faulty(), "drive": drive() / "imu.csv"}
     for name, path in files.items():
         yield name, partial(command, "health", path, "--json")
@@ -392,67 +372,61 @@ def diagnosis() -> Iterator[tuple[str, Callable[[], Any]]]:
 
 MODELS = {
     "N": WhiteNoise(1.0),
-    "Q+N": QuantizationNoise(0.05) + WhiteNoise(1.0),
-    "N+B": WhiteNoise(1.0) + BiasInstability(0.5),
+    "Q+N": gmwm.QuantizationNoise(0.05) + WhiteNoise(1.0),
+    "N+B": WhiteNoise(1.0) + gmwm.BiasInstability(0.5),
     "N+K": WhiteNoise(1.0) + RandomWalk(0.1),
-    "N+R": WhiteNoise(1.0) + RateRamp(0.02),
+    "N+R": WhiteNoise(1.0) + gmwm.RateRamp(0.02),
     "N+GM": WhiteNoise(1.0) + GaussMarkov(1.0, 5.0),
     "N+2GM": WhiteNoise(1.0) + GaussMarkov(1.0, 2.0) + GaussMarkov(1.0, 50.0),
     "N+line": WhiteNoise(1.0) + Sinusoid(1.0, 0.5),
-    "N+resonance": WhiteNoise(1.0) + Resonance(2.0, 1.0, 0.05),
-    "lowpass": LowPassNoise(1.0, 2.0, 1.0, 0.7) + RandomWalk(0.1),
-    "averaged": AveragedNoise(1.0, 0.5) + RandomWalk(0.1),
-    "AR": AR([0.9], 1.0),
-    "MA": MA([0.4], 1.0),
-    "ARMA": ARMA([0.8], [0.3], 1.0),
-    "ARIMA": ARIMA([0.5], 1, [0.3], 1.0) + WhiteNoise(3.0),
+    "N+resonance": WhiteNoise(1.0) + gmwm.Resonance(2.0, 1.0, 0.05),
+    "lowpass": gmwm.LowPassNoise(1.0, 2.0, 1.0, 0.7) + RandomWalk(0.1),
+    "averaged": gmwm.AveragedNoise(1.0, 0.5) + RandomWalk(0.1),
+    "AR": gmwm.AR([0.9], 1.0),
+    "MA": gmwm.MA([0.4], 1.0),
+    "ARMA": gmwm.ARMA([0.8], [0.3], 1.0),
+    "ARIMA": gmwm.ARIMA([0.5], 1, [0.3], 1.0) + WhiteNoise(3.0),
 }
 METHODS = ("gmwm", "mle", "whittle", "em", "allan", "simulated")
 WEIGHTS = ("model", "data", "diagonal", "identity")
 
 
-def _make_series(path: Path) -> None:
-    values = {name: gmwm.simulate(model, 6000, 0.1, seed=5) for name, model in MODELS.items()}
-    with path.open("wb") as stream:
-        np.savez(stream, **values)
-
-
 @part
-def process() -> Iterator[tuple[str, Callable[[], Any]]]:
+def process() -> Cases:
     tau, f = 0.1 * 2.0 ** np.arange(12), np.geomspace(1e-3, 5.0, 30)
     for name, model in MODELS.items():
-        model = model if isinstance(model, gmwm.Model) else gmwm.Model((model,))
-        yield name, partial(_laws, model, tau, f)
+        yield name, partial(_laws, as_model(model), tau, f)
     for each in ("WhiteNoise", "GaussMarkov", "Resonance", "LowPassNoise", "ARMA", "Sinusoid"):
         for values in ((-1.0,), (0.0,), (float("nan"),), (1.0, -1.0), (1.0, 1.0, 1.0, 1.0)):
             yield f"{each}{values}", lambda e=each, v=values: str(getattr(gmwm, e)(*v))
 
 
 def _laws(model: gmwm.Model, tau: np.ndarray, f: np.ndarray) -> dict[str, Any]:
-    return {
-        "params": model.params,
-        "keys": [each.key for each in model.parameters],
-        "terms": [each.to_dict() for each in model.terms],
-        "labels": model.term_labels(),
-        "haar": outcome(lambda: model.haar_variance(tau, 0.1)),
-        "db2": outcome(lambda: model.wavelet_variance(tau, 0.1, "db2")),
-        "psd": outcome(lambda: model.psd(f, 0.1)),
-        "autocovariance": outcome(lambda: model.autocovariance(np.arange(5), 0.1)),
-        "states": outcome(lambda: model.state_space(0.1)),
-        "drawn": outcome(lambda: model.simulate(500, 0.1, seed=2)),
-        "white": model.white_density(),
-        "drift": model.drift_rate(),
-        "lines": model.lines(),
+    laws = {
+        "params": lambda: model.params,
+        "keys": lambda: [each.key for each in model.parameters],
+        "terms": lambda: [each.to_dict() for each in model.terms],
+        "labels": model.term_labels,
+        "haar": lambda: model.haar_variance(tau, 0.1),
+        "db2": lambda: model.wavelet_variance(tau, 0.1, "db2"),
+        "psd": lambda: model.psd(f, 0.1),
+        "autocovariance": lambda: model.autocovariance(np.arange(5), 0.1),
+        "states": lambda: model.state_space(0.1),
+        "drawn": lambda: model.simulate(500, 0.1, seed=2),
+        "white": model.white_density,
+        "drift": model.drift_rate,
+        "lines": model.lines,
     }
+    return {name: outcome(law) for name, law in laws.items()}
 
 
 @part
-def estimate() -> Iterator[tuple[str, Callable[[], Any]]]:
-    series = np.load(made("series.npz", _make_series))
+def estimate() -> Cases:
+    given_series = series()
     for name, model in MODELS.items():
-        free = (model if isinstance(model, gmwm.Model) else gmwm.Model((model,))).opened()
-        wv = gmwm.wavelet_variance(series[name], 0.1)
-        octave = gmwm.wavelet_variance(series[name], 0.1, data_covariance="octave")
+        free, own = as_model(model).opened(), given_series[name]
+        wv = gmwm.wavelet_variance(own, 0.1)
+        octave = gmwm.wavelet_variance(own, 0.1, data_covariance="octave")
         for weights in WEIGHTS:
             given = octave if weights == "data" else wv
             yield f"{name}_{weights}", partial(gmwm.fit, free, given, weights=weights)
@@ -460,13 +434,12 @@ def estimate() -> Iterator[tuple[str, Callable[[], Any]]]:
             if method == "em" and name not in ("N+K", "N+GM", "N+R"):
                 continue
             n = 1500 if method in ("mle", "em") else 6000
-            yield f"{name}_{method}", partial(gmwm.fit, free, series[name][:n], 0.1, method=method)
-    model = MODELS["N+K"]
-    x = series["N+K"]
+            yield f"{name}_{method}", partial(gmwm.fit, free, own[:n], 0.1, method=method)
+    model, x = MODELS["N+K"], given_series["N+K"]
     halves = [gmwm.wavelet_variance(each, 0.1) for each in np.split(x, 2)]
     yield "joint", lambda: gmwm.fit(model.opened(), halves)
     yield "robust", lambda: gmwm.fit(model.opened(), gmwm.wavelet_variance(x, 0.1, robust=True))
-    yield "fixed", lambda: gmwm.fit(WhiteNoise() + GaussMarkov(tau=5.0), series["N+GM"], 0.1)
+    yield "fixed", lambda: gmwm.fit(WhiteNoise() + GaussMarkov(tau=5.0), given_series["N+GM"], 0.1)
     yield "bootstrap", lambda: gmwm.bootstrap(gmwm.fit(model.opened(), x, 0.1), 8, seed=1)
     white = gmwm.fit(WhiteNoise(), x[:1000], 0.1)
     yield "test", lambda: gmwm.bootstrap_test(white, WhiteNoise() + RandomWalk(), 8)
@@ -476,29 +449,23 @@ def estimate() -> Iterator[tuple[str, Callable[[], Any]]]:
 
 
 def _parts_of(fit: Any) -> Any:
-    return [
-        fit.interval(0.9),
-        fit.error_growth,
-        fit.needed_length(),
-        fit.deviation_interval(fit.wv.tau),
-        [each.to_dict() for each in fit.estimates],
-        fit.reasons,
-        fit.implied,
-    ]
+    texts = [each.to_dict() for each in fit.estimates]
+    numbers = [fit.interval(0.9), fit.error_growth, fit.needed_length()]
+    return [*numbers, fit.deviation_interval(fit.wv.tau), texts, fit.reasons, fit.implied]
 
 
 @part
-def selection() -> Iterator[tuple[str, Callable[[], Any]]]:
-    series = np.load(made("series.npz", _make_series))
+def selection() -> Cases:
+    given = series()
     for name in ("N", "N+K", "N+2GM", "N+B", "Q+N", "N+R", "lowpass", "AR"):
-        yield name, partial(gmwm.select, series[name], 0.1)
-    yield "validity", lambda: gmwm.select(series["N+GM"], 0.1, max_gauss_markov=2, rule="validity")
+        yield name, partial(gmwm.select, given[name], 0.1)
+    yield "validity", lambda: gmwm.select(given["N+GM"], 0.1, max_gauss_markov=2, rule="validity")
     line = {"max_gauss_markov": 1, "extra": [Sinusoid()]}
-    yield "extra", partial(gmwm.select, series["N+line"], 0.1, **line)
+    yield "extra", partial(gmwm.select, given["N+line"], 0.1, **line)
 
 
 @part
-def calibration_() -> Iterator[tuple[str, Callable[[], Any]]]:
+def calibration_() -> Cases:
     out = ("--jobs", 1, "--json", "-o", tempfile.mkdtemp())
     for name, files, options in (
         ("mems", [mems()], ""),
@@ -524,7 +491,7 @@ def _loaded(found: Any) -> Any:
 
 
 @part
-def filter_numbers() -> Iterator[tuple[str, Callable[[], Any]]]:
+def filter_numbers() -> Cases:
     for name in calibrations():
         path = calibration(name)
         for form in ("N+K", "N+GM", "N+K+GM", "N+2GM"):
@@ -584,14 +551,9 @@ def _study(**changes: Any) -> Any:
 def _validation() -> Any:
     own = _study()
     found = ins.monte_carlo(own.scenario, own.source, own.filters, own.runs, own.seed)
-    return {
-        "filters": {name: _errors(each) for name, each in found.filters.items()},
-        "notices": found.notices,
-    }
-
-
-def _errors(each: Any) -> Any:
-    return [each.time, each.error, each.sd, each.nees, each.nis, each.sensor_error, each.diverged]
+    names = ("time", "error", "sd", "nees", "nis", "sensor_error", "diverged")
+    filters = {k: [getattr(each, name) for name in names] for k, each in found.filters.items()}
+    return {"filters": filters, "notices": found.notices}
 
 
 def _analysis() -> Any:
@@ -601,7 +563,7 @@ def _analysis() -> Any:
 
 
 @part
-def ins_() -> Iterator[tuple[str, Callable[[], Any]]]:
+def ins_() -> Cases:
     log = ("navigate", f"--imu={drive() / 'imu.csv'}", f"--gnss={drive() / 'fixes.csv'}")
     out = ("--json", "-o", tempfile.mkdtemp())
     cal, other = (f"{calibration(f'mems_{k}')}" for k in (1, 2))
@@ -624,15 +586,12 @@ def ins_() -> Iterator[tuple[str, Callable[[], Any]]]:
 
 
 def _reduction(found: Any) -> Any:
-    models = {
-        name: [each.to_dict() for each in model.terms]
-        for name, model in found.models.models.items()
-    }
+    models = {k: [each.to_dict() for each in m.terms] for k, m in found.models.models.items()}
     return [found.form, models, found.inflation, found.errors, found.notices]
 
 
 @part
-def population() -> Iterator[tuple[str, Callable[[], Any]]]:
+def population() -> Cases:
     paths = [calibration(name) for name in ("mems_1", "mems_2")]
     yield "compare", lambda: command("compare", *paths, "--json", "-o", _new("compare.html"))
     if Path("adis_1.csv").exists():
@@ -660,11 +619,8 @@ def _make_lot(folder: Path) -> None:
     (folder / "unit_9.csv").write_text("no,numbers\nat,all\n")
 
 
-TARGETS = tuple(importlib.import_module("gmwm.export").TARGETS)
-
-
 @part
-def export() -> Iterator[tuple[str, Callable[[], Any]]]:
+def export() -> Cases:
     for name in calibrations():
         found = gmwm.load(calibration(name))
         for target in TARGETS:
@@ -704,9 +660,7 @@ USES: dict[str, Callable[[Path, int], Any]] = {
         gmwm.health(gmwm.read(path, units=SI)),
         gmwm.calibrate(gmwm.read(path, units=SI), WhiteNoise() + RandomWalk(), jobs=1),
     ],
-    "numbers": lambda path, case: importlib.import_module("gmwm.export").read_numbers(
-        path, 100.0 if case % 2 else None
-    ),
+    "numbers": lambda path, case: read_numbers(path, 100.0 if case % 2 else None),
     "datasheet": lambda path, case: gmwm.report.read_datasheet(
         path, {"gyro_x": "gyro", "accel_x": "accel"}
     ),
@@ -735,9 +689,9 @@ def _make_corpus(folder: Path) -> None:
 
 
 @part
-def fuzz() -> Iterator[tuple[str, Callable[[], Any]]]:
+def fuzz() -> Cases:
     corpus = made("fuzz", _make_corpus)
-    importlib.import_module("gmwm.filter_numbers"), importlib.import_module("gmwm.report")
+    importlib.import_module("gmwm.report")
     for kind in (*READ, *USES):
         for own in sorted((corpus / kind).iterdir(), key=lambda path: int(path.name)):
             use, case = USES.get(kind, _read), int(own.name)
@@ -760,46 +714,36 @@ def record(folder: Path, only: list[str], inputs: Path | None) -> None:
     try:
         os.chdir(inputs)
         for name in only or PARTS:
-            start, found = time.process_time(), {}
-            for case, act in PARTS[name]():
-                begin = time.process_time()
-                found[case] = outcome(act)
-                if (seconds := time.process_time() - begin) > 4.0:
-                    print(f"  {name}/{case}: {seconds:.1f} s", flush=True)
-            failed = [
-                case for case, each in found.items() if isinstance(each, dict) and "failed" in each
-            ]
-            print(
-                f"{name}: {len(found)} cases, {time.process_time() - start:.0f} s"
-                + (f"; failed: {', '.join(failed[:20])}" if failed else ""),
-                flush=True,
-            )
+            start = time.process_time()
+            found = {case: outcome(act) for case, act in PARTS[name]()}
+            seconds = time.process_time() - start
+            failed = [k for k, each in found.items() if isinstance(each, dict) and "failed" in each]
+            print(f"{name}: {len(found)} cases, {seconds:.0f} s; failed: {failed}", flush=True)
             text = json.dumps(found, indent=0, sort_keys=True)
             (folder / f"{name}.json").write_text(text, encoding="utf-8")
     finally:
         os.chdir(home)
 
 
-def differences(a: Any, b: Any, tolerance: float, path: str = "") -> Iterator[tuple[str, Any, Any]]:
-    """Place and both values wherever they are not the same."""
+def differences(
+    a: Any, b: Any, tolerance: float, path: str = "", scale: float = 0.0
+) -> Iterator[tuple[str, Any, Any]]:
+    """Place and both values wherever they are not the same.
+
+    scale: Of the numbers beside these: a thousandth of it is the least that is compared with.
+    """
     if isinstance(a, dict) and isinstance(b, dict):
         for key in sorted({*a, *b}):
-            if key not in a or key not in b:
-                yield f"{path}/{key}", a.get(key, "(none)"), b.get(key, "(none)")
-            else:
-                yield from differences(a[key], b[key], tolerance, f"{path}/{key}")
+            one, other = a.get(key, "(none)"), b.get(key, "(none)")
+            yield from differences(one, other, tolerance, f"{path}/{key}")
     elif _is_number(a) and _is_number(b):
         floor = ROUND_OFF.get(path.rsplit("/", 1)[-1], 0.0)
-        if abs(a - b) > max(tolerance * max(abs(a), abs(b)), floor):
+        if abs(a - b) > max(tolerance * max(abs(a), abs(b), 1e-3 * scale), floor):
             yield path, a, b
     elif isinstance(a, list) and isinstance(b, list) and len(a) == len(b):
-        scale = max((abs(each) for each in (*a, *b) if _is_number(each)), default=0.0)
-        for i, (one, other) in enumerate(zip(a, b, strict=True)):
-            if _is_number(one) and _is_number(other):
-                if abs(one - other) > tolerance * max(abs(one), abs(other), 1e-3 * scale):
-                    yield f"{path}/{i}", one, other
-            else:
-                yield from differences(one, other, tolerance, f"{path}/{i}")
+        largest = max((abs(each) for each in (*a, *b) if _is_number(each)), default=0.0)
+        for i, pair in enumerate(zip(a, b, strict=True)):
+            yield from differences(*pair, tolerance, f"{path}/{i}", largest)
     elif a != b:
         yield path, a, b
 
@@ -832,21 +776,19 @@ def compare(before: Path, after: Path, tolerance: float, most: int) -> int:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    commands = parser.add_subparsers(dest="command", required=True)
-    recorder = commands.add_parser("record")
-    recorder.add_argument("folder", type=Path)
-    recorder.add_argument("--only", type=lambda text: text.split(","), default=[])
-    recorder.add_argument("--inputs", type=Path)
-    comparer = commands.add_parser("compare")
-    comparer.add_argument("before", type=Path)
-    comparer.add_argument("after", type=Path)
-    comparer.add_argument("--tolerance", type=float, default=1e-9)
-    comparer.add_argument("--most", type=int, default=4, help="examples of each group")
+    parser.add_argument("command", choices=("record", "compare"))
+    parser.add_argument("folders", type=Path, nargs="+")
+    parser.add_argument("--only", type=lambda text: text.split(","), default=[])
+    parser.add_argument("--inputs", type=Path)
+    parser.add_argument("--tolerance", type=float, default=1e-9)
+    parser.add_argument("--most", type=int, default=4, help="examples of each group")
     given = parser.parse_args()
+    if len(given.folders) != 1 + (given.command == "compare"):
+        parser.error("give a folder to record into, or two to compare")
     if given.command == "record":
-        record(given.folder, given.only, given.inputs)
+        record(*given.folders, given.only, given.inputs)
     else:
-        sys.exit(compare(given.before, given.after, given.tolerance, given.most) > 0)
+        sys.exit(compare(*given.folders, given.tolerance, given.most) > 0)
 
 
 if __name__ == "__main__":

@@ -11,7 +11,7 @@ To add an issue, add its entry to the section of its room below and report it by
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, fields
 from functools import partial
 from string import Formatter
@@ -214,15 +214,8 @@ def _plain(value: Any) -> Any:
     return float(value) if math.isfinite(value) else None
 
 
-def _catalogue(*rooms: Sequence[Issue]) -> dict[str, Issue]:
-    issues = [issue for room in rooms for issue in room]
-    result = {issue.code: issue for issue in issues}
-    if len(result) < len(issues):
-        raise ValueError("a code stands twice in the catalogue")
-    return result
-
-
 _reading = partial(Issue, topic="reading")
+_channel = partial(Issue, severity="warning", topic="samples", spoils=("channel",))
 _fit = partial(Issue, topic="fit", severity="bad")
 _filter = partial(Issue, topic="filter")
 _navigation = partial(Issue, topic="navigation")
@@ -263,8 +256,8 @@ _READERS = (
         severity="warning"),
     _reading("gyro-unit", {
         "noise": "white noise of {size:.3g} deg/s/sqrt(Hz) is more than gyros at rest have",
-        "mean": "a mean rate of {size:.3g} deg/s is more than gyros at rest have"},
-        "check the unit and the sampling rate{explained}", severity="warning", topic="recording"),
+        "mean": "a mean rate of {size:.3g} deg/s is more than gyros at rest have"}, "check the "
+        "unit and the sampling rate{explained}", severity="warning", topic="recording"),
     _reading("log-dropouts", "the logger dropped {count} stretches, {duration:.3g} s in all",
         topic="recording"),
     _reading("mean-rate", "a mean rate of {size:.3g} deg/s is more than the bias of most gyros: "
@@ -323,20 +316,18 @@ _VARIANCE = (
 )  # fmt: skip
 
 _DIAGNOSIS = (
-    Issue("abrupt-end", "the distribution of the samples is cut off at {ends}: they were "
+    _channel("abrupt-end", "the distribution of the samples is cut off at {ends}: they were "
         "rectified, wrapped round or sorted out", "look for what wraps, cuts or takes absolute "
-        "values between the sensor and the file", severity="warning", topic="samples",
-        lacks="within_range", reason="distribution cut off", spoils=("channel",),
-        user_only=True),
+        "values between the sensor and the file", lacks="within_range",
+        reason="distribution cut off", user_only=True),
     Issue("clean", "nothing found that spoils the estimates", severity="good"),
     Issue("clock", "time-stamp intervals vary by {jitter:.2g%} rms", "harmless if only the stamps "
         "are delayed; otherwise sample on the sensor's own clock", severity="warning"),
     Issue("crosstalk", "the fast noise of {both} has a correlation of {correlation:.2g}",
         "each channel has its own model; a filter may need their covariance", severity="warning",
         topic="samples"),
-    Issue("dead", "every sample is {shown}: the channel is dead",
-        "check sensor and columns; the calibration skips it", severity="bad", topic="samples",
-        lacks="samples_change", spoils=("channel",), repeats="reader"),
+    _channel("dead", "every sample is {shown}: the channel is dead", "check sensor and columns; "
+        "the calibration skips it", severity="bad", lacks="samples_change", repeats="reader"),
     Issue("drift", {
         "": "means of {length:.3g} s wander by {shown} rms, {times} times as much as the fast "
         "noise explains",
@@ -351,10 +342,9 @@ _DIAGNOSIS = (
         severity="warning", topic="samples", masks=True),
     Issue("events-left-out", "{samples:,} samples of {copies}spikes, shocks or lost packets left "
         "out", topic="samples", repeats="diagnosis"),
-    Issue("filled", "{share:.2g%} of the samples lie exactly on lines between their neighbours: "
+    _channel("filled", "{share:.2g%} of the samples lie exactly on lines between their neighbours: "
         "lost or removed samples were interpolated", "set the interpolated samples to NaN",
-        severity="warning", topic="samples", lacks="samples_measured",
-        reason="interpolated samples", spoils=("channel",), user_only=True),
+        lacks="samples_measured", reason="interpolated samples", user_only=True),
     Issue("gap", {
         "": "{missing:,.0f} of {n:,} samples missing ({share:.2g%}) in {gaps:,.0f} gap{gaps:s?}, "
         "the longest {longest:.3g} s",
@@ -365,18 +355,16 @@ _DIAGNOSIS = (
         "power": "the noise has heavy tails, like exp(-|x|^{shape:.2g}): large samples are part of "
         "it"}, "nothing is left out; the standard error of the white noise allows for it",
         topic="samples"),
-    Issue("held", "{share:.2g%} of the samples repeat the previous one ({chance:.2g%} by chance): "
-        "the last sample was written again for lost packets", "set these samples to NaN",
-        severity="warning", topic="samples", lacks="samples_measured",
-        reason="held samples", spoils=("channel",), masks=True,
-        user_only=True),
+    _channel("held", "{share:.2g%} of the samples repeat the previous one ({chance:.2g%} by "
+        "chance): the last sample was written again for lost packets", "set these samples to NaN",
+        lacks="samples_measured", reason="held samples", masks=True, user_only=True),
     Issue("infinite", "{count:,} infinite samples", "correct them, or set them to NaN",
         severity="bad", topic="samples", repeats="reader"),
     Issue("interpolated", "{share:.2g%} of the samples lie exactly on lines between others: "
-        "interpolated from about {rate:.3g} Hz, so the noise is not the sensor's",
-        "record the sensor's own samples: in a topic of its own, or without the driver's "
-        "interpolation (RealSense: unite_imu_method 0); the calibration skips the channel",
-        severity="bad", topic="samples"),
+        "interpolated from about {rate:.3g} Hz, so the noise is not the sensor's", "record the "
+        "sensor's own samples: in a topic of its own, or without the driver's interpolation "
+        "(RealSense: unite_imu_method 0); the calibration skips the channel", severity="bad",
+        topic="samples"),
     Issue("length", {
         "": "{n:,} samples at {rate:g} Hz, {duration:.6g} s",
         "short": "{n:,} samples at {rate:g} Hz, {duration:.6g} s: too short for slow errors of "
@@ -404,11 +392,10 @@ _DIAGNOSIS = (
     Issue("resonance", "a resonance at {frequency:.3g} Hz, damping {damping:.2g}, {times} times "
         "the noise around it, {shown} rms", "gmwm calibrate models it as a Resonance if needed",
         topic="samples"),
-    Issue("rounding", {
+    _channel("rounding", {
         "": "samples come in steps of {step}, {times} times the white noise of {shown}",
         "coarse": "samples come in steps of {step}, more than three times the noise"},
-        severity="bad", topic="samples", lacks="resolution_fine",
-        reason="steps coarser than the noise", spoils=("channel",)),
+        severity="bad", lacks="resolution_fine", reason="steps coarser than the noise"),
     Issue("rows-copied", {
         "": "{samples:,.0f} rows from {start:.6g} s on are exact copies of the rows from "
         "{first:.6g} s on",
@@ -416,45 +403,41 @@ _DIAGNOSIS = (
         "stretches; the longest is {longest:.6g} s at {start:.6g} s, a copy of {first:.6g} s"},
         "look for files joined with an overlap and for buffers sent twice", severity="warning",
         topic="samples", masks=True),
-    Issue("saturation", "cut off at {ends}: {samples:,.0f} samples ({share:.2g%}) at the end of "
+    _channel("saturation", "cut off at {ends}: {samples:,.0f} samples ({share:.2g%}) at the end of "
         "the range", "use a wider range; if they are few, set these samples to NaN",
-        severity="warning", topic="samples", lacks="within_range",
-        reason="samples cut off at range", spoils=("channel",), user_only=True),
+        lacks="within_range", reason="samples cut off at range", user_only=True),
     Issue("size", "varies by {spread:.1g} {unit}, which is not sensor noise", "check the unit",
         severity="bad"),
     Issue("still-stretches", "in motion or vibrating for part of its {duration:.4g} s; at rest "
         "from {listed} |{timeline}|: these {total:.4g} s are used; the longest stretch, "
         "{longest:.4g} s, limits the averaging time", "for slower errors, record longer at rest",
         severity="warning"),
-    Issue("stuck", {
+    _channel("stuck", {
         "": "stuck at {shown} for {longest:,.0f} samples from {time:.6g} s on (rounding explains "
         "{chance:,})",
         "often": "stuck {count:,.0f} times, the longest at {shown} for {longest:,.0f} samples from "
         "{time:.6g} s on (rounding explains {chance:,})",
         "log": "constant for {length:.4g} s from {start:.10g} s on: the sensor is stuck"},
-        "set these samples to NaN before the fit", severity="warning", topic="samples",
-        lacks="samples_change", reason="stuck values", spoils=("channel",), user_only=True),
-    Issue("temperature", "follows {name} by {per} (correlation {correlation:.2g})",
-        "compensate for it first; otherwise slow noise is too large", severity="warning",
+        "set these samples to NaN before the fit", lacks="samples_change", reason="stuck values",
         user_only=True),
+    Issue("temperature", "follows {name} by {per} (correlation {correlation:.2g})", "compensate "
+        "for it first; otherwise slow noise is too large", severity="warning", user_only=True),
     Issue("tilt", "tilted by {degrees:.2g} deg at {time:.4g} s{others}: gravity moves between the "
         "axes", severity="warning", lacks="attitude_kept", reason="the sensor tilted",
         spoils=("accel",)),
-    Issue("value-repeated", {
+    _channel("value-repeated", {
         "": "{shown} occurs in {samples:,.0f} samples ({share:.2g%}), {times} times as often as "
         "neighbouring values",
         "cut": "zero occurs twice as often as neighbouring values explain ({share:.2g%}): samples "
         "were truncated, not rounded"}, "if it marks a missing answer or a dead band, set these "
-        "samples to NaN", severity="warning", topic="samples", lacks="samples_measured",
-        reason="one value too frequent", spoils=("channel",)),
-    Issue("variance", {
+        "samples to NaN", lacks="samples_measured", reason="one value too frequent"),
+    _channel("variance", {
         "": "{before}the noise is not steady: {low} in the quietest tenth of its parts of "
         "{part:.3g} s, {high} in the loudest; its mean is {excess:.2g%} above the quietest quarter",
         "half": "the noise is {growth:.2g%} {word} in the second half than in the first",
         "tenth": "the noise is {growth:.2g%} larger than usual in the tenth of the record that "
         "begins at {start:.4g} s"}, "use a recording, or a part of one, without the vibration",
-        severity="bad", topic="samples", lacks="noise_steady", reason="the noise comes and goes",
-        spoils=("channel",), user_only=True),
+        severity="bad", lacks="noise_steady", reason="the noise comes and goes", user_only=True),
     Issue("vibration", "vibration for {total:.4g} s, from {listed}: samples scatter up to {times} "
         "times as much as at rest", "use the stretches at rest (gmwm.find_still)",
         severity="warning"),
@@ -484,8 +467,8 @@ _CALIBRATION = (
     Issue("mostly-missing", "{missing:,} of {n:,} samples missing, more than half{why}",
         severity="bad"),
     Issue("not-estimable", "{text}", severity="bad"),
-    Issue("slow-period", "a period of {when} with an amplitude of {height}{also}",
-        "find the cause, such as the temperature{back}", severity="bad", topic="departure",
+    Issue("slow-period", "a period of {when} with an amplitude of {height}{also}", "find the "
+        "cause, such as the temperature{back}", severity="bad", topic="departure",
         lacks="stationary", reason="a slow period"),
     Issue("step", "a step of {height} at {when}{also}", "calibrate only the part before or after "
         "the step{back}", severity="bad", topic="departure", lacks="stationary",
@@ -604,7 +587,8 @@ _FILTER_NUMBERS = (
     _filter("turn-on-left-out", "the start bias leaves out the turn-on bias, which a recording at "
         "rest cannot show", "add its variance"),
     _filter("uncertainty-not-covered", {
-        "": "parameter uncertainty is not included", "why": "{reason}"}),
+        "": "parameter uncertainty is not included",
+        "why": "{reason}"}),
     _filter("upper-limit", "no such term was found: {letters} is the 95 % upper limit"),
 )  # fmt: skip
 
@@ -640,8 +624,8 @@ _INS = (
         "": "{source}: {degrees:.2f} deg, 1 sigma {sd_deg:.2g} deg",
         "wrong": "the heading that the filter started with is wrong by {by:.1f} deg (standard "
         "error {error_deg:.1g} deg): the IMU is mounted rotated, or drives backwards"}),
-    _navigation("judged-on-loiter", "tested on the loiter of a fixed-wing aircraft",
-        "give your own motion, trajectory= or scenario="),
+    _navigation("judged-on-loiter", "tested on the loiter of a fixed-wing aircraft", "give your "
+        "own motion, trajectory= or scenario="),
     _navigation("levelled", "levelled on {length:.3g} s {how}, from {start:.6g} s on{bias}"),
     _navigation("lever-arm", "the antenna is off the lever arm by {parts}, standard errors in "
         "brackets", severity="bad"),
@@ -675,8 +659,8 @@ _INS = (
     _navigation("time-offset", "the fixes are stamped {size:.3g} s too {late} (standard error "
         "{error:.1g} s){scale}", "{change} their times", severity="bad"),
     _navigation("time-scales", "both have dates, the fixes in {scale}: if the IMU's are in UTC, "
-        "GPS time is ahead of them by the leap seconds, {seconds:g} s since 2017",
-        "shift the fixes by as much", severity="warning"),
+        "GPS time is ahead of them by the leap seconds, {seconds:g} s since 2017", "shift the "
+        "fixes by as much", severity="warning"),
     _navigation("too-large", {
         "": "The filter's model does not fit: innovations are {sizes} as expected; the sensors are "
         "worse than their models, or the fixes worse than their standard deviations.",
@@ -705,8 +689,8 @@ _POPULATION = (
     _population("not-noise", "{bad}", "not compared: the curve is not noise alone"),
     _population("rates-differ", {
         "": "at {rate:.6g} Hz, {others} at {usual:.6g} Hz",
-        "fleet": "{have} another sampling rate than {rate:g} Hz: {names}"},
-        "not compared level by level"),
+        "fleet": "{have} another sampling rate than {rate:g} Hz: {names}"}, "not compared level by "
+        "level"),
     _population("same-recording", {
         "": "the same recording as {other}",
         "fleet": "the same recording: {names}"}, "left out"),
@@ -718,8 +702,9 @@ _STUDY = (
         "its lowest point gives a Gauss-Markov process"),
 )  # fmt: skip
 
-CATALOGUE: Mapping[str, Issue] = _catalogue(
-    _READERS, _VARIANCE, _DIAGNOSIS, _CALIBRATION, _ESTIMATE, _SELECTION, _FILTER_NUMBERS, _INS,
-    _POPULATION, _STUDY,
-)  # fmt: skip
+_ROOMS = (
+    *(_READERS, _VARIANCE, _DIAGNOSIS, _CALIBRATION, _ESTIMATE, _SELECTION, _FILTER_NUMBERS),
+    *(_INS, _POPULATION, _STUDY),
+)
+CATALOGUE: Mapping[str, Issue] = {issue.code: issue for room in _ROOMS for issue in room}
 """Code -> issue."""

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
-from gmwm.study.runs import run_study
-from gmwm.study.studies import FIVE, TABLE_2, TABLE_3, TABLE_4
+from gmwm.study.studies import FIVE, TABLE_2, TABLE_3, TABLE_4, run_study
 from gmwm.study.summary import summarise
 
 BOUNDS = {

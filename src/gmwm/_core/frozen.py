@@ -1,11 +1,13 @@
-"""What results hold does not change: arrays and dictionaries that can be read only."""
+"""What results hold does not change: arrays and dictionaries that can be read only, by name."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any, NoReturn, TypeVar
+from collections.abc import Iterator, Mapping
+from typing import Any, ClassVar, NoReturn, TypeVar
 
 import numpy as np
+
+from gmwm.errors import MissingNameError
 
 K = TypeVar("K")
 V = TypeVar("V")
@@ -33,6 +35,28 @@ def frozen(value: Any) -> Any:
     if isinstance(value, Mapping) and not isinstance(value, FrozenDict):
         return FrozenDict(value)
     return value
+
+
+class ByName(Mapping[str, V]):
+    """A result that is a mapping, that of its field ``_held``.
+
+    _unknown: Says that it lacks a ``{name}``, and which are ``{known}``.
+    """
+
+    _held: ClassVar[str]
+    _unknown: ClassVar[str]
+
+    def __getitem__(self, name: str) -> V:
+        held: Mapping[str, V] = getattr(self, self._held)
+        if name not in held:
+            raise MissingNameError(self._unknown.format(name=name, known=", ".join(held)))
+        return held[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(getattr(self, self._held))
+
+    def __len__(self) -> int:
+        return len(getattr(self, self._held))
 
 
 def freeze(instance: Any, *names: str) -> None:

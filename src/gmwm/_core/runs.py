@@ -115,7 +115,11 @@ class _Store:
         """Take the runs of a file, and write after it."""
         self._next = int(part.stem.rpartition("-")[2]) + 1
         try:
-            study, runs, values = _content(part)
+            with part.open("rb") as file, np.load(file) as content:
+                values = dict(content)
+            study, runs = dict(json.loads(str(values.pop("study")))), values.pop("run")
+            if any(each.shape[:1] != runs.shape for each in (runs.ravel(), *values.values())):
+                raise ValueError("arrays of other shapes than those of runs")
         except Exception as error:  # numpy, zipfile and zlib raise a dozen types
             which = checks.line(str(error))
             _log.warning("%s is damaged (%s): its runs are done again", part, which)
@@ -126,19 +130,8 @@ class _Store:
                 f"{part} belongs to another study (other {', '.join(names)}): give another folder",
                 "other-runs",
             )
-        for i, run in enumerate(runs):
-            self.runs[run] = {name: of_runs[i] for name, of_runs in values.items()}
-
-
-def _content(part: Path) -> tuple[dict[str, Any], list[int], Values]:
-    """The study, the numbers of the runs and their values."""
-    with part.open("rb") as file, np.load(file) as content:
-        arrays = dict(content)
-    study, runs = dict(json.loads(str(arrays.pop("study")))), arrays.pop("run")
-    values = {name.removeprefix(_VALUES): each for name, each in arrays.items()}
-    if any(each.shape[:1] != runs.shape for each in (runs.ravel(), *values.values())):
-        raise ValueError("arrays of other shapes than those of runs")
-    return study, runs.tolist(), values
+        for i, run in enumerate(runs.tolist()):
+            self.runs[run] = {k.removeprefix(_VALUES): each[i] for k, each in values.items()}
 
 
 def _stacked(rows: Sequence[Mapping[str, Any]]) -> Values:

@@ -2,11 +2,16 @@
 
 from gmwm.calibration.calibrate import AMBIGUITY as AMBIGUITY, calibrate as calibrate
 from gmwm.calibration.calibration import Calibration as Calibration, load as load
-from gmwm.calibration.channel import LONGEST_PART as LONGEST_PART
+from gmwm.calibration.channel import (
+    LONGEST_PART as LONGEST_PART,
+    Stopwatch as Stopwatch,
+    stage as stage,
+)
 from gmwm.calibration.departures import (
     DEPARTURES as DEPARTURES,
     Departure as Departure,
     departures as departures,
+    without_departures as without_departures,
 )
 from gmwm.calibration.numbers import (
     PLATEAU as PLATEAU,
@@ -16,6 +21,4 @@ from gmwm.calibration.numbers import (
     fast_density as fast_density,
     upper_limit as upper_limit,
 )
-from gmwm.calibration.removal import without_departures as without_departures
 from gmwm.calibration.screening import SCREENING as SCREENING
-from gmwm.calibration.stages import Stopwatch as Stopwatch, stage as stage

@@ -21,7 +21,10 @@ from gmwm.calibration.channel import (
     ChannelTask,
     GivenModels,
     advise_cut,
+    current,
     model_of,
+    stage,
+    unresolved_notice,
     with_validity,
 )
 from gmwm.calibration.screening import (
@@ -31,8 +34,6 @@ from gmwm.calibration.screening import (
     stretches_at_rest,
     with_outcomes,
 )
-from gmwm.calibration.stages import current, stage
-from gmwm.calibration.unresolved import unresolved_notice
 from gmwm.diagnosis import first_in_common, thinned
 from gmwm.errors import InputError
 from gmwm.issues import Notice, notice
@@ -191,10 +192,8 @@ def _tasks(
     tasks = []
     for name, parts in alive.items():
         extra = next((e.extra[name] for e in treated if e.extra.get(name)), ())
-        task = ChannelTask(
-            name, parts, sources[name], models[name], extra, name in robust, removals
-        )
-        tasks.append(task)
+        about = (sources[name], models[name], extra, name in robust, removals)
+        tasks.append(ChannelTask(name, parts, *about))
     return tasks, dead
 
 

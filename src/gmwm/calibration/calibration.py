@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -13,7 +13,7 @@ from annotated_types import Ge
 
 from gmwm._core import checks
 from gmwm._core.documents import Document, Rate, Samples, Text, load_document
-from gmwm._core.frozen import freeze
+from gmwm._core.frozen import ByName, freeze
 from gmwm._core.pages import make
 from gmwm._core.tables import frame
 from gmwm._core.text import wrapped
@@ -34,7 +34,7 @@ Index = Annotated[int, Ge(0)]
 
 
 @dataclass(frozen=True, repr=False)
-class Calibration(Mapping[str, Fit], Document):
+class Calibration(ByName[Fit], Document):
     """Error models of the channels of a recording: a mapping of their names to `Fit`.
 
     Attributes
@@ -67,6 +67,9 @@ class Calibration(Mapping[str, Fit], Document):
     LATER: ClassVar[frozenset[str]] = frozenset({"rivals", "left_out"})
     SCHEMA_VERSION: ClassVar[int] = 2
 
+    _held = "fits"
+    _unknown = "the calibration has no model of channel {name!r}: it has {known}"
+
     fits: Mapping[Text, Fit]
     skipped: Mapping[Text, Notice]
     source: Text
@@ -80,18 +83,10 @@ class Calibration(Mapping[str, Fit], Document):
         freeze(self, "fits", "skipped", "rivals", "left_out")
 
     def __getitem__(self, name: str) -> Fit:
-        if name in self.fits:
-            return self.fits[name]
-        why = f"it has {', '.join(self.fits)}"
-        if name in self.skipped:
-            why = self.skipped[name].text
-        raise MissingNameError(f"the calibration has no model of channel {name!r}: {why}")
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self.fits)
-
-    def __len__(self) -> int:
-        return len(self.fits)
+        if name in self.skipped and name not in self.fits:
+            text = f"the calibration has no model of channel {name!r}: {self.skipped[name].text}"
+            raise MissingNameError(text)
+        return super().__getitem__(name)
 
     @property
     def duration(self) -> float:

@@ -1,22 +1,80 @@
-"""The model of one channel, selected or fitted, and what makes it invalid."""
+"""The model of one channel, selected or fitted, what it leaves open and what makes it invalid."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import dataclass, field, replace
 
-from gmwm.calibration.departures import Departure, departure_notices, departures
-from gmwm.calibration.removal import variance_without
-from gmwm.calibration.stages import Stopwatch, stage
+import numpy as np
+
+from gmwm._core.text import brief
+from gmwm._core.units import customary_unit
+from gmwm.calibration import tuning
+from gmwm.calibration.departures import Departure, departure_notices, departures, variance_without
+from gmwm.calibration.numbers import upper_limit
 from gmwm.calibration.steadiness import steadiness_notice
-from gmwm.calibration.unresolved import with_largest_walk
 from gmwm.errors import InputError
 from gmwm.estimate import Fit, estimate
 from gmwm.issues import Notice, failure, notice
-from gmwm.process import Model, Process, as_model
+from gmwm.process import Model, Process, RandomWalk, as_model
 from gmwm.readers import Channel
 from gmwm.selection import Selection, select
 from gmwm.variance import WaveletVariance
+
+
+@dataclass(frozen=True, eq=False)
+class Stopwatch:
+    """Time by stage, of all processes together; a stage costs nothing where no watch runs::
+
+        with Stopwatch().running() as watch:
+            gmwm.calibrate(recording)
+        print(watch.worked)
+
+    elapsed: Stage -> s by the clock on the wall; stages of several processes run at one time.
+    worked: Stage -> s of the processor.
+    """
+
+    elapsed: dict[str, float] = field(default_factory=dict)
+    worked: dict[str, float] = field(default_factory=dict)
+
+    @contextmanager
+    def running(self) -> Iterator[Stopwatch]:
+        """Let `stage` of this thread count here."""
+        before = _watch.set(self)
+        try:
+            yield self
+        finally:
+            _watch.reset(before)
+
+    def add(self, name: str, elapsed: float, worked: float) -> None:
+        self.elapsed[name] = self.elapsed.get(name, 0.0) + elapsed
+        self.worked[name] = self.worked.get(name, 0.0) + worked
+
+
+_watch: ContextVar[Stopwatch | None] = ContextVar("watch", default=None)
+
+
+def current() -> Stopwatch | None:
+    """The watch that runs in this thread, for threads that it starts."""
+    return _watch.get()
+
+
+@contextmanager
+def stage(name: str) -> Iterator[None]:
+    """Count the time of a block for the watch that runs, if one does."""
+    watch = _watch.get()
+    if watch is None:
+        yield
+        return
+    start, worked = time.perf_counter(), time.thread_time()
+    try:
+        yield
+    finally:
+        watch.add(name, time.perf_counter() - start, time.thread_time() - worked)
+
 
 LONGEST_PART = "longest-part"
 """Code of the advice for a recording with several departures from noise."""
@@ -189,3 +247,44 @@ def advise_cut(
         )
         marked[name] = replace(each, fit=replace(each.fit, notices=notices))
     return marked, [advice]
+
+
+UNRESOLVED = "unresolved-walk"
+"""Code of the notice that a walk may be there that the model lacks."""
+
+
+def with_largest_walk(fitted: Fit) -> Model | None:
+    """The model with the random walk that is its upper bound (95 %), fitted beside it.
+
+    None where the model has a walk or a ramp, or the walk would change little at `tuning.OPEN_AT`.
+    """
+    if any(term.is_drift for term in fitted.model.terms):
+        return None
+    try:
+        if fitted.params.get("K", 0.0) > 0.0 and "K" not in fitted.upper_bounds:
+            return None
+        walk = upper_limit(fitted, "K")
+        noise = Model(tuple(t for t in fitted.model.terms if not isinstance(t, RandomWalk)))
+        free = [key for key in (*fitted.keys, *fitted.upper_bounds) if key in noise.params]
+        largest = estimate(
+            noise.with_params(dict.fromkeys(free)) + RandomWalk(walk), fitted.wv
+        ).model
+    except InputError:  # of a record so short that nothing bounds it
+        return None
+    return largest if _growth(fitted, largest)[1] > tuning.OPEN else None
+
+
+def unresolved_notice(name: str, fitted: Fit, largest: Model) -> Notice:
+    """Say how large the walk and its effect may be."""
+    walk, (tau, growth) = largest.params["K"] or 0.0, _growth(fitted, largest)
+    unit, per_si = customary_unit("u/s/sqrt(Hz)", fitted.wv.quantity, fitted.wv.unit)
+    values = {"K": walk, "tau": tau, "growth": growth}
+    shown = f"{walk * per_si:.2g} {unit}"
+    return notice(UNRESOLVED, name, values, shown=shown, times=brief(growth))
+
+
+def _growth(fitted: Fit, largest: Model) -> tuple[float, float]:
+    """The time that is looked at, s, and the ratio of the deviations of two models there."""
+    tau, dt = max(tuning.OPEN_AT, fitted.wv.dt), fitted.wv.dt
+    there, least = (float(m.haar_variance(np.array([tau]), dt)[0]) for m in (largest, fitted.model))
+    return tau, float(np.sqrt(there / least)) if least > 0.0 else float("inf")

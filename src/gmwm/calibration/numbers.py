@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
+from gmwm._core.frozen import ByName
 from gmwm._core.tables import frame, html_table, plain_table
 from gmwm._core.text import Printed, brief, with_error
 from gmwm._core.typing import FloatArray
 from gmwm._core.units import shown_unit
 from gmwm.calibration import tuning
-from gmwm.errors import InputError, MissingNameError
+from gmwm.errors import InputError
 from gmwm.estimate import Estimate, Fit, estimate
 from gmwm.estimate.result import confidence_interval
 from gmwm.plotting import sensor_lines
@@ -97,24 +98,15 @@ class AxisNumbers:
         return with_error(shown.value, shown.lower, shown.upper)
 
 
-class SensorNumbers(Mapping[str, AxisNumbers], Printed):
+class SensorNumbers(ByName[AxisNumbers], Printed):
     """N, B and K of every axis of a sensor: channel -> `AxisNumbers`; see `Calibration.numbers`."""
 
     COLUMNS: ClassVar = ("channel", "number", *_KEYS, "valid")
+    _held = "_axes"
+    _unknown = "there is no channel {name!r}: there are {known}"
 
     def __init__(self, axes: Mapping[str, AxisNumbers]) -> None:
         self._axes = dict(axes)
-
-    def __getitem__(self, name: str) -> AxisNumbers:
-        if name not in self._axes:
-            raise MissingNameError(f"there is no channel {name!r}: there are {', '.join(self)}")
-        return self._axes[name]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._axes)
-
-    def __len__(self) -> int:
-        return len(self._axes)
 
     def __repr__(self) -> str:
         return f"<SensorNumbers of {', '.join(self)}>"

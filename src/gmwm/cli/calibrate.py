@@ -1,4 +1,4 @@
-"""``gmwm calibrate``: a recording in, an error model for every channel out."""
+"""``gmwm calibrate`` and ``gmwm health``: an error model for every channel, and what spoils it."""
 
 from __future__ import annotations
 
@@ -13,9 +13,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from gmwm._core.files import folder_to_fill, moved_together, replaceable
-from gmwm.cli.console import command_line, progress_bar
-from gmwm.cli.hints import in_options
-from gmwm.cli.options import PATH, folder_to_write, options, read_recording
+from gmwm.cli.console import command_line, in_options, print_result, progress_bar
+from gmwm.cli.options import FILE_TO_WRITE, PATH, folder_to_write, options, read_recording
 from gmwm.errors import InputError
 
 if TYPE_CHECKING:
@@ -300,3 +299,48 @@ def write_files(
     after = after if all(fit.valid for fit in result.values()) else f"1. above, then {after}"
     last = "error model and all notices: -v"
     return [*wrapped(f"wrote {', '.join(written)}", indent=2), *lines, f"next: {after}", last]
+
+
+@click.command()
+@click.argument("file", type=PATH)
+@options(
+    """
+    -o --output FILE  Write all findings with their numbers, in SI units, to this file.
+    --reading
+    --part
+    --memory
+    --json
+    --quiet
+    """,
+    output=FILE_TO_WRITE,
+)
+def health(
+    file: Path,
+    output: Path | None,
+    memory: float | None,
+    as_json: bool,
+    quiet: bool,
+    **reading: Any,
+) -> None:
+    """Find defects of a recording before it is calibrated.
+
+    Motion, gaps, dead and stuck channels, saturation, spikes and shocks, rounding, periodic lines,
+    resonances, drift, changes of the noise, dependence between channels; worst first, with what
+    to do about it. The exit code is 0 whatever is found. FILE is as for gmwm calibrate.
+
+    \b
+    Example:
+      gmwm health static.csv --rate 100 --gyro-unit deg/s --accel-unit g
+    """
+    from gmwm._core.memory import limited
+    from gmwm.cli.console import with_option
+    from gmwm.diagnosis import health as examine
+
+    with limited(memory):
+        recording = read_recording(file, **reading)
+    found = examine(recording)
+    if output is not None:  # first: who pipes the table into head must not lose it
+        found.save(output)
+    span = (reading["start"], reading["start"] + recording.duration)
+    shown = replace(found, notices=tuple(with_option(each, span) for each in found.notices))
+    print_result(found, output, text=str(shown), as_json=as_json, quiet=quiet)

@@ -1,16 +1,18 @@
-"""``gmwm demo``: a simulated recording, calibrated and compared with the truth."""
+"""``gmwm demo`` and ``gmwm reproduce``: what is simulated, and compared with the truth."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from gmwm._core.files import folder_to_fill, moved_together
+from gmwm._core.files import folder_to_fill, moved_into_place, moved_together, write_text
 from gmwm.cli.calibrate import folder_of_results, show, write_files
-from gmwm.cli.console import progress_bar
-from gmwm.cli.options import options
+from gmwm.cli.console import print_result, progress_bar
+from gmwm.cli.options import folder_to_write, options, read_recording
+from gmwm.errors import InputError
 
 if TYPE_CHECKING:
     from gmwm.calibration import Calibration
@@ -117,3 +119,130 @@ def show_truth(fitted: Calibration, truth: dict[str, Model]) -> None:
     text = f"{len(determined)} of {len(shown)} parameters are determined by this record; "
     text += f"{sum(determined)} of these {len(determined)} intervals hold the truth (* does not)."
     click.echo("\n".join(wrapped(text)))
+
+
+_SIMULATED = (
+    *("table2", "table3", "table4", "five-gm", "fig2", "fig3", "fig4"),
+    *("weights2", "weights3", "weights4"),
+)
+_NAVIGATED, _ROTATED = ("fig5", "fig6", "fig7", "fig8", "fig9"), ("fig8", "fig9")
+_TESTS = ("appendix-a", "selection")
+
+Found = tuple[str, Sequence[Path]]
+"""What to print, and the files that were written."""
+
+
+@click.command()
+@click.argument(
+    "experiment", type=click.Choice([*_SIMULATED, *_NAVIGATED, *_TESTS]), metavar="EXPERIMENT"
+)
+@options(
+    """
+    -o --output  Folder for tables, figures and raw estimates.
+    --runs N  Number of simulated series.
+    --seed N  Of the first series.
+    --jobs
+    --method NAME  Only this method, e.g. GMWM; repeat. By default all of the table.
+    --resume
+    --cluster
+    --recording FILE  fig5 to fig9: a real static recording instead of a simulated one; the first
+        is calibrated, the others are navigated with; repeat.
+    --rotate  fig8, fig9: calibrate every recording in turn and navigate with the others; further
+        filters, intervals over recordings.
+    --reading
+    """,
+    output=folder_to_write("gmwm-study"),
+    runs={"type": click.IntRange(min=2)},
+    seed={"type": click.IntRange(min=0), "default": 0},
+    method={"multiple": True},
+    recording={"multiple": True},
+)
+def reproduce(
+    experiment: str, output: Path, recording: Sequence[Path], rotate: bool, **options: Any
+) -> None:
+    """Repeat an experiment of the paper, or our own harder one.
+
+    The paper is Stebler and others (2012).
+
+    table2, table3 and table4 print errors (root mean square, relative, over the Cramer-Rao
+    bound), coverage of the 95 % intervals and the paper's own errors; fig2, fig3 and fig4 draw
+    the same runs as boxplots; five-gm is white noise + five Gauss-Markov processes; appendix-a
+    shows the bias of lines in the Allan plot; weights2, weights3 and weights4 compare weights and
+    wavelets of the method of moments; selection counts how often the true model is chosen. fig5
+    and fig6 show one gyro with lines and with the fitted model; fig7 and fig8 navigate a
+    helicopter, fig9 a car, with GNSS outages, by filters with different calibrations.
+    Times are in seconds, rates in 1/s. Raw estimates are kept in Parquet.
+
+    \b
+    Example:
+      gmwm reproduce table2 --runs 200 -o study
+      gmwm reproduce fig2 --runs 200 -o study --resume
+      gmwm reproduce fig9 --recording a.csv --recording b.csv --rate 100 \\
+        --gyro-unit deg/s --accel-unit g --rotate
+    """
+    alone = {name: options.pop(name) for name in ("method", "cluster", "resume")}
+    known = set(alone) if experiment in _SIMULATED else set()
+    if experiment in _NAVIGATED:
+        known = {"recording"} | ({"rotate"} if experiment in _ROTATED else set())
+        known |= {"resume"} if rotate else set()
+    for name, each in {**alone, "recording": recording, "rotate": rotate}.items():
+        if each and name not in known:
+            raise InputError(f"{experiment} has no option --{name}: leave it out")
+    work = {name: options.pop(name) for name in ("runs", "seed", "jobs")}
+    recordings = [read_recording(file, **options) for file in recording]
+    with folder_to_fill(output) as folder:
+        try:
+            if experiment in _SIMULATED:
+                text, paths = _simulated(experiment, folder, **work, **alone)
+            elif experiment in _NAVIGATED:
+                work |= {"recordings": recordings} | ({"resume": alone["resume"]} if rotate else {})
+                text, paths = _navigated(experiment, folder, rotate, **work)
+            else:
+                text = _tested(experiment, **work)
+                paths = [write_text(folder / f"{experiment}.txt", text)]
+        except KeyboardInterrupt:
+            if "resume" in known:
+                click.echo(f"finished runs are in {folder}: add --resume to continue", err=True)
+            raise
+    print_result(text, *paths)
+
+
+def _simulated(
+    experiment: str, folder: Path, *, runs: int | None, seed: int, method: Any, **work: Any
+) -> Found:
+    """Tables and boxplots of simulated series."""
+    import pyarrow.parquet as pq
+
+    from gmwm.study import FIGURES, STUDIES, boxplots, run_study, summarise
+
+    study = FIGURES.get(experiment) or STUDIES[experiment]
+    with progress_bar(study.name, "runs") as bar:
+        work |= {"methods": method or None, "progress": bar}
+        table = run_study(study, folder, runs=runs or study.runs, seed=seed, **work)
+    raw = folder / f"{experiment}.parquet"
+    with moved_into_place(raw) as temporary:
+        pq.write_table(table, temporary)
+    if experiment in FIGURES:
+        return "", [raw, *boxplots(study, table, folder / experiment)]
+    summary = summarise(study, table, seed)
+    texts = {"txt": str(summary), "md": summary.markdown()}
+    pages = [write_text(folder / f"{study.name}.{end}", text) for end, text in texts.items()]
+    return texts["txt"], [raw, *pages]
+
+
+def _navigated(experiment: str, folder: Path, rotate: bool, **work: Any) -> Found:
+    """Figures 5 to 9; 8 and 9 with every recording calibrated in turn if ``rotate``."""
+    from gmwm.study import reproduce_figure, reproduce_rotation
+
+    run = reproduce_rotation if rotate else reproduce_figure
+    with progress_bar(experiment, "recordings" if rotate else "runs") as bar:
+        return run(experiment, folder, progress=bar, **work)
+
+
+def _tested(experiment: str, *, runs: int | None, seed: int, jobs: int) -> str:
+    """A table of its own kind."""
+    from gmwm.study import choice_study, choice_table, converge, convergence_table
+
+    if experiment == "selection":
+        return choice_table(choice_study(runs or 100, seed, jobs))
+    return convergence_table(converge(runs or 200, seed, jobs))

@@ -15,17 +15,12 @@ import click
 
 from gmwm._core import __version__
 from gmwm._core.memory import OUT_OF_MEMORY
-from gmwm.cli.calibrate import calibrate
-from gmwm.cli.certify import certify
-from gmwm.cli.compare import compare
-from gmwm.cli.demo import demo
-from gmwm.cli.export import export
-from gmwm.cli.fleet import fleet
-from gmwm.cli.health import health
-from gmwm.cli.hints import with_hint
+from gmwm.cli.calibrate import calibrate, health
+from gmwm.cli.compare import compare, fleet
+from gmwm.cli.console import with_hint
+from gmwm.cli.demo import demo, reproduce
 from gmwm.cli.navigate import navigate
-from gmwm.cli.numbers import bound, budget, reduce
-from gmwm.cli.reproduce import reproduce
+from gmwm.cli.numbers import bound, budget, certify, export, reduce
 from gmwm.errors import InputError, printable
 
 _EXIT_INPUT, _EXIT_INTERRUPTED, _EXIT_PIPE = 2, 130, 141  # the latter two as shells have them

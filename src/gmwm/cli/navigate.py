@@ -10,8 +10,7 @@ from typing import Any
 import click
 
 from gmwm._core.files import folder_to_fill, write_text
-from gmwm.cli.console import print_result, progress_bar
-from gmwm.cli.hints import with_option
+from gmwm.cli.console import print_result, progress_bar, with_option
 from gmwm.cli.options import PATH, READING, arguments_of_read, folder_to_write, numbers, options
 from gmwm.errors import InputError
 
@@ -39,10 +38,6 @@ def _key(convert: Callable[[str, Any], Any], **settings: Any) -> dict[str, Any]:
 
 def _absolute(_: str, path: str | Path) -> str:
     return str(Path(path).absolute())  # paths of a study are relative to its file
-
-
-def _lever_arm(flag: str, text: str) -> list[float]:
-    return numbers(flag, text, "X,Y,Z in metres, e.g. 0.5,0,-1.2", 3)
 
 
 def _sd(flag: str, text: str) -> list[float] | float:
@@ -129,7 +124,7 @@ def _sensors(flag: str, texts: Sequence[str]) -> str | dict[str, str]:
     gnss=_key(_absolute, name="gnss_fixes"),
     sensors=_key(_sensors, multiple=True),
     outages=_key(_outages),
-    lever_arm=_key(_lever_arm),
+    lever_arm=_key(lambda flag, arm: numbers(flag, arm, "X,Y,Z in metres, e.g. 0.5,0,-1.2", 3)),
     heading=_key(lambda _, angle: f"{angle!r} deg"),
     attitude=_key(_attitude),
     barometer=_key(_absolute),

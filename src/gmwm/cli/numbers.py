@@ -1,20 +1,23 @@
-"""``gmwm bound``, ``gmwm reduce`` and ``gmwm budget``: what a calibration means for a filter."""
+"""Numbers for filters: ``gmwm bound``, ``reduce``, ``budget``, ``certify`` and ``export``."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
+from gmwm._core.tables import plain_table
 from gmwm._core.text import bullets
-from gmwm.cli.console import print_result, progress_bar
-from gmwm.cli.options import FILE_TO_WRITE, PATH, options, seconds
+from gmwm.cli.console import print_result, progress_bar, with_option
+from gmwm.cli.options import FILE_TO_WRITE, PATH, numbers, options, seconds
+from gmwm.errors import InputError
 
 if TYPE_CHECKING:
+    from gmwm.calibration import Calibration
     from gmwm.filter_numbers import FilterNumbers
-
 
 _number_options = options(
     """
@@ -143,3 +146,172 @@ def _show(
     flags = [f"--{kind}-bias" for kind in bias_sd if found.of(kind) and bias_sd[kind] == 0.0]
     hint = bullets([f"add your turn-on bias (1 sigma) by {' and '.join(flags)}"] if flags else [])
     print_result(found, output, text="\n".join([found.text(units), *hint]), as_json=as_json)
+
+
+_GRAVITY = 9.80665
+_IN_SI = {
+    "scale_error": 0.01,
+    "misalignment": math.radians(1.0),
+    "g_sensitivity": math.radians(1.0) / _GRAVITY,
+    "time_offset": 1e-3,
+    "vibration_rectification": 1e-3 / _GRAVITY,
+    "vibration": _GRAVITY,
+}
+"""SI units in one of each option of errors."""
+
+
+@click.command()
+@click.argument("file", type=PATH)
+@options(
+    """
+    --imu FILE  Numbers in use: a file of Kalibr, OpenVINS, VINS, ORB-SLAM3, FAST-LIO, LIO-SAM or
+        their like, or of gmwm bound and gmwm reduce (.json).
+    -N GYRO,ACCEL  White noise in use, instead of --imu, rad/s/sqrt(Hz) and m/s^2/sqrt(Hz).
+    -K GYRO,ACCEL  Random walk in use, with -N, rad/s^2/sqrt(Hz) and m/s^3/sqrt(Hz).
+    --outages T,T,...  Lengths of outages in seconds.
+    --keyframe S  Interval of keyframes or scans in seconds.
+    --motion NAME  Motion in which the errors below act: handheld, drone, car, fixed-wing, or a
+        recording of your own.
+    --scale-error PERCENT  Scale error of both sensors.
+    --misalignment DEG  Misalignment of the axes.
+    --g-sensitivity DEG/S/G  g-sensitivity of the gyros.
+    --time-offset MS  Delay against what the IMU is fused with.
+    --vibration-rectification MG/G^2  Vibration rectification of the accelerometers, for the
+        vibration.
+    --vibration G  Vibration, root mean square.
+    -o --output JSON  File to save the certificate in.
+    --units
+    --json
+    """,
+    output=FILE_TO_WRITE,
+    N={"name": "white"},
+    K={"name": "walk"},
+    outages={"default": "10,60"},
+    keyframe={"default": 1.0},
+    **{name: {"default": 0.0} for name in _IN_SI},
+)
+def certify(
+    file: Path, output: Path | None, units: str, as_json: bool, motion: str | None, **given: Any
+) -> None:
+    """Predict how consistent a filter is with the numbers in use.
+
+    FILE is a calibration.json, taken for the truth. True errors beside those that the filter
+    predicts, for free inertial growth, an INS/GNSS filter in outages and relative poses between
+    keyframes; then what N and K have to cover, cause by cause.
+
+    \b
+    Examples:
+      gmwm certify out/calibration.json --imu kalibr.yaml
+      gmwm certify out/calibration.json -N 1e-4,2e-3 -K 1e-6,3e-5
+      gmwm certify calibration.json --imu imu.yaml --motion car --scale-error 1
+    """
+    from gmwm.calibration import Calibration
+    from gmwm.filter_numbers import Imperfections, certify as run
+    from gmwm.readers import read
+
+    calibration = Calibration.load(file)
+    imperfections = Imperfections(**{name: given[name] * unit for name, unit in _IN_SI.items()})
+    if imperfections.needs_motion and motion is None:
+        raise InputError("these errors have no effect at rest: add --motion drone")
+    found = run(
+        calibration,
+        _numbers(given["imu"], given["white"], given["walk"], calibration),
+        outages=seconds("--outages", given["outages"]),
+        keyframe=given["keyframe"],
+        imperfections=imperfections,
+        motion=read(motion) if motion is not None and Path(motion).is_file() else motion,
+    )
+    if output is not None:
+        found.save(output)
+    print_result(found, output, text=found.text(units), as_json=as_json)
+
+
+def _numbers(
+    imu: Path | None, white: str | None, walk: str | None, calibration: Calibration
+) -> Any:
+    from gmwm.export import read_numbers
+    from gmwm.filter_numbers import FilterNumbers
+
+    if (imu is None) == (white is None and walk is None):
+        raise InputError("the numbers in use: give --imu FILE, or -N GYRO,ACCEL and -K GYRO,ACCEL")
+    if imu is not None:
+        is_basalt = imu.is_file() and b"gyro_noise_std" in imu.read_bytes()
+        is_saved = imu.suffix.lower() == ".json" and not is_basalt
+        return FilterNumbers.load(imu) if is_saved else read_numbers(imu, calibration.rate)
+    if white is None or walk is None:
+        raise InputError("-N and -K belong together: give both")
+    kinds = sorted({fit.wv.quantity or "" for fit in calibration.values()}, reverse=True)
+    form = f"a positive number for {' and '.join(kinds)}, e.g. {'1e-4,1e-3'[: 5 * len(kinds) - 1]}"
+    columns = []
+    for flag, text in (("-N", white), ("-K", walk)):
+        columns.append(numbers(flag, text, form, len(kinds)))
+        if not min(columns[-1]) > 0.0:
+            raise InputError(f"{flag} {text}: write {form}")
+    return dict(zip(kinds, zip(*columns, strict=True), strict=True))  # gyro before accel
+
+
+@click.command()
+@click.argument("files", metavar="FILE...", nargs=-1, type=PATH)
+@options(
+    """
+    --to NAME  The program; see --list.
+    --horizon S  Longest outage that the numbers cover, in seconds; 60 by default.
+    --form FORM  N+K, N+GM, ...: most programs hold one; state-space holds any.
+    -o --output FILE  File to write instead of printing; .npz for state-space.
+    --explain  Print what the numbers are, axis by axis, in place of the file.
+    --force  Write the numbers although an axis is not valid.
+    --list  List the programs.
+    """,
+    to={"name": "target"},
+    output=FILE_TO_WRITE,
+    list={"name": "listed"},
+)
+def export(
+    files: tuple[Path, ...],
+    target: str | None,
+    horizon: float | None,
+    form: str | None,
+    output: Path | None,
+    explain: bool,
+    force: bool,
+    listed: bool,
+) -> None:
+    """Write numbers for a filter as the program wants them.
+
+    FILE is a calibration.json, or numbers that gmwm bound or gmwm reduce saved. Several files make
+    one IMU, such as gyros and accelerometers of different rates. The numbers of a calibration are
+    the smallest that are not overconfident for its error models; --explain has the details.
+
+    Exit status: 0 if the numbers were written, 1 if an axis is not valid (nothing is written), 2 if
+    the input cannot be used.
+
+    \b
+    Examples:
+      gmwm export out/calibration.json --to openvins -o kalibr_imu_chain.yaml
+      gmwm export gyro.json accel.json --to px4
+      gmwm export --list
+    """
+    from gmwm.export import TARGETS, not_valid, refusal
+
+    if listed:
+        rows = [(t.name, t.title, t.form, t.file_name) for t in TARGETS.values()]
+        click.echo(plain_table(("name", "program", "form", "file"), rows))
+        return
+    if not files or target is None:
+        usage = "gmwm export calibration.json --to NAME (names: gmwm export --list)"
+        raise InputError(f"gmwm export needs files and a program: {usage}")
+    from gmwm import export as written, load
+    from gmwm._core import checks
+
+    checks.choice("--to", target, tuple(TARGETS))
+    given = [load(file) for file in files]
+    if explain:
+        click.echo(TARGETS[target].explain(given, horizon, form), nl=False)
+        return
+    found = not_valid(given)
+    if found and not force:
+        why = refusal({name: with_option(each) for name, each in found.items()})
+        click.echo(f"gmwm: {why}, or add --force", err=True)
+        click.get_current_context().exit(1)
+    text = written(given, target, horizon=horizon, form=form, path=output)
+    click.echo(f"wrote {output}" if output else text, nl=output is not None)

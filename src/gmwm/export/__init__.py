@@ -15,8 +15,6 @@ from gmwm.export.imu import (
     Axis as Axis,
     ImuNumbers as ImuNumbers,
     Triad as Triad,
-)
-from gmwm.export.numbers import (
     axis_of as axis_of,
     imu_of as imu_of,
     not_valid as not_valid,

@@ -15,9 +15,19 @@ from gmwm._core.files import writable_file
 from gmwm.calibration import Calibration
 from gmwm.errors import InputError
 from gmwm.export.keys import Keys, Pair, entries
-from gmwm.export.programs.filters import Basalt, Glim, Gtsam, GtsamCpp, KfGins, Ros
+from gmwm.export.programs.filters import (
+    Basalt,
+    Gazebo,
+    Glim,
+    GnssInsSim,
+    Gtsam,
+    GtsamCpp,
+    KfGins,
+    Matlab,
+    PyIns,
+    Ros,
+)
 from gmwm.export.programs.keyed import KEYED
-from gmwm.export.programs.simulators import Gazebo, GnssInsSim, Matlab, PyIns
 from gmwm.export.programs.state_space import StateSpaceFile
 from gmwm.export.target import Target
 from gmwm.filter_numbers import FilterNumbers

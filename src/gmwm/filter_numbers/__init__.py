@@ -29,7 +29,7 @@ from gmwm.filter_numbers.certify import (
 )
 from gmwm.filter_numbers.imperfections import Imperfections as Imperfections, Motion as Motion
 from gmwm.filter_numbers.propagation import Chain as Chain, ChainErrors as ChainErrors
-from gmwm.filter_numbers.reduce import reduce as reduce
+from gmwm.filter_numbers.reduce import reduce as reduce, usable as usable
 from gmwm.filter_numbers.result import (
     FORMS as FORMS,
     AxisFilterNumbers as AxisFilterNumbers,
@@ -37,4 +37,3 @@ from gmwm.filter_numbers.result import (
     Predicted as Predicted,
 )
 from gmwm.filter_numbers.tuning import HORIZON as HORIZON
-from gmwm.filter_numbers.usable import usable as usable

@@ -15,7 +15,7 @@ from gmwm._core.units import SI_UNIT, factor
 from gmwm.errors import InputError
 from gmwm.estimate import Fit
 from gmwm.filter_numbers.axes import AxisModel, One, SensorAxes, Several, given_times
-from gmwm.filter_numbers.integrals import integral_rms
+from gmwm.filter_numbers.propagation import integral_rms
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
@@ -11,11 +11,10 @@ from annotated_types import MaxLen, MinLen
 
 from gmwm._core import checks
 from gmwm._core.documents import Document, NoneIs, NotNegative, Positive, Rate, Text
-from gmwm._core.frozen import freeze
+from gmwm._core.frozen import ByName, freeze
 from gmwm._core.tables import cell, frame, plain_table
 from gmwm._core.text import WIDTH, Printed, bullets, wrapped
 from gmwm._core.units import SI_UNIT, field_units, si_parameter_unit
-from gmwm.errors import MissingNameError
 from gmwm.issues import Notice
 from gmwm.process import Model
 
@@ -188,7 +187,7 @@ class AxisFilterNumbers(Document, InUnits):
 
 
 @dataclass(frozen=True, repr=False)
-class FilterNumbers(Mapping[str, AxisFilterNumbers], Document, InUnits):
+class FilterNumbers(ByName[AxisFilterNumbers], Document, InUnits):
     """The numbers that a small filter should believe of a sensor: channel -> `AxisFilterNumbers`.
 
     Attributes
@@ -212,6 +211,9 @@ class FilterNumbers(Mapping[str, AxisFilterNumbers], Document, InUnits):
         "duration": "duration_s",
     }
 
+    _held = "axes"
+    _unknown = "there are no filter numbers of channel {name!r}: there are {known}"
+
     axes: Annotated[Mapping[Text, AxisFilterNumbers], MinLen(1), MaxLen(10_000)]
     source: Text = ""
     rate: Annotated[Rate, NoneIs(_NAN)] = _NAN
@@ -220,19 +222,6 @@ class FilterNumbers(Mapping[str, AxisFilterNumbers], Document, InUnits):
 
     def __post_init__(self) -> None:
         freeze(self, "axes")
-
-    def __getitem__(self, name: str) -> AxisFilterNumbers:
-        if name not in self.axes:
-            raise MissingNameError(
-                f"there are no filter numbers of channel {name!r}: there are {', '.join(self.axes)}"
-            )
-        return self.axes[name]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self.axes)
-
-    def __len__(self) -> int:
-        return len(self.axes)
 
     def of(self, quantity: str) -> dict[str, AxisFilterNumbers]:
         """The axes of the gyros ("gyro") or accelerometers ("accel")."""

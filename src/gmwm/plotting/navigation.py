@@ -135,7 +135,11 @@ def growth(
                 ax.plot(time, rms[:, row], color=colour, linewidth=width, label=label)
                 ax.plot(time, predicted[:, row], color=colour, linewidth=1.2, linestyle=":")
             _plain(ax)
-            _from_zero(ax, [each[1][:, row] for each in filters.values()])
+            true = [each[1][:, row] for each in filters.values()]
+            most = max((float(np.nanmax(each, initial=0.0)) for each in true), default=0.0)
+            ax.set_ylim(bottom=0.0)
+            if most > 0.0:
+                ax.set_ylim(top=min(ax.get_ylim()[1], 1.1 * _PREDICTED_SHOWN * most))
             if column == 0:
                 ax.set_ylabel(quantity)
         axes[0, column].set_title(title, fontsize="medium")
@@ -165,14 +169,6 @@ def _largest(panels: Mapping[str, tuple[FloatArray, FloatArray, FloatArray]]) ->
     bands = [np.max(3.0 * sd, axis=0, initial=0.0) for _, _, sd in panels.values()]
     top = np.maximum(np.max(peaks, axis=0), np.min(bands, axis=0))
     return np.asarray(1.1 * top, dtype=float)
-
-
-def _from_zero(ax: Axes, true: Sequence[FloatArray]) -> None:
-    """Axis of errors that begins at zero and shows all true ones."""
-    most = max((float(np.nanmax(each, initial=0.0)) for each in true), default=0.0)
-    ax.set_ylim(bottom=0.0)
-    if most > 0.0:
-        ax.set_ylim(top=min(ax.get_ylim()[1], 1.1 * _PREDICTED_SHOWN * most))
 
 
 def _styles(

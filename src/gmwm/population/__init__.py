@@ -7,8 +7,14 @@ from gmwm.population.comparison import (
     SensorComparison as SensorComparison,
 )
 from gmwm.population.curves import Difference as Difference, Equality as Equality
-from gmwm.population.fleet import Fleet as Fleet, fleet as fleet
-from gmwm.population.limits import FAIL as FAIL, NONE as NONE, PASS as PASS, in_words as in_words
+from gmwm.population.fleet import (
+    FAIL as FAIL,
+    NONE as NONE,
+    PASS as PASS,
+    Fleet as Fleet,
+    fleet as fleet,
+    in_words as in_words,
+)
 from gmwm.population.spread import (
     Spread as Spread,
     needed_units as needed_units,
@@ -17,13 +23,14 @@ from gmwm.population.spread import (
     rank_of_limit as rank_of_limit,
     spreads_of as spreads_of,
 )
-from gmwm.population.structure import Choice as Choice, Structure as Structure
 from gmwm.population.task import Item as Item, Task as Task, recordings as recordings
 from gmwm.population.tuning import CONFIDENCE as CONFIDENCE, CONTENT as CONTENT
 from gmwm.population.unit import (
     LETTERS as LETTERS,
     SCHEMA as SCHEMA,
+    Choice as Choice,
     Number as Number,
+    Structure as Structure,
     Unit as Unit,
     rows_of as rows_of,
 )

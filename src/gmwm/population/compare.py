@@ -23,7 +23,7 @@ from gmwm.issues import Notice, notice
 from gmwm.population import tuning
 from gmwm.population.comparison import AxisComparison, SensorComparison
 from gmwm.population.curves import Equality
-from gmwm.population.structure import Choice
+from gmwm.population.unit import Choice
 from gmwm.readers import Recording, is_frame
 
 _LONGEST_LABEL = 28  # characters

@@ -6,7 +6,7 @@ import json
 import os
 import re
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -14,20 +14,18 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from pydantic_core import to_json
 
-from gmwm._core.frozen import freeze
+from gmwm._core.frozen import ByName, freeze
 from gmwm._core.pages import make
 from gmwm._core.tables import frame
 from gmwm._core.text import Printed, brief, bullets, per_cent, wrapped
 from gmwm._core.units import customary_unit
 from gmwm.calibration import Calibration
-from gmwm.errors import MissingNameError
 from gmwm.estimate import Fit
 from gmwm.filter_numbers import AxisFilterNumbers
 from gmwm.issues import Notice, worst_first
 from gmwm.population import tuning
 from gmwm.population.curves import Difference, Equality
-from gmwm.population.structure import Structure
-from gmwm.population.unit import LETTERS
+from gmwm.population.unit import LETTERS, Structure
 
 if TYPE_CHECKING:
     import pandas
@@ -173,7 +171,7 @@ class AxisComparison:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class SensorComparison(Mapping[str, AxisComparison], Printed):
+class SensorComparison(ByName[AxisComparison], Printed):
     """Several recordings or units of a sensor compared: a mapping of channels to `AxisComparison`.
 
     Attributes
@@ -187,6 +185,9 @@ class SensorComparison(Mapping[str, AxisComparison], Printed):
         What was found: channels that are missing or left out, other rates, too few recordings.
     """
 
+    _held = "axes"
+    _unknown = "channel {name!r} was not compared: there are {known}"
+
     calibrations: Mapping[str, Calibration]
     axes: Mapping[str, AxisComparison]
     horizon: float
@@ -194,18 +195,6 @@ class SensorComparison(Mapping[str, AxisComparison], Printed):
 
     def __post_init__(self) -> None:
         freeze(self, "calibrations", "axes")
-
-    def __getitem__(self, name: str) -> AxisComparison:
-        if name not in self.axes:
-            known = ", ".join(self.axes)
-            raise MissingNameError(f"channel {name!r} was not compared: there are {known}")
-        return self.axes[name]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self.axes)
-
-    def __len__(self) -> int:
-        return len(self.axes)
 
     @property
     def labels(self) -> tuple[str, ...]:

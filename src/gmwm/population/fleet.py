@@ -1,10 +1,10 @@
-"""`fleet`: many units of a sensor, their sensor numbers, and which of them stand apart."""
+"""`fleet`: many units of a sensor, which of them stand apart, and which meet limits."""
 
 from __future__ import annotations
 
 import csv
 import os
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from contextlib import closing, nullcontext
 from dataclasses import dataclass
 from functools import cached_property
@@ -16,7 +16,7 @@ import pyarrow.parquet as pq
 
 from gmwm._core import checks
 from gmwm._core.files import moved_together, replaceable
-from gmwm._core.frozen import freeze
+from gmwm._core.frozen import ByName, freeze
 from gmwm._core.jobs import results
 from gmwm._core.pages import make
 from gmwm._core.tables import cell, frame, plain_table
@@ -27,20 +27,79 @@ from gmwm.errors import InputError, MissingNameError, printable
 from gmwm.estimate import Fit
 from gmwm.issues import Notice, notice
 from gmwm.population import tuning
-from gmwm.population.limits import FAIL, NONE, PASS, Grid, Limits, checked, grid_of, in_words
 from gmwm.population.spread import Spread, needed_units, spreads_of
-from gmwm.population.store import Index, Listed, Store, opened_store
-from gmwm.population.structure import Choice, Structure
-from gmwm.population.task import OUTPUTS, Paths, Task, recordings
-from gmwm.population.unit import LETTERS, SCHEMA, Row, Unit, rows_of
+from gmwm.population.task import (
+    OUTPUTS,
+    Index,
+    Listed,
+    Paths,
+    Store,
+    Task,
+    opened_store,
+    recordings,
+)
+from gmwm.population.unit import LETTERS, SCHEMA, Choice, Number, Row, Structure, Unit, rows_of
 from gmwm.process import Model, Process
 
 if TYPE_CHECKING:
     import pandas
 
+PASS, FAIL, OPEN, NONE = "pass", "FAIL", "?", "none"
+"""The 95 % interval is below the limit, above it, or contains it; or no number can be used."""
+
+Limits = Mapping[str, Mapping[str, float]]
+Grid = Mapping[str, Mapping[str, Mapping[str, str]]]
+"""Unit -> channel -> letter -> verdict."""
+
+
+def checked(limits: Any) -> Limits:
+    """Limits in SI by sensor or channel; raises InputError if they are something else."""
+    hint = 'give them in SI as {"gyro": {"N": 6e-5}}'
+    found: dict[str, dict[str, float]] = {}
+    for name, own in limits.items() if isinstance(limits, Mapping) else [("", limits)]:
+        if not (
+            name and isinstance(name, str) and isinstance(own, Mapping) and {*own} <= {*LETTERS}
+        ):
+            raise InputError(f"limits of {checks.shown(name)} = {checks.shown(own)}: {hint}")
+        found[name] = {k: checks.positive(f"limit {k} of {name}", v, hint) for k, v in own.items()}
+    return found
+
+
+def grid_of(limits: Limits, structures: Sequence[Structure], units: Sequence[Unit]) -> Grid:
+    """The verdicts on every unit; a limit of an axis that no unit has is not met."""
+    by_channel = {each.channel: each for each in structures}
+    named = {*by_channel, *(each.quantity for each in structures)}
+    wanted = {k: limits.get(k, limits.get(each.quantity, {})) for k, each in by_channel.items()}
+    wanted |= {name: own for name, own in limits.items() if name not in named}
+    grid: dict[str, dict[str, dict[str, str]]] = {unit.name: {} for unit in units}
+    for name, row in grid.items():
+        for channel, own in wanted.items():
+            structure = by_channel.get(channel)
+            known = structure.usable.get(name, {}) if structure is not None else {}
+            if own:
+                row[channel] = {key: _verdict(known.get(key), end) for key, end in own.items()}
+    return grid
+
+
+def _verdict(number: Number | None, limit: float) -> str:
+    if number is None:
+        return NONE
+    if number.upper <= limit:
+        return PASS
+    return FAIL if number.lower > limit else OPEN
+
+
+def in_words(verdicts: Mapping[str, str]) -> str:
+    """The verdicts on an axis in a word: ``pass``, ``FAIL NK``, ``? B`` or ``none``."""
+    for state in (NONE, FAIL, OPEN):
+        letters = "".join(letter for letter, each in verdicts.items() if each == state)
+        if letters:
+            return state if state == NONE else f"{state} {letters}"
+    return PASS
+
 
 @dataclass(frozen=True, repr=False)
-class Fleet(Mapping[str, Calibration | Notice]):
+class Fleet(ByName[Calibration | Notice]):
     """Units of a sensor: a mapping of paths to a `Calibration`, or to a `Notice` of why not.
 
     Attributes
@@ -57,6 +116,8 @@ class Fleet(Mapping[str, Calibration | Notice]):
         Which units have no calibration, and what makes units unlike each other.
     """
 
+    _held = "units"
+
     units: Mapping[str, Unit]
     structures: tuple[Structure, ...]
     options: Mapping[str, Any]
@@ -70,12 +131,6 @@ class Fleet(Mapping[str, Calibration | Notice]):
         if path not in self.units:
             raise MissingNameError(f"the fleet has no recording {checks.shown(path)}")
         return self.units[path].result
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self.units)
-
-    def __len__(self) -> int:
-        return len(self.units)
 
     @property
     def done(self) -> dict[str, Calibration]:

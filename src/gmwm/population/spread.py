@@ -14,9 +14,8 @@ from gmwm._core.frozen import freeze
 from gmwm._core.typing import BoolArray, FloatArray
 from gmwm._core.units import customary_unit
 from gmwm.population import tuning
-from gmwm.population.structure import Structure
 from gmwm.population.tuning import CONFIDENCE, CONTENT
-from gmwm.population.unit import LETTERS
+from gmwm.population.unit import LETTERS, Structure
 
 _SD_PER_MAD = 1.0 / norm.ppf(0.75)
 _ONE_SIDED = 1.645  # standard errors from an estimate of zero to its 95 % upper limit

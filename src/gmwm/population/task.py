@@ -1,4 +1,4 @@
-"""Which recordings a fleet has, and how each is calibrated, on this machine or another."""
+"""Which recordings a fleet has, how each is calibrated, here or elsewhere, and where it is kept."""
 
 from __future__ import annotations
 
@@ -8,21 +8,25 @@ import json
 import os
 import re
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from inspect import signature
 from itertools import count
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Annotated, Any, ClassVar, NamedTuple
+
+from pydantic import StringConstraints
 
 from gmwm._core import checks
-from gmwm._core.files import opened
+from gmwm._core.documents import Document, Positive, Text, read_json
+from gmwm._core.files import folder_to_fill, one_writer, opened, written
 from gmwm._core.jobs import ENDED
 from gmwm._core.memory import OUT_OF_MEMORY
-from gmwm.calibration import SCREENING, calibrate
+from gmwm.calibration import SCREENING, Calibration, calibrate
 from gmwm.errors import InputError, printable
-from gmwm.issues import failure
-from gmwm.population.unit import Unit
+from gmwm.issues import Notice, failure
+from gmwm.population.unit import Structure, Unit
 from gmwm.process import Model, as_model
 from gmwm.readers import read
 
@@ -232,3 +236,127 @@ def _names(paths: Sequence[str]) -> list[str]:
             names[i] = next(each for each in numbered if each.lower() not in taken)
             taken.add(names[i].lower())
     return names
+
+
+@dataclass(frozen=True)
+class _Origin(Document):
+    """What a fleet adds to the calibration of a unit."""
+
+    path: Text
+    sha256: Annotated[str, StringConstraints(pattern="^[0-9a-f]{64}$")]
+    options: Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Listed:
+    """A unit in the index: its calibration is in a file of this name, or why there is none."""
+
+    path: Text
+    name: Annotated[str, StringConstraints(pattern=r"^[^/\\]+$", max_length=1000)]
+    failed: Notice | None
+
+
+@dataclass(frozen=True)
+class Index(Document):
+    """Content of fleet.json: the units, and why some have no calibration."""
+
+    SCHEMA: ClassVar[str] = "gmwm.fleet-index"
+
+    options: Mapping[str, Any]
+    limits: Mapping[Text, Mapping[Text, Positive]]
+    structures: tuple[Structure, ...]
+    units: tuple[Listed, ...]
+    notices: tuple[Notice, ...]
+
+
+@dataclass(frozen=True)
+class Store:
+    """Calibrations of a fleet on disk; for the options see `Task.options`."""
+
+    folder: Path
+    options: Mapping[str, Any]
+
+    @property
+    def calibrations(self) -> list[Path]:
+        """Files that are there."""
+        return sorted((self.folder / "calibrations").glob("*.json"))
+
+    def path(self, name: str) -> Path:
+        return self.folder / "calibrations" / f"{name}.json"
+
+    def kept(self, item: Item) -> Unit | None:
+        """The unit of an earlier run, unless the recording has changed since.
+
+        Raises InputError if the file is damaged, or of another fleet (code "other-runs").
+        """
+        path = self.path(item.name)
+        if not path.exists():
+            return None
+        origin, unit = self._load(item)
+        earlier = origin.options
+        names = sorted({*earlier, *self.options})
+        other = [name for name in names if earlier.get(name) != self.options.get(name)]
+        if other:
+            raise InputError(
+                f"{path} belongs to another fleet (other {', '.join(other)}): give another folder",
+                "other-runs",
+            )
+        try:
+            digest = digest_of(item.path)
+        except InputError:
+            return None  # reading it reports why
+        if digest == unit.digest:
+            return unit
+        if origin.path != printable(item.path):
+            raise InputError(
+                f"{path} is of {origin.path}, not of {item.path}: give another folder", "other-runs"
+            )
+        return None
+
+    def load(self, listed: Listed) -> Unit:
+        """A unit of the index; raises InputError if its file is damaged or missing."""
+        if listed.failed is not None:
+            return Unit(listed.path, listed.name, listed.failed)
+        return self._load(Item(listed.path, listed.name))[1]
+
+    def _load(self, item: Item) -> tuple[_Origin, Unit]:
+        """The stored origin of a unit, and the unit."""
+        path = self.path(item.name)
+        content = read_json(path)
+        try:
+            if not isinstance(content, dict) or "fleet" not in content:
+                raise InputError("was not written by a fleet")
+            origin = _Origin.from_content(content["fleet"])
+            calibration = Calibration.from_dict(content)
+        except (InputError, TypeError) as error:
+            hint = "move it away, or give another folder"
+            raise InputError(f"{path}: {error}: {hint}") from None
+        return origin, Unit(item.path, item.name, calibration, origin.sha256)
+
+    def save(self, unit: Unit) -> None:
+        """Write the calibration of a unit; if it has none, remove that of an earlier run."""
+        if not isinstance(unit.result, Calibration):
+            self.path(unit.name).unlink(missing_ok=True)
+            return
+        origin = _Origin(printable(unit.path), unit.digest, self.options).content()
+        with written(self.path(unit.name)) as stream:
+            json.dump(unit.result.to_dict() | {"fleet": origin}, stream, indent=1, allow_nan=False)
+            stream.write("\n")
+
+
+@contextmanager
+def opened_store(folder: Path, options: Mapping[str, Any], resume: bool) -> Iterator[Store]:
+    """The folder, for one fleet at a time.
+
+    Raises InputError if it cannot be written, is in use (code "runs-in-use"), or holds calibrations
+        that are not to be resumed (code "earlier-runs").
+    """
+    store = Store(folder, options)
+    with folder_to_fill(folder), one_writer(folder), folder_to_fill(folder / "calibrations"):
+        if not resume and store.calibrations:
+            raise InputError(
+                f"{folder} holds calibrations of an earlier fleet: resume it, or give another "
+                "folder",
+                "earlier-runs",
+            )
+        yield store

@@ -1,24 +1,29 @@
-"""A unit of a fleet, its sensor numbers, and its rows in the table of the fleet."""
+"""The units of a lot, one model structure for an axis of all, and the sensor numbers from it."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from math import isfinite
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
 
-from gmwm._core.documents import NotNegative, OrInfinity
+from gmwm._core.documents import NotNegative, OrInfinity, Text
+from gmwm._core.frozen import freeze
+from gmwm._core.jobs import one_blas_thread
 from gmwm._core.units import si_parameter_unit
 from gmwm.calibration import Calibration, axis_numbers
-from gmwm.errors import printable
-from gmwm.estimate import Fit
+from gmwm.errors import InputError, printable
+from gmwm.estimate import Fit, estimate
+from gmwm.estimate.problem import chi_square
 from gmwm.issues import Notice
-
-if TYPE_CHECKING:
-    from gmwm.population.structure import Structure
+from gmwm.population import tuning
+from gmwm.process import GaussMarkov, Model, Process, RandomWalk, WhiteNoise
+from gmwm.selection import penalty
 
 LETTERS = {"N": "u/sqrt(Hz)", "B": "u", "K": "u/s/sqrt(Hz)"}
 """Sensor numbers (see `gmwm.Calibration.numbers`) and their units."""
@@ -134,3 +139,171 @@ def _of_channel(unit: Unit, name: str, fit: Fit, structure: Structure) -> Iterat
         known = {each: getattr(number, each) for each in ("value", "stderr", "lower", "upper")}
         known |= {"kind": "bound" if number.value is None else "estimated", "number": key}
         yield {**own, **known, "unit": si_parameter_unit(LETTERS[key], fit.wv.quantity)}
+
+
+_SIMPLE = (
+    Model((WhiteNoise(),)),
+    WhiteNoise() + RandomWalk(),
+    WhiteNoise() + GaussMarkov(),
+    WhiteNoise() + RandomWalk() + GaussMarkov(),
+)
+"""Structures that are tried for every lot."""
+
+_ORDER: dict[type[Process], int] = {WhiteNoise: 0, RandomWalk: 1, GaussMarkov: 2}
+
+_SUPERFLUOUS = {
+    *("amplitude-bound", "confounded", "indistinct-terms", "redundant-term", "search-limit"),
+    "undetermined",
+}
+"""Codes of what a unit may have: a term of the lot can be too small to see in one of its units."""
+
+_MISFITS = {"level-missed", "misfit"}
+
+
+@dataclass(frozen=True)
+class Structure:
+    """The model of an axis of a lot, and N, B and K of its units.
+
+    model: Title of the noise terms that all units are fitted with; empty without a valid unit.
+    counts: Title -> number of units for which these noise terms were selected, commonest first.
+    own: Units that reject the model: their numbers are those of their own.
+    invalid: Units without a valid model; their numbers are not to be used.
+    numbers: Unit -> letter -> `Number`.
+    """
+
+    channel: Text
+    quantity: Text
+    model: Text
+    counts: Mapping[Text, int]
+    own: tuple[Text, ...]
+    invalid: tuple[Text, ...]
+    numbers: Mapping[Text, Mapping[Text, Number]]
+
+    def __post_init__(self) -> None:
+        freeze(self, "counts", "numbers")
+
+    @property
+    def usable(self) -> dict[str, Mapping[str, Number]]:
+        """The numbers of units with a valid model."""
+        return {name: own for name, own in self.numbers.items() if name not in self.invalid}
+
+
+@dataclass(frozen=True)
+class Choice:
+    """The choice of a structure as a function of the channel, which can be sent to workers.
+
+    fits: Channel -> unit -> its own fit.
+    is_given: Whether the models were given, so that there is nothing to choose.
+    """
+
+    fits: Mapping[str, Mapping[str, Fit]]
+    is_given: bool
+
+    @one_blas_thread()
+    def __call__(self, channel: str) -> Structure:
+        """Choose the structure of a channel and fit it to every unit."""
+        fits = self.fits[channel]
+        sound = {name: fit for name, fit in fits.items() if self._is_usable(fit)}
+        titles = {name: _noise(fit.model) for name, fit in sound.items()}
+        counts = Counter(model.title() for model in titles.values())
+        usual = {model.title(): model for model in titles.values()}
+        chosen, common = next(iter(counts), ""), dict(sound)
+        if sound and not self.is_given:
+            likely = [usual[title] for title, _ in counts.most_common(tuning.LIKELY)]
+            tried = {model.title(): model for model in (*likely, *_SIMPLE)}
+            chosen, common = _best({t: _fitted(sound, model) for t, model in tried.items()})
+            # The lot's model may fit where the one selected for the unit alone does not.
+            lost = {k: fit for k, fit in fits.items() if k not in sound and _is_noise(fit)}
+            again = _fitted(lost, tried[chosen]) if lost else {}
+            common |= {name: fit for name, fit in again.items() if self._is_usable(fit)}
+        own = [name for name, fit in sound.items() if self._rejects(common.get(name), fit)]
+        used = {**fits, **common} | {name: sound[name] for name in own}
+        return Structure(
+            channel=channel,
+            quantity=next((fit.wv.quantity or "" for fit in fits.values()), ""),
+            model=chosen,
+            counts=dict(counts.most_common()),
+            own=tuple(own),
+            invalid=tuple(name for name in fits if name not in {*common, *own}),
+            numbers={name: numbers_of(fit) for name, fit in used.items()},
+        )
+
+    def _is_usable(self, fit: Fit) -> bool:
+        """Whether a fit is valid but for small terms, and misfits that are chance in such a lot."""
+        fitting = tuning.REJECTED / sum(map(len, self.fits.values())) <= fit.goodness.largest_p
+        codes = {n.code for n in fit.notices if n.severity == "bad"} - _SUPERFLUOUS
+        return not (codes - _MISFITS if fitting else codes)
+
+    def _rejects(self, common: Fit | None, own: Fit) -> bool:
+        """Whether a unit contradicts the structure of the lot while its own model is valid."""
+        return common is None or not (common is own or self._is_usable(common))
+
+
+def _is_noise(fit: Fit) -> bool:
+    """Whether nothing but the model is wrong with a fit."""
+    return all(n.severity != "bad" or n.issue.topic == "fit" for n in fit.notices)
+
+
+def _is_common(term: Process) -> bool:
+    return term.is_candidate and not term.is_drift
+
+
+def _noise(model: Model) -> Model:
+    """The terms of a model that units have in common, open; N also stands for band-limited noise.
+
+    Lines, resonances, the sensor's bandwidth and drifts belong to the unit or its recording.
+    """
+    terms = [term for term in model.opened().terms if _is_common(term)]
+    if not any(term.is_white for term in terms):
+        terms.insert(0, WhiteNoise())
+    return Model(tuple(sorted(terms, key=lambda term: _ORDER.get(type(term), len(_ORDER)))))
+
+
+def _fitted(fits: Mapping[str, Fit], noise: Model) -> dict[str, Fit]:
+    """A structure fitted to every unit that it can be fitted to, with the unit's own terms."""
+    found = {}
+    for name, fit in fits.items():
+        own = [term for term in fit.model.terms if not _is_common(term)]
+        opened = []
+        for each in own:
+            size = each.linear_parameter  # a drift has none
+            names = [size] if size is not None else each.parameters
+            opened.append(each.with_values(**dict.fromkeys(item.name for item in names)))
+        # Behind the sensor's low-pass there need be no other white noise.
+        is_white = any(term.is_white for term in fit.model.terms)
+        behind = any(term.is_band_limited for term in own) and not is_white
+        terms = (*(term for term in noise.terms if not (behind and term.is_white)), *opened)
+        with suppress(InputError):  # too short for so many parameters
+            found[name] = estimate(Model(terms), fit.wv)
+    return found
+
+
+def _best(tried: Mapping[str, dict[str, Fit]]) -> tuple[str, dict[str, Fit]]:
+    """The structure with the smallest sum of criteria over the units, and its fits."""
+    names = {name for own in tried.values() for name in own}
+    criteria = np.array([_criteria([own.get(name) for own in tried.values()]) for name in names])
+    excess = np.minimum(criteria - criteria.min(axis=1, keepdims=True), tuning.CONTRADICTION)
+    title = list(tried)[int(np.argmin(excess.sum(axis=0)))]
+    return title, tried[title]
+
+
+def _criteria(candidates: Sequence[Fit | None]) -> list[float]:
+    """Hannan and Quinn's criterion of each structure for one unit.
+
+    All with the discrepancy of the one that needs least.
+    """
+    least = min((fit.discrepancy for fit in candidates if fit is not None), default=0.0)
+    found = []
+    for fit in candidates:
+        if fit is None:
+            found.append(1e12)
+            continue
+        at = fit.moments
+        has = (at.implied > 0.0) & (np.diag(at.statistical) > 0.0)
+        implied, block = at.implied[has], np.ix_(has, has)
+        covariance = at.statistical[block] + np.diag((least * implied) ** 2)
+        target = np.maximum(at.target[has], 0.0)
+        free = len({*fit.keys, *fit.upper_bounds})
+        statistic = chi_square(target, implied, covariance, implied)[1]
+        found.append(statistic + penalty(fit.wv.n) * free)
+    return found

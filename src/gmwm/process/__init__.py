@@ -28,9 +28,10 @@ from gmwm.process.spectral import (
     resolved_share as resolved_share,
 )
 from gmwm.process.state_space import StateSpace as StateSpace, block_diagonal as block_diagonal
-from gmwm.process.wavelet_gain import pair_weights as pair_weights, unit_legendre as unit_legendre
 from gmwm.process.wavelets import (
     ComplexArray as ComplexArray,
     Wavelet as Wavelet,
+    pair_weights as pair_weights,
+    unit_legendre as unit_legendre,
     wavelet as wavelet,
 )

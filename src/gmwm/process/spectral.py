@@ -12,7 +12,7 @@ first ``_RESOLVED_LOBES`` of a level, and replaced by their mean 3/8 above, with
 over one octave (an infinitely smooth cut-off makes the error of the replacement fall faster
 than any power of the number of lobes). With that, a spectrum is evaluated once, and the variances
 of all levels are one matrix product. Other wavelets have weights of their own
-(`gmwm.process.wavelet_gain`), for dyadic averaging times.
+(`gmwm.process.wavelets`), for dyadic averaging times.
 """
 
 from __future__ import annotations
@@ -29,8 +29,7 @@ from scipy.special import expit
 
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
-from gmwm.process.wavelet_gain import GainWeights, gain_weights
-from gmwm.process.wavelets import Wavelet, wavelet
+from gmwm.process.wavelets import GainWeights, Wavelet, gain_weights, wavelet
 
 PSD = Callable[[FloatArray, float], FloatArray]
 """``psd(f, dt)``: two-sided density in u^2/Hz at frequencies f in Hz."""

@@ -13,10 +13,39 @@ determines but for an odd polynomial R,
 
 (Daubechies, *Ten Lectures on Wavelets*, 1992, sec. 6.1). R = 0 for "db" and "sym"; for "coif" it
 is found from the filter. The form keeps all digits near f = 0, where |H|^2 falls as f^2r.
+
+Integrals of the gains against smooth spectra are exact at every level. A level's squared gain
+|H_j|^2 has up to 2^(j-1) lobes, which no fixed quadrature resolves at coarse levels. But a spectrum
+S is smooth on the panels of a grid graded by octaves, so that there
+
+    int |H_j|^2 S df = sum_i W_ji S(f_i),    W_ji = int |H_j|^2 l_i df,
+
+with the Lagrange polynomials l_i of a panel's Gauss-Legendre nodes f_i: the lobes go into weights
+that are found once. A panel is [a, a + 2^-s] with a a multiple of 2^-s; as f runs through it,
+u = 2^s f - 2^s a runs through one period, and
+
+    |H_j(f)|^2 = P_s(f) |H_{j-s}(u)|^2,    P_s(f) = prod_{l<s} |G(2^l f)|^2.
+
+P_s is smooth there, and integrals of smooth functions against |H_j(u)|^2 over a period obey
+
+    int |H_j|^2 phi du = int |H_{j-1}|^2 T phi du,
+    T phi(u) = [|G(u/2)|^2 phi(u/2) + |G((u+1)/2)|^2 phi((u+1)/2)] / 2,
+
+where T, the transfer operator of the scaling filter, leads from smooth functions to smooth
+functions (Daubechies, *Ten Lectures on Wavelets*, 1992, ch. 7; Villemoes 1992, *SIAM J. Math.
+Anal.* 23, 1519-1543). On ``_ORDER`` nodes it is a matrix, and each level costs one product with it.
+To keep all digits where the gain is minute, the zeros are taken out in closed form: with r
+vanishing moments and Q = |G|^2 / cos^2r,
+
+    P_s(f) = [sin(pi u) / (2^s sin(pi f))]^2r prod_{l<s} Q(2^l f),
+
+the factor sin^2r(pi u) goes to the measure, and T has 2^-2r Q in the place of |G|^2: all terms are
+positive.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 from math import comb
@@ -168,3 +197,210 @@ def _odd_polynomial(scaling: FloatArray, binomials: FloatArray) -> FloatArray:
     result = np.zeros(degree + 1)
     result[1::2] = np.linalg.lstsq(basis, excess, rcond=None)[0]
     return result
+
+
+_NODES_PER_PANEL = 8
+_PANELS_LOG2 = 5  # panels an octave: 32 hold a resonance of damping 0.01 to 1e-5
+_PANELS_BELOW_LOG2 = 2
+_OCTAVES_BELOW = 26  # below the coarsest pass band
+_ORDER = 64
+
+
+@dataclass(frozen=True, eq=False)
+class GainWeights:
+    """Nodes and weights for the levels 1 to J of a wavelet.
+
+    frequency: (K,), nodes in cycles per sample, rising, within (0, 1/2).
+    weight: (J, K), int_0^{1/2} |H_j|^2 S df = weight[j - 1] @ S(frequency), in cycles per sample.
+    lowest, second: Nodes of the two lowest octaves.
+    """
+
+    frequency: FloatArray
+    weight: FloatArray
+    lowest: slice
+    second: slice
+
+
+@lru_cache(maxsize=8)
+def unit_legendre(order: int) -> tuple[FloatArray, FloatArray]:
+    """Gauss-Legendre nodes and weights on [0, 1]."""
+    x, w = np.polynomial.legendre.leggauss(order)
+    return 0.5 * (x + 1.0), 0.5 * w
+
+
+def lagrange(nodes: FloatArray, at: FloatArray) -> FloatArray:
+    """Lagrange polynomials of ``nodes`` (m,) at points (k,), shape (k, m)."""
+    # The scale 4 is the inverse capacity of [0, 1]: products of many differences stay in range.
+    apart = 4.0 * (nodes[:, None] - nodes[None, :])
+    np.fill_diagonal(apart, 1.0)
+    barycentric = 1.0 / np.prod(apart, axis=1)
+    difference = at[:, None] - nodes[None, :]
+    hit = difference == 0.0
+    difference[hit] = 1.0
+    terms = barycentric / difference
+    result = terms / np.sum(terms, axis=1, keepdims=True)
+    rows = np.any(hit, axis=1)
+    result[rows] = hit[rows]
+    return np.asarray(result)
+
+
+def transfer_matrix(factor: FloatArray, other: FloatArray) -> FloatArray:
+    """T phi at the nodes from phi at the nodes, for factors at u/2 and (u + 1)/2."""
+    u, _ = unit_legendre(_ORDER)
+    low, high = lagrange(u, 0.5 * u), lagrange(u, 0.5 * (u + 1.0))
+    return 0.5 * (factor[:, None] * low + other[:, None] * high)
+
+
+def _composite() -> tuple[FloatArray, FloatArray]:
+    """Nodes and weights on [0, 1] that integrate products of gains and Lagrange polynomials."""
+    u, w = unit_legendre(_ORDER)
+    nodes = (np.arange(8)[:, None] + u) / 8
+    return nodes.ravel(), np.tile(w / 8, 8)
+
+
+@lru_cache(maxsize=8)
+def gain_measures(name: str, count: int) -> FloatArray:
+    """int_0^1 sin^2r(pi u) |H_j(u)|^2 l_n(u) du, j = 1 .. count, shape (count, _ORDER)."""
+    filters = wavelet(name)
+    power = 2 * filters.vanishing_moments
+    u, _ = unit_legendre(_ORDER)
+    step = transfer_matrix(filters.remainder(0.5 * u), filters.remainder(0.5 * (u + 1.0)))
+    step *= 0.5**power
+    fine, weight = _composite()
+    first = weight * np.sin(np.pi * fine) ** power * filters.detail_gain(fine)
+    result = np.empty((count, u.size))
+    result[0] = first @ lagrange(u, fine)
+    for row in range(1, count):
+        result[row] = result[row - 1] @ step
+    result.flags.writeable = False
+    return result
+
+
+def _octaves(levels: int) -> Iterator[tuple[int, FloatArray, FloatArray]]:
+    """Panels of every octave, from the lowest to the top one.
+
+    Their width is 2^-s; s, fine frequencies (P, _ORDER), nodes (P, _NODES_PER_PANEL).
+    """
+    x, _ = unit_legendre(_NODES_PER_PANEL)
+    u, _ = unit_legendre(_ORDER)
+    for octave in range(levels + _OCTAVES_BELOW, -1, -1):
+        split = _PANELS_LOG2 if octave <= levels + 1 else _PANELS_BELOW_LOG2
+        doublings = octave + 2 + split
+        start = 2.0**split + np.arange(2**split)[:, None]
+        yield doublings, 0.5**doublings * (start + u), 0.5**doublings * (start + x)
+
+
+def _rest(levels: int) -> tuple[FloatArray, FloatArray]:
+    """Nodes and weights from zero to the lowest octave."""
+    x, w = unit_legendre(_NODES_PER_PANEL)
+    low = 0.5 ** (levels + _OCTAVES_BELOW + 2)
+    return low * x, low * w
+
+
+def _unresolved_factor(filters: Wavelet, doublings: int, fine: FloatArray) -> FloatArray:
+    """P_s(f) / sin^2r(pi u) at the fine points of an octave, (P, _ORDER)."""
+    power = 2 * filters.vanishing_moments
+    result = (2.0**doublings * np.sin(np.pi * fine)) ** -power
+    for doubling in range(doublings):
+        scaled = np.ldexp(fine, doubling)
+        result *= filters.remainder(scaled - np.rint(scaled))
+    return np.asarray(result)
+
+
+@lru_cache(maxsize=8)
+def gain_weights(name: str, levels: int) -> GainWeights:
+    """Nodes and weights of the levels 1 to ``levels`` of a wavelet, found once."""
+    filters = wavelet(name)
+    u, w = unit_legendre(_ORDER)
+    polynomials = lagrange(unit_legendre(_NODES_PER_PANEL)[0], u)
+    measures = gain_measures(name, levels)
+    low_nodes, low_weights = _rest(levels)
+    # A spectrum may rise to infinity on [0, lowest], but its product with the gain is smooth.
+    frequencies, weights = [low_nodes], [low_weights * filters.gains(levels, low_nodes)]
+    for doublings, fine, nodes in _octaves(levels):
+        width, direct = 0.5**doublings, min(levels, doublings)
+        weight = np.empty((levels, *nodes.shape))
+        weight[:direct] = width * (filters.gains(direct, fine) * w) @ polynomials
+        if levels > direct:
+            factor = _unresolved_factor(filters, doublings, fine)
+            for row in range(direct, levels):
+                weight[row] = width * (factor * measures[row - direct]) @ polynomials
+        frequencies.append(nodes.ravel())
+        weights.append(weight.reshape(levels, -1))
+    frequency, weight = np.concatenate(frequencies), np.concatenate(weights, axis=1)
+    for array in (frequency, weight):
+        array.flags.writeable = False
+    first, second, third = np.cumsum([each.size for each in frequencies[:3]])
+    return GainWeights(frequency, weight, slice(first, second), slice(second, third))
+
+
+@dataclass(frozen=True, eq=False)
+class PairWeights:
+    """Weights for products of the gains of two levels.
+
+    frequency: (K,), as in `GainWeights`.
+    weight: (P, K), int_0^{1/2} |H_j|^2 |H_k|^2 F df = weight[p] @ F(frequency) for the pair p of
+        levels j = first[p] + 1 <= k = second[p] + 1.
+    first, second: (P,).
+    """
+
+    frequency: FloatArray
+    weight: FloatArray
+    first: npt.NDArray[np.intp]
+    second: npt.NDArray[np.intp]
+
+
+def _pair_measures(name: str, count: int) -> FloatArray:
+    """int_0^1 sin^4r(pi u) |H_j|^2 |H_k|^2 l_n du for j <= k <= count, (count, count, _ORDER).
+
+    As the levels drop together, the transfer operator has |G|^4; once the finer level is 1, the
+    rest is that of one level.
+    """
+    filters = wavelet(name)
+    power = 2 * filters.vanishing_moments
+    u, _ = unit_legendre(_ORDER)
+    single = gain_measures(name, count)
+    halves = np.stack([0.5 * u, 0.5 * (u + 1.0)])
+    scaling = filters.remainder(halves)
+    detail = filters.detail_gain(halves) * np.sin(np.pi * halves) ** power
+    both = 0.25**power * transfer_matrix(*scaling**2)
+    finer_ends = 0.5**power * transfer_matrix(*(scaling * detail))
+    fine, weight = _composite()
+    result = np.zeros((count, count, u.size))
+    square = (np.sin(np.pi * fine) ** power * filters.detail_gain(fine)) ** 2
+    result[0, 0] = (weight * square) @ lagrange(u, fine)
+    result[0, 1:] = single[: count - 1] @ finer_ends
+    for j in range(1, count):
+        result[j, j:] = result[j - 1, j - 1 : -1] @ both
+    return result
+
+
+@lru_cache(maxsize=4)
+def pair_weights(name: str, levels: int) -> PairWeights:
+    """Nodes and weights of all pairs of the levels 1 to ``levels``, found once."""
+    filters = wavelet(name)
+    u, w = unit_legendre(_ORDER)
+    polynomials = lagrange(unit_legendre(_NODES_PER_PANEL)[0], u)
+    first, second = np.triu_indices(levels)
+    low_nodes, low_weights = _rest(levels)
+    low_gains = filters.gains(levels, low_nodes)
+    pieces = [low_weights * low_gains[first] * low_gains[second]]
+    single, double = gain_measures(name, levels), _pair_measures(name, levels)
+    for doublings, fine, nodes in _octaves(levels):
+        # The gain of a level is resolved down to the width of a panel, beyond it a measure.
+        direct = min(levels, doublings)
+        gains = filters.gains(direct, fine)
+        factor = _unresolved_factor(filters, doublings, fine)
+        weight = np.empty((first.size, *nodes.shape))
+        for row, (j, k) in enumerate(zip(first, second, strict=True)):
+            if k < direct:
+                density = gains[j] * gains[k] * w
+            elif j < direct:
+                density = gains[j] * factor * single[k - direct]
+            else:
+                density = factor**2 * double[j - direct, k - direct]
+            weight[row] = 0.5**doublings * density @ polynomials
+        pieces.append(weight.reshape(first.size, -1))
+    weight = np.concatenate(pieces, axis=1)
+    weight.flags.writeable = False
+    return PairWeights(gain_weights(name, levels).frequency, weight, first, second)

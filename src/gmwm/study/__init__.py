@@ -3,17 +3,19 @@
 from gmwm.study.appendix import converge as converge, convergence_table as convergence_table
 from gmwm.study.choice import choice_study as choice_study, choice_table as choice_table
 from gmwm.study.demo import (
+    FAULTS as FAULTS,
     compare as compare,
+    emulated_log as emulated_log,
+    sensors as sensors,
     simulated_imu as simulated_imu,
     write_demo_files as write_demo_files,
 )
-from gmwm.study.emulated_logs import (
-    FAULTS as FAULTS,
-    emulated_log as emulated_log,
-    sensors as sensors,
-)
 from gmwm.study.navigation import reproduce_figure as reproduce_figure
 from gmwm.study.rotation import reproduce_rotation as reproduce_rotation
-from gmwm.study.runs import run_study as run_study
-from gmwm.study.studies import FIGURES as FIGURES, STUDIES as STUDIES, Study as Study
+from gmwm.study.studies import (
+    FIGURES as FIGURES,
+    STUDIES as STUDIES,
+    Study as Study,
+    run_study as run_study,
+)
 from gmwm.study.summary import boxplots as boxplots, summarise as summarise

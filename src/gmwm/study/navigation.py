@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gmwm._core.files import written
+from gmwm._core.files import write_text
 from gmwm._core.typing import Progress
 from gmwm.calibration import Calibration, calibrate
 from gmwm.errors import InputError
@@ -25,15 +25,37 @@ from gmwm.ins import tuning
 from gmwm.ins.filter import Outage, gnss
 from gmwm.ins.imu import AXES, Recorded, SensorModels
 from gmwm.ins.simulation import Experiment, Scenario, Simulated, Validation
+from gmwm.ins.spec import sensor_models
 from gmwm.ins.trajectory import car_drive, helicopter_mapping
 from gmwm.process import BiasInstability, GaussMarkov, Model, Process, RandomWalk, WhiteNoise
 from gmwm.readers import Recording
-from gmwm.study.sensor_tables import TABLE_5, TABLE_6
 from gmwm.study.summary import saved
 from gmwm.variance import WaveletVariance
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+TABLE_5 = sensor_models(
+    {
+        "gyro": {"N": "720 deg/h/sqrt(Hz)", "GM": [["180 deg/h", 1000.0]]},
+        "accel": {"N": "100000 ug/sqrt(Hz)", "GM": [["40000 ug", 100.0]]},
+    },
+    "Table V",
+)
+"""What the paper's filter was tuned to by hand."""
+
+TABLE_6 = sensor_models(
+    {
+        "gyro": {
+            "N": "140 deg/h/sqrt(Hz)",
+            "GM": [["113 deg/h", 2000.0], ["65 deg/h", 20.0], ["206 deg/h", 0.1]],
+        },
+        "accel": {"N": "140 ug/sqrt(Hz)", "GM": [["5 ug", 25.0], ["13 ug", 500.0]]},
+    },
+    "Table VI",
+)
+"""What the paper's GMWM found in an XSens MTi-G, read as plain standard deviations."""
+
 
 FIGURES = ("fig5", "fig6", "fig7", "fig8", "fig9")
 
@@ -241,8 +263,5 @@ def reproduce_figure(
         "fig8": validation.plot_errors,
         "fig9": validation.plot_growth,
     }
-    text = str(validation)
-    target = folder / f"{figure}.txt"
-    with written(target) as stream:
-        stream.write(text + "\n")
-    return text, [target, *saved(draw[figure](), folder / figure)]
+    text, stem = str(validation), folder / figure
+    return text, [write_text(stem.with_suffix(".txt"), text), *saved(draw[figure](), stem)]

@@ -19,7 +19,7 @@ from gmwm import filter_numbers
 from gmwm._core import __version__
 from gmwm._core.distributions import norm
 from gmwm._core.documents import Document
-from gmwm._core.files import folder_to_fill, written
+from gmwm._core.files import folder_to_fill, write_text
 from gmwm._core.runs import Earlier
 from gmwm._core.tables import plain_table
 from gmwm._core.text import bullets, wrapped
@@ -355,12 +355,10 @@ def reproduce_rotation(
     check_channels(figure, recordings, AXES)
     earlier: Earlier = "resume" if resume else "refuse"
     rotation = rotate(vehicle_of(figure), recordings, folder, earlier=earlier, **options)
-    text, paths = str(rotation), []
-    for suffix, content in (("txt", text), ("md", rotation.markdown())):
-        paths.append(folder / f"{figure}-rotated.{suffix}")
-        with written(paths[-1]) as stream:
-            stream.write(content + "\n")
-    return text, [*paths, *saved(rotation.plot(), folder / f"{figure}-rotated")]
+    text, stem = str(rotation), folder / f"{figure}-rotated"
+    contents = {".txt": text, ".md": rotation.markdown()}
+    paths = [write_text(stem.with_suffix(end), each) for end, each in contents.items()]
+    return text, [*paths, *saved(rotation.plot(), stem)]
 
 
 def _filters(

@@ -1,4 +1,4 @@
-"""What is simulated, how it is estimated, and what was published about it.
+"""What is simulated, how it is estimated, what was published about it, and the runs.
 
 Numbers are those of Stebler, Guerrier, Skaloud & Victoria-Feser, IEEE/ION PLANS 2012, Tables II to
 IV: relative root mean square errors over 200 runs.
@@ -6,11 +6,25 @@ IV: relative root mean square errors over 200 runs.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import json
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
+from pathlib import Path
+from time import perf_counter
+from typing import Any
 
-from gmwm.estimate import EM, GMWM, MLE, AllanLines, Method, Whittle
+import numpy as np
+import numpy.typing as npt
+import pyarrow as pa
+
+from gmwm._core.runs import do_runs
+from gmwm._core.typing import FloatArray
+from gmwm.errors import InputError
+from gmwm.estimate import EM, GMWM, MLE, AllanLines, Method, Whittle, estimate
+from gmwm.estimate.result import Fit
 from gmwm.process import GaussMarkov, Model, RandomWalk, RateRamp, WhiteNoise
+from gmwm.variance import wavelet_variance
 
 
 @dataclass(frozen=True)
@@ -207,3 +221,96 @@ def _compared(study: Study, number: int, runs: int) -> Study:
 WEIGHTS = (_compared(TABLE_2, 2, 200), _compared(TABLE_3, 3, 200), _compared(TABLE_4, 4, 50))
 
 STUDIES = {s.name: s for s in (TABLE_2, TABLE_3, TABLE_4, FIVE, *WEIGHTS)}
+
+
+def one_run(name: str, methods: Sequence[str], seed: int, run: int) -> dict[str, npt.NDArray[Any]]:
+    """Simulate one series and estimate it by every method.
+
+    name: Of the study.
+    seed, run: Together the seed of the series.
+    Returns: column -> its values by method.
+    """
+    study = STUDIES[name]
+    series = study.truth.simulate(study.n, study.dt, np.random.default_rng([seed, run]))
+    rows = [_row(study, method, series) for method in methods]
+    return {column: np.array([row[column] for row in rows]) for column in rows[0]}
+
+
+def _row(study: Study, method: str, series: FloatArray) -> dict[str, Any]:
+    start = perf_counter()
+    result: Fit | None = None
+    try:
+        result = _estimate(study, series, study.methods[method])
+        message, valid = result.message, result.valid
+    except InputError as error:
+        message, valid = str(error), False
+    row = {"method": method, "seconds": perf_counter() - start, "valid": valid, "message": message}
+    for quantity in study.quantities:
+        row |= _values(quantity, result)
+    return row
+
+
+def _estimate(study: Study, series: FloatArray, by: Estimation) -> Fit:
+    model, dt = study.truth.opened(), study.dt
+    if by.wavelet == "haar" and not by.robust:
+        return estimate(model, series, dt, by.method)
+    of_data = isinstance(by.method, GMWM) and by.method.weights == "data"
+    kind = "octave" if of_data else None
+    wv = wavelet_variance(series, dt, wavelet=by.wavelet, robust=by.robust, data_covariance=kind)
+    return estimate(model, wv, method=by.method)
+
+
+def _values(quantity: Quantity, result: Fit | None) -> dict[str, float]:
+    """Estimate and 95 % interval of a quantity; not a number where the fit has none."""
+    value, ends = float("nan"), (float("nan"), float("nan"))
+    if result is not None and quantity.key in result.params:
+        value, ends = result.params[quantity.key], result.interval().get(quantity.key, ends)
+    with np.errstate(divide="ignore"):
+        value, *powers = (float(each) for each in np.array([value, *ends]) ** quantity.power)
+    lower, upper = powers if quantity.power > 0 else powers[::-1]
+    return {quantity.name: value, f"{quantity.name}_lower": lower, f"{quantity.name}_upper": upper}
+
+
+def run_study(
+    study: Study,
+    folder: Path,
+    *,
+    runs: int,
+    seed: int = 0,
+    methods: Sequence[str] | None = None,
+    resume: bool = False,
+    **work: Any,
+) -> pa.Table:
+    """Make (or complete) the runs of a study.
+
+    Finished runs are kept in ``folder/NAME-runs`` every few seconds, also when the work is
+    interrupted.
+
+    methods: Some of ``study.methods``; all by default.
+    resume: Go on where an earlier call stopped.
+    work: ``jobs``, ``cluster`` and ``progress`` of `gmwm._core.runs.do_runs`.
+    Returns: one row a run and method: estimates, intervals, validity, seconds.
+    Raises InputError if a method is unknown, or the folder holds runs and ``resume`` is not set, or
+        it is and they are not of the same study.
+    """
+    chosen = tuple(methods or study.methods)
+    for method in chosen:
+        if method not in study.methods:
+            raise InputError(
+                f"{study.name} has no method {method!r}: it has {', '.join(study.methods)}"
+            )
+    if runs < 1:
+        raise InputError(f"runs = {runs!r}: give a positive integer")
+    what = {"study": study.name, "seed": seed, "methods": list(chosen)}
+    found = do_runs(
+        partial(one_run, study.name, chosen, seed),
+        runs,
+        what,
+        folder=folder / f"{study.name}-runs",
+        earlier="resume" if resume else "refuse",
+        **work,
+    )
+    columns = {"run": np.repeat(np.arange(runs), len(chosen))}
+    columns |= {name: values.ravel() for name, values in found.items()}
+    table = pa.table(columns, metadata={"gmwm": json.dumps(what)})
+    return table.sort_by([("run", "ascending"), ("method", "ascending")])

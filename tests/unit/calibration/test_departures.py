@@ -19,7 +19,7 @@ from gmwm import (
     WhiteNoise,
 )
 from gmwm.calibration import departures
-from gmwm.cli.hints import with_option
+from gmwm.cli.console import with_option
 from marks import slow
 
 DT = 1.0

@@ -5,7 +5,7 @@ import pytest
 
 import gmwm
 from gmwm import GaussMarkov, RandomWalk, WhiteNoise
-from gmwm.calibration.unresolved import UNRESOLVED, unresolved_notice, with_largest_walk
+from gmwm.calibration.channel import UNRESOLVED, unresolved_notice, with_largest_walk
 
 N, RATE = 1e-4, 100.0
 

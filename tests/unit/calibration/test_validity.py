@@ -8,8 +8,7 @@ import pytest
 import gmwm
 from gmwm import Channel, WhiteNoise
 from gmwm.calibration.channel import ChannelModel, advise_cut, with_validity
-from gmwm.calibration.departures import Departure
-from gmwm.calibration.removal import _independent, _without
+from gmwm.calibration.departures import Departure, _independent, _without
 from gmwm.issues import Notice
 
 NAMES = ("gyro_x", "accel_y")

@@ -6,7 +6,7 @@ import re
 import numpy as np
 import pytest
 
-from gmwm.cli.hints import HINTS, with_hint, with_option
+from gmwm.cli.console import HINTS, with_hint, with_option
 from gmwm.cli.main import cli
 from gmwm.errors import InputError
 from gmwm.issues import Notice

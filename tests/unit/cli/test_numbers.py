@@ -6,7 +6,7 @@ import pytest
 
 import gmwm
 from gmwm import FilterNumbers, GaussMarkov, WhiteNoise
-from gmwm.cli.certify import _numbers
+from gmwm.cli.numbers import _numbers
 
 MODELS = {
     "gyro_x": WhiteNoise(1e-4) + GaussMarkov(2e-3, 3.0),

@@ -33,7 +33,7 @@ from gmwm.filter_numbers.spectra import (
     standard_errors,
 )
 from gmwm.ins import Outage, Scenario, SensorModels, covariance_analysis, fixed_wing_loiter, gnss
-from gmwm.study.sensor_tables import TABLE_6
+from gmwm.study.navigation import TABLE_6
 
 ONE = TRUTHS["one"]
 WORST = 1.001

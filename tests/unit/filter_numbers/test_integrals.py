@@ -20,7 +20,7 @@ from gmwm import (
     WhiteNoise,
     parameter,
 )
-from gmwm.filter_numbers.integrals import integral_rms
+from gmwm.filter_numbers.propagation import integral_rms
 from gmwm.process import CATALOGUE
 
 EXAMPLES = [process for kind in CATALOGUE for process in kind.examples()]

@@ -18,7 +18,7 @@ from gmwm import (
 from gmwm.filter_numbers import Chain, tuning
 from gmwm.filter_numbers.axes import SensorAxes
 from gmwm.ins import Outage, Scenario, SensorModels, covariance_analysis, fixed_wing_loiter, gnss
-from gmwm.study.sensor_tables import TABLE_6
+from gmwm.study.navigation import TABLE_6
 from marks import slow
 
 ONE = TRUTHS["one"]

@@ -7,8 +7,14 @@ from hypothesis import given, settings, strategies as st
 import gmwm
 from gmwm.process import CATALOGUE
 from gmwm.process.spectral import Panels, wavelet_variance
-from gmwm.process.wavelet_gain import gain_weights, lagrange, pair_weights, unit_legendre
-from gmwm.process.wavelets import NAMES, wavelet
+from gmwm.process.wavelets import (
+    NAMES,
+    gain_weights,
+    lagrange,
+    pair_weights,
+    unit_legendre,
+    wavelet,
+)
 from marks import slow
 
 EXAMPLES = [process for kind in CATALOGUE for process in kind.examples()]

@@ -16,7 +16,7 @@ import yaml
 import gmwm
 from gmwm import Channel, InputError, Process, RandomWalk, WhiteNoise, parameter
 from gmwm.calibration import axis_numbers
-from gmwm.cli.hints import in_options
+from gmwm.cli.console import in_options
 from gmwm.issues import Notice
 from gmwm.plotting import COMPONENT_COLOURS
 from gmwm.report import figure as figures, write_report

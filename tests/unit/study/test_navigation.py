@@ -8,8 +8,7 @@ from gmwm.errors import InputError
 from gmwm.ins.imu import AXES, SensorModels
 from gmwm.process import BiasInstability, Model
 from gmwm.study import navigation
-from gmwm.study.navigation import Calibrated, aligned, experiment, reproduce_figure
-from gmwm.study.sensor_tables import TABLE_6
+from gmwm.study.navigation import TABLE_6, Calibrated, aligned, experiment, reproduce_figure
 
 RATE, N = 20.0, 60_000
 UNITS = {"gyro": "rad/s", "accel": "m/s^2"}

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from gmwm import AllanLines, InputError, RandomWalk, WhiteNoise
-from gmwm.study.runs import one_run, run_study
-from gmwm.study.studies import STUDIES, Estimation, Quantity, Study
+from gmwm.study.studies import STUDIES, Estimation, Quantity, Study, one_run, run_study
 
 SMALL = Study(
     name="small",

@@ -20,10 +20,8 @@ from gmwm._core.typing import FloatArray
 from gmwm._core.units import SI_UNIT
 from gmwm.calibration import Calibration
 from gmwm.errors import InputError
-from gmwm.export.comments import not_valid_line, wrapped
-from gmwm.export.imu import NO_RATE
-from gmwm.export.numbers import not_valid, numbers_of, reason
-from gmwm.export.target import Target, json_text
+from gmwm.export.imu import NO_RATE, not_valid, numbers_of, reason
+from gmwm.export.target import Target, json_text, not_valid_line, wrapped
 from gmwm.filter_numbers import FORMS, FilterNumbers
 from gmwm.process import Model, Process, StateSpace, block_diagonal
 

@@ -6,6 +6,7 @@ from gmwm.filter_numbers.spectra.dominance import (
     Problem as Problem,
     correlation_time as correlation_time,
     dominating as dominating,
+    standard_errors as standard_errors,
     with_correlation_times as with_correlation_times,
 )
 from gmwm.filter_numbers.spectra.region import (
@@ -14,4 +15,3 @@ from gmwm.filter_numbers.spectra.region import (
     region_spectra as region_spectra,
 )
 from gmwm.filter_numbers.spectra.required import RequiredSpectrum as RequiredSpectrum
-from gmwm.filter_numbers.spectra.standard_errors import standard_errors as standard_errors

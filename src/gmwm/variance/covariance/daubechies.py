@@ -7,7 +7,7 @@ pairs of them at lag h,
 
 g_jk being their cross-covariance (Serroukh, Walden & Percival 2000, *JASA* 95, 184-196). Sums over
 all lags with min(M_j, M_k) pairs each are spectral integrals, whose weights are those of
-`gmwm.process.wavelet_gain`. For the coarse levels they are multiplied by the ratio of the two sums,
+`gmwm.process.wavelets`. For the coarse levels they are multiplied by the ratio of the two sums,
 over the lags that are multiples of a block of samples: g_jk^2 is smooth on that scale. Filters need
 not be symmetric: their transfer functions enter with their phases.
 """

@@ -13,7 +13,7 @@ from gmwm.ins import Comparison, Outage, Paired, compare, tuning
 from gmwm.ins.geometry import ned_difference
 from gmwm.ins.logs import Replay, align, paired, smooth
 from gmwm.ins.simulation import Ratio
-from gmwm.study.emulated_logs import emulated_log, sensors
+from gmwm.study.demo import emulated_log, sensors
 
 
 @pytest.fixture(scope="module")
