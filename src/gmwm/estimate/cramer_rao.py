@@ -264,8 +264,7 @@ def _exact_information(
     def run(at: FloatArray) -> _Recursion:
         own = stacked(coordinates.processes(at, processes), dt)
         space = StateSpace.stack([own, constant])
-        nothing = np.zeros((1, space.n_states))
-        found = filtered(arrays_of(space), np.zeros((n, 1)), nothing, nothing)
+        found = filtered(arrays_of(space), np.zeros((n, 1)))
         return _Recursion(space.transition, space.output, found.gains, found.variances)
 
     slopes = []
