@@ -168,9 +168,11 @@ def _maximization(series: Series, processes: Terms, e: Expectation) -> Terms:
             if like.values["N"] is None:
                 process = process.with_values(N=float(np.sqrt(e.residual / e.count * dt)))
         else:
-            a, b, c, d = (float(m[k, k]) for m in (e.later, e.cross, e.earlier, e.first))
-            update = _walk if process.is_walk else _gauss_markov
-            process = update(process, like, StateMoments(a, b, c, d, e.steps), dt)
+            if not process.is_walk:
+                process = _gauss_markov(process, like, e, k, dt)
+            elif like.values["K"] is None:
+                squares = e.later[k, k] - 2.0 * e.cross[k, k] + e.earlier[k, k]
+                process = process.with_values(K=float(np.sqrt(squares / e.steps / dt)))
             k += 1
         found.append(process)
     return tuple(found)
@@ -234,45 +236,27 @@ def _extrapolated(
     return (second, e) if e.log_likelihood >= reached.log_likelihood else (first, reached)
 
 
-@dataclass(frozen=True)
-class StateMoments:
-    """Second moments of the state of one process, see `Expectation`."""
-
-    later: float
-    cross: float
-    earlier: float
-    first: float
-    steps: int
-
-
-def _walk(process: Process, like: Process, m: StateMoments, dt: float) -> Process:
-    """A random walk with K of the M step, where ``like`` has it open."""
-    if like.values["K"] is not None:
-        return process
-    squares = m.later - 2.0 * m.cross + m.earlier
-    return process.with_values(K=float(np.sqrt(squares / m.steps / dt)))
-
-
-def _gauss_markov(process: Process, like: Process, m: StateMoments, dt: float) -> Process:
-    """A Gauss-Markov process with the parameters of the M step that ``like`` has open."""
-    n, sigma = m.steps + 1, like.values["sigma"]
+def _gauss_markov(process: Process, like: Process, e: Expectation, k: int, dt: float) -> Process:
+    """The process of state ``k`` with the parameters of the M step that ``like`` has open."""
+    later, cross, earlier, first = (float(m[k, k]) for m in (e.later, e.cross, e.earlier, e.first))
+    n, sigma = e.steps + 1, like.values["sigma"]
     delta = -float(np.expm1(-dt / float(process.values["tau"] or np.inf)))  # 1 - phi
     drift = Polynomial([1.0, -1.0])  # phi in terms of 1 - phi, whose digits matter
     loss = Polynomial([0.0, 2.0, -1.0])  # 1 - phi^2
-    squares = m.later - 2.0 * m.cross * drift + m.earlier * drift**2
+    squares = later - 2.0 * cross * drift + earlier * drift**2
     if like.values["tau"] is None:
-        total = squares + m.first * loss
+        total = squares + first * loss
         if sigma is None:
             condition = n * total.deriv() * loss - total * loss.deriv()
         else:
-            condition = m.steps * sigma**2 * loss.deriv() * loss
+            condition = e.steps * sigma**2 * loss.deriv() * loss
             condition = condition + squares.deriv() * loss - squares * loss.deriv()
 
         def log_likelihood(delta: float) -> float:
             size = float(loss(delta))
             if sigma is None:
                 return float(-0.5 * (n * np.log(total(delta)) - np.log(size)))
-            return -0.5 * (m.steps * np.log(size) + float(squares(delta)) / sigma**2 / size)
+            return -0.5 * (e.steps * np.log(size) + float(squares(delta)) / sigma**2 / size)
 
         # The root between 0 and 1 of highest likelihood; the present value where there is none.
         inside = [
@@ -283,7 +267,7 @@ def _gauss_markov(process: Process, like: Process, m: StateMoments, dt: float) -
         delta = max([*inside, min(delta, _FASTEST)], key=log_likelihood)
         process = process.with_values(tau=float(-dt / np.log1p(-delta)))
     if sigma is None:
-        variance = (float(squares(delta)) / float(loss(delta)) + m.first) / n
+        variance = (float(squares(delta)) / float(loss(delta)) + first) / n
         process = process.with_values(sigma=float(np.sqrt(variance)))
     return process
 

@@ -198,17 +198,8 @@ class KalmanLikelihood:
 
 
 class WhittleLikelihood:
-    """Log-likelihood of a series near some values of its noise.
+    """Log-likelihood of a series without gaps near some values of its noise, which whiten it.
 
-    Parameters
-    ----------
-    columns : Columns
-        Without missing samples.
-    filters : sequence of Process
-        Processes close to the noise, that whiten the series.
-
-    Notes
-    -----
     With e the innovations over their standard deviations, zero-padded to 2 n samples, I their
     periodogram, c the share of its expectation that the regression takes, and rho the spectrum
     over that of the filter, the log-likelihood is ``-1/4 sum (1 - c) log rho + I / rho`` over all
