@@ -379,17 +379,12 @@ def _from_moments(fit: Fit, coordinates: Coordinates) -> tuple[Process, ...]:
 
 def _from_user(model: Model, start: Model, coordinates: Coordinates) -> tuple[Process, ...]:
     found = _filled(coordinates.noise, start)
-    if any(match is None or match.is_open for match in found):
+    is_given = all(match and not match.is_open and _scale(match) > 0.0 for match in found)
+    if not is_given or len(found) < sum(not term.is_drift for term in start.terms):
         raise InputError(
-            f"start = {start!r} does not give every term of {model!r} a value: repeat the model "
-            "with numbers"
+            f"start = {start!r} does not give every term of {model!r} a value, or not a positive "
+            "one, or has another: repeat the model with numbers"
         )
-    for match in found:
-        if not _scale(match) > 0.0:
-            raise InputError(f"start = {start!r}: {match.linear_parameter.name} must be positive")
-    more = [term for term in start.terms if not (term.is_drift or any(term is p for p in found))]
-    if more:
-        raise InputError(f"start = {start!r} has a term that {model!r} has not: {more[0]!r}")
     return tuple(found)
 
 
