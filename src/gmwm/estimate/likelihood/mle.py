@@ -168,7 +168,8 @@ def _fit(series: Series, climb: Climb, method: str) -> Fit:
         if not absent and not series.start_is_valid:
             # The method of moments may start in a corner from which no climb leads to the top.
             other, exact = climb(coordinates, _spread(series)), KalmanLikelihood(series.columns)
-            top = max(top, other, key=lambda each: defined(exact, each.processes))
+            first, second = (defined(exact, each.processes) for each in (top, other))
+            top = other if second > first + tuning.NEGLIGIBLE else top
         for i, process in zip(present, top.processes, strict=True):
             processes[i] = process
         redundant = redundant_term(part, top.processes, top.likelihood)
