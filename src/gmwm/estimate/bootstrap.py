@@ -17,12 +17,10 @@ from gmwm._core.documents import Array, Document, Text
 from gmwm._core.frozen import freeze
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
-from gmwm.estimate.entrance import estimate
-from gmwm.estimate.moments import GMWM, Design, Profile, Weights, search
+from gmwm.estimate.moments import Design, Profile, Weights, search
 from gmwm.estimate.problem import FittedMoments, drift_key, shape_of
 from gmwm.estimate.result import Fit
 from gmwm.process import Model, Process, as_model
-from gmwm.variance import PooledVariance
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +70,7 @@ class Bootstrap(Document):
         return {key: (float(a), float(b)) for key, a, b in zip(self.keys, *ends, strict=True)}
 
 
-def bootstrap(fit: Fit, runs: int = 200, seed: int = 0, *, full: bool = False) -> Bootstrap:
+def bootstrap(fit: Fit, runs: int = 200, seed: int = 0) -> Bootstrap:
     """Estimates of the same model from data simulated under a fit.
 
     Parameters
@@ -81,9 +79,6 @@ def bootstrap(fit: Fit, runs: int = 200, seed: int = 0, *, full: bool = False) -
         By the method of moments, of one recording or several.
     runs : int, optional
     seed : int, optional
-    full : bool, optional
-        Simulate series and estimate from scratch, instead of drawing wavelet variances and
-        refining the estimates: slow, and free of the normal approximation.
 
     Returns
     -------
@@ -95,30 +90,21 @@ def bootstrap(fit: Fit, runs: int = 200, seed: int = 0, *, full: bool = False) -
         If the fit is of another method, or ``runs`` is less than 2.
     """
     runs = _check(fit, runs)
-    rng = checks.generator(seed)
-    opened, wv = _opened(fit), fit.wv
+    rng, opened = checks.generator(seed), _opened(fit)
     draws: list[dict[str, float]] = []
-    if full:
-        lengths = [part.n for part in wv.parts] if isinstance(wv, PooledVariance) else [wv.n]
-        method = GMWM(fit.weights, fit.discrepancy)
-        for _ in range(runs):
-            series = [fit.model.simulate(n, wv.dt, rng) for n in lengths]
-            data = series if len(series) > 1 else series[0]
-            draws.append(estimate(opened, data, wv.dt, method).params)
-    else:
-        at, root = fit.moments, _root(fit)
-        design = Design(opened, at.scales)
-        start = [shape_of(fit.model.terms[term.place]) for term in design.terms]
-        ramp = drift_key(fit.model)
-        slopes = np.zeros(runs)
-        if ramp in fit.keys:
-            slopes = fit.params[str(ramp)] + fit.stderr[str(ramp)] * rng.standard_normal(runs)
-        for target, slope in zip(_targets(at, runs, rng), slopes, strict=True):
-            profile = Profile(design, target, root)
-            point = profile.refine(profile.at(start))
-            fitted = Model(tuple(design.fitted_processes(point.x, point.shapes)))
-            found = {key: float(value or 0.0) for key, value in fitted.params.items()}
-            draws.append(found | ({str(ramp): float(slope)} if ramp in fit.keys else {}))
+    at, root = fit.moments, _root(fit)
+    design = Design(opened, at.scales)
+    start = [shape_of(fit.model.terms[term.place]) for term in design.terms]
+    ramp = drift_key(fit.model)
+    slopes = np.zeros(runs)
+    if ramp in fit.keys:
+        slopes = fit.params[str(ramp)] + fit.stderr[str(ramp)] * rng.standard_normal(runs)
+    for target, slope in zip(_targets(at, runs, rng), slopes, strict=True):
+        profile = Profile(design, target, root)
+        point = profile.refine(profile.at(start))
+        fitted = Model(tuple(design.fitted_processes(point.x, point.shapes)))
+        found = {key: float(value or 0.0) for key, value in fitted.params.items()}
+        draws.append(found | ({str(ramp): float(slope)} if ramp in fit.keys else {}))
     keys = tuple(key for key in fit.params if key in opened.params and opened.params[key] is None)
     table = np.array([[values.get(key, np.nan) for key in keys] for values in draws])
     return Bootstrap(keys, table)

@@ -264,8 +264,7 @@ def _exact_information(
     def run(at: FloatArray) -> _Recursion:
         own = stacked(coordinates.processes(at, processes), dt)
         space = StateSpace.stack([own, constant])
-        nothing = np.zeros((1, space.n_states))
-        found = filtered(arrays_of(space), np.zeros((n, 1)), nothing, nothing)
+        found = filtered(arrays_of(space), np.zeros((n, 1)))
         return _Recursion(space.transition, space.output, found.gains, found.variances)
 
     slopes = []
@@ -300,30 +299,19 @@ def _accumulate(at: _Recursion, by: _Recursion) -> FloatArray:
     size = p * (1 + d)
     information = np.zeros((d, d))
     covariance = np.zeros((size, size))
-    A = np.zeros((size, size))
-    b = np.zeros(size)
+    A, b = np.zeros((size, size)), np.zeros(size)
     rows = np.zeros((d, size))  # d v of each parameter as a row over the joint state
+    rows[:, :p] = -dh
     for i in range(d):
-        for q in range(p):
-            rows[i, q] = -dh[i, q]
-            rows[i, p * (1 + i) + q] = -h[q]
+        rows[i, p * (1 + i) : p * (2 + i)] = -h
     for k in range(n):
         moved = rows @ covariance @ rows.T
+        information += moved / s[k] + 0.5 * np.outer(ds[:, k], ds[:, k]) / s[k] ** 2
+        A[:p, :p], b[:p] = F, G[k]
         for i in range(d):
-            for j in range(d):
-                information[i, j] += moved[i, j] / s[k]
-                information[i, j] += 0.5 * ds[i, k] * ds[j, k] / s[k] ** 2
-        A[:, :] = 0.0
-        for q in range(p):
-            b[q] = G[k, q]
-            for r in range(p):
-                A[q, r] = F[q, r]
-        for i in range(d):
-            start = p * (1 + i)
-            for q in range(p):
-                b[start + q] = dG[i, k, q]
-                for r in range(p):
-                    A[start + q, r] = dF[i, q, r] - G[k, q] * dh[i, r]
-                    A[start + q, start + r] = F[q, r] - G[k, q] * h[r]
+            own = slice(p * (1 + i), p * (2 + i))
+            b[own] = dG[i, k]
+            A[own, :p] = dF[i] - np.outer(G[k], dh[i])
+            A[own, own] = F - np.outer(G[k], h)
         covariance = A @ covariance @ A.T + s[k] * np.outer(b, b)
     return information

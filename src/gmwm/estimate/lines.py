@@ -95,7 +95,8 @@ class AllanLines:
     Notes
     -----
     The top of a Gauss-Markov process looks like bias instability, and its flank like a random walk:
-    where the sum of the lines misses the data, the fit is not valid.
+    where the sum of the lines misses the data, the fit is not valid. Nothing is subtracted for
+    given terms, and standard errors do not include what other processes add in the region.
 
     IEEE Std 952-2020, annex C; Stebler et al. (2012), *Proc. IEEE/ION PLANS*, figure 5.
     """
@@ -116,30 +117,7 @@ class AllanLines:
             _two_times(key, region)
 
     def estimate(self, model: Model, wv: WaveletVariance) -> Fit:
-        """Read the open parameters of a model from straight regions of the Allan plot.
-
-        Parameters
-        ----------
-        model : Model
-            Of quantization noise, white noise, bias instability, random walk and rate ramp. Terms
-            that have a value keep it; nothing is subtracted for them.
-        wv : WaveletVariance
-
-        Returns
-        -------
-        Fit
-            Its model holds the terms that were fixed or found. A parameter without a region is not
-            estimated, and the fit is not valid. Standard errors are statistical, by linear
-            propagation of ``wv.covariance``: they do not include the bias from other processes
-            that leak into the region. ``chi_square`` is NaN, for parameters read from a part of
-            the levels do not minimise it.
-
-        Raises
-        ------
-        InputError
-            For another process, a wavelet other than "haar", regions that cannot be used, or if
-            nothing is found.
-        """
+        """Read the open parameters of a model from straight regions of the Allan plot."""
         if wv.wavelet != "haar":
             raise InputError(
                 f'method = "allan" reads the Allan deviation, which {wv.wavelet!r} does not give: '

@@ -57,6 +57,11 @@ MISFIT_P = 0.001  # level of the chi-square test below which a discrepancy is es
 DISCREPANCY_KNOWN = 0.3  # relative standard error of a variance that can show a discrepancy
 DISCREPANCY_NOTABLE = 0.02  # of the reference mixture, to start a fit with: its grid has less
 
+DISCREPANCY_LARGE = 0.3
+"""A fit of a larger one starts again from a notable one, and the smaller of the two is taken: in
+units of a large discrepancy a level without any noise is off by little, so that it can grow until a
+model without amplitudes passes. That takes the root of the share of levels missed."""
+
 # -- search and iteration -------------------------------------------------------------------------
 
 EXCHANGES = 2  # rounds in which each term is taken out and placed anew

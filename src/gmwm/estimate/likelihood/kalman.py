@@ -127,14 +127,11 @@ def whiten(space: Space, Y: FloatArray) -> tuple[FloatArray, float, int]:
                 ahead[i] = 0.0
                 for j in range(p):
                     ahead[i] += F[i, j] * x[c, j]
-            for i in range(p):
-                x[c, i] = ahead[i]
+            x[c] = ahead
         if missing or not steady:
-            for i in range(p):
-                for j in range(p):
-                    updated[i, j] = P[i, j]
-                    if not missing:
-                        updated[i, j] -= gain[i] * Ph[j]
+            updated[:] = P
+            if not missing:
+                updated -= np.outer(gain, Ph)
             steady = not missing
             for i in range(p):
                 before[i] = P[i, i]
@@ -146,30 +143,24 @@ def whiten(space: Space, Y: FloatArray) -> tuple[FloatArray, float, int]:
 
 
 @compiled()
-def filtered(space: Space, Y: FloatArray, A0: FloatArray, U: FloatArray) -> Filtered:
-    """Filter columns with initial mean ``A0`` (m, p) and constant input ``U`` (m, p) of each."""
+def filtered(space: Space, Y: FloatArray) -> Filtered:
+    """Filter columns; their states begin with a mean of zero."""
     F, Q, h, r, P0 = space
     n, m = Y.shape
     p = h.size
     X, PP, G = np.zeros((n, m, p)), np.zeros((n, p, p)), np.zeros((n, p))
     V, S = np.zeros((n, m)), np.full(n, np.inf)
-    P, x = P0.copy(), A0.copy()
+    P, x = P0.copy(), np.zeros((m, p))
     updated, half, Ph = np.zeros((p, p)), np.zeros((p, p)), np.zeros(p)
     for k in range(n):
         missing = np.isnan(Y[k, 0])
         s = _innovation(P, h, r, Ph)
-        for i in range(p):
-            for c in range(m):
-                X[k, c, i] = x[c, i]
-            for j in range(p):
-                PP[k, i, j] = P[i, j]
-                updated[i, j] = P[i, j]
-                if not missing:
-                    updated[i, j] -= Ph[i] * Ph[j] / s
+        X[k], PP[k], updated[:] = x, P, P
         if not missing:
             S[k] = s
             for i in range(p):
                 for j in range(p):
+                    updated[i, j] -= Ph[i] * Ph[j] / s
                     G[k, i] += F[i, j] * Ph[j] / s
         for c in range(m):
             if not missing:
@@ -177,7 +168,7 @@ def filtered(space: Space, Y: FloatArray, A0: FloatArray, U: FloatArray) -> Filt
                 for i in range(p):
                     V[k, c] -= h[i] * X[k, c, i]
             for i in range(p):
-                x[c, i] = U[c, i] + G[k, i] * V[k, c]
+                x[c, i] = G[k, i] * V[k, c]
                 for j in range(p):
                     x[c, i] += F[i, j] * X[k, c, j]
         _propagate(F, Q, updated, half, P)
@@ -186,44 +177,39 @@ def filtered(space: Space, Y: FloatArray, A0: FloatArray, U: FloatArray) -> Filt
 
 @compiled()
 def smooth(
-    space: Space, Y: FloatArray, A0: FloatArray, U: FloatArray
+    space: Space, Y: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
     """Smoothed states given all samples, with their covariances at lags zero and one.
 
     The backward recursion of de Jong (1989, *JASA* 84, 1085-1088) gives the result of Rauch, Tung
     and Striebel's without inverting a covariance.
 
-    Y, A0, U: As of `filtered`.
     Returns: X (n, m, p), smoothed states of each column; C (n, p, p), their covariance; D (n - 1,
         p, p), covariance of state k+1 with state k; V, S, innovations and their variances.
     """
     F, h = space.F, space.h
     n, m = Y.shape
     p = h.size
-    X, C, G, V, S = filtered(space, Y, A0, U)
+    X, C, G, V, S = filtered(space, Y)
     D = np.zeros((max(n - 1, 0), p, p))
     R, back = np.zeros((m, p)), np.zeros(p)
     N, L, later = np.zeros((p, p)), np.zeros((p, p)), np.zeros((p, p))
     left, right, predicted = np.zeros((p, p)), np.zeros((p, p)), np.zeros((p, p))
     for k in range(n - 1, -1, -1):
+        predicted[:] = C[k]
         for i in range(p):
             for j in range(p):
-                predicted[i, j] = C[k, i, j]
                 L[i, j] = F[i, j] - G[k, i] * h[j]
         if k < n - 1:  # (1 - P[k + 1] N) L P[k]
             _times(L, predicted, right)
             _times(later, N, left)
-            for i in range(p):
-                for j in range(p):
-                    left[i, j] = (1.0 if i == j else 0.0) - left[i, j]
-            _times(left, right, D[k])
+            _times(np.eye(p) - left, right, D[k])
         for c in range(m):
             for i in range(p):
                 back[i] = h[i] * V[k, c] / S[k]
                 for j in range(p):
                     back[i] += L[j, i] * R[c, j]
-            for i in range(p):
-                R[c, i] = back[i]
+            R[c] = back
             for i in range(p):
                 for j in range(p):
                     X[k, c, i] += predicted[i, j] * R[c, j]
@@ -235,8 +221,6 @@ def smooth(
                     N[i, j] += L[q, i] * right[q, j]
         _times(predicted, N, left)
         _times(left, predicted, right)
-        for i in range(p):
-            for j in range(p):
-                C[k, i, j] -= right[i, j]
-                later[i, j] = predicted[i, j]
+        C[k] -= right
+        later[:] = predicted
     return X, C, D, V, S

@@ -127,14 +127,6 @@ class Columns:
         columns.matrix = np.ascontiguousarray(values[:, None])
         return columns
 
-    @property
-    def centred(self) -> FloatArray:
-        """The series less its mean alone, (n,)."""
-        series = self.matrix[:, 0]
-        if self.drift_is_free:
-            series = series + self._removed * self.matrix[:, -1]
-        return series - np.nanmean(series)
-
     def slope(self, processes: Sequence[Process]) -> Slope:
         """The slope of the last regressor under a sum of processes."""
         innovations, _, _ = whitened(self, processes)
@@ -206,17 +198,8 @@ class KalmanLikelihood:
 
 
 class WhittleLikelihood:
-    """Log-likelihood of a series near some values of its noise.
+    """Log-likelihood of a series without gaps near some values of its noise, which whiten it.
 
-    Parameters
-    ----------
-    columns : Columns
-        Without missing samples.
-    filters : sequence of Process
-        Processes close to the noise, that whiten the series.
-
-    Notes
-    -----
     With e the innovations over their standard deviations, zero-padded to 2 n samples, I their
     periodogram, c the share of its expectation that the regression takes, and rho the spectrum
     over that of the filter, the log-likelihood is ``-1/4 sum (1 - c) log rho + I / rho`` over all
@@ -396,17 +379,12 @@ def _from_moments(fit: Fit, coordinates: Coordinates) -> tuple[Process, ...]:
 
 def _from_user(model: Model, start: Model, coordinates: Coordinates) -> tuple[Process, ...]:
     found = _filled(coordinates.noise, start)
-    if any(match is None or match.is_open for match in found):
+    is_given = all(match and not match.is_open and _scale(match) > 0.0 for match in found)
+    if not is_given or len(found) < sum(not term.is_drift for term in start.terms):
         raise InputError(
-            f"start = {start!r} does not give every term of {model!r} a value: repeat the model "
-            "with numbers"
+            f"start = {start!r} does not give every term of {model!r} a value, or not a positive "
+            "one, or has another: repeat the model with numbers"
         )
-    for match in found:
-        if not _scale(match) > 0.0:
-            raise InputError(f"start = {start!r}: {match.linear_parameter.name} must be positive")
-    more = [term for term in start.terms if not (term.is_drift or any(term is p for p in found))]
-    if more:
-        raise InputError(f"start = {start!r} has a term that {model!r} has not: {more[0]!r}")
     return tuple(found)
 
 

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
-import scipy
 
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
@@ -26,31 +25,19 @@ from gmwm.estimate.likelihood.likelihood import (
     Columns,
     KalmanLikelihood,
     Objective,
-    Regression,
     Series,
     WhittleLikelihood,
     defined,
     have_states,
     objective_of,
-    whitened,
 )
-from gmwm.estimate.moments import Design
-from gmwm.estimate.problem import (
-    Coordinates,
-    Moments,
-    Scales,
-    solve_nonnegative,
-    spectral_information,
-)
+from gmwm.estimate.problem import Coordinates, Scales, spectral_information
 from gmwm.estimate.result import Fit
 from gmwm.issues import notice
 from gmwm.process import Model, Process, as_model
 from gmwm.readers import Channel
 
 _SEGMENT = 1 << 16  # samples whose likelihood is computed exactly, for the beginning
-_LOG2_COUNT = 3  # of the candidates
-_LEAST_LEFT = 0.01  # share of a wavelet variance that is left after removing a drift
-_SMALL = 0.1  # share of the variance that a term which is not needed starts with
 
 Climb = Callable[[Coordinates, tuple[Process, ...]], Top]
 
@@ -179,14 +166,10 @@ def _fit(series: Series, climb: Climb, method: str) -> Fit:
         part = coordinates.without(absent)
         top = climb(part, tuple(processes[i] for i in present))
         if not absent and not series.start_is_valid:
-            # From another candidate, if that lies above the top already.
-            likelihood = KalmanLikelihood(series.columns)
-            reached = defined(likelihood, top.processes)
-            places = [_rescaled(point, series) for point in candidates(series)]
-            height, best = max(places, key=lambda place: place[0], default=(-np.inf, ()))
-            if height > reached:
-                other = climb(coordinates, best)
-                top = other if defined(likelihood, other.processes) > reached else top
+            # The method of moments may start in a corner from which no climb leads to the top.
+            other, exact = climb(coordinates, _spread(series)), KalmanLikelihood(series.columns)
+            first, second = (defined(exact, each.processes) for each in (top, other))
+            top = other if second > first + tuning.NEGLIGIBLE else top
         for i, process in zip(present, top.processes, strict=True):
             processes[i] = process
         redundant = redundant_term(part, top.processes, top.likelihood)
@@ -201,62 +184,23 @@ def _fit(series: Series, climb: Climb, method: str) -> Fit:
     return conclude_likelihood(series, processes, absent, top, method, notices)
 
 
-def _rescaled(processes: tuple[Process, ...], series: Series) -> tuple[float, tuple[Process, ...]]:
-    """Likelihood and terms with all variances times the factor of highest likelihood.
+def _spread(series: Series) -> tuple[Process, ...]:
+    """The noise terms with shapes spread over those that the record can show.
 
-    Innovations keep their proportions when all variances grow alike, so that the factor is their
-    mean square. Where an amplitude is given nothing is changed.
+    Each has the largest free amplitude that stays below the wavelet variances.
     """
-    coordinates, columns = series.coordinates, series.columns
-    amplitudes = np.array([is_amplitude for _, is_amplitude in coordinates.owners])
-    if np.sum(amplitudes) < len(processes):
-        return defined(KalmanLikelihood(columns), processes), processes
-    try:
-        with np.errstate(all="ignore"):
-            innovations, log_variance, count = whitened(columns, processes)
-            regression = Regression.of(innovations.T @ innovations)
-            free = count - regression.beta.size
-            log_factor = np.log(regression.residual / free)
-            z = coordinates.pack(processes)
-            z[amplitudes] += log_factor
-            moved = coordinates.processes(z, processes)
-    except (InputError, np.linalg.LinAlgError, ZeroDivisionError):
-        return -np.inf, processes
-    height = -0.5 * (
-        free * (np.log(2.0 * np.pi) + 1.0 + log_factor) + log_variance + regression.log_determinant
-    )
-    return float(height) if np.isfinite(height) else -np.inf, moved
-
-
-def candidates(series: Series) -> list[tuple[Process, ...]]:
-    """Values of the noise terms of a series' model, eight sets where a shape is open.
-
-    Where the model is not that of the data, the estimates by the method of moments may lie in a
-    corner from which the likelihood does not climb to its top. A few points spread over the shapes
-    that the record can show (a Sobol sequence: Sobol 1967, *USSR Computational Mathematics and
-    Mathematical Physics* 7, 86-112), each with amplitudes near the wavelet variances, cost one
-    likelihood each.
-    """
-    try:
-        design = Design(Model(series.coordinates.noise), Scales.of(series.wv))
-    except InputError:
-        return []  # no grid for coefficients of which only some are given
-    moments = Moments.of(series.wv, series.coordinates.model)
-    target = np.maximum(moments.target, _LEAST_LEFT * series.wv.variance)
-    points = np.zeros((1, 0))
-    if design.shaped:
-        sequence = scipy.stats.qmc.Sobol(len(design.shaped), scramble=False)
-        points = sequence.random_base2(_LOG2_COUNT) + 0.5 / 2**_LOG2_COUNT
-    given = [i for i in range(len(design.terms)) if i not in design.linear]
-    found = []
-    for point in points:
-        fractions = dict(zip(design.shaped, point, strict=True))
-        grids = [design.grid(i) for i in range(len(design.terms))]
-        shapes = [grid[int(fractions.get(i, 0.0) * len(grid))] for i, grid in enumerate(grids)]
-        # Amplitudes of least relative squares, all of them positive.
-        curves = design.curves(shapes) / target[:, None]
-        free = curves[:, list(design.linear)]
-        x, _ = solve_nonnegative(free, 1.0 - curves[:, given].sum(axis=1))
-        highest = np.maximum(np.max(free, axis=0, initial=0.0), np.finfo(float).tiny)
-        found.append(tuple(design.fitted_processes(np.maximum(x, _SMALL / highest), shapes)))
-    return found
+    wv, terms, found = series.wv, series.coordinates.terms, []
+    rank, count = 0.5, sum(bool(term.n_shapes) for term in terms)
+    for term, process in zip(terms, series.start, strict=True):
+        if term.n_shapes:
+            grid = list(process.shape_grid(wv.dt, wv.n))
+            shape, rank = grid[int(rank / count * len(grid))], rank + 1.0
+            if all(term.free_shape):
+                names = [parameter.name for parameter in process.shape_parameters]
+                process = process.with_values(**dict(zip(names, shape, strict=True)))
+        if term.free_scale:
+            alone = Scales.of(wv).curve(process.with_amplitude(1.0))
+            ratio = wv.variance / np.maximum(alone, np.finfo(float).tiny)
+            process = process.with_amplitude(float(np.min(ratio[wv.variance > 0.0])))
+        found.append(process)
+    return tuple(found)

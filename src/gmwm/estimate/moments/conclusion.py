@@ -15,8 +15,8 @@ from gmwm.estimate import tuning
 from gmwm.estimate.moments.design import Design
 from gmwm.estimate.moments.profile import Point, Profile
 from gmwm.estimate.moments.weights import Weights
-from gmwm.estimate.problem import FittedMoments, Moments, Slope, drift_key, weight_root
-from gmwm.estimate.result import Comparison, Estimates, Fit, Goodness, conclude, upper_amplitude
+from gmwm.estimate.problem import Moments, Slope, weight_root
+from gmwm.estimate.result import Comparison, Estimates, Fit, conclude, upper_amplitude
 from gmwm.issues import Notice, notice
 from gmwm.process import Model, Process
 from gmwm.variance import WaveletVariance
@@ -46,31 +46,18 @@ class Converged:
         """The moments that were fitted."""
         return replace(Moments.of(wv, self.design.model, self.design.scales), slope=self.slope)
 
-    def goodness(self, wv: WaveletVariance) -> Goodness:
-        """How well the minimum describes the data: `Fit.goodness` of its fit."""
-        slope = self.slope if self.moments(wv).slope_is_free else None
-        processes = self.design.fitted_processes(self.point.x, self.point.shapes)
-        value = None if slope is None else slope.value
-        model, keys = self.design.coordinates.fitted(processes, value)
-        error = 0.0
-        if slope is not None:
-            keys.append(str(drift_key(model)))
-            error = float(np.sqrt(slope.variance))
-        at = FittedMoments.of(model, wv, keys, error, self.discrepancy)
-        return Goodness.of(at, wv, is_tested=True)
-
 
 def conclude_moments(
     end: Converged,
     wv: WaveletVariance,
     weights: Weights,
     method: str,
-    goodness_without: Callable[[int], Goodness | None],
+    without: Callable[[int], Fit | None],
 ) -> Fit:
     """Make the `Fit` of a minimum.
 
-    goodness_without: How well the fit without a noise term describes the data; None if nothing is
-        left to fit. It shows whether a doubtful term is needed.
+    without: The fit without a noise term, which shows whether a doubtful term is needed; None if
+        nothing is left to fit.
     """
     design, point, moments = end.design, end.point, end.moments(wv)
     target, implied = moments.target, design.implied(point.x, point.shapes)
@@ -103,7 +90,7 @@ def conclude_moments(
     )
     fit = conclude(found, comparison, wv, misfits=end.discrepancy > 0.0)
     redundant = _redundant_terms(design, point, comparison.objective, target, end.covariance)
-    return _with_doubtful_terms(fit, redundant, design, processes, goodness_without)
+    return _with_doubtful_terms(fit, redundant, design, processes, without)
 
 
 def _jacobian(design: Design, point: Point, curves: FloatArray, absent: list[int]) -> FloatArray:
@@ -192,7 +179,7 @@ def _with_doubtful_terms(
     redundant: Sequence[tuple[float, int]],
     design: Design,
     processes: Sequence[Process],
-    goodness_without: Callable[[int], Goodness | None],
+    without: Callable[[int], Fit | None],
 ) -> Fit:
     """A fit with the notice of the term that the data can do without, if there is one.
 
@@ -211,8 +198,8 @@ def _with_doubtful_terms(
     def is_needed(i: int) -> bool:
         if not fit.goodness.describes_all:
             return False
-        reduced = goodness_without(i)
-        return reduced is not None and reduced.loses_to(fit.goodness)
+        reduced = without(i)
+        return reduced is not None and reduced.goodness.loses_to(fit.goodness)
 
     keys = design.coordinates.fitted(processes)[1]
     places: Mapping[str, int] = {

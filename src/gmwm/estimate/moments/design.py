@@ -147,11 +147,9 @@ class Design:
 
     def pack(self, shapes: Sequence[Shape]) -> FloatArray:
         """The free shape parameters of all terms on the real line."""
-        parts = [
-            self.terms[i].process.shape_to_free(shapes[i])[self.terms[i].free_shape]
-            for i in self.shaped
-        ]
-        return np.concatenate(parts) if parts else np.zeros(0)
+        chosen = ((self.terms[i], shapes[i]) for i in self.shaped)
+        parts = [term.process.shape_to_free(shape)[term.free_shape] for term, shape in chosen]
+        return np.concatenate([np.zeros(0), *parts])
 
     def unpack(self, z: FloatArray, template: Sequence[Shape]) -> list[Shape]:
         """Shapes of all terms; fixed parameters are taken from ``template``."""
@@ -166,14 +164,12 @@ class Design:
     @cached_property
     def bounds(self) -> tuple[FloatArray, FloatArray]:
         """How far z may go: `SEARCH_REACH` beyond the grids."""
-        low, high = [], []
+        low, high = [np.zeros(0)], [np.zeros(0)]
         for i in self.shaped:
             term = self.terms[i]
             free = np.array([term.process.shape_to_free(shape) for shape in self.grid(i)])
             low.append((free.min(axis=0) - tuning.SEARCH_REACH)[term.free_shape])
             high.append((free.max(axis=0) + tuning.SEARCH_REACH)[term.free_shape])
-        if not low:
-            return np.zeros(0), np.zeros(0)
         return np.concatenate(low), np.concatenate(high)
 
     def part(self, present: Sequence[int]) -> Design:

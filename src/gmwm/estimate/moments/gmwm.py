@@ -8,6 +8,7 @@ point: it is smooth where one computed from the data is noisy.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import ClassVar
 from weakref import WeakKeyDictionary
@@ -21,9 +22,15 @@ from gmwm.estimate import tuning
 from gmwm.estimate.moments.conclusion import Converged, conclude_moments
 from gmwm.estimate.moments.design import Design
 from gmwm.estimate.moments.profile import Point, Profile, search
-from gmwm.estimate.moments.weights import WEIGHTS, Discrepancy, Weights, dictionary_fit
+from gmwm.estimate.moments.weights import (
+    WEIGHTS,
+    Discrepancy,
+    Weights,
+    dictionary_fit,
+    with_discrepancy,
+)
 from gmwm.estimate.problem import Moments, Scales, Simulation, is_plain
-from gmwm.estimate.result import Fit, Goodness
+from gmwm.estimate.result import Fit
 from gmwm.process import Model
 from gmwm.variance import WaveletVariance
 
@@ -73,15 +80,18 @@ class GMWM:
     def estimate(self, model: Model, wv: WaveletVariance) -> Fit:
         """Fit the open parameters of a model to wavelet variances."""
 
-        def goodness_without(i: int) -> Goodness | None:
+        def without(i: int) -> Fit | None:
             noise = [k for k, term in enumerate(model.terms) if not term.is_drift]
             left = tuple(term for k, term in enumerate(model.terms) if k != noise[i])
             if not any(term.is_open for term in left) or all(t.is_drift or t.is_line for t in left):
                 return None
-            return self._cached(Model(left), wv).goodness(wv)
+            return concluded(Model(left), lambda _: None)
 
-        weights = Weights.of(self.weights, wv)
-        return conclude_moments(self._cached(model, wv), wv, weights, self.name, goodness_without)
+        def concluded(model: Model, without: Callable[[int], Fit | None]) -> Fit:
+            weights = Weights.of(self.weights, wv)
+            return conclude_moments(self._cached(model, wv), wv, weights, self.name, without)
+
+        return concluded(model, without)
 
     def _cached(self, model: Model, wv: WaveletVariance) -> Converged:
         """The minimum, searched once for each model and series."""
@@ -109,13 +119,20 @@ class GMWM:
             first.append(level.value)
             if all(process.is_candidate for process in noise):
                 del first[0]
+
+        def end(value: float) -> Converged | None:
+            level.value = value
+            return _iterate(problem, reference.weights(problem.moments.target, value), level)
+
         found = None
         for value in dict.fromkeys(first):
-            level.value = value
-            relaxed = level.added_to(reference.covariance, problem.moments.target)
-            found = _iterate(problem, relaxed, level)
+            found = end(value)
             if found is not None and level.value == 0.0:
                 break
+        is_large = self.discrepancy is None and level.value > tuning.DISCREPANCY_LARGE
+        if found is not None and is_large:
+            other = end(tuning.DISCREPANCY_NOTABLE) or found
+            found = min(found, other, key=lambda each: each.discrepancy)
         return found or _under_reference(problem, level)
 
 
@@ -184,7 +201,7 @@ def _iterate(problem: _Problem, relaxed: FloatArray, level: Discrepancy) -> Conv
         noise = design.fitted_noise(point.x, point.shapes)
         moments = moments.under(noise, part)
         target, statistical = moments.target, moments.covariance(noise)
-        covariance = level.added_to(statistical, target)
+        covariance = with_discrepancy(statistical, target, level.value)
         relaxed = covariance if rounds == 1 else (1.0 - part) * relaxed + part * covariance
         if np.min(np.diag(relaxed)) < np.finfo(float).tiny:
             return None  # a level without any noise of the model would outweigh all others
@@ -226,9 +243,9 @@ def _under_reference(problem: _Problem, level: Discrepancy) -> Converged:
         moments = moments.under(reference.mixture)
     reference = dictionary_fit(moments.wv, moments.target, noise)
     target, statistical = moments.target, moments.covariance(reference.mixture)
-    level.restart()
+    level.value = level.given or 0.0
     for _ in range(tuning.REFERENCE_ROUNDS):
-        covariance = level.added_to(statistical, target)
+        covariance = with_discrepancy(statistical, target, level.value)
         point = problem.search(target, covariance)
         residual = target - design.implied(point.x, point.shapes)
         if not level.update(residual, statistical, target, reference.curve):

@@ -113,10 +113,15 @@ def _well_known(
     return known, max(dof - (target.size - known.size), 1)
 
 
+def with_discrepancy(covariance: FloatArray, target: FloatArray, value: float) -> FloatArray:
+    """Covariance of wavelet variances that may be off by a share of each, u^4, (J, J)."""
+    return covariance + np.diag((value * target) ** 2)
+
+
 def _objective(
     value: float, residual: FloatArray, covariance: FloatArray, target: FloatArray
 ) -> float:
-    whitened = weight_root(covariance + np.diag((value * target) ** 2)) @ residual
+    whitened = weight_root(with_discrepancy(covariance, target, value)) @ residual
     return float(whitened @ whitened)
 
 
@@ -129,7 +134,7 @@ class Discrepancy:
 
     def __init__(self, given: float | None, dof: int) -> None:
         self.value = given or 0.0
-        self._given = given
+        self.given = given
         self._estimated = given is None and dof > 0
         self._dof = dof
 
@@ -140,14 +145,6 @@ class Discrepancy:
         """
         if self._estimated and value > tuning.DISCREPANCY_NOTABLE:
             self.value = value
-
-    def restart(self) -> None:
-        """Forget what was estimated."""
-        self.value = self._given or 0.0
-
-    def added_to(self, covariance: FloatArray, target: FloatArray) -> FloatArray:
-        """Covariance of the wavelet variances with the discrepancy, u^4, (J, J)."""
-        return covariance + np.diag((self.value * target) ** 2)
 
     def update(
         self, residual: FloatArray, covariance: FloatArray, target: FloatArray, basis: FloatArray
@@ -213,7 +210,7 @@ class Reference:
 
     def weights(self, target: FloatArray, discrepancy: float) -> FloatArray:
         """Covariance of the wavelet variances with a discrepancy, u^4, (J, J)."""
-        return self.covariance + np.diag((discrepancy * target) ** 2)
+        return with_discrepancy(self.covariance, target, discrepancy)
 
 
 _references: WeakKeyDictionary[WaveletVariance, dict[Any, Reference]] = WeakKeyDictionary()
@@ -284,7 +281,7 @@ def _mixture(wv: WaveletVariance, target: FloatArray, kinds: tuple[Process, ...]
 def _amplitudes(
     matrix: FloatArray, target: FloatArray, covariance: FloatArray, discrepancy: float
 ) -> FloatArray:
-    root = weight_root(covariance + np.diag((discrepancy * target) ** 2))
+    root = weight_root(with_discrepancy(covariance, target, discrepancy))
     return solve_nonnegative(root @ matrix, root @ target)[0]
 
 

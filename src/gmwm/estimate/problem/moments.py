@@ -44,10 +44,6 @@ class Simulation:
     replications: int
     seed: int
 
-    def inflation(self, lengths: float = 1.0) -> float:
-        """Growth of the covariance of the moments, for data of so many simulated lengths."""
-        return 1.0 + lengths / self.replications
-
     def curve(
         self, process: Process, tau: FloatArray, n: int, dt: float, wavelet: str
     ) -> FloatArray:
@@ -185,9 +181,7 @@ class Moments:
 
     def under(self, noise: Model, part: float = 1.0) -> Moments:
         """The moments with the slope moved by ``part`` of the way to its estimate under a noise."""
-        if self.slope is None or not self.slope_is_free:
-            return self
-        if not _has_power(noise):
+        if self.slope is None or not self.slope_is_free or not _has_power(noise):
             return self
         new, old = gls_slope(self.wv, self.scales.spectrum(noise)), self.slope
         moved = Slope(
@@ -207,7 +201,7 @@ class Moments:
             means = wv.mean_covariance_under(psd)
             covariance = detrended_covariance(covariance, means, wv.drift_response, self.slope)
         if any(self.scales.is_simulated(term) for term in noise.terms):
-            covariance = covariance * self.scales.simulation.inflation(wv.n_all / wv.n)
+            covariance = covariance * (1.0 + wv.n_all / wv.n / self.scales.simulation.replications)
         return covariance
 
 

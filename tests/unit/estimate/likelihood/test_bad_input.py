@@ -21,7 +21,7 @@ X = WhiteNoise(1.0).simulate(100, 1.0, 1)
         (WhiteNoise(0.2) + GaussMarkov(0.5, 30.0), "does not give every term"),
         (WhiteNoise(0.2) + GaussMarkov(0.5), "does not give every term"),
         (WhiteNoise(0.2) + GaussMarkov(0.5, 20.0) + RandomWalk(0.1), "RandomWalk"),
-        (WhiteNoise(0.0) + GaussMarkov(0.5, 20.0), "N must be positive"),
+        (WhiteNoise(0.0) + GaussMarkov(0.5, 20.0), "does not give every term .* positive"),
         ("mle", "is not a term"),
         (3, "not an error model"),
     ],

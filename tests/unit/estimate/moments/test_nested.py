@@ -1,0 +1,49 @@
+"""A larger model describes a curve that no model fits as well as one that it nests."""
+
+import json
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+import gmwm
+from gmwm import GaussMarkov, WhiteNoise
+from gmwm.variance import WaveletVariance
+from places import SHARED
+
+CURVES = SHARED / "reference" / "smac_curves.json"
+
+
+def series_of(variance, dt):
+    """Wavelet variances by level, as of a record of that many octaves."""
+    levels, n = len(variance), 2 ** (len(variance) + 1) - 1
+    return WaveletVariance(
+        tau=dt * 2.0 ** np.arange(levels), variance=np.array(variance), mean=np.zeros(levels),
+        blocks=np.zeros(64), block=n // 64, n=n, dt=dt,
+    )  # fmt: skip
+
+
+def made(seed):
+    """Coloured noise at the finest levels that no term of the models has."""
+    rng = np.random.default_rng(seed)
+    truth = WhiteNoise(7e-5) + GaussMarkov(8e-5, 4.0) + GaussMarkov(1.7e-4, 2000.0)
+    variance = truth.wavelet_variance(0.004 * 2.0 ** np.arange(20), 0.004)
+    bend = np.concatenate([2.0 * np.sort(rng.uniform(size=5))[::-1], rng.normal(0.0, 0.15, 15)])
+    return series_of(variance * np.exp(bend), 0.004)
+
+
+def stored(axis):
+    if not CURVES.exists():
+        pytest.skip("needs the stored curves")
+    record = json.loads(CURVES.read_text())["navchip"]
+    return series_of(record["axes"][axis]["wavelet_variance"], 1.0 / record["rate"])
+
+
+@pytest.mark.parametrize("source", ["Gyro. X", "Gyro. Y", *range(4)])
+@pytest.mark.filterwarnings("ignore::gmwm.errors.FitWarning")
+def test_a_further_term_does_not_spoil_the_fit(source):
+    wv = stored(source) if isinstance(source, str) else made(source)
+    fits = [gmwm.fit(WhiteNoise() + k * GaussMarkov(), wv) for k in (1, 2, 3, 4)]
+    misfits = [float(np.std(np.log(fit.implied / wv.variance))) for fit in fits]
+    assert all(b < 1.1 * a for a, b in pairwise(misfits)), misfits
+    assert max(fit.discrepancy for fit in fits) < 0.6
