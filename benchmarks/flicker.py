@@ -33,7 +33,7 @@ def found(truth, seed):
         return None
     true = np.sqrt(2.0 * truth.haar_variance(TAU, DT))
     rivals = [fit.model for fit in chosen.rivals]
-    ends = [chosen.fit.deviation_interval(TAU, rivals=some)[1:] for some in ((), rivals)]
+    ends = [chosen.fit.deviation_interval(TAU, rivals=some)[1:] for some in (None, rivals)]
     return np.array(ends) / true
 
 

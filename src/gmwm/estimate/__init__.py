@@ -21,4 +21,9 @@ from gmwm.estimate.moments import (
     SimulatedMoments as SimulatedMoments,
     compile_search as compile_search,
 )
-from gmwm.estimate.result import Estimate as Estimate, Fit as Fit, JointFit as JointFit
+from gmwm.estimate.result import (
+    Estimate as Estimate,
+    Fit as Fit,
+    JointFit as JointFit,
+    left_open as left_open,
+)

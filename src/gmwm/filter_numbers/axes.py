@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Concatenate, ParamSpec, Protocol, cast, overload
 
 import numpy as np
@@ -57,6 +57,7 @@ class AxisModel:
     quantity: {"gyro", "accel", ""}.
     bias_sd: Of a constant bias, u.
     fit: Where the model is from, if from a fit.
+    rivals: Models that describe its data equally well, of a calibration.
     """
 
     name: str
@@ -65,6 +66,7 @@ class AxisModel:
     quantity: str
     bias_sd: float
     fit: Fit | None
+    rivals: tuple[Model, ...] = ()
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, AxisModel) and self._key == other._key
@@ -123,6 +125,7 @@ class SensorAxes:
             raise InputError(f"{checks.shown(source)} has no error model: give a fit, {hint}")
         axes = tuple(_axis(name, item, dt, bias_sd) for name, item in source.items())
         if isinstance(source, Calibration):
+            axes = tuple(replace(axis, rivals=source.rivals.get(axis.name, ())) for axis in axes)
             rate = source.rate if source.has_one_rate else float("nan")
             return cls(axes, source.source, rate, source.duration, False)
         return cls(axes, "", 1.0 / axes[0].dt, float("nan"), False)

@@ -54,8 +54,9 @@ def bound(
         Time without aiding for which they are to be small, s; they dominate at any time. The
         interval of fixes or keyframes is no horizon: see docs/filter-numbers.md.
     level : float, optional
-        Of the confidence region of a fit, e.g. 0.95: all models in it are dominated. By default
-        only the estimate is, and the uncertainty of its parameters is not covered.
+        Of the confidence region of a fit, e.g. 0.95: all models in it are dominated, those of a
+        calibration that fit equally well, and one more Gauss-Markov process that the data leave
+        open (`Fit.deviation_interval`). By default only the estimate is.
     bias_sd : float or mapping, optional
         Standard deviation of a constant bias, such as the turn-on bias, in u; by axis or kind
         ("gyro", "accel") if a mapping.
@@ -159,7 +160,7 @@ def _problem(group: Sequence[AxisModel], horizon: float, level: float | None) ->
     region: list[RequiredSpectrum] = []
     for axis, target in zip(group, targets, strict=True):
         if level is not None and axis.fit is not None:
-            region += region_spectra(target, axis.fit, level)
+            region += region_spectra(target, axis.fit, level, axis.rivals)
     return Problem(targets, horizon, tuple(region))
 
 

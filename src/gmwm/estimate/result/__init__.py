@@ -31,3 +31,4 @@ from gmwm.estimate.result.joint import (
     between as between,
     fit_joint as fit_joint,
 )
+from gmwm.estimate.result.left_open import left_open as left_open

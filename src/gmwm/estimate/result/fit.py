@@ -28,6 +28,7 @@ from gmwm.estimate.result.estimate import (
     slope_name,
 )
 from gmwm.estimate.result.goodness import Goodness
+from gmwm.estimate.result.left_open import left_open
 from gmwm.issues import Notice
 from gmwm.process import Model
 from gmwm.variance import WaveletVariance
@@ -280,12 +281,13 @@ class Fit(Document, Printed):
         return FittedMoments.of(self.model, self.wv, self.keys, slope_error, self.discrepancy)
 
     def deviation_interval(
-        self, tau: FloatArray, level: float = 0.95, rivals: Sequence[Model] = ()
+        self, tau: FloatArray, level: float = 0.95, rivals: Sequence[Model] | None = None
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Allan deviation of the fitted model with its interval, at any averaging times.
 
-        The interval holds if the model is the right one. Often others fit equally well beyond a
-        tenth of the record: give them as ``rivals``, and the interval covers all of them.
+        The interval holds if the model is the right one. A model that was selected from these data
+        lacks terms too faint to be chosen, and others may fit equally well: with ``rivals`` the
+        interval covers both.
 
         Parameters
         ----------
@@ -293,8 +295,10 @@ class Fit(Document, Printed):
             Averaging times, s.
         level : float, optional
         rivals : sequence of Model, optional
-            Others with their values (`Calibration.rivals`, `Selection.rivals`); each counts with
-            the relative error of this one.
+            Models with their values that fit equally well (`Calibration.rivals`,
+            `Selection.rivals`), empty if there are none. Each counts with the relative error of
+            this one. One further Gauss-Markov process, as large as the data leave open
+            (`left_open`), then counts too.
 
         Returns
         -------
@@ -310,8 +314,13 @@ class Fit(Document, Printed):
         value = np.sqrt(2.0 * curve)
         with np.errstate(over="ignore"):  # an end that nothing limits is infinite
             ratio = np.exp(norm.ppf(0.5 + 0.5 * level) * spread.reshape(tau.shape))
-        all_ = np.array([value, *(np.sqrt(2.0 * scales.curve(each)) for each in rivals)])
-        return value, np.min(all_, axis=0) / ratio, np.max(all_, axis=0) * ratio
+        faint = () if rivals is None else left_open(self, level)
+        all_, larger = (
+            np.array([value, *(np.sqrt(2.0 * scales.curve(each)) for each in models)])
+            for models in (rivals or (), faint)
+        )
+        lower = np.fmin(np.min(all_, axis=0) / ratio, np.min(larger, axis=0))
+        return value, lower, np.fmax(np.max(all_, axis=0) * ratio, np.max(larger, axis=0))
 
     def logarithmic_error(self, value: Callable[[Model], FloatArray]) -> FloatArray:
         """Standard error of the logarithm of a positive function of the model, (k,).

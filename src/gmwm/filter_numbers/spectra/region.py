@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,7 +11,7 @@ from scipy.optimize import minimize
 from gmwm._core.distributions import chi2, norm
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
-from gmwm.estimate import Fit
+from gmwm.estimate import Fit, left_open
 from gmwm.filter_numbers import tuning
 from gmwm.filter_numbers.spectra.required import RequiredSpectrum
 from gmwm.process import Model, Process
@@ -173,19 +174,24 @@ class _Spectrum:
 
 
 def region_spectra(
-    target: RequiredSpectrum, fit: Fit, level: float
+    target: RequiredSpectrum, fit: Fit, level: float, rivals: Sequence[Model] = ()
 ) -> tuple[RequiredSpectrum, ...]:
     """Models of a confidence region, one of which has nearly the largest density at any frequency.
 
-    They are drawn, or found by search at frequencies on a grid.
+    They are drawn, or found by search at frequencies on a grid. Models that fit equally well, and
+    those with one more Gauss-Markov process that the data leave open, belong to them.
 
     target: Of the estimate.
+    rivals: Models that fit equally well.
     Raises InputError if the data do not bound a parameter.
     """
     region = ParameterRegion.of(fit, level)
     dt = target.dt
+    others = [
+        RequiredSpectrum.of(each, dt, target.horizon) for each in (*rivals, *left_open(fit, level))
+    ]
     if not region.keys:
-        return (RequiredSpectrum.of(region.model, dt, target.horizon),)
+        return (RequiredSpectrum.of(region.model, dt, target.horizon), *others)
     spectrum = _Spectrum.of(region, dt)
     # Slower processes than the estimate change at lower frequencies.
     f = target.frequencies(tuning.REGION_POINTS, region.points_of_peak)
@@ -212,4 +218,6 @@ def region_spectra(
     fine = np.append(f[:2], target.frequencies(10 * tuning.REGION_POINTS))
     largest = np.unique(np.argmax([spectrum.density(point, fine) for point in points], axis=0))
     models = [region.model_at(points[i]) for i in largest]
-    return tuple(RequiredSpectrum.of(model, dt, target.horizon) for model in models)
+    found = [*(RequiredSpectrum.of(model, dt, target.horizon) for model in models), *others]
+    largest = np.unique(np.argmax([each.psd(fine) for each in found], axis=0))
+    return tuple(found[i] for i in largest)

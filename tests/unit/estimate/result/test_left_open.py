@@ -1,0 +1,52 @@
+"""Terms too faint to be chosen: what the data leave open is covered, and no more than that."""
+
+import numpy as np
+import pytest
+
+import gmwm
+from gmwm import GaussMarkov, RandomWalk, WhiteNoise
+from gmwm.estimate import left_open
+
+TRUTH = WhiteNoise(1.22e-4) + GaussMarkov(2e-5, 8.0) + RandomWalk(1.5e-6)
+DT, SAMPLES, RECORDS = 0.05, 36_000, 16
+
+
+@pytest.fixture(scope="module")
+def chosen():
+    """Selections of half an hour in which the Gauss-Markov term is too faint to be chosen."""
+    series = (TRUTH.simulate(SAMPLES, DT, seed) for seed in range(RECORDS))
+    return [gmwm.select(gmwm.wavelet_variance(x, DT)) for x in series]
+
+
+def test_intervals_of_a_selected_model_hold_a_term_too_faint_to_be_chosen(chosen):
+    """Those of the model and its rivals alone hold the truth in two of three records."""
+    tau = np.array([5.0, 20.0])
+    true = np.sqrt(2.0 * TRUTH.haar_variance(tau, DT))
+    held = np.zeros(2)
+    for each in chosen:
+        _, low, high = each.fit.deviation_interval(tau, rivals=[r.model for r in each.rivals])
+        held += (low <= true) & (true <= high)
+    assert np.all(held >= 14)  # of 16 at 95 %: less once in twenty
+
+
+def test_numbers_of_a_level_dominate_a_term_too_faint_to_be_chosen(chosen):
+    """Those of the confidence region alone lay below the truth in 19 of 20 records."""
+    tau = np.geomspace(6.0, 60.0, 5)
+    need = TRUTH.haar_variance(tau, DT)
+    bounds = (gmwm.bound(each.fit, horizon=60.0, level=0.95).model for each in chosen[:6])
+    assert all(np.all(model.haar_variance(tau, DT) >= need) for model in bounds)
+
+
+@pytest.mark.parametrize(("level", "squared"), [(0.68, 0.989), (0.95, 3.841)])
+def test_they_are_as_far_from_the_data_as_the_level_allows(chosen, level, squared):
+    """Their chi-square exceeds that of the fit by the quantile squared, or less if held back."""
+    rises = []
+    for fit in (each.fit for each in chosen[:6]):
+        at = fit.moments
+        models = left_open(fit, level)
+        assert len(models) >= 10
+        rest = [at.target - at.scales.curve(model) for model in (fit.model, *models)]
+        first, *others = (each @ np.linalg.solve(at.covariance, each) for each in rest)
+        rises.append(max(others) - first)
+    assert np.max(rises) == pytest.approx(squared, rel=0.2)
+    assert np.count_nonzero(np.array(rises) > 0.5 * squared) >= 3
