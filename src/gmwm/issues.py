@@ -490,6 +490,8 @@ _ESTIMATE = (
     _fit("confounded", "cannot be distinguished from {other} (their estimates have a correlation "
         "of {correlation:.5f})", "fix one of them", lacks="parameters_separable",
         reason="terms cannot be separated"),
+    _fit("drift-in-state", "a drift that enters the {term} state is not a ramp of the signal",
+        lacks="drift_is_ramp", reason="the drift is not a ramp"),
     _fit("indistinct-terms", "two {kind} terms do not differ significantly ({first} = {one:.3g} s, "
         "{second} = {other:.3g} s)", "use one fewer", lacks="terms_distinct",
         reason="two terms look alike"),

@@ -264,7 +264,8 @@ def _exact_information(
     def run(at: FloatArray) -> _Recursion:
         own = stacked(coordinates.processes(at, processes), dt)
         space = StateSpace.stack([own, constant])
-        found = filtered(arrays_of(space), np.zeros((n, 1)))
+        nothing = np.zeros((1, space.n_states))
+        found = filtered(arrays_of(space), np.zeros((n, 1)), nothing, nothing)
         return _Recursion(space.transition, space.output, found.gains, found.variances)
 
     slopes = []

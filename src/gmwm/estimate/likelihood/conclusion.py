@@ -19,7 +19,7 @@ from gmwm.estimate.likelihood.likelihood import (
     objective_of,
 )
 from gmwm.estimate.moments import suffices
-from gmwm.estimate.problem import Coordinates, Moments, density, difference, frequency_nodes
+from gmwm.estimate.problem import Coordinates, Moments, Slope, density, difference, frequency_nodes
 from gmwm.estimate.result import Comparison, Estimates, Fit, conclude
 from gmwm.issues import Notice, notice
 from gmwm.process import Model, Process
@@ -173,6 +173,7 @@ def conclude_likelihood(
     method: str,
     notices: Sequence[Notice] = (),
     trace: Sequence[float] = (),
+    drift: float | None = None,
 ) -> Fit:
     """Make the `Fit` of a maximum.
 
@@ -182,8 +183,11 @@ def conclude_likelihood(
     absent: Those among them that the likelihood can do without.
     top: The maximum over the other terms.
     notices, trace: What only the method itself knows.
+    drift: Slope (u/s) that it has estimated in place of the regression.
     """
     slope = series.columns.slope(top.processes) if series.columns.drift_is_free else None
+    if slope is not None and drift is not None:
+        slope = Slope(drift, slope.variance)
     found = Estimates(
         coordinates=series.coordinates,
         processes=[p.with_amplitude(0.0) if i in absent else p for i, p in enumerate(processes)],

@@ -15,7 +15,7 @@ likelihood; its maximum is the root of a cubic (Beach & MacKinnon 1978, *Econome
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
@@ -48,6 +48,7 @@ from gmwm.issues import notice
 from gmwm.process import Model, Process, StateSpace, as_model
 from gmwm.readers import Channel
 
+DRIFTS = ("ramp", "state")
 _TINY = 1e-12  # keeps the stopping rule defined where the log-likelihood is zero
 _FASTEST, _SLOWEST = 1.0 - 1e-12, 1e-12  # of 1 - phi
 
@@ -67,6 +68,9 @@ class EM:
     max_iterations : int, optional
     accelerate : bool, optional
         Whether steps are extrapolated.
+    drift : {"ramp", "state"}, optional
+        A ramp added to the signal, or an input to the first state as in Stebler et al. (2011),
+        which a Gauss-Markov state forgets.
 
     Raises
     ------
@@ -78,6 +82,7 @@ class EM:
     tolerance: float = 1e-10
     max_iterations: int = 10_000
     accelerate: bool = True
+    drift: str = "ramp"
 
     name: ClassVar[str] = "em"
 
@@ -87,6 +92,7 @@ class EM:
         checks.positive("tolerance", self.tolerance, "give a small positive number, e.g. 1e-10")
         checks.whole("max_iterations", self.max_iterations, 1)
         checks.truth("accelerate", self.accelerate)
+        checks.choice("drift", self.drift, DRIFTS)
 
     def estimate(self, model: Model, channel: Channel) -> Fit:
         """Fit the open parameters of a model to samples, some of which may be missing."""
@@ -97,7 +103,21 @@ class EM:
                     'RateRamp and GaussMarkov; "mle" supports the others, "gmwm" a Sinusoid too'
                 )
         series = Series.of(model, channel, self.start, exact=True)
-        return _conclude(series, *_run(series, self))
+        iteration = Iteration(series, self.drift == "state")
+        return _conclude(series, iteration, *iteration.run(self))
+
+
+@dataclass(frozen=True, eq=False)
+class Stage:
+    """Parameters during the iteration.
+
+    initial, drive: (p,), mean of the first state and input of each step, where the drift enters a
+        state; zero otherwise.
+    """
+
+    processes: tuple[Process, ...]
+    initial: FloatArray
+    drive: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,6 +126,7 @@ class Expectation:
 
     later, cross, earlier: (p, p), sums over k of E x[k+1] x[k+1]', E x[k+1] x[k]' and E x[k] x[k]'.
     first: (p, p), E x[0] x[0]'.
+    start, later_sum, earlier_sum: (p,), E x[0] and the sums of E x[k+1] and E x[k].
     steps: Number of transitions, n - 1.
     residual: Sum of the expected squares of the measurement noise.
     count: Number of samples that are not missing.
@@ -116,23 +137,34 @@ class Expectation:
     cross: FloatArray
     earlier: FloatArray
     first: FloatArray
+    start: FloatArray
+    later_sum: FloatArray
+    earlier_sum: FloatArray
     steps: int
     residual: float
     count: int
     log_likelihood: float
 
 
-def expect(columns: Columns, space: StateSpace) -> Expectation:
-    """Smooth the series under a state space, with the regressors' coefficients integrated out."""
-    y, h = columns.matrix, space.output
-    x, c, d, v, s = smooth(arrays_of(space), y)
+def expect(
+    columns: Columns, space: StateSpace, initial: FloatArray, drive: FloatArray
+) -> Expectation:
+    """Smooth the series under a state space, with the regressors' coefficients integrated out.
+
+    initial, drive: (p,), mean of the first state and constant input of each step.
+    """
+    y, h, p = columns.matrix, space.output, space.n_states
+    n, m = y.shape
+    starts, inputs = np.zeros((m, p)), np.zeros((m, p))
+    starts[0], inputs[0] = initial, drive
+    x, c, d, v, s = smooth(arrays_of(space), y, starts, inputs)
     present = np.isfinite(s)
     innovations = v[present] / np.sqrt(s[present])[:, None]
     regression = Regression.of(innovations.T @ innovations)
     weights = np.concatenate([[1.0], -regression.beta])
     mean = np.einsum("c,kci->ki", weights, x)
     # The uncertainty of the coefficients adds to the covariance of the states.
-    root = np.linalg.cholesky(regression.covariance)
+    root = np.linalg.cholesky(regression.covariance) if m > 1 else np.zeros((0, 0))
     spread = np.einsum("kci,ce->kei", x[:, 1:], root)
 
     def second(a: slice, b: slice, covariance: FloatArray) -> FloatArray:
@@ -150,113 +182,162 @@ def expect(columns: Columns, space: StateSpace) -> Expectation:
         cross=second(last, first, d),
         earlier=second(first, first, c[:-1]),
         first=second(slice(0, 1), slice(0, 1), c[:1]),
-        steps=len(y) - 1,
+        start=mean[0],
+        later_sum=mean[1:].sum(axis=0),
+        earlier_sum=mean[:-1].sum(axis=0),
+        steps=n - 1,
         residual=float(residual @ residual + np.sum(unknown**2) + of_states),
         count=count,
         log_likelihood=regression.log_likelihood(count, float(np.sum(np.log(s[present])))),
     )
 
 
-Terms = tuple[Process, ...]
+class Iteration:
+    """The EM iteration of one series.
 
+    in_state: Whether the drift is an input to the first state, as in Stebler et al. (2011). Then
+        the mean of the series is removed, the mean of the first state is estimated, and its
+        covariance is that of one step.
+    Raises InputError if the drift is to enter a state and there is none, or no drift to estimate.
+    """
 
-def _maximization(series: Series, processes: Terms, e: Expectation) -> Terms:
-    """The M step: open parameters in closed form, given ones stay."""
-    dt, found, k = series.columns.dt, [], 0
-    for process, like in zip(processes, series.coordinates.noise, strict=True):
-        if process.is_white:
-            if like.values["N"] is None:
-                process = process.with_values(N=float(np.sqrt(e.residual / e.count * dt)))
-        else:
-            if not process.is_walk:
-                process = _gauss_markov(process, like, e, k, dt)
-            elif like.values["K"] is None:
-                squares = e.later[k, k] - 2.0 * e.cross[k, k] + e.earlier[k, k]
-                process = process.with_values(K=float(np.sqrt(squares / e.steps / dt)))
+    def __init__(self, series: Series, in_state: bool) -> None:
+        self.series, self.in_state = series, in_state
+        self._terms = series.coordinates.noise
+        self.columns, self.dt = series.columns, series.columns.dt
+        if in_state:
+            if not self.columns.drift_is_free:
+                raise InputError('drift = "state" needs a RateRamp() of free slope in the model')
+            if all(term.is_white for term in self._terms):
+                raise InputError('drift = "state" needs a RandomWalk or GaussMarkov to drive')
+            self.columns = Columns.without_regressors(series.columns.centred, self.dt)
+
+    def expectation(self, stage: Stage) -> Expectation:
+        """The E step."""
+        space = stacked(stage.processes, self.dt)
+        if self.in_state:
+            space = replace(space, initial_covariance=space.process_noise)
+        return expect(self.columns, space, stage.initial, stage.drive)
+
+    def maximization(self, stage: Stage, e: Expectation) -> Stage:
+        """The M step: open parameters in closed form, given ones stay."""
+        drive = stage.drive
+        # Remove the input from the later state: E (x[k+1] - u)(...)'.
+        later = e.later - np.outer(drive, e.later_sum) - np.outer(e.later_sum, drive)
+        later = later + e.steps * np.outer(drive, drive)
+        cross = e.cross - np.outer(drive, e.earlier_sum)
+        processes, k = [], 0
+        for process, like in zip(stage.processes, self._terms, strict=True):
+            if process.is_white:
+                if like.values["N"] is None:
+                    density = float(np.sqrt(e.residual / e.count * self.dt))
+                    process = process.with_values(N=density)
+                processes.append(process)
+                continue
+            a, b, c, d = (float(m[k, k]) for m in (later, cross, e.earlier, e.first))
+            update = _walk if process.is_walk else _gauss_markov
+            processes.append(update(process, like, StateMoments(a, b, c, d, e.steps), self.dt))
             k += 1
-        found.append(process)
-    return tuple(found)
+        if not self.in_state:
+            return Stage(tuple(processes), stage.initial, drive)
+        transition = stacked(processes, self.dt).transition
+        drift = (e.later_sum - transition @ e.earlier_sum) / e.steps
+        return Stage(tuple(processes), e.start, np.where(np.arange(drift.size) == 0, drift, 0.0))
+
+    def run(self, method: EM) -> tuple[Stage, list[float], bool]:
+        """Iterate; returns the best stage, the log-likelihoods, and whether it converged.
+
+        Each of the log-likelihoods is after one M step; none is below the one before.
+        """
+        nothing = np.zeros(sum(not process.is_white for process in self._terms))
+        stage = Stage(self.series.start, nothing, nothing)
+        e = self.expectation(stage)
+        trace: list[float] = []
+        while len(trace) < method.max_iterations:
+            previous, before = stage, e.log_likelihood
+            first = self.maximization(stage, e)
+            after = self.expectation(first)
+            if not after.log_likelihood > before:  # rounding errors, at the top
+                return stage, [*trace, before], True
+            trace.append(after.log_likelihood)
+            stage, e = first, after
+            if method.accelerate and len(trace) < method.max_iterations:
+                stage, e = self._extrapolated(previous, first, e)
+                trace.append(e.log_likelihood)
+            gain = e.log_likelihood - before
+            if gain < method.tolerance * (0.5 * abs(e.log_likelihood + before) + _TINY):
+                return stage, trace, True
+        return stage, trace, False
+
+    def _extrapolated(
+        self, stage: Stage, first: Stage, reached: Expectation
+    ) -> tuple[Stage, Expectation]:
+        """A long step in the direction of two, if it climbs; else the second of them, if it does.
+
+        ``reached`` is the expectation of the first.
+        """
+        second = self.maximization(first, reached)
+        coordinates = self.series.coordinates
+        zs = [coordinates.pack(s.processes) for s in (stage, first, second)]
+        r, v = zs[1] - zs[0], zs[2] - 2.0 * zs[1] + zs[0]
+        norm, length = float(np.linalg.norm(v)), 1.0
+        if norm > 0.0:
+            length = min(float(np.linalg.norm(r)) / norm, tuning.LONGEST_EXTRAPOLATION)
+        step = 2.0 * length * r + length**2 * v
+        # Where an amplitude has all but vanished EM hardly moves: do not jump there.
+        is_near = np.max(np.abs(step), initial=0.0) < tuning.FARTHEST_EXTRAPOLATION
+        if length > 1.0 and not self.in_state and is_near:
+            try:
+                far = replace(stage, processes=coordinates.processes(zs[0] + step, stage.processes))
+                with np.errstate(all="ignore"):
+                    e = self.expectation(far)
+                if e.log_likelihood >= reached.log_likelihood:
+                    return far, e
+            except (InputError, np.linalg.LinAlgError, ZeroDivisionError):
+                pass  # no parameters there
+        e = self.expectation(second)
+        return (second, e) if e.log_likelihood >= reached.log_likelihood else (first, reached)
 
 
-def _run(series: Series, method: EM) -> tuple[Terms, list[float], bool]:
-    """Iterate; returns the best terms, the log-likelihoods, and whether it converged.
+@dataclass(frozen=True)
+class StateMoments:
+    """Second moments of the state of one process, see `Expectation`."""
 
-    Each of the log-likelihoods is after one M step; none is below the one before.
-    """
-    processes = series.start
-    e = _expectation(series, processes)
-    trace: list[float] = []
-    while len(trace) < method.max_iterations:
-        previous, before = processes, e.log_likelihood
-        first = _maximization(series, processes, e)
-        after = _expectation(series, first)
-        if not after.log_likelihood > before:  # rounding errors, at the top
-            return processes, [*trace, before], True
-        trace.append(after.log_likelihood)
-        processes, e = first, after
-        if method.accelerate and len(trace) < method.max_iterations:
-            processes, e = _extrapolated(series, previous, first, e)
-            trace.append(e.log_likelihood)
-        gain = e.log_likelihood - before
-        if gain < method.tolerance * (0.5 * abs(e.log_likelihood + before) + _TINY):
-            return processes, trace, True
-    return processes, trace, False
+    later: float
+    cross: float
+    earlier: float
+    first: float
+    steps: int
 
 
-def _expectation(series: Series, processes: Terms) -> Expectation:
-    return expect(series.columns, stacked(processes, series.columns.dt))
+def _walk(process: Process, like: Process, m: StateMoments, dt: float) -> Process:
+    """A random walk with K of the M step, where ``like`` has it open."""
+    if like.values["K"] is not None:
+        return process
+    squares = m.later - 2.0 * m.cross + m.earlier
+    return process.with_values(K=float(np.sqrt(squares / m.steps / dt)))
 
 
-def _extrapolated(
-    series: Series, processes: Terms, first: Terms, reached: Expectation
-) -> tuple[Terms, Expectation]:
-    """A long step in the direction of two, if it climbs; else the second of them, if it does.
-
-    ``reached`` is the expectation of the first.
-    """
-    second = _maximization(series, first, reached)
-    coordinates = series.coordinates
-    zs = [coordinates.pack(each) for each in (processes, first, second)]
-    r, v = zs[1] - zs[0], zs[2] - 2.0 * zs[1] + zs[0]
-    norm, length = float(np.linalg.norm(v)), 1.0
-    if norm > 0.0:
-        length = min(float(np.linalg.norm(r)) / norm, tuning.LONGEST_EXTRAPOLATION)
-    step = 2.0 * length * r + length**2 * v
-    # Where an amplitude has all but vanished EM hardly moves: do not jump there.
-    if length > 1.0 and np.max(np.abs(step), initial=0.0) < tuning.FARTHEST_EXTRAPOLATION:
-        try:
-            far = coordinates.processes(zs[0] + step, processes)
-            with np.errstate(all="ignore"):
-                e = _expectation(series, far)
-            if e.log_likelihood >= reached.log_likelihood:
-                return far, e
-        except (InputError, np.linalg.LinAlgError, ZeroDivisionError):
-            pass  # no parameters there
-    e = _expectation(series, second)
-    return (second, e) if e.log_likelihood >= reached.log_likelihood else (first, reached)
-
-
-def _gauss_markov(process: Process, like: Process, e: Expectation, k: int, dt: float) -> Process:
-    """The process of state ``k`` with the parameters of the M step that ``like`` has open."""
-    later, cross, earlier, first = (float(m[k, k]) for m in (e.later, e.cross, e.earlier, e.first))
-    n, sigma = e.steps + 1, like.values["sigma"]
+def _gauss_markov(process: Process, like: Process, m: StateMoments, dt: float) -> Process:
+    """A Gauss-Markov process with the parameters of the M step that ``like`` has open."""
+    n, sigma = m.steps + 1, like.values["sigma"]
     delta = -float(np.expm1(-dt / float(process.values["tau"] or np.inf)))  # 1 - phi
     drift = Polynomial([1.0, -1.0])  # phi in terms of 1 - phi, whose digits matter
     loss = Polynomial([0.0, 2.0, -1.0])  # 1 - phi^2
-    squares = later - 2.0 * cross * drift + earlier * drift**2
+    squares = m.later - 2.0 * m.cross * drift + m.earlier * drift**2
     if like.values["tau"] is None:
-        total = squares + first * loss
+        total = squares + m.first * loss
         if sigma is None:
             condition = n * total.deriv() * loss - total * loss.deriv()
         else:
-            condition = e.steps * sigma**2 * loss.deriv() * loss
+            condition = m.steps * sigma**2 * loss.deriv() * loss
             condition = condition + squares.deriv() * loss - squares * loss.deriv()
 
         def log_likelihood(delta: float) -> float:
             size = float(loss(delta))
             if sigma is None:
                 return float(-0.5 * (n * np.log(total(delta)) - np.log(size)))
-            return -0.5 * (e.steps * np.log(size) + float(squares(delta)) / sigma**2 / size)
+            return -0.5 * (m.steps * np.log(size) + float(squares(delta)) / sigma**2 / size)
 
         # The root between 0 and 1 of highest likelihood; the present value where there is none.
         inside = [
@@ -267,13 +348,15 @@ def _gauss_markov(process: Process, like: Process, e: Expectation, k: int, dt: f
         delta = max([*inside, min(delta, _FASTEST)], key=log_likelihood)
         process = process.with_values(tau=float(-dt / np.log1p(-delta)))
     if sigma is None:
-        variance = (float(squares(delta)) / float(loss(delta)) + first) / n
+        variance = (float(squares(delta)) / float(loss(delta)) + m.first) / n
         process = process.with_values(sigma=float(np.sqrt(variance)))
     return process
 
 
-def _conclude(series: Series, processes: Terms, trace: Sequence[float], converged: bool) -> Fit:
-    coordinates, columns = series.coordinates, series.columns
+def _conclude(
+    series: Series, iteration: Iteration, stage: Stage, trace: Sequence[float], converged: bool
+) -> Fit:
+    coordinates, columns, processes = series.coordinates, series.columns, stage.processes
     likelihood = KalmanLikelihood(columns)
     notices = []
     if not converged:
@@ -283,7 +366,9 @@ def _conclude(series: Series, processes: Terms, trace: Sequence[float], converge
     while True:
         present = [i for i in range(len(processes)) if i not in absent]
         part, left = coordinates.without(absent), tuple(processes[i] for i in present)
-        redundant = redundant_term(part, left, likelihood) if converged else None
+        if not converged or iteration.in_state:
+            break
+        redundant = redundant_term(part, left, likelihood)
         if redundant is None:
             break
         absent.append(present[redundant])
@@ -297,4 +382,10 @@ def _conclude(series: Series, processes: Terms, trace: Sequence[float], converge
     if not is_maximum:
         hint = "lower the tolerance"
         notices.append(notice("not-converged", variant="no-maximum", hint=hint))
-    return conclude_likelihood(series, processes, absent, top, "em", notices, trace)
+    drift = None
+    if iteration.in_state:
+        drift = float(stage.drive[0]) / iteration.dt
+        first = next(p for p in processes if not p.is_white)
+        if not first.is_walk:
+            notices.append(notice("drift-in-state", term=first.title()))
+    return conclude_likelihood(series, processes, absent, top, "em", notices, trace, drift)

@@ -143,14 +143,14 @@ def whiten(space: Space, Y: FloatArray) -> tuple[FloatArray, float, int]:
 
 
 @compiled()
-def filtered(space: Space, Y: FloatArray) -> Filtered:
-    """Filter columns; their states begin with a mean of zero."""
+def filtered(space: Space, Y: FloatArray, A0: FloatArray, U: FloatArray) -> Filtered:
+    """Filter columns with initial mean ``A0`` (m, p) and constant input ``U`` (m, p) of each."""
     F, Q, h, r, P0 = space
     n, m = Y.shape
     p = h.size
     X, PP, G = np.zeros((n, m, p)), np.zeros((n, p, p)), np.zeros((n, p))
     V, S = np.zeros((n, m)), np.full(n, np.inf)
-    P, x = P0.copy(), np.zeros((m, p))
+    P, x = P0.copy(), A0.copy()
     updated, half, Ph = np.zeros((p, p)), np.zeros((p, p)), np.zeros(p)
     for k in range(n):
         missing = np.isnan(Y[k, 0])
@@ -168,7 +168,7 @@ def filtered(space: Space, Y: FloatArray) -> Filtered:
                 for i in range(p):
                     V[k, c] -= h[i] * X[k, c, i]
             for i in range(p):
-                x[c, i] = G[k, i] * V[k, c]
+                x[c, i] = U[c, i] + G[k, i] * V[k, c]
                 for j in range(p):
                     x[c, i] += F[i, j] * X[k, c, j]
         _propagate(F, Q, updated, half, P)
@@ -177,20 +177,21 @@ def filtered(space: Space, Y: FloatArray) -> Filtered:
 
 @compiled()
 def smooth(
-    space: Space, Y: FloatArray
+    space: Space, Y: FloatArray, A0: FloatArray, U: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
     """Smoothed states given all samples, with their covariances at lags zero and one.
 
     The backward recursion of de Jong (1989, *JASA* 84, 1085-1088) gives the result of Rauch, Tung
     and Striebel's without inverting a covariance.
 
+    Y, A0, U: As of `filtered`.
     Returns: X (n, m, p), smoothed states of each column; C (n, p, p), their covariance; D (n - 1,
         p, p), covariance of state k+1 with state k; V, S, innovations and their variances.
     """
     F, h = space.F, space.h
     n, m = Y.shape
     p = h.size
-    X, C, G, V, S = filtered(space, Y)
+    X, C, G, V, S = filtered(space, Y, A0, U)
     D = np.zeros((max(n - 1, 0), p, p))
     R, back = np.zeros((m, p)), np.zeros(p)
     N, L, later = np.zeros((p, p)), np.zeros((p, p)), np.zeros((p, p))

@@ -127,6 +127,14 @@ class Columns:
         columns.matrix = np.ascontiguousarray(values[:, None])
         return columns
 
+    @property
+    def centred(self) -> FloatArray:
+        """The series less its mean alone, (n,)."""
+        series = self.matrix[:, 0]
+        if self.drift_is_free:
+            series = series + self._removed * self.matrix[:, -1]
+        return series - np.nanmean(series)
+
     def slope(self, processes: Sequence[Process]) -> Slope:
         """The slope of the last regressor under a sum of processes."""
         innovations, _, _ = whitened(self, processes)

@@ -22,7 +22,7 @@ from gmwm import (
 )
 from gmwm.errors import InputError
 from gmwm.estimate.likelihood import Columns, KalmanLikelihood, stacked
-from gmwm.estimate.likelihood.em import Expectation, _gauss_markov, expect
+from gmwm.estimate.likelihood.em import StateMoments, _gauss_markov, expect
 from gmwm.process import as_model
 
 
@@ -152,6 +152,45 @@ def test_iterations_that_run_out_are_no_valid_fit(accelerate):
         assert len(fit.trace) == most
 
 
+# -- a drift of the state -------------------------------------------------------------------------
+
+
+def test_a_drift_of_a_walk_is_a_ramp_of_the_signal():
+    truth = WhiteNoise(0.5) + RandomWalk(0.05) + RateRamp(0.03)
+    x = truth.simulate(2000, 1.0, seed=7)
+    ramp = em(truth.opened(), x)
+    state = em(truth.opened(), x, drift="state")
+    for key, error in ramp.stderr.items():
+        assert state.params[key] == pytest.approx(ramp.params[key], abs=0.2 * error)
+    assert falls(state.trace) < 1e-8 * abs(state.trace[-1])
+
+
+@pytest.mark.parametrize("order", [1, -1])
+def test_a_drift_of_a_gauss_markov_state_is_forgotten(order):
+    """x[k+1] = phi x[k] + R dt + w[k]: its mean rises to R dt / (1 - phi)."""
+    tau, rate, n = 50.0, 0.05, 5000
+    phi = np.exp(-1.0 / tau)
+    rise = rate * (1.0 - phi ** np.arange(n)) / (1.0 - phi)
+    x = (WhiteNoise(0.5) + GaussMarkov(0.5, tau)).simulate(n, 1.0, seed=8) + rise
+    terms = [WhiteNoise(), GaussMarkov()][::order]
+    fit = em(terms[0] + terms[1] + RateRamp(), x, drift="state", max_iterations=200)
+    assert "not a ramp of the signal" in fit.message
+    # The first state has the covariance of one step, which its M step does not know of.
+    assert falls(fit.trace) < 0.02
+
+
+def test_a_drift_needs_a_state_and_a_ramp():
+    x = WhiteNoise(1.0).simulate(100, 1.0, 1)
+    with pytest.raises(InputError, match="of free slope"):
+        em(WhiteNoise() + RandomWalk(), x, drift="state")
+    with pytest.raises(InputError, match="of free slope"):
+        em(WhiteNoise() + RandomWalk() + RateRamp(0.1), x, drift="state")
+    with pytest.raises(InputError, match="RandomWalk or GaussMarkov"):
+        em(WhiteNoise() + RateRamp(), x, drift="state")
+    with pytest.raises(InputError, match="choose from ramp, state"):
+        em(WhiteNoise() + RandomWalk() + RateRamp(), x, drift="signal")
+
+
 # -- the M step -----------------------------------------------------------------------------------
 
 
@@ -160,22 +199,19 @@ def moments(draw_phi, n, seed, spread):
     rng = np.random.default_rng(seed)
     x = as_model(AR([draw_phi], 1.0)).simulate(n, 1.0, rng)
     lagged = 0.9 * draw_phi * spread
-    return Expectation(
-        later=np.array([[np.sum(x[1:] ** 2) + (n - 1) * spread]]),
-        cross=np.array([[np.sum(x[1:] * x[:-1]) + (n - 1) * lagged]]),
-        earlier=np.array([[np.sum(x[:-1] ** 2) + (n - 1) * spread]]),
-        first=np.array([[x[0] ** 2 + spread]]),
+    return StateMoments(
+        later=np.sum(x[1:] ** 2) + (n - 1) * spread,
+        cross=np.sum(x[1:] * x[:-1]) + (n - 1) * lagged,
+        earlier=np.sum(x[:-1] ** 2) + (n - 1) * spread,
+        first=x[0] ** 2 + spread,
         steps=n - 1,
-        residual=0.0,
-        count=n,
-        log_likelihood=0.0,
     )
 
 
 def expected_log_likelihood(process, m, dt):
     """Of a Gauss-Markov process whose states are seen, up to a constant."""
     variance, phi = process.sigma**2, np.exp(-dt / process.tau)
-    later, cross, earlier, first = (float(s[0, 0]) for s in (m.later, m.cross, m.earlier, m.first))
+    later, cross, earlier, first = m.later, m.cross, m.earlier, m.first
     noise = -variance * np.expm1(-2.0 * dt / process.tau)
     squares = later - 2.0 * phi * cross + phi**2 * earlier
     return -0.5 * (np.log(variance) + first / variance + m.steps * np.log(noise) + squares / noise)
@@ -188,7 +224,7 @@ def test_the_gauss_markov_step_is_the_maximum(like, phi, n, spread):
     dt = 0.1
     m = moments(phi, n, seed=n, spread=spread)
     start = GaussMarkov(*(value or 1.0 for value in like.values.values()))
-    found = _gauss_markov(start, like, m, 0, dt)
+    found = _gauss_markov(start, like, m, dt)
     best = expected_log_likelihood(found, m, dt)
     free = [name for name, value in like.values.items() if value is None]
     assert all(found.values[k] == v for k, v in like.values.items() if v is not None)
@@ -210,7 +246,7 @@ def test_expected_moments_are_those_of_draws_from_the_posterior(drift):
     x = np.random.default_rng(3).normal(size=n)
     x[[0, 7, 8]] = np.nan
     columns = Columns(x, 1.0, None, drift)
-    e = expect(columns, stacked(processes, 1.0))
+    e = expect(columns, stacked(processes, 1.0), np.zeros(2), np.zeros(2))
     k = np.arange(n)
     prior = np.zeros((2 * n, 2 * n))
     prior[:n, :n] = processes[0].autocovariance(np.abs(k[:, None] - k), 1.0)

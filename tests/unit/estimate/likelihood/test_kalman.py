@@ -106,17 +106,23 @@ def test_smoothing_is_conditioning_on_all_samples(model, gap):
     space = model.state_space(1.0)
     p = space.n_states
     y = columns(N, gap)
+    rng = np.random.default_rng(2)
+    starts, inputs = rng.normal(size=(3, p)), 0.1 * rng.normal(size=(3, p))
     present = ~np.isnan(y[:, 0])
+    mean = np.empty((N, 3, p))
+    mean[0] = starts
+    for k in range(N - 1):
+        mean[k + 1] = mean[k] @ space.transition.T + inputs
     prior = state_covariance(space, N)
     read = np.kron(np.eye(N), space.output)[present]
     of_samples = sample_covariance(space, N)[np.ix_(present, present)]
     gain = np.linalg.solve(of_samples, read @ prior).T
     posterior = (prior - gain @ read @ prior).reshape(N, p, N, p)
-    states, covariance, lagged, innovations, variances = smooth(arguments(space), y)
+    states, covariance, lagged, innovations, variances = smooth(arguments(space), y, starts, inputs)
     np.testing.assert_array_equal(np.isfinite(variances), present)
     scale = max(float(np.max(np.abs(prior), initial=0.0)), 1.0)
     for c in range(3):
-        expected = gain @ y[present, c]
+        expected = mean[:, c].ravel() + gain @ (y[present, c] - read @ mean[:, c].ravel())
         np.testing.assert_allclose(states[:, c].ravel(), expected, rtol=1e-8, atol=1e-8)
     for k in range(N):
         np.testing.assert_allclose(covariance[k], posterior[k, :, k], atol=1e-9 * scale)
@@ -126,7 +132,7 @@ def test_smoothing_is_conditioning_on_all_samples(model, gap):
     np.testing.assert_allclose(variances[present], np.diag(root) ** 2, rtol=1e-9)
     np.testing.assert_allclose(
         innovations[present, 0] / np.sqrt(variances[present]),
-        solve_triangular(root, y[present, 0], lower=True),
+        solve_triangular(root, y[present, 0] - read @ mean[:, 0].ravel(), lower=True),
         rtol=1e-8,
         atol=1e-9,
     )
@@ -150,7 +156,8 @@ def test_filter_and_smoother_agree_with_statsmodels(model, gap):
     peer.initialize_known(np.zeros(p), space.initial_covariance)
     peer.tolerance = 0.0  # no settled gain
     theirs = peer.smooth()
-    states, covariance, lagged, _, _ = smooth(arguments(space), y)
+    zero = np.zeros((1, p))
+    states, covariance, lagged, _, _ = smooth(arguments(space), y, zero, zero)
     np.testing.assert_allclose(states[:, 0], theirs.smoothed_state.T, rtol=1e-7, atol=1e-8)
     np.testing.assert_allclose(covariance, theirs.smoothed_state_cov.transpose(2, 0, 1), atol=1e-8)
     np.testing.assert_allclose(
@@ -166,7 +173,8 @@ LONG = 5000
 
 def full_recursion(space, y):
     """Innovations and log-determinant with the gain renewed at every sample."""
-    _, _, _, innovations, variances = smooth(arguments(space), y)
+    zero = np.zeros((y.shape[1], space.n_states))
+    _, _, _, innovations, variances = smooth(arguments(space), y, zero, zero)
     present = np.isfinite(variances)
     whitened = np.zeros_like(innovations)
     whitened[present] = innovations[present] / np.sqrt(variances[present])[:, None]
