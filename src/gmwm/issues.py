@@ -463,7 +463,7 @@ _CALIBRATION = (
         "compared": "its own fit is not valid ({reasons})"}, "read its notices first",
         severity="warning"),
     Issue("longest-part", "the longest part without the {count} steps and drifts is {kept:,.0f} s "
-        "of {of:,.0f} s, from {start:.6g} s to {stop:.6g} s", "calibrate that part{also}"),
+        "of {of:,.0f} s, from {start:.6g} s to {stop:.6g} s", "calibrate that part"),
     Issue("mostly-missing", "{missing:,} of {n:,} samples missing, more than half{why}",
         severity="bad"),
     Issue("not-estimable", "{text}", severity="bad"),

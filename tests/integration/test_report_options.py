@@ -39,7 +39,7 @@ def report(run, file, tmp_path):
 
 def test_what_is_found_and_taken_off(report):
     text, _ = report()
-    assert "static.csv: 50 s at 100 Hz. 2 of 3 axes usable" in text
+    assert "static.csv: 50 s at 100 Hz. Usable: gyro_y and accel_z. Not valid: gyro_x." in text
     assert re.search(r"gyro_x not valid : bias step at 30\S* s", text)
     assert re.search(r"severe gyro_x A step of .*? --remove-departures", text)
     text, _ = report("--remove-departures")

@@ -234,9 +234,9 @@ def advise_cut(
     kept, start, stop = max(parts)
     removable = all(each.values["removable"] for each in departed)
     values = {"start": start, "stop": stop, "of": length, "removable": removable}
-    also = ", or subtract them (remove_departures=True)" if removable else ""
-    advice = notice(LONGEST_PART, "", values, count=len(departed), kept=kept, also=also)
-    hint = "leave it out with the others, or subtract them"
+    advice = notice(LONGEST_PART, "", values, count=len(departed), kept=kept)
+    way = "subtract all of them (remove_departures=True)"
+    hint = way if removable else "calibrate the longest part without any"
     marked = {}
     for name, each in found.items():
         notices = tuple(

@@ -272,7 +272,7 @@ def write_files(
     from gmwm.export import TARGETS, export
 
     document, page, kalibr = (folder / name for name in _FILES)
-    written, lines = [f"{page} (open this)", str(document)], []
+    written, lines = [f"{page.name} (open this)", document.name], []
     shown = in_options(result)
     with moved_together(folder) as new:
         with stage("report"):
@@ -283,7 +283,7 @@ def write_files(
             try:
                 with stage("exports"):
                     export(shown, "kalibr", path=new / kalibr.name)
-                written.insert(1, f"{kalibr} (Kalibr)")
+                written.insert(1, f"{kalibr.name} (Kalibr)")
             except InputError as error:  # the other files are no worse for it
                 lines = wrapped(f"no {kalibr.name}: {error}")
     has_imu = len(written) > 2
@@ -293,12 +293,12 @@ def write_files(
         path = folder / TARGETS[target].file_name
         with stage("exports"):
             export(result, target, path=path)
-        written.append(f"{path} ({target})")
-    quoted = shlex.quote(str(document))
-    after = f"gmwm export {quoted} --to openvins" if has_imu else f"gmwm bound {quoted}"
+        written.append(f"{path.name} ({target})")
+    after = shlex.quote(str(document))
+    after = f"gmwm export {after} --to openvins" if has_imu else f"gmwm bound {after}"
     after = after if all(fit.valid for fit in result.values()) else f"1. above, then {after}"
-    last = "error model and all notices: -v"
-    return [*wrapped(f"wrote {', '.join(written)}", indent=2), *lines, f"next: {after}", last]
+    wrote = wrapped(f"wrote {', '.join(written)} in {folder}", indent=2)
+    return [*wrote, *lines, f"next: {after}"]
 
 
 @click.command()

@@ -45,28 +45,18 @@ def command_line() -> str:
 @contextmanager
 def progress_bar(title: str, unit: str, *, quiet: bool = False) -> Iterator[Progress | None]:
     """A bar with the time that is left, on a terminal only."""
+    from rich import progress
     from rich.console import Console
-    from rich.progress import (
-        BarColumn,
-        MofNCompleteColumn,
-        Progress as Bar,
-        TextColumn,
-        TimeRemainingColumn,
-    )
 
     console = Console(stderr=True)
     if quiet or not console.is_terminal:
         yield None
         return
-    columns = (
-        TextColumn(title),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TextColumn(unit + " {task.description}", markup=False),
-        TimeRemainingColumn(),
-        TextColumn("left"),
-    )
-    with Bar(*columns, console=console, transient=True) as bar:
+    text = progress.TextColumn
+    what = text(f"{unit} {{task.description}}", markup=False)
+    columns = (text(title), progress.BarColumn(), progress.MofNCompleteColumn(), what)
+    left = (progress.TimeRemainingColumn(), text("left"))
+    with progress.Progress(*columns, *left, console=console, transient=True) as bar:
         task = bar.add_task("", total=None)
         yield lambda done, total, what: bar.update(
             task, completed=done, total=total, description=what
@@ -102,6 +92,8 @@ HINTS = {
 }
 
 
+Span = tuple[float, float] | None
+
 _LEAST_KEPT = 0.2  # share of a recording that is worth calibrating alone
 _LONG = 100.0  # s: longer parts begin and end at whole seconds
 
@@ -122,57 +114,73 @@ def with_hint(error: InputError) -> str:
 
 def in_options(calibration: Calibration) -> Calibration:
     """A calibration whose notices advise in options, for a report of the command line."""
+    from gmwm.calibration import LONGEST_PART
+
     part = next((n.values for n in calibration.notices if n.code == "part"), {"start": 0.0})
     span = (part["start"], part["start"] + calibration.duration)
+    notices = tuple(with_option(each, span) for each in calibration.notices)
+    longest = next((n.hint for n in notices if n.code == LONGEST_PART), "")
+    # Samples at which a step may be are left out where it is subtracted.
+    steps = [[n.values for n in fit.notices if n.code == "step"] for fit in calibration.values()]
+    lost = max(sum(v.get("time_upper", 0) - v.get("time_lower", 0) for v in own) for own in steps)
     fits = {
-        name: replace(fit, notices=tuple(with_option(each, span) for each in fit.notices))
+        name: replace(fit, notices=tuple(with_option(n, span, lost, longest) for n in fit.notices))
         for name, fit in calibration.items()
     }
-    notices = tuple(with_option(each, span) for each in calibration.notices)
     return replace(calibration, fits=fits, notices=notices)
 
 
-def with_option(notice: Notice, span: tuple[float, float] | None = None) -> Notice:
+def with_option(notice: Notice, span: Span = None, lost: float = 0.0, longest: str = "") -> Notice:
     """A notice with the options that do what it advises.
 
     span: Of the file, s, where times of a calibration count from its start.
+    lost: s: of a channel, where departures are subtracted.
+    longest: How to calibrate the longest part without any.
     """
     from gmwm.calibration import LONGEST_PART
 
     values = notice.values
-    if notice.code == "sd-assumed":
-        return replace(notice, hint=f"give --{notice.where}-sd")
-    if notice.code == "axis-up":
-        hint = (
-            "correct if the sensor is mounted upside down; otherwise give --channel gyro_z=-NAME "
-            "--channel accel_z=-NAME, and also y if it points left"
-        )
-        return replace(notice, hint=hint)
-    if notice.code == "vibration":
-        return replace(notice, hint="leave it out with --start and --stop, or record again")
-    if notice.code in ("not-static", "tilt") and "start" in values and not notice.source:
-        return replace(notice, hint=_again(_cut(values["start"], values["stop"], span)))
-    options = ["--remove-departures" * bool(values.get("removable"))]
-    if notice.code == LONGEST_PART:
-        return replace(notice, hint=_again(*options, _cut(values["start"], values["stop"], span)))
-    if notice.code == "unsteady" and span is not None and not notice.source:
-        first, last, length = values["start"], values["stop"], span[1] - span[0]
-        start, stop = (0.0, first) if first > length - last else (last, length)
-        return replace(notice, hint=f"{_again(_cut(start, stop, span))} or record again")
-    if notice.severity == "note" or not values.get("evident") or values.get("together"):
+    always = {
+        "sd-assumed": f"give --{notice.where}-sd",
+        "axis-up": "correct if the sensor is mounted upside down; otherwise give --channel "
+        "gyro_z=-NAME --channel accel_z=-NAME, and also y if it points left",
+        "vibration": "leave it out with --start and --stop, or record again",
+    }
+    if notice.code in always:
+        return replace(notice, hint=always[notice.code])
+    is_part = notice.code in ("not-static", "tilt") and "start" in values and not notice.source
+    if is_part or notice.code == LONGEST_PART:
+        return replace(notice, hint=f"rerun with {_cut(values['start'], values['stop'], span)}")
+    length = span[1] - span[0] if span is not None and not notice.source else 0.0
+    if notice.code == "unsteady" and length:
+        first, last = values["start"], values["stop"]
+        ends = (0.0, first) if first > length - last else (last, length)
+        return replace(notice, hint=_rerun(_cut(ends[0], ends[1], span), ends[1] - ends[0], length))
+    if notice.severity == "note" or not values.get("evident"):
         return notice
-    if span is not None and not notice.source:
-        length, last = span[1] - span[0], values["time_upper"]
-        last *= 3.0 if notice.code == "transient" else 1.0
+    hint = longest if values.get("together") else ""
+    if values.get("removable"):
+        hint = _rerun("--remove-departures", length - lost, length)
+    elif length and not hint and notice.code != "slow-period":
+        last = values["time_upper"] * (3.0 if notice.code == "transient" else 1.0)
         first = values["time_lower"] if notice.code == "step" else 0.0
-        start, stop = (last, length) if length - last >= first else (0.0, first)
-        if notice.code != "slow-period" and stop - start > _LEAST_KEPT * length:
-            options.append(_cut(start, stop, span))
+        ends = (last, length) if length - last >= first else (0.0, first)
+        if ends[1] - ends[0] > _LEAST_KEPT * length:
+            hint = _rerun(_cut(ends[0], ends[1], span), ends[1] - ends[0], length)
     cause = "find what varies so, such as the temperature" * (notice.code == "slow-period")
-    return replace(notice, hint="; ".join(filter(None, [_again(*options), cause])) or notice.hint)
+    return replace(notice, hint="; ".join(filter(None, [hint, cause])) or notice.hint)
 
 
-def _cut(start: float, stop: float, span: tuple[float, float] | None) -> str:
+def _rerun(options: str, kept: float, length: float) -> str:
+    """The command, and how many seconds of a recording it keeps; of length 0: unknown."""
+    from gmwm.report import duration_text
+
+    shown, whole = map(duration_text, (kept, length))
+    keeps = "the whole recording" if shown == whole else f"about {shown} of {whole}"
+    return f"rerun with {options}" + f": keeps {keeps}" * (kept > 0.0)
+
+
+def _cut(start: float, stop: float, span: Span) -> str:
     """The options that keep a part, which begins and ends at whole seconds if it is long."""
     zero, end = span or (0.0, math.inf)
     first, last = zero + start, zero + stop
@@ -180,8 +188,3 @@ def _cut(start: float, stop: float, span: tuple[float, float] | None) -> str:
         first, last = float(math.ceil(first)), float(math.floor(last))
     options = [f"--start {first:.10g}"] if start > 0.0 else []
     return " ".join([*options, f"--stop {last:.10g}"] if zero + stop < end else options)
-
-
-def _again(*options: str) -> str:
-    given = " or ".join(filter(None, options))
-    return f"run again with {given}" if given else ""

@@ -20,7 +20,7 @@ from gmwm._core.frozen import ByName, freeze
 from gmwm._core.jobs import results
 from gmwm._core.pages import make
 from gmwm._core.tables import cell, frame, plain_table
-from gmwm._core.text import brief, bullets, per_cent, wrapped
+from gmwm._core.text import Printed, brief, bullets, per_cent, wrapped
 from gmwm._core.typing import Progress
 from gmwm.calibration import Calibration
 from gmwm.errors import InputError, MissingNameError, printable
@@ -99,7 +99,7 @@ def in_words(verdicts: Mapping[str, str]) -> str:
 
 
 @dataclass(frozen=True, repr=False)
-class Fleet(ByName[Calibration | Notice]):
+class Fleet(ByName[Calibration | Notice], Printed):
     """Units of a sensor: a mapping of paths to a `Calibration`, or to a `Notice` of why not.
 
     Attributes
@@ -186,9 +186,6 @@ class Fleet(ByName[Calibration | Notice]):
     def __repr__(self) -> str:
         failed = f", {len(self.failed)} not" if self.failed else ""
         return f"<Fleet of {len(self)} units: {len(self.done)} calibrated{failed}>"
-
-    def _repr_html_(self) -> str:
-        return str(make("fragment", self))
 
     def __str__(self) -> str:
         valid = sum(unit.valid for unit in self.units.values())

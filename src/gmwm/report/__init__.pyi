@@ -1,8 +1,8 @@
-from .answer import verdict as verdict
 from .calibration import fragment as fragment, write_report as write_report
 from .compared import write_sensor_comparison_report as write_sensor_comparison_report
 from .datasheet import read_datasheet as read_datasheet
-from .fleet import fleet_fragment as fleet_fragment, write_fleet_report as write_fleet_report
+from .fleet import write_fleet_report as write_fleet_report
+from .health import verdict as verdict
 from .navigation import (
     write_comparison_report as write_comparison_report,
     write_navigated_report as write_navigated_report,

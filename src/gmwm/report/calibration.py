@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from gmwm._core.files import writable_file, written
+from gmwm._core.files import writable_file, write_text
 from gmwm._core.jobs import shared
 from gmwm._core.pages import page_of
 from gmwm._core.text import brief, per_cent
@@ -23,7 +23,6 @@ from gmwm.estimate.result import confidence_interval
 from gmwm.issues import worst_first
 from gmwm.process import Model, WhiteNoise
 from gmwm.readers import Channel, Recording
-from gmwm.report.answer import quantity_text, trust
 from gmwm.report.budget import navigation
 from gmwm.report.datasheet import UNITS, Datasheet, read_datasheet
 from gmwm.report.figure import (
@@ -34,9 +33,9 @@ from gmwm.report.figure import (
     residual_figure,
     series_figure,
 )
-from gmwm.report.health import ambiguity, health
+from gmwm.report.health import ambiguity, health, trust
 from gmwm.report.numbers import SHOWN, Certified, certified
-from gmwm.report.page import duration_text, origin, rendered, resource, units_of
+from gmwm.report.page import duration_text, origin, quantity_text, rendered, resource, units_of
 from gmwm.report.screen import filter_table, first_screen, sensor_tables
 from gmwm.report.summary import verdict_line
 
@@ -70,9 +69,7 @@ def write_report(
     """
     path = writable_file(path)
     text = page(calibration, recording, datasheet=datasheet, provenance=provenance)
-    with written(path) as stream:
-        stream.write(text)
-    return path
+    return write_text(path, text)
 
 
 def page(

@@ -67,12 +67,14 @@ def overview_figure(calibration: Calibration, quantity: str | None) -> Figure:
         value = factor * fit.wv.allan_deviation
         traces.append(_line(tau, total, name, colour, "solid", 1.8))
         points = _points(fit.wv.tau, value, f"{name}, data", colour, 4)
-        traces.append({**points, "legendgroup": name})
+        ends = factor * np.sqrt(2.0 * np.stack([fit.wv.lower, fit.wv.upper]))
+        bars = _bars(value, ends[0], ends[1], colour)
+        traces.append({**points, "error_y": bars, "legendgroup": name})
         seen += [total, value]
     low, high = deviation_range(np.concatenate(seen))
-    ends = np.concatenate([fit.wv.tau for fit in fits.values()])
+    times = np.sort(np.concatenate([fit.wv.tau for fit in fits.values()]))
     deviations = _axis(units[0][0], 2.0 * low, high)
-    layout = {"height": 300, "xaxis": _times(np.sort(ends)), "yaxis": deviations}
+    layout = {"height": 300, "xaxis": _times(times), "yaxis": deviations}
     return _figure(traces, layout, units=units, toggles=range(0, len(traces), 2))
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from html import escape
 from pathlib import Path
 from typing import Any
 
@@ -39,6 +38,9 @@ def write_fleet_report(fleet: Fleet, path: str | os.PathLike[str]) -> Path:
     Raises InputError if the file cannot be written.
     """
     path = writable_file(path)
+    # Without those that say nothing, or that the page has elsewhere.
+    given = {key: each for key, each in fleet.options.items() if key != "version"}
+    options = {key: _in_words(each) for key, each in given.items() if each or each is False}
     return write_page(
         path,
         "fleet.html",
@@ -57,14 +59,8 @@ def write_fleet_report(fleet: Fleet, path: str | os.PathLike[str]) -> Path:
         farthest=outlier_distance,
         limits=_limits(fleet),
         troubled=_troubled(fleet),
-        provenance=origin(_options(fleet), "report of", None),
+        provenance=origin(options, "report of", None),
     )
-
-
-@page_of(Fleet, "fragment")
-def fleet_fragment(fleet: Fleet) -> str:
-    """The fleet for a notebook."""
-    return f"<pre>{escape(str(fleet))}</pre>"
 
 
 def _about(fleet: Fleet) -> str:
@@ -158,12 +154,6 @@ def _troubled(fleet: Fleet) -> list[tuple[str, str, str]]:
             rows += [(names[path], channel, "; ".join(texts))] if texts else []
         rows += [(names[path], name, why.text) for name, why in calibration.skipped.items()]
     return rows
-
-
-def _options(fleet: Fleet) -> dict[str, str]:
-    """Those that say something, without those that the page has elsewhere."""
-    shown = {k: each for k, each in fleet.options.items() if k != "version"}
-    return {key: _in_words(each) for key, each in shown.items() if each or each is False}
 
 
 def _in_words(value: object) -> str:

@@ -1,4 +1,4 @@
-"""Findings of the recording, worst first, and whether it is long enough for a filter."""
+"""Whether recording and fits are healthy: verdict, findings worst first, length for a filter."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from gmwm._core.text import per_cent
+from gmwm._core.pages import page_of
+from gmwm._core.text import brief, per_cent
 from gmwm.calibration import AMBIGUITY, LONGEST_PART, Calibration
 from gmwm.diagnosis import gathered
 from gmwm.errors import InputError
@@ -28,11 +29,14 @@ def health(calibration: Calibration) -> dict[str, Any]:
     """Content of the section: notices, worst first, and the good ones apart."""
     examined, notices = calibration.is_examined, _of_recording(calibration)
     found = findings(calibration)
+    _, _, least = _worst(calibration, SHOWN) or ("", 0.0, np.inf)
+    words = [
+        f"That part is {size} for {SHOWN:g} s outages." for size in ("too short", "long enough")
+    ]
     return {
         "examined": examined,
         "advice": [
-            f"{begun(n.text)}: {n.hint}. "
-            + _part_sentence(calibration, n.values["stop"] - n.values["start"], SHOWN)
+            f"{begun(n.text)}: {n.hint}. {words[least <= n.values['stop'] - n.values['start']]}"
             for n in calibration.notices
             if n.code == LONGEST_PART
         ],
@@ -47,8 +51,15 @@ def health(calibration: Calibration) -> dict[str, Any]:
 
 
 def findings(calibration: Calibration) -> list[Notice]:
-    """What the section counts and lists, and the line above the page counts."""
-    found = findings_of_fits(calibration)
+    """Departures, defects of fits, and, if it was examined, what the recording has."""
+    known = {notice.code for notice in calibration.notices if notice.severity == "bad"}
+    found = [
+        replace(notice, where=" ".join(part for part in (name, notice.where) if part))
+        for name, fit in calibration.items()
+        for notice in fit.notices
+        if notice.issue.topic == "departure"
+        or (notice.severity == "bad" and notice.code not in known)
+    ]
     if calibration.is_examined:
         found += [each for each in _of_recording(calibration) if each.severity != "good"]
     return found
@@ -69,16 +80,50 @@ def _of_recording(calibration: Calibration) -> list[Notice]:
     ]
 
 
-def findings_of_fits(calibration: Calibration) -> list[Notice]:
-    """Departures, and defects of fits that the recording's findings do not include."""
-    known = {notice.code for notice in calibration.notices if notice.severity == "bad"}
-    return [
-        replace(notice, where=" ".join(part for part in (name, notice.where) if part))
-        for name, fit in calibration.items()
-        for notice in fit.notices
-        if notice.issue.topic == "departure"
-        or (notice.severity == "bad" and notice.code not in known)
-    ]
+@page_of(Calibration, "verdict")
+def verdict(calibration: Calibration) -> dict[str, str]:
+    """The health of sensor and recording in one line."""
+    found = findings(calibration)
+    is_severe = any(n.severity == "bad" for n in gathered(calibration.notices))
+    removed = dict.fromkeys(n.where for n in found if n.values.get("removed"))
+    causes: dict[str, list[str]] = {}  # why fits are not valid -> their channels
+    for name, fit in calibration.items():
+        if not fit.valid:
+            causes.setdefault(trust(name, fit, calibration)[1], []).append(name)
+    parts = [f"{', '.join(names)} not valid: {cause}" for cause, names in causes.items()]
+    parts += [f"{', '.join(calibration.skipped)} have no model"] if calibration.skipped else []
+    parts += [counted(found, severity) for severity in ("bad", "warning")]
+    if removed:
+        parts.append(f"departures from noise subtracted ({', '.join(removed)})")
+    text = "; ".join(filter(None, parts))
+    if is_severe or causes or calibration.skipped:
+        all_out = not any(fit.valid for fit in calibration.values())
+        state, word = ("bad", "Not healthy") if all_out or is_severe else ("care", "Usable in part")
+        return {"state": state, "word": word, "text": text}
+    if not calibration.is_examined:
+        return {"state": "care", "word": "Not examined", "text": "the fits are valid"}
+    if text:
+        return {"state": "care", "word": "Healthy, with care", "text": text}
+    return {"state": "good", "word": "Healthy", "text": "no defect found"}
+
+
+def trust(name: str, fit: Fit, calibration: Calibration) -> tuple[bool, str]:
+    """Whether the numbers of a channel can be used, and why, in about five words."""
+    bad = [notice.issue for notice in fit.notices if notice.severity == "bad"]
+    if bad:
+        # A departure from noise is why the model misses levels too.
+        issue = next((each for each in bad if each.topic == "departure"), bad[0])
+        return False, issue.reason or issue.code.replace("-", " ")
+    at = fit.goodness
+    fits = "fits the data"
+    if at.worst is not None:
+        share = per_cent(abs(at.worst[0]))
+        fits = f"within {share} of the data up to {brief(at.known_to, 2)} s"
+    tied = next((n for n in calibration.notices if n.code == AMBIGUITY and n.where == name), None)
+    return (
+        True,
+        f"{fits}, {tied.values.get('models', 2):g} models fit equally well" if tied else fits,
+    )
 
 
 def ambiguity(calibration: Calibration, channel: str) -> list[str]:
@@ -160,10 +205,3 @@ def length_sentence(calibration: Calibration, horizon: float) -> str:
         )
     why = f" ({worst} at {horizon:g} s: +-{share})" if error > _AIM else ""
     return f"too short for {horizon:g} s outages: record {text}{why}"
-
-
-def _part_sentence(calibration: Calibration, length: float, horizon: float) -> str:
-    """Whether a part (s) of the recording is long enough too."""
-    found = _worst(calibration, horizon)
-    word = "long enough" if found is not None and found[2] <= length else "too short"
-    return f"That part is {word} for {horizon:g} s outages." if found is not None else ""

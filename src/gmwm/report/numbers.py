@@ -96,12 +96,8 @@ def _by_axis(axes: Mapping[str, Axis], invalid: Set[str]) -> dict[str, str]:
     )
     marks = {name: f"  # {_NOT_VALID}" if name in invalid else "" for name in values}
     lines = [f"    {name!r}: {each!r},{marks[name]}" for name, each in values.items()]
-    blocks = [
-        yaml.safe_dump({name: each}, sort_keys=False, allow_unicode=True).replace(
-            "\n", f"{marks[name]}\n", 1
-        )
-        for name, each in values.items()
-    ]
+    as_yaml = yaml.safe_dump(values, sort_keys=False, allow_unicode=True)
+    blocks = [f"{line}{marks.get(line[:-1], '')}\n" for line in as_yaml.splitlines()]
     return {
         "YAML, axis by axis": f"# {about}\n{''.join(blocks)}",
         "Python, axis by axis": "\n".join([f"# {about}", "imu_noise = {", *lines, "}", ""]),

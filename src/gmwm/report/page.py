@@ -16,10 +16,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from gmwm._core import __version__
-from gmwm._core.files import written
+from gmwm._core.files import write_text
 from gmwm._core.text import brief, per_cent
 from gmwm._core.units import field_units, si_parameter_unit
 from gmwm.errors import printable
+from gmwm.estimate import Fit
 from gmwm.variance import WaveletVariance
 
 _DAY, _YEAR = 86400.0, 365.25 * 86400.0
@@ -65,15 +66,18 @@ def units_of(unit: str, wv: WaveletVariance) -> tuple[str, float, str]:
     return (known[0].unit, known[0].per_si, si) if known else (si, 1.0, si)
 
 
+def quantity_text(value: float, unit: str, fit: Fit) -> dict[str, str]:
+    """A value in the field's first unit and in SI."""
+    field, scale, si = units_of(unit, fit.wv)
+    return {"field": f"{brief(value * scale, 3)} {field}", "si": f"{value:.3g} {si}"}
+
+
 def write_page(path: str | os.PathLike[str], template: str, **values: Any) -> Path:
     """Write a page from its template; see `rendered`.
 
     Raises InputError if the file cannot be written.
     """
-    text = rendered(template, **values)
-    with written(path) as stream:
-        stream.write(text)
-    return Path(path)
+    return write_text(path, rendered(template, **values))
 
 
 def rendered(template: str, scripts: Sequence[str] = (), **values: Any) -> str:

@@ -7,12 +7,23 @@ from typing import Any
 import numpy as np
 
 from gmwm._core.text import brief
-from gmwm._core.units import si_parameter_unit
 from gmwm.calibration import AxisNumbers, Calibration
-from gmwm.report.answer import quantity_text, verdict
 from gmwm.report.datasheet import UNITS, Datasheet
+from gmwm.report.health import verdict
 from gmwm.report.numbers import SHOWN, Certified
-from gmwm.report.summary import actions, covers, reason, short, unusable, verdict_line
+from gmwm.report.page import quantity_text
+from gmwm.report.summary import (
+    KEYS,
+    actions,
+    covers,
+    filter_key,
+    filter_values,
+    reason,
+    state,
+    unusable,
+    use,
+    verdict_line,
+)
 
 
 def first_screen(
@@ -48,33 +59,32 @@ def sensor_tables(calibration: Calibration, sheet: Datasheet | None = None) -> l
     tables = []
     for (quantity, *_), names in groups.items():
         first = calibration.numbers[names[0]]
-        rows = [
-            {
-                "name": name,
-                "why": "" if calibration[name].valid else reason(name, calibration),
-                "stated": False,
-                "cells": [_cell(calibration.numbers[name], letter) for letter in first.names],
-            }
-            for name in names
-        ]
+        rows = [_row(name, calibration) for name in names]
         stated = {} if sheet is None else sheet.entries
         for name in (each for each in (quantity, *names) if each in stated):
-            fit = calibration[names[0]]
-            texts = {n: quantity_text(v, UNITS[n], fit) for n, v in stated[name].items()}
-            cells = [
-                {
-                    units: texts.get(n, {units: ""})[units].partition(" ")[0]
-                    for units in ("field", "si")
-                }
-                for n in UNITS
+            texts = [
+                quantity_text(stated[name][n], unit, calibration[names[0]])
+                if n in stated[name]
+                else {"field": "", "si": ""}
+                for n, unit in UNITS.items()
             ]
-            rows.append({"name": f"data sheet, {name}", "why": "", "cells": cells, "stated": True})
+            cells = [{key: each.partition(" ")[0] for key, each in one.items()} for one in texts]
+            own = {"name": f"data sheet, {name}", "stated": True, "cells": cells}
+            rows.append({"mark": "", "why": "", **own})
         heads = [
             (f"{key}, {title}", {"field": number.usual.unit, "si": number.unit})
             for (key, title), number in zip(first.names.items(), first, strict=True)
         ]
         tables.append({"name": quantity or "other", "heads": heads, "rows": rows})
     return tables
+
+
+def _row(name: str, calibration: Calibration) -> dict[str, Any]:
+    axis, fit = calibration.numbers[name], calibration[name]
+    cells = [_cell(axis, letter) for letter in axis.names]
+    why = "" if fit.valid else reason(name, calibration)
+    mark = "*" * (state(fit) == "inflated")
+    return {"name": name, "mark": mark, "why": why, "stated": False, "cells": cells}
 
 
 def _cell(axis: AxisNumbers, letter: str) -> dict[str, str]:
@@ -92,17 +102,11 @@ def filter_table(calibration: Calibration, numbers: Certified) -> list[dict[str,
     rows = []
     for triad in numbers.triads:
         fits = {axis.name: calibration[axis.name] for axis in triad.axes}
-        values = {"N": triad.N, "K": triad.K, "start": triad.initial_sd}
-        row: dict[str, Any] = {
-            "name": triad.quantity,
-            "covers": covers(fits),
-            "warning": unusable(fits),
-        }
-        for key, value in values.items():
-            limit = "≤ " if key in UNITS and triad.is_upper(key) else ""
-            unit = si_parameter_unit(UNITS.get(key, "u"), triad.quantity)
-            row[key] = f"{limit}{short(value)} {unit}"
-        rows.append(row)
+        texts = {k: text.replace("<=", "≤") for k, text in filter_values(triad).items()}
+        keys = {letter: filter_key(triad.quantity, letter) for letter in KEYS}
+        about = {"covers": covers(fits)[1], "warning": unusable(fits), "keys": keys}
+        mark = "*" * (use(fits) == "usable *")
+        rows.append({"name": triad.quantity, "mark": mark, **texts, **about})
     return rows
 
 
@@ -119,6 +123,6 @@ def _by_axis(calibration: Calibration, numbers: Certified) -> list[dict[str, Any
             row[key] = {units: f"{limit}{each}" for units, each in text.items()}
         nees = axis.nees.get(SHOWN, float("nan"))
         row["nees"] = f"{nees:.2g}" if np.isfinite(nees) else "unknown"
-        row["covers"] = covers({name: fit}).removesuffix(f" ({name})")
+        row["covers"] = covers({name: fit})[1].removesuffix(f" ({name})")
         rows.append(row)
     return rows

@@ -7,31 +7,40 @@ from pathlib import PurePath
 
 from gmwm._core.text import WIDTH, brief, wrapped
 from gmwm._core.units import si_parameter_unit
-from gmwm.calibration import LONGEST_PART, Calibration, SensorNumbers
+from gmwm.calibration import Calibration, SensorNumbers
 from gmwm.errors import InputError
 from gmwm.estimate import Fit, JointFit
-from gmwm.export import SENSORS
+from gmwm.export import SENSORS, Triad
 from gmwm.filter_numbers import bound
 from gmwm.issues import Notice, worst_first
-from gmwm.report.answer import quantity_text, trust
-from gmwm.report.health import findings, length_sentence
+from gmwm.report.datasheet import UNITS
+from gmwm.report.health import findings, length_sentence, trust
 from gmwm.report.numbers import SHOWN, triad_of
-from gmwm.report.page import duration_text
+from gmwm.report.page import duration_text, quantity_text
 
 _LINES = 30  # of the page, with those about files
 _ACTIONS = 3  # notices that matter most
-_FEWEST = 4  # lines of them
-_NAME, _SOURCE, _TEXT = 16, 40, 60  # characters; longer ones are shortened
+_AXES, _FEWEST = 6, 4  # lines of them beside the numbers of more axes
+_NAME, _SOURCE, _TEXT = 18, 40, 60  # characters; longer ones are shortened
 _LEAST = 0.1  # smallest number without an exponent
 _LEGEND = "+-, (a to b): 95 % interval. <=: 95 % upper limit. B: lowest deviation / 0.664"
+_FILTER = "For your filter, outages up to {:g} s (keys of OpenVINS, Kalibr; GTSAM: N^2, K^2)"
+KEYS = {"N": "noise_density", "K": "random_walk"}
+"""Ends of the keys of OpenVINS and Kalibr, which begin with the names of `SENSORS`."""
 _DEPARTURES = {
-    "step": "a bias step",
-    "transient": "a transient at the start",
-    "drift-at-start": "a drift at the start",
-    "slow-period": "a slow period",
+    "step": "bias steps",
+    "transient": "start transient",
+    "drift-at-start": "drift at the start",
+    "slow-period": "slow period",
 }
 _DONE = frozenset({"event", "outliers", "rounding", "crosstalk", "held"})
 """Codes of warnings that the calibration has allowed for: nothing is to be done."""
+_STATES = {
+    "usable": "Usable",
+    "inflated": "Usable, but B and K inflated (*)",
+    "not valid": "Not valid",
+    "no model": "No model",
+}
 
 
 def summary_text(calibration: Calibration, files: Iterable[str] = ()) -> str:
@@ -47,15 +56,24 @@ def summary_text(calibration: Calibration, files: Iterable[str] = ()) -> str:
     """
     parts = [wrapped(verdict_line(calibration)), [], _filter(calibration), [], list(files)]
     left = _LINES - sum(len(part) + 1 for part in (parts[0], parts[2], parts[4]) if part)
-    texts = enumerate(actions(calibration), 1)
-    to_do = [wrapped(text, first=f"{place}. ", indent=3) for place, text in texts]
-    parts[1] = _sensor(calibration, left - 1 - min(len(_fitting(to_do, left)), _FEWEST + 1))
-    parts[3] = _fitting(to_do, left - len(parts[1]) - 2)
+    texts = actions(calibration)
+    least = len(_to_do(texts[:1], left))
+    many = min(len(_to_do(texts, left)), _FEWEST + 1) if len(calibration) > _AXES else 0
+    parts[1] = _sensor(calibration, left - 1 - max(least, many))
+    parts[3] = _to_do(texts, left - len(parts[1]) - 1)
     return "\n\n".join("\n".join(part) for part in parts if part)
 
 
+def state(fit: Fit) -> str:
+    """Whether its numbers are "usable", B and K "inflated" by departures, or "not valid"."""
+    if not fit.valid:
+        return "not valid"
+    departed = any(n.issue.topic == "departure" and n.severity != "note" for n in fit.notices)
+    return "inflated" if departed else "usable"
+
+
 def verdict_line(calibration: Calibration) -> str:
-    """The recording, its length, and how many axes are usable."""
+    """The recording, its length, and which axes are usable."""
     joint = max((len(f.parts) for f in calibration.values() if isinstance(f, JointFit)), default=1)
     names = calibration.source.split(", ") if joint > 1 else [calibration.source]
     files = list(dict.fromkeys(each.partition(" from ")[0] for each in names))
@@ -66,19 +84,18 @@ def verdict_line(calibration: Calibration) -> str:
     size = f"{duration_text(calibration.duration)} at {most}{calibration.rate:.6g} Hz"
     word = "recordings" if len(files) > 1 else "parts at rest"
     size += f" in {joint} {word}" if joint > 1 else ""
-    axes = {name: fit.valid for name, fit in calibration.items()}
-    axes |= dict.fromkeys(calibration.skipped, False)
-    others = [name for name, valid in axes.items() if not valid]
-    text, where = f"{len(axes) - len(others)} of {len(axes)} axes usable", ""
-    if not others:
-        text = {1: "The axis is", 2: "Both axes are"}.get(len(axes), f"All {len(axes)} axes are")
-        text += " usable"
-    elif len(others) == len(axes):
-        text = "No axis is usable"
-    else:
-        where = f"; {_listed(others)} {'are' if len(others) > 1 else 'is'} not"
-    start = f"{name}{more}: {size}. {text}"
-    return f"{start}{where if len(start + where) < WIDTH else ''}."
+    axes = {name: state(fit) for name, fit in calibration.items()}
+    axes |= dict.fromkeys(calibration.skipped, "no model")
+    found = {key: [n for n, own in axes.items() if own == key] for key in _STATES}
+    texts = [
+        f"{word}: {_places(found[key], calibration)}" for key, word in _STATES.items() if found[key]
+    ]
+    if len(found["usable"]) == len(axes):
+        all_of_them = {1: "The axis is", 2: "Both axes are"}
+        texts = [f"{all_of_them.get(len(axes), f'All {len(axes)} axes are')} usable"]
+    elif not (found["usable"] or found["inflated"]):
+        texts = ["No axis is usable"]
+    return ". ".join([f"{name}{more}: {size}", *texts, ""]).rstrip()
 
 
 def _shortened(text: str, most: int) -> str:
@@ -92,6 +109,20 @@ def _listed(names: Sequence[str], most: int = 4) -> str:
     if len(shown) > most:
         return f"{', '.join(shown[: most - 1])} and {len(shown) - most + 1} more"
     return " and ".join(filter(None, [", ".join(shown[:-1]), *shown[-1:]]))
+
+
+def _places(said: Collection[str], calibration: Calibration) -> str:
+    """Channels in a sentence."""
+    names = [name for name in (*calibration, *calibration.skipped) if name in said]
+    if len(names) == len(calibration) + len(calibration.skipped) > 2:
+        return "all axes"
+    sensors = []
+    for quantity, sensor in SENSORS.items():
+        own = [name for name, fit in calibration.items() if fit.wv.quantity == quantity]
+        if len(own) > 2 and {*own} <= {*names}:
+            names = [name for name in names if name not in own]
+            sensors.append(f"all {sensor}s")
+    return _listed([*names, *sensors])
 
 
 def _sensor(calibration: Calibration, most: int) -> list[str]:
@@ -115,7 +146,8 @@ def _sensor(calibration: Calibration, most: int) -> list[str]:
 
 
 def _table(calibration: Calibration, names: Sequence[str]) -> list[str]:
-    for short in ({n: n for n in names}, {_shortened(n, _NAME): n for n in names}):
+    marked = {n: f"{n}{'*' * (state(calibration[n]) == 'inflated')}" for n in names}
+    for short in ({marked[n]: n for n in names}, {_shortened(marked[n], _NAME): n for n in names}):
         numbers = SensorNumbers({each: calibration.numbers[name] for each, name in short.items()})
         units = {(axis.quantity, axis.B.usual.unit) for axis in numbers.values()}
         heads = len({quantity for quantity, _ in units})
@@ -140,44 +172,59 @@ def reason(name: str, calibration: Calibration) -> str:
     fit = calibration[name]
     cause = next((n for n in fit.notices if n.severity == "bad" and n.issue.spoils), None)
     steps = [n for n in fit.notices if n.code == "step" and n.severity in ("bad", "warning")]
-    if cause is not None or all(n.severity != "bad" for n in steps):
-        return cause.issue.reason if cause else trust(name, fit, calibration)[1]
     times = [f"{time:.0f} s" for time in sorted(n.values.get("time", 0.0) for n in steps)]
-    return f"bias step{'s' if times[1:] else ''} at {_listed(times)}"
+    at = f"bias step{'s' if times[1:] else ''} at {_listed(times)}" if times else ""
+    if cause is None and any(n.severity == "bad" for n in steps):
+        return at
+    return ", ".join(
+        filter(None, [cause.issue.reason if cause else trust(name, fit, calibration)[1], at])
+    )
 
 
 # -- filter numbers --------------------------------------------------------------------------------
 
 
 def _filter(calibration: Calibration) -> list[str]:
-    """N, K and start bias of each sensor for outages, and what else they cover."""
-    lines = []
+    """N and K of each sensor by key, the start bias, and what else they cover."""
+    lines, starts, largest = [], [], (0.0, "")
     for quantity in SENSORS:
         fits = {name: fit for name, fit in calibration.items() if fit.wv.quantity == quantity}
-        if not fits:
-            continue
         try:
-            lines += _of_sensor(quantity, fits)
+            values = filter_values(triad_of(quantity, fits)) if fits else {}
         except InputError as error:
             lines += wrapped(f"no filter numbers: {error}", f"{quantity:<6} ", 7)[:2]
-    title = f"For your filter, outages up to {SHOWN:g} s (bias0: initial bias sd; add turn-on bias)"
-    return [title, *lines] if lines else []
+            continue
+        for letter in KEYS if values else ():
+            row = f"{filter_key(quantity, letter):<27}  filter {letter} {values[letter]}"
+            lines.append(f"{row:<62}  {use(fits)}".rstrip())
+        starts += [f"{quantity} {values['start']}"] if values and values["start"][0] != "0" else []
+        largest = max(largest, covers(fits))
+    if not lines:
+        return []
+    if starts:
+        lines += wrapped(f"start bias, 1 sigma (add turn-on bias): {', '.join(starts)}", indent=2)
+    return [_FILTER.format(SHOWN), *lines, *wrapped(largest[1], indent=2)]
 
 
-def _of_sensor(quantity: str, fits: Mapping[str, Fit]) -> list[str]:
-    triad = triad_of(quantity, fits)
-    row = f"{quantity:<6}"
-    values = {"N": ("u/sqrt(Hz)", triad.N), "K": ("u/s/sqrt(Hz)", triad.K)}
-    for key, (unit, value) in (values | {"bias0": ("u", triad.initial_sd)}).items():
-        limit = "<= " if key in values and triad.is_upper(key) else ""
-        row += f" {key} {limit}{short(value)} {si_parameter_unit(unit, quantity)} " if value else ""
-    about = (each for text in (covers(fits), unusable(fits)) for each in wrapped(text, " " * 7, 7))
-    return [*wrapped(row.rstrip(), indent=7), *about]
+def filter_key(quantity: str, letter: str) -> str:
+    """What OpenVINS and Kalibr call N or K of a sensor."""
+    return f"{SENSORS[quantity]}_{KEYS[letter]}"
 
 
-def short(value: float) -> str:
-    """Three digits: ``8.10e-4``."""
-    return f"{value:.2e}".replace("e-0", "e-") if 0.0 < value < _LEAST else f"{value:.3g}"
+def filter_values(triad: Triad) -> dict[str, str]:
+    """N, K and the start bias for all axes of a sensor, SI."""
+    texts = {}
+    for key, value in (("N", triad.N), ("K", triad.K), ("start", triad.initial_sd)):
+        limit = "<= " if key in KEYS and triad.is_upper(key) else ""
+        shown = f"{value:.2e}".replace("e-0", "e-") if 0.0 < value < _LEAST else f"{value:.3g}"
+        texts[key] = f"{limit}{shown} {si_parameter_unit(UNITS.get(key, 'u'), triad.quantity)}"
+    return texts
+
+
+def use(fits: Mapping[str, Fit]) -> str:
+    """Whether the numbers for all axes of a sensor can be used; empty if nothing is wrong."""
+    states = {state(fit) for fit in fits.values()}
+    return "do not use" if "not valid" in states else "usable *" * ("inflated" in states)
 
 
 def unusable(fits: Mapping[str, Fit]) -> str:
@@ -187,14 +234,13 @@ def unusable(fits: Mapping[str, Fit]) -> str:
     return f"do not use yet: {_listed(invalid)} {verb} not valid" if invalid else ""
 
 
-def covers(fits: Mapping[str, Fit]) -> str:
-    """The largest slow term that the numbers of a sensor cover; empty if there is none."""
-    covered = sorted(_covered(fits))[-1:]
-    return "".join(f"{letters} {term} ({name})" for _, term, name, letters in covered)
+def covers(fits: Mapping[str, Fit]) -> tuple[float, str]:
+    """Share of the largest slow term that the numbers of a sensor cover, and its text."""
+    return max(_covered(fits), default=(0.0, ""))
 
 
-def _covered(fits: Mapping[str, Fit]) -> Iterator[tuple[float, str, str, str]]:
-    """Slow terms that N or K cover: the share, the term, its axis and what covers it."""
+def _covered(fits: Mapping[str, Fit]) -> Iterator[tuple[float, str]]:
+    """Slow terms that N or K cover: the share, and what covers which."""
     for name, fit in fits.items():
         shares: dict[str, dict[str, float]] = {}
         for notice in bound(fits, horizon=SHOWN, shared=True)[name].notices:
@@ -209,15 +255,18 @@ def _covered(fits: Mapping[str, Fit]) -> Iterator[tuple[float, str, str, str]]:
             text = quantity_text(term.values[size.name] or 0.0, size.unit, fit)["field"]
             text = f"{label.rstrip(' 0123456789')}, {text}"
             text += f", tau {brief(tau)} s" if tau else ""
-            letters = f"{', '.join(sorted(by_letter, key='NK'.index))} raised to cover"
-            yield max(by_letter.values()), text, name, letters
+            letters = f"filter {', '.join(sorted(by_letter, key='NK'.index))} raised to cover"
+            yield max(by_letter.values()), f"{letters} {text} ({name})"
 
 
 # -- what to do ------------------------------------------------------------------------------------
 
 
 def actions(calibration: Calibration) -> list[str]:
-    """The notices that matter most, those of one kind together, each with what to do."""
+    """The notices that matter most, those of one kind together, each with what to do.
+
+    A longer recording comes last.
+    """
     groups: dict[str, list[Notice]] = {}
     found = [each for each in findings(calibration) if each.severity in ("bad", "warning")]
     found.sort(key=lambda n: (not n.issue.spoils, n.issue.topic != "departure"))
@@ -227,39 +276,26 @@ def actions(calibration: Calibration) -> list[str]:
         done = notice.code in _DONE and notice.severity != "bad"
         if not done and not (departed and notice.code == "unsteady"):  # that is the cause
             groups.setdefault(topic if topic == "departure" else notice.code, []).append(notice)
-    cut = next((each.hint for each in calibration.notices if each.code == LONGEST_PART), "")
-    texts = [_action(group, cut, calibration) for group in groups.values()]
+    texts = [_action(group, calibration) for group in groups.values()]
     length = length_sentence(calibration, SHOWN)
     if length.startswith("too short") and any(fit.valid for fit in calibration.values()):
-        severe = sum(group[0].severity == "bad" for group in groups.values())
-        texts.insert(min(severe, _ACTIONS - 1), length)
+        texts[_ACTIONS - 1 :] = [f"later, {length.removeprefix('too short ')}"]
     return texts[:_ACTIONS]
 
 
-def _fitting(actions: Sequence[Sequence[str]], most: int) -> list[str]:
+def _to_do(texts: Sequence[str], most: int) -> list[str]:
     """The title and as many of them as there are lines."""
-    lines = ["What to do"] if actions else []
-    for each in actions:
-        if len(lines) + len(each) <= most:
-            lines += each
+    lines, place = ["What to do (error models and all notices: -v)"], 1
+    for text in texts or ["nothing: no defect was found, and the recording is long enough"]:
+        whole = text.replace(" h ", "\xa0h\xa0").replace(" min", "\xa0min")
+        item = wrapped(whole, first=f"{place}. " if texts else "", indent=3)
+        if len(lines) + len(item) <= most:
+            lines, place = [*lines, *(line.replace("\xa0", " ") for line in item)], place + 1
     return lines if lines[1:] else []
 
 
-def _places(said: Collection[str], calibration: Calibration) -> str:
-    """Channels in a sentence."""
-    names = [name for name in (*calibration, *calibration.skipped) if name in said]
-    for quantity, sensor in SENSORS.items():
-        own = [name for name, fit in calibration.items() if fit.wv.quantity == quantity]
-        if len(own) > 2 and names == own:
-            return f"all {sensor}s"
-    return "all axes" if len(names) == len(calibration) > 2 else _listed(names)
-
-
-def _action(group: Sequence[Notice], cut: str, calibration: Calibration) -> str:
-    """What was found, where, and what to do.
-
-    cut: What to do about several departures.
-    """
+def _action(group: Sequence[Notice], calibration: Calibration) -> str:
+    """What was found, where, and what to do."""
     first, parameters = group[0], dict.fromkeys(n.where.partition(" ")[2] for n in group)
     said = {place.partition(" ")[0] for each in group for place in each.where.split(", ")}
     where = _places(said, calibration) or _shortened(first.where, _SOURCE)
@@ -270,12 +306,12 @@ def _action(group: Sequence[Notice], cut: str, calibration: Calibration) -> str:
     while len(text) > _TEXT and (", " in text or ": " in text):
         text = text.rpartition(", " if ", " in text else ": ")[0]
     if first.issue.topic == "departure":
-        kinds = dict.fromkeys(_DEPARTURES[each.code] for each in group)
-        if sum(each.code == "step" for each in group) > 1:
-            kinds = {kind.replace("a bias step", "bias steps"): None for kind in kinds}
-        verb = "inflates" if len(group) == 1 else "inflate"
-        text, hint = f"{' and '.join(kinds)} {verb} B and K", cut or hint
-    elif len({notice.text for notice in group}) > 1:
+        kinds: dict[str, set[str]] = {}
+        for each in group:
+            kinds.setdefault(_DEPARTURES[each.code], set()).add(each.where.partition(" ")[0])
+        where = "; ".join(f"{kind}: {_places(on, calibration)}" for kind, on in kinds.items())
+        return "; ".join(filter(None, [where, hint]))
+    if len({notice.text for notice in group}) > 1:
         text = first.issue.reason or f"{text}, and more"
     if not hint and first.severity == "bad":
         hint = "look at the plot in the report"

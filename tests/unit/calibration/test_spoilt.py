@@ -6,7 +6,7 @@ from scipy.signal import lfilter
 
 import gmwm
 from gmwm import WhiteNoise
-from gmwm.report.answer import trust
+from gmwm.report.health import trust
 
 N, SD = 6_000, 8.7e-4
 

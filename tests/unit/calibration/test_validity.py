@@ -52,10 +52,10 @@ def test_the_longest_part_without_any(notices, part):
     found, (advice,) = advise_cut(models(*notices), 100.0)
     assert (advice.values["start"], advice.values["stop"]) == part
     assert advice.values["of"] == 100.0 and advice.values["removable"]
-    assert "remove_departures" in advice.hint
+    assert advice.hint == "calibrate that part"
     assert f"{part[1] - part[0]:,.0f} s of 100 s" in advice.text
     for notice in found["gyro_x"].fit.notices:
-        assert notice.values["together"] and "with the others" in notice.hint
+        assert notice.values["together"] and "remove_departures=True" in notice.hint
     assert found["accel_y"].fit.notices == ()
 
 
@@ -75,8 +75,11 @@ def test_one_that_is_evident_has_its_own_remedy(notices, length):
 
 def test_what_cannot_be_taken_off_is_cut():
     kept = departed("step", 70.0, 80.0, removable=False)
-    _, (advice,) = advise_cut(models(STEP, kept), 100.0)
-    assert not advice.values["removable"] and advice.hint == "calibrate that part"
+    found, (advice,) = advise_cut(models(STEP, kept), 100.0)
+    assert not advice.values["removable"]
+    assert {n.hint for n in found["gyro_x"].fit.notices} == {
+        "calibrate the longest part without any"
+    }
 
 
 def issue(code, severity="bad", where=""):

@@ -20,7 +20,6 @@ from gmwm.cli.console import in_options
 from gmwm.issues import Notice
 from gmwm.plotting import COMPONENT_COLOURS
 from gmwm.report import figure as figures, write_report
-from gmwm.report.answer import trust
 from gmwm.report.budget import navigation
 from gmwm.report.calibration import _needed as needed, page
 from gmwm.report.datasheet import read_datasheet
@@ -30,7 +29,7 @@ from gmwm.report.figure import (
     residual_figure,
     series_figure,
 )
-from gmwm.report.health import health
+from gmwm.report.health import health, trust
 from gmwm.report.numbers import certified
 from gmwm.report.page import duration_text, resource
 from gmwm.report.screen import first_screen
@@ -186,7 +185,7 @@ def test_the_page_says_what_was_found(parsed, calibration):
     notes = gmwm.error_budget(calibration).notes
     assert notices and notes, "the fixture must have some"
     for words in (
-        "bench.csv: 80 s at 100 Hz. 2 of 4 axes usable",
+        "80 s at 100 Hz. Usable: gyro_x and voltage. Not valid: accel_x. No model: gyro_y.",
         "8,000 samples a channel",
         f"gmwm {gmwm.__version__}, numpy",
         "Column not used: 'temp'",
@@ -497,7 +496,7 @@ def test_what_filter_numbers_cover_is_said(calibration):
     one = replace(calibration, fits={"gyro_x": fit}, rivals={})
     found = first_screen(one, certified(one))
     assert re.fullmatch(
-        r"N, K raised to cover Gauss-Markov, \d+ deg/h, tau \d+ s \(gyro_x\)",
+        r"filter N, K raised to cover Gauss-Markov, \d+ deg/h, tau \d+ s \(gyro_x\)",
         found["filter"][0]["covers"],
     )
     assert found["by_axis"][0]["covers"] == found["filter"][0]["covers"].removesuffix(" (gyro_x)")
@@ -678,7 +677,7 @@ def test_a_step_that_spoils_a_fit_is_the_first_finding(calibration):
     first, second = health(spoilt)["rows"]
     assert (first.severity, first.where) == ("bad", "accel_x")
     assert first.text == "a step of +2.7 mg at 29.3 s"
-    assert first.hint == "run again with --remove-departures or --start 30.32"
+    assert first.hint == "rerun with --remove-departures: keeps about 78 s of 80 s"
     assert second.severity == "warning"
 
 
@@ -708,7 +707,9 @@ def test_health_is_in_the_first_lines_and_findings_worst_first(calibration):
         issue("note", "seen"),
     )
     shown = Page(page(replace(calibration, notices=notices)))
-    assert shown.text.startswith("Sensor error models: bench.csv bench.csv: 80 s at 100 Hz. 2 of 4")
+    assert shown.text.startswith(
+        "Sensor error models: bench.csv bench.csv: 80 s at 100 Hz. Usable: "
+    )
     to_do = shown.text[shown.text.index("What to do") : shown.text.index("All findings")]
     assert "broken" in to_do and "seen" not in to_do
     # With those for which fits are not valid.
@@ -821,7 +822,7 @@ def test_units_are_text_not_markup(calibration):
 def test_the_file(calibration, tmp_path):
     path = tmp_path / "report.html"
     assert write_report(calibration, path) == path
-    assert path.read_text(encoding="utf-8") == page(calibration)
+    assert path.read_text(encoding="utf-8") == f"{page(calibration)}\n"
     assert calibration.report(tmp_path / "again.html").read_bytes() == path.read_bytes()
 
 

@@ -11,6 +11,7 @@ import pytest
 import gmwm
 from gmwm import Channel, RandomWalk, Recording, WhiteNoise
 from gmwm.cli.calibrate import show
+from gmwm.export import TARGETS
 from gmwm.issues import Notice
 from gmwm.report import summary_text
 from marks import slow
@@ -18,6 +19,8 @@ from marks import slow
 DT, SAMPLES = 0.01, 8000
 WALK = WhiteNoise(4e-4) + RandomWalk(3e-4)
 UNITS = {"gyro": "rad/s", "accel": "m/s^2"}
+NAMES = TARGETS["openvins"].keys.names
+KEYS = {"gyro": NAMES[:2], "accel": NAMES[2:]}
 FILES = ["wrote out/report.html, out/imu.yaml, out/calibration.json", "next: one", "last"]
 
 
@@ -95,12 +98,13 @@ def test_every_sensor_has_filter_numbers(calibrated):
     text = summary_text(calibrated)
     for quantity in UNITS:
         axes = {name: fit for name, fit in calibrated.items() if fit.wv.quantity == quantity}
-        row = re.search(rf"^{quantity} +N (<= )?(\S+) .* K (<= )?(\S+) ", text, re.MULTILINE)
-        assert (row is not None) == bool(axes)
-        if axes:
-            shared = next(iter(gmwm.bound(axes, horizon=60.0, shared=True).values()))
-            assert float(row[2]) == pytest.approx(shared.N, rel=5e-3)
-            assert bool(row[3]) or float(row[4]) == pytest.approx(shared.K, rel=5e-3)
+        for letter, key in zip("NK", KEYS[quantity], strict=True):
+            row = re.search(rf"^{key} +filter {letter} (<= )?(\S+) ", text, re.MULTILINE)
+            assert (row is not None) == bool(axes)
+            if axes:
+                shared = next(iter(gmwm.bound(axes, horizon=60.0, shared=True).values()))
+                value = pytest.approx(getattr(shared, letter), rel=5e-3)
+                assert bool(row[1]) or float(row[2]) == value
 
 
 # -- the same digits everywhere --------------------------------------------------------------------
@@ -152,16 +156,22 @@ def test_the_verdict_counts_the_axes(two):
     bad = with_defects(two)
     assert "No axis is usable." in summary_text(bad)
     one = replace(two, fits={**two.fits, "accel_x": bad["accel_x"]})
-    assert "1 of 2 axes usable; accel_x is not." in summary_text(one)
+    assert "Usable: gyro_z. Not valid: accel_x." in summary_text(one)
     assert re.search(r"^accel_x +not valid: bias steps at 30 s, 31 s, 32 s and 2 more$",
                      summary_text(one), re.MULTILINE)  # fmt: skip
-    assert "do not use yet: accel_x is not valid" in summary_text(one)
+    states = dict(re.findall(r"^(\S+) +filter .*?(do not use|$)", summary_text(one), re.MULTILINE))
+    assert [states[KEYS[each][0]] for each in UNITS] == ["", "do not use"]
+    steps = replace(bad["accel_x"].notices[-10], severity="warning")
+    inflated = replace(two["accel_x"], notices=(steps,))
+    text = summary_text(replace(two, fits={**two.fits, "accel_x": inflated}))
+    assert "Usable: gyro_z. Usable, but B and K inflated (*): accel_x." in " ".join(text.split())
+    assert re.search(r"^accel_x\* ", text, re.MULTILINE)
+    assert len(re.findall(r"^accelerometer_.* usable \*$", text, re.MULTILINE)) == 2
 
 
 def test_departures_come_first_and_once(two):
-    lines = summary_text(with_defects(two)).partition("What to do\n")[2].splitlines()
-    assert lines[0].startswith("1. all axes: " if len(two) > 2 else "1. gyro_z and accel_x: ")
-    assert "bias steps inflate B and K" in lines[0]
+    lines = summary_text(with_defects(two)).partition("What to do")[2].splitlines()[1:]
+    assert lines[0].startswith("1. bias steps: gyro_z and accel_x; ")
     assert sum("bias step" in line for line in lines) == 1
 
 

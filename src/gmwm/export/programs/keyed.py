@@ -108,7 +108,7 @@ imu0:
         + "  Tg:\n"
         + 3 * "    - [0.0, 0.0, 0.0]\n"
     )
-    file_name = "kalibr_imu_chain.yaml"
+    file_name, to_copy = "kalibr_imu_chain.yaml", "YAML, OpenVINS"
 
 
 class Vins(KeyedFile):
