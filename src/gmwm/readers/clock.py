@@ -12,7 +12,7 @@ from gmwm._core.typing import BoolArray, FloatArray, IntArray, median
 from gmwm.errors import InputError
 from gmwm.issues import Notice, notice
 from gmwm.readers import tuning
-from gmwm.readers.grid import Change, Jumps, Uneven, find_change, find_jumps, place_uneven
+from gmwm.readers.grid import Change, Jumps, Uneven, find_change, find_jumps, find_lattice, place_uneven
 from gmwm.readers.table import more_such
 
 # Names of units of time, by their seconds.
@@ -150,6 +150,7 @@ class _Grid:
     jitter: float
     change: Change | None
     uneven: Uneven | None = None
+    is_lattice: bool = False  # whether many rows are lost from a clock that shows the interval
 
 
 def _grid(clock: Clock) -> _Grid:
@@ -157,6 +158,9 @@ def _grid(clock: Clock) -> _Grid:
     with np.errstate(all="ignore"):  # extreme stamps end in an InputError, not in a warning
         steps = np.diff(clock.stamps)
         is_increasing = bool(np.all(steps > 0.0))
+        if is_increasing and (lattice := find_lattice(clock.stamps)) is not None:
+            whole = np.delete(steps, lattice.rows - 1) / lattice.interval
+            return _Grid(lattice, float(np.std(whole)), None, is_lattice=True)
         is_even = is_increasing and not _are_in_turns(clock.stamps, steps)
         every = 1 if is_even else tuning.ROWS_OF_ROUGH
         change = find_change(clock.stamps[::every])
@@ -241,6 +245,8 @@ def without_unit(
 def _check_jumps(clock: Clock, found: _Grid, seconds: float) -> None:
     """Reject a clock whose rate changes much, or whose jumps are not lost rows."""
     jumps, n = found.jumps, clock.stamps.size
+    if found.is_lattice:
+        return
     off_grid = int(np.count_nonzero(jumps.is_off_grid))
     if found.change is not None:
         first, then = (rate / seconds for rate in found.change.rates)

@@ -137,6 +137,52 @@ def find_jumps(stamps: FloatArray) -> Jumps:
     return replace(found, interval=line)
 
 
+def find_lattice(stamps: FloatArray) -> Jumps | None:
+    """Jumps where many rows are lost from a clock whose steps are whole multiples of the shortest.
+
+    None if few steps are longer, if the steps are not such multiples, or if the rows that are there
+    have a rhythm: stamps rounded to a coarse unit, batches and stalls are multiples of a unit, too.
+    """
+    steps = np.diff(stamps)
+    low = float(np.quantile(steps, tuning.SHARE_OF_SHORTEST))
+    interval = median(steps[(steps >= low) & (steps <= tuning.LONGEST_STEP * low)])
+    if not (interval > 0.0 and np.sum(steps) < tuning.MOST_LOST * steps.size * interval):
+        return None
+    # Longer steps tell the interval more finely, once it is known well enough to number them.
+    for reach in (1.0, 4.0, 16.0, 64.0, 256.0, np.inf):
+        number = np.rint(steps / interval)
+        near = (number > 0.0) & (number <= reach)
+        near &= np.abs(steps / interval - number) < tuning.OFF_GRID
+        if np.mean(near) < tuning.SHARE_OF_SHORTEST:
+            return None
+        interval = float(steps[near] @ number[near] / (number[near] @ number[near]))
+    number = np.rint(steps / interval)
+    off = np.abs(steps / interval - number) > tuning.OFF_GRID
+    if np.min(number) < 1.0 or np.mean(off) > tuning.MOST_OFF_GRID:
+        return None
+    rows = np.flatnonzero(number > 1.0) + 1
+    if rows.size < tuning.MANY_LOST * steps.size:
+        return None
+    place = np.cumsum(np.append(0.0, number)).astype(np.int64)
+    if _has_rhythm(place):
+        return None
+    starts = np.append(False, off)
+    line = interval_of(stamps, place, starts)
+    return Jumps(rows, steps[rows - 1] / line, number[rows - 1] - 1.0, line)
+
+
+def _has_rhythm(place: IntArray) -> bool:
+    """Whether rows at these places of a grid have lines in their spectrum, as lost ones have not."""
+    from scipy import ndimage
+
+    size = min(tuning.PLACES_OF_RHYTHM, int(place[-1]) + 1)
+    there = np.zeros(size)
+    there[place[: np.searchsorted(place, size)]] = 1.0
+    power = np.abs(np.fft.rfft((there - np.mean(there)) * np.hanning(size))[3:]) ** 2
+    usual = ndimage.median_filter(power, tuning.BINS_OF_RHYTHM, mode="nearest")
+    return bool(np.any(power > tuning.RHYTHM * usual))
+
+
 def _advance(stamps: FloatArray, rows: IntArray, interval: float) -> FloatArray:
     """Advance of the clock at each of these rows, in intervals, with jitter averaged out."""
 
