@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 import shlex
 import sys
 from collections.abc import Iterator
@@ -67,7 +68,7 @@ HINTS = {
     "accel-unit-missing": "--accel-unit {unit}",
     "channel-unknown": "--channel gyro_x=COLUMN for each channel",
     "channels-swapped": "--channel accel_x=COLUMN for each channel",
-    "clock": "--rate 100 --time none",
+    "clock": "--rate {rate:.6g} --time none",
     "damaged": "get a whole copy, or read the rest with --damaged",
     "earlier-runs": "--resume, or -o FOLDER",
     "gyro-unit-missing": "--gyro-unit deg/s",
@@ -106,7 +107,8 @@ def with_hint(error: InputError) -> str:
     if not hint:
         return str(error)
     if error.code == "clock":  # to ignore the stamps is right only if nothing else is
-        return str(error).replace("give rate= and time=False", f"give e.g. {hint}")
+        hint = hint if "rate" in error.values else "the sampling rate, --rate, and --time none"
+        return f"{error.problem}: {re.sub('give [^;]*time=False', f'give {hint}', error.hint)}"
     if error.hint:
         return f"{error.problem}: {'give e.g. ' if hint.startswith('-') else ''}{hint}"
     return f"{error} (on the command line: {hint})"

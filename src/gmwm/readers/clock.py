@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gmwm._core.typing import BoolArray, FloatArray, IntArray, median
+from gmwm._core.typing import BoolArray, FloatArray, IntArray, known_of, median
 from gmwm.errors import InputError
 from gmwm.issues import Notice, notice
 from gmwm.readers import tuning
@@ -19,7 +19,7 @@ from gmwm.readers.table import more_such
 UNITS = {86400.0: "days", 3600.0: "hours", 60.0: "minutes", 1.0: "seconds"}
 UNITS |= {1e-3: "milliseconds", 1e-6: "microseconds", 1e-9: "nanoseconds"}
 _SHORT = dict(zip(UNITS, ("days", "h", "min", "s", "ms", "us", "ns"), strict=True))
-_WAY_OUT = "if the samples are evenly spaced all the same, give rate= and time=False"
+_WAY_OUT = "if the samples are evenly spaced all the same, give {} and time=False"
 _SHORTEST_SHOWN = 1e-3  # s; less is given in microseconds
 _SHORTEST_STEP = 1e-100  # in any unit; shorter ones only leave the range of floating point
 _DAY = 86400.0
@@ -40,7 +40,23 @@ class Clock:
     def error(self, row: int | None, text: str, hint: str = _WAY_OUT) -> InputError:
         """An error about the stamps, with the file, the column and the place."""
         place = "" if row is None else f", {self.where(row)}"
-        return InputError(f"{self.source}, {self.column}{place}: {text}", "clock", hint)
+        rate, values = self.usual_rate, dict[str, float | str]()
+        if rate is not None:
+            values["rate"] = rate
+        given = "the sampling rate, rate=" if rate is None else f"rate={rate:.6g}"
+        text = f"{self.source}, {self.column}{place}: {text}"
+        return InputError(text, "clock", hint.format(given), values)
+
+    @property
+    def usual_rate(self) -> float | None:
+        """Rate (Hz) of the usual steps, of all where most are none; None without a unit."""
+        with np.errstate(all="ignore"):
+            steps = np.diff(np.sort(known_of(self.stamps))) * (self.seconds or 1.0)
+            usual = median(steps) if steps.size else 0.0
+            some = steps[(steps > 0.5 * usual) & (steps <= tuning.USUAL_STEP * usual)]
+            step = float(np.mean(some if usual > 0.0 else steps)) if steps.size else 0.0
+        is_likely = tuning.LEAST_STEP <= step < tuning.LARGEST_STEP
+        return 1.0 / step if step > 0.0 and (is_likely or self.seconds is not None) else None
 
 
 @dataclass(frozen=True)
@@ -260,6 +276,10 @@ def _check_jumps(clock: Clock, found: _Grid, seconds: float) -> None:
     if off_grid > tuning.MOST_OFF_GRID * n and found.uneven is None:
         usual = f"the usual one of {jumps.interval:.6g}, so that the sampling rate is not known"
         text = f"{off_grid:,} of {n:,} steps are not near a whole number of {usual}"
+        raise clock.error(None, text)
+    if found.uneven is None and found.change is None and jumps.strays(clock.stamps):
+        text = f"its steps differ at random from the usual one of {jumps.interval:.6g}, and the"
+        text += " differences add up, as if rows were lost"
         raise clock.error(None, text)
     if jumps.are_bursts:
         text = f"every {jumps.rows[1] - jumps.rows[0]} rows the clock steps by {jumps.steps[0]:.3g}"

@@ -55,6 +55,14 @@ class Jumps:
         shortest = np.min(apart[half - 1 :] - apart[: apart.size - half + 1])
         return bool(shortest <= 1.0 + 0.1 * np.median(apart))
 
+    def strays(self, stamps: FloatArray) -> bool:
+        """Whether the differences of the steps add up, as those of rows lost unnoticed do."""
+        number = np.ones(stamps.size)
+        number[self.rows] += self.missing
+        ahead = stamps / self.interval - np.cumsum(number)
+        away = ahead[tuning.ROWS_OF_STRAYING :] - ahead[: -tuning.ROWS_OF_STRAYING]
+        return away.size > 0 and median(np.abs(away)) > tuning.MOST_STRAYING
+
     def spread(self, values: FloatArray) -> FloatArray:
         """Samples (n,) on the even grid: NaN where a row is missing, without copies."""
         if not (self.repeated.size or self.rows.size):
@@ -176,11 +184,15 @@ def _has_rhythm(place: IntArray) -> bool:
     from scipy import ndimage
 
     size = min(tuning.PLACES_OF_RHYTHM, int(place[-1]) + 1)
-    there = np.zeros(size)
-    there[place[: np.searchsorted(place, size)]] = 1.0
-    power = np.abs(np.fft.rfft((there - np.mean(there)) * np.hanning(size))[3:]) ** 2
-    usual = ndimage.median_filter(power, tuning.BINS_OF_RHYTHM, mode="nearest")
-    return bool(np.any(power > tuning.RHYTHM * usual))
+    for start in np.linspace(0, place[-1] + 1 - size, tuning.PARTS_OF_RHYTHM).astype(int):
+        first, last = np.searchsorted(place, [start, start + size])
+        there = np.zeros(size)
+        there[place[first:last] - start] = 1.0
+        power = np.abs(np.fft.rfft((there - np.mean(there)) * np.hanning(size))[3:]) ** 2
+        usual = ndimage.median_filter(power, tuning.BINS_OF_RHYTHM, mode="reflect")
+        if np.any(power > tuning.RHYTHM * usual):
+            return True
+    return False
 
 
 def _advance(stamps: FloatArray, rows: IntArray, interval: float) -> FloatArray:

@@ -38,7 +38,7 @@ NUMBERS_OF_SENSORS = frozenset(
     {"id", "i", "inst", "instance"}
     | {f"{what}{end}" for what in ("imu", "sensor", "device", "unit") for end in ("", "id", "_id")}
 )
-_TIME_WORDS = frozenset({"t", "ts", "time", "timestamp", "stamp"})
+_TIME_WORDS = frozenset({"t", "ts", "time", "timestamp", "stamp", "tow"})
 # Columns about a sensor, or about a temperature or a voltage, other than its samples.
 _NO_SAMPLES = frozenset(
     {"bias", "offset", "std", "sigma", "var", "cov", "err", "error", "ref", "reference"}
@@ -66,7 +66,7 @@ _UNIT_WORDS = {
 
 _BEFORE_TIME = frozenset(
     {"header", "field", "imu", "sensor", "sample", "sampling", "system", "sys", "unix", "utc"}
-    | {"gps", "ros", "elapsed", "relative", "boot", "device", "local", "date", "datetime", "iso"}
+    | {"gps", "ros", "elapsed", "relative", "boot", "device", "local", "date", "datetime", "iso", "gnss"}
 )
 _SECONDS = {
     word: seconds

@@ -128,4 +128,7 @@ def _format_of(path: Path, name: str | None = None) -> Format:
         head = stream.read(max(len(magic) for each in FORMATS for magic in each.magic))
     by_content = [each for each in FORMATS if each.magic and head.startswith(each.magic)]
     by_name = [each for each in FORMATS if suffix in each.suffixes]
-    return next(iter(by_content + by_name), _TEXT)
+    found = next(iter(by_content + by_name), _TEXT)
+    # MATLAB's save -ascii writes text into files of the same name; its others have binary headers.
+    is_ascii = found.name == "mat" and not by_content and head[:16].isascii() and b"\0" not in head
+    return _TEXT if is_ascii and head.split() else found

@@ -93,11 +93,15 @@ FEWEST_IN_RHYTHM, ALL_IN_RHYTHM = 4, 6
 
 # Rows lost at random: share of the steps that are the shortest (of 95 % lost one in twenty is), times
 # the rows that a recording may be longer, and share of longer steps from which one looks for them.
-SHARE_OF_SHORTEST, MOST_LOST, MANY_LOST = 0.005, 25.0, 0.05
+SHARE_OF_SHORTEST, MOST_LOST, MANY_LOST = 0.005, 25.0, 0.01
 
-# Places of the grid and bins beside a line from which a rhythm shows, and its height above their
-# median: noise alone exceeds it with a probability of 1e-10 in a recording.
-PLACES_OF_RHYTHM, BINS_OF_RHYTHM, RHYTHM = 1 << 16, 101, 50.0
+# Parts of the grid, places of each and bins beside a line from which a rhythm shows, and its height
+# above their median: noise alone exceeds it with a probability of 1e-10 in a recording.
+PARTS_OF_RHYTHM, PLACES_OF_RHYTHM, BINS_OF_RHYTHM, RHYTHM = 8, 1 << 16, 101, 50.0
+
+# Rows after which, and intervals by which in the median, a clock without a grid strays from an even
+# one: jitter of 12 % does if each step adds its own to those before.
+ROWS_OF_STRAYING, MOST_STRAYING = 64, 0.75
 
 ROUNDS_OF_LINE, LINE_SETTLED = 20, 1e-9  # of the robust line; relative change that ends them
 

@@ -3,10 +3,21 @@
 import numpy as np
 import pytest
 
+from gmwm.errors import InputError
 from gmwm.readers import tuning
+from gmwm.readers.clock import Clock, timing_of
 from gmwm.readers.grid import Jumps, find_change, find_jumps
 
 DT = 0.004
+
+
+def clock(times):
+    """A clock of these stamps in seconds."""
+
+    def never(rows):
+        return np.zeros(rows.size, dtype=bool)
+
+    return Clock("a.csv", "column 't'", times, 1.0, "s", lambda row: f"row {row}", never)
 
 
 def stamps(n=3000, lost=(), late=(), dt=DT):
@@ -112,3 +123,56 @@ def test_a_change_of_the_rate_needs_two_parts():
     rng = np.random.default_rng(1)
     noisy = np.repeat([0.01, 0.0103], 400) * (1.0 + 0.3 * rng.normal(size=800))
     assert find_change(np.cumsum(noisy)) is None
+
+
+def lossy(share, one_at_a_time, n=60_000, dt=DT):
+    """An even clock that lost a share of its rows, or each with that chance if none before was."""
+    rng = np.random.default_rng(3)
+    kept = rng.random(n) >= share
+    if one_at_a_time:
+        kept[1:] |= ~kept[:-1]
+    kept[:2] = True
+    return np.round(dt * np.flatnonzero(kept), 6), kept
+
+
+@pytest.mark.parametrize("one_at_a_time", [True, False])
+@pytest.mark.parametrize("share", [0.05, 0.3, 0.5, 0.7, 0.9, 0.95])
+def test_rows_lost_from_an_exact_clock_leave_its_rate(share, one_at_a_time):
+    times, kept = lossy(share, one_at_a_time)
+    timing = timing_of(clock(times))
+    assert timing.rate == pytest.approx(1.0 / DT, rel=1e-5)
+    placed = timing.jumps.spread(np.ones(times.size))
+    np.testing.assert_array_equal(np.isfinite(placed), kept[: placed.size])
+
+
+@pytest.mark.parametrize("jitter", [0.02, 0.05, 0.1, 0.2, 0.3])
+@pytest.mark.parametrize("share", [0.5, 0.8, 0.95])
+def test_with_jitter_the_rate_is_right_or_the_clock_rejected(share, jitter):
+    times, _ = lossy(share, one_at_a_time=False)
+    times += jitter * DT * np.random.default_rng(4).normal(size=times.size)
+    try:
+        assert timing_of(clock(times)).rate == pytest.approx(1.0 / DT, rel=1e-5)
+        assert jitter < 0.1
+    except InputError:
+        assert jitter > 0.05
+
+
+def test_runs_of_lost_rows_leave_the_rate():
+    change = np.random.default_rng(5).random(60_000) < 1.0 / 50.0
+    kept = np.cumsum(change) % 2 == 0
+    timing = timing_of(clock(DT * np.flatnonzero(kept)))
+    assert timing.rate == pytest.approx(1.0 / DT, rel=1e-5)
+
+
+@pytest.mark.parametrize("steps", [(0.004, 0.006), (0.002, 0.003), (0.010, 0.015)])
+def test_steps_of_two_sizes_without_a_whole_ratio_are_no_clock(steps):
+    times = np.cumsum(np.random.default_rng(6).choice(steps, 20_000))
+    with pytest.raises(InputError, match="differences add up"):
+        timing_of(clock(times))
+
+
+@pytest.mark.parametrize("share", [0.2, 0.5, 0.9])
+def test_lost_rows_of_stamps_rounded_too_coarsely_are_not_placed_by_the_unit(share):
+    times, _ = lossy(share, one_at_a_time=False, dt=1.0 / 700.0)
+    with pytest.raises(InputError):
+        timing_of(clock(np.round(times, 3)))

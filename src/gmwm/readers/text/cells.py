@@ -26,11 +26,15 @@ _MISSING = re.compile(r"[+-]?nan|n/?a|#n/a|null|none|", re.IGNORECASE)
 _INFINITE = re.compile(r"[+-]?inf(?:inity)?", re.IGNORECASE)
 
 
+_MONTHS = ("Jan", "Feb", "Mar", "Apr", "May", "Jun", "Jul", "Aug", "Sep", "Oct", "Nov", "Dec")
+_MONTH = rf"\d{{1,2}}-(?:{'|'.join(_MONTHS)})-\d{{4}}"  # 05-Jan-2023, of MATLAB
+
+
 def _date(fraction: str, zone: str) -> re.Pattern[str]:
     """Day, hour, minute and second in groups 1 to 4 or, without marks, 5 to 8; the zone in 9."""
     second = rf"(\d{{2}}(?:{fraction}\d*)?)"
     return re.compile(
-        rf"(?:(\d{{4}}(?:[-/]\d{{1,2}}[-/]\d{{1,2}}|-\d{{3}}|-W\d\d-\d))[Tt ]\s*"
+        rf"(?:(\d{{4}}(?:[-/]\d{{1,2}}[-/]\d{{1,2}}|-\d{{3}}|-W\d\d-\d)|{_MONTH})[Tt ]\s*"
         rf"(\d{{1,2}}):(\d{{2}}):{second}"
         rf"|(\d{{7,8}}|\d{{4}}W\d{{3}})[Tt](\d{{2}})(\d{{2}}){second})\s?([Zz]|UTC|GMT|{zone})?"
     )
@@ -104,6 +108,8 @@ def _day(text: str) -> date:
     """Of the month, of the year (2026-123) or of the week (2026-W12-3), with marks or without."""
     if "W" in text:
         return date.fromisoformat(text)
+    if "-" in text and text[-8:-5] in _MONTHS:
+        return date(int(text[-4:]), _MONTHS.index(text[-8:-5]) + 1, int(text[:-9]))
     plain = re.sub("[-/]", "", text)
     if len(plain) == 7 and len(text) <= 8:
         found = datetime.strptime(plain, "%Y%j").date()
