@@ -277,6 +277,9 @@ _READERS = (
         "about {time:.4g} s; {rate:.6g} Hz is used throughout", "use the part before or after "
         "({row})", severity="bad", topic="clock", lacks="rate_constant",
         reason="the sampling rate changed", spoils=("gyro", "accel")),
+    _reading("rate-ignores-stamps", "{column} has stamps of {own:.6g} Hz, with {mean:.6g} rows a "
+        "second, where the given rate is {rate:.6g} Hz", "use the stamps", severity="warning",
+        topic="clock"),
     _reading("rate-stated", "the given rate of {rate:g} Hz is used"),
     _reading("rate-unlikely", "{rate:.6g} Hz is an unlikely rate of an inertial sensor",
         "check the unit of the time column", severity="warning"),

@@ -12,7 +12,16 @@ from gmwm._core.typing import BoolArray, FloatArray, IntArray, known_of, median
 from gmwm.errors import InputError
 from gmwm.issues import Notice, notice
 from gmwm.readers import tuning
-from gmwm.readers.grid import Change, Jumps, Uneven, find_change, find_jumps, find_lattice, place_uneven
+from gmwm.readers.grid import (
+    Change,
+    Jumps,
+    Uneven,
+    find_change,
+    find_jumps,
+    find_lattice,
+    place_uneven,
+)
+from gmwm.readers.names import bare
 from gmwm.readers.table import more_such
 
 # Names of units of time, by their seconds.
@@ -45,16 +54,13 @@ class Clock:
             values["rate"] = rate
         given = "the sampling rate, rate=" if rate is None else f"rate={rate:.6g}"
         text = f"{self.source}, {self.column}{place}: {text}"
-        return InputError(text, "clock", hint.format(given), values)
+        return InputError(text, "clock", hint.replace("{}", given), values)
 
     @property
     def usual_rate(self) -> float | None:
-        """Rate (Hz) of the usual steps, of all where most are none; None without a unit."""
+        """Rate (Hz) of the usual steps; None without a unit."""
         with np.errstate(all="ignore"):
-            steps = np.diff(np.sort(known_of(self.stamps))) * (self.seconds or 1.0)
-            usual = median(steps) if steps.size else 0.0
-            some = steps[(steps > 0.5 * usual) & (steps <= tuning.USUAL_STEP * usual)]
-            step = float(np.mean(some if usual > 0.0 else steps)) if steps.size else 0.0
+            step = usual_step(np.sort(known_of(self.stamps))) * (self.seconds or 1.0)
         is_likely = tuning.LEAST_STEP <= step < tuning.LARGEST_STEP
         return 1.0 / step if step > 0.0 and (is_likely or self.seconds is not None) else None
 
@@ -67,6 +73,16 @@ class Timing:
     jumps: Jumps  # where rows are missing
     notices: tuple[Notice, ...]  # the rate, its unit, the jitter, jumps, and what else is uneven
     jitter: float  # standard deviation of the steps, as a share of a step
+
+
+def usual_step(stamps: FloatArray) -> float:
+    """Sampling interval of sorted stamps: mean of usual steps, of all where most are none."""
+    steps = np.diff(stamps)
+    usual = median(steps) if steps.size else 0.0
+    if usual > 0.0 and np.min(steps) > 0.0 and (lattice := find_lattice(stamps)):
+        return lattice.interval
+    some = steps[(steps > 0.5 * usual) & (steps <= tuning.USUAL_STEP * usual)]
+    return float(np.mean(some if usual > 0.0 else steps)) if steps.size else 0.0
 
 
 def agree(rate: float, other: float) -> bool:
@@ -92,7 +108,7 @@ def timing_of(clock: Clock, expected: float | None = None) -> Timing:
         clock = replace(clock, stamps=clock.stamps[rows], where=lambda row: where(int(rows[row])))
         variant = "many" if copies.size > 1 else ""
         last.append(notice("rows-repeated", "", {"count": copies.size}, variant=variant))
-    continued = _unwrapped(clock.stamps)
+    continued = _unwrapped(clock.stamps, clock.seconds or 1.0)
     if continued is not None:
         clock = replace(clock, stamps=continued)
         last.insert(0, notice("clock-wraps"))
@@ -114,6 +130,12 @@ def timing_of(clock: Clock, expected: float | None = None) -> Timing:
     notices = _notices(clock, found, seconds, is_guess=is_guess)
     is_told = expected is not None or not is_guess
     slowest, fastest = tuning.RATES_OF_SENSORS if is_told else tuning.RATES_OF_SECONDS
+    are_seconds = tuning.LEAST_STEP <= jumps.interval < tuning.LARGEST_STEP
+    if rate > fastest and are_seconds and clock.seconds is not None and expected is None:
+        text = f"its steps are {1.0 / rate:.3g} s by the unit in its name, a rate of {rate:.6g} Hz"
+        raise clock.error(
+            None, text, f"write the unit it has, such as '{_name_of(clock.column)} [s]'"
+        )
     if not slowest <= rate <= fastest:
         hint = "the time column states no unit: name it, such as 'time [s]' or 'time [ms]'"
         shown_hint = None if is_told else hint
@@ -139,8 +161,8 @@ def _copies(clock: Clock) -> IntArray:
     return np.sort(order[copies]) if many else none
 
 
-def _unwrapped(stamps: FloatArray) -> FloatArray | None:
-    """Stamps of a counter of 16 or 32 bit that overflowed, continued; None if it did not."""
+def _unwrapped(stamps: FloatArray, unit: float) -> FloatArray | None:
+    """Stamps that began again after 16 or 32 bit, a day or a week, continued; None if none did."""
     with np.errstate(all="ignore"):
         steps = np.diff(stamps)
         back = np.flatnonzero(steps < 0.0)
@@ -149,11 +171,11 @@ def _unwrapped(stamps: FloatArray) -> FloatArray | None:
         usual = median(steps)
         if usual == 0.0 and np.any(steps > 0.0):  # in bursts most are none
             usual = median(steps[steps > 0.0])
-        for bits in (16, 32):
-            forward = steps[back] + 2.0**bits
+        for period in (2.0**16, 2.0**32, _DAY / unit, 7.0 * _DAY / unit):
+            forward = steps[back] + period
             if usual > 0.0 and np.all((forward > 0.0) & (forward < tuning.LONGEST_OF_WRAP * usual)):
                 wraps = np.zeros(stamps.size)
-                wraps[back + 1] = 2.0**bits
+                wraps[back + 1] = period
                 return np.asarray(stamps + np.cumsum(wraps))
     return None
 
@@ -235,6 +257,10 @@ def _unit(clock: Clock, step: float, expected: float | None) -> tuple[float, boo
     return 1.0, True
 
 
+def _name_of(column: str) -> str:
+    return bare(column[8:-1]) if column.endswith(("'", '"')) else "time"
+
+
 def without_unit(
     source: str, column: str, step: float, expected: float | None = None
 ) -> InputError | None:
@@ -250,7 +276,7 @@ def without_unit(
     each = [f"{rates[unit]:.6g} Hz if they are {UNITS[unit]}" for unit in likely]
     each += [] if expected is None else [f"not the given {expected:.6g} Hz"]
     text = ", ".join([f"{source}, {column}: steps of {step:.6g} without a unit", *each])
-    name = column[8:-1] if column.endswith(("'", '"')) else "time"
+    name = _name_of(column)
     rate, called = 100.0, "by its unit"
     if likely:
         rate, called = rates[likely[0]], repr(f"{name} [{_SHORT[likely[0]]}]")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -78,7 +78,8 @@ def roles_of(table: Table, given: Given) -> Roles:
     if isinstance(channels, Mapping):
         if not channels:
             raise InputError(f"channels names no channel: give the column of each, e.g. {_EXAMPLE}")
-        chosen = {name: find_column(table, each, name) for name, each in channels.items()}
+        each_axis = dict(_each_axis(table, channels))
+        chosen = {name: find_column(table, each, name) for name, each in each_axis.items()}
         stamps = [i for i in stamps if i not in chosen.values()]
     else:
         chosen = _named_channels(table)
@@ -117,6 +118,16 @@ def roles_of(table: Table, given: Given) -> Roles:
         hint = 'name one of a gyro or an accelerometer, e.g. channels={"gyro_x": 1}'
         raise InputError(f"{table.source}: every channel is auxiliary: {hint}", "channel-unknown")
     return Roles(chosen, tuple(auxiliary), time, tuple(notices))
+
+
+def _each_axis(table: Table, channels: Mapping[str, Reference]) -> Iterator[tuple[str, Reference]]:
+    """The channels, with the three axes of a sensor for an array of them: ``gyro`` = ``wb``."""
+    for name, column in channels.items():
+        axes = [f"{column}_{axis}" for axis in AXES]
+        if name in SI_UNIT and column not in table.names and {*axes} <= {*map(bare, table.names)}:
+            yield from zip((f"{name}_{axis}" for axis in AXES), axes, strict=True)
+        else:
+            yield name, column
 
 
 def find_column(table: Table, reference: Reference, what: str) -> int:

@@ -180,7 +180,7 @@ def find_lattice(stamps: FloatArray) -> Jumps | None:
 
 
 def _has_rhythm(place: IntArray) -> bool:
-    """Whether rows at these places of a grid have lines in their spectrum, as lost ones have not."""
+    """Whether rows at these places of a grid have lines in their spectrum; lost ones have none."""
     from scipy import ndimage
 
     size = min(tuning.PLACES_OF_RHYTHM, int(place[-1]) + 1)

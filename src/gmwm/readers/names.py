@@ -31,7 +31,14 @@ _SENSOR_WORDS = {
     for word in words.split()
 }
 # These mean a sensor only where nothing stands before them.
-_SENSOR_LETTERS = {"g": "gyro", "w": "gyro", "a": "accel", "f": "accel"}
+_SENSOR_LETTERS = {
+    "g": "gyro",
+    "w": "gyro",
+    "wb": "gyro",
+    "a": "accel",
+    "f": "accel",
+    "fb": "accel",
+}
 
 # Columns that say which of several sensors a row is of.
 NUMBERS_OF_SENSORS = frozenset(
@@ -66,7 +73,19 @@ _UNIT_WORDS = {
 
 _BEFORE_TIME = frozenset(
     {"header", "field", "imu", "sensor", "sample", "sampling", "system", "sys", "unix", "utc"}
-    | {"gps", "ros", "elapsed", "relative", "boot", "device", "local", "date", "datetime", "iso", "gnss"}
+    | {
+        "gps",
+        "ros",
+        "elapsed",
+        "relative",
+        "boot",
+        "device",
+        "local",
+        "date",
+        "datetime",
+        "iso",
+        "gnss",
+    }
 )
 _SECONDS = {
     word: seconds

@@ -23,7 +23,7 @@ from gmwm.readers.columns import AuxiliaryColumn, Given, Reference, Roles, chann
 from gmwm.readers.formats.binary import BinaryTable, layout_of
 from gmwm.readers.joining import Part, has_sensors, joined, shares, with_temperature
 from gmwm.readers.missing import without_sentinels
-from gmwm.readers.names import NUMBERS_OF_SENSORS, bare, meaning, stated_seconds
+from gmwm.readers.names import NUMBERS_OF_SENSORS, TIME, bare, meaning, stated_seconds
 from gmwm.readers.recording import Channel, Recording, auxiliary_channel
 from gmwm.readers.registry import NAMES, Wanted, open_tables
 from gmwm.readers.rest import rest_notices
@@ -156,6 +156,8 @@ def recording_of(table: Table, given: Given) -> Part:
         arrays[index], found = without_sentinels(name, arrays[index], largest, table.where)
         odd += found
     timing = None if roles.time is None else _timing(table, roles.time, arrays, stated)
+    if given.time is False and stated is not None:
+        odd += _contradicted(table, stated)
     rate = stated or (timing.rate if timing else 0.0)  # or it was asked for with the units
     if timing is not None:
         # One column at a time: its short form goes before the next one is made longer.
@@ -225,6 +227,23 @@ def _unknown_rate(table: Table, time: int | None, stated: float | None) -> Input
     steps = np.diff(table.load([time])[time])
     usual = float(np.median(steps)) if steps.size else 0.0  # too few samples are reported later
     return clocks.without_unit(table.source, table.column(time), usual)
+
+
+def _contradicted(table: Table, rate: float) -> list[Notice]:
+    """Say that stamps which are not used have another rate (Hz) than the given one."""
+    found = {i: meaning(name) for i, name in enumerate(table.names)}
+    index = next((i for i, each in found.items() if each.role == TIME and each.seconds), None)
+    if index is not None:
+        with suppress(InputError, ZeroDivisionError):
+            stamps = np.sort(known_of(load_columns(table, [index])[index]))
+            unit = found[index].seconds or 1.0
+            own = 1.0 / (clocks.usual_step(stamps) * unit)
+            mean = (stamps.size - 1) / (float(stamps[-1] - stamps[0]) * unit)
+            if not (clocks.agree(rate, own) and clocks.agree(rate, mean)):
+                values = {"rate": rate, "own": own, "mean": mean}
+                column = table.column(index)
+                return [notice("rate-ignores-stamps", "", values, column=column)]
+    return []
 
 
 def _load(

@@ -91,8 +91,8 @@ LONGEST_OF_WRAP = 100.0  # steps within which a counter that ran over goes on
 # have as many alike at most.
 FEWEST_IN_RHYTHM, ALL_IN_RHYTHM = 4, 6
 
-# Rows lost at random: share of the steps that are the shortest (of 95 % lost one in twenty is), times
-# the rows that a recording may be longer, and share of longer steps from which one looks for them.
+# Rows lost at random: share of the steps that are the shortest (one in twenty if 95 % are lost),
+# times the rows that a recording may be longer, and share of longer steps that is worth a look.
 SHARE_OF_SHORTEST, MOST_LOST, MANY_LOST = 0.005, 25.0, 0.01
 
 # Parts of the grid, places of each and bins beside a line from which a rhythm shows, and its height

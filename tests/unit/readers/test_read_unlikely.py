@@ -1,5 +1,7 @@
 """Clocks and units that are more likely wrong than what they say."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -49,9 +51,8 @@ def test_rows_that_are_lost_now_and_then_in_a_rhythm_are_lost():
     assert found["gyro_x"].missing == 2 * (N // 102)
 
 
-@pytest.mark.parametrize(("name", "step"), [("time [s]", 10.0), ("time_ms", 0.01)])
-def test_a_stated_unit_that_no_sensor_has(name, step):
-    assert "rate-unlikely" in codes(gmwm.read(frame(step * np.arange(N), name)))
+def test_a_stated_unit_that_no_sensor_has():
+    assert "rate-unlikely" in codes(gmwm.read(frame(10.0 * np.arange(N), "time [s]")))
     assert "rate-unlikely" not in codes(gmwm.read(frame(0.01 * np.arange(N))))
 
 
@@ -210,3 +211,21 @@ def test_rows_of_two_sensors_in_turns_are_refused():
 def test_columns_that_number_something_else(number):
     found = gmwm.read(frame(0.01 * np.arange(N)).assign(id=number, device="front"))
     assert found.n == N
+
+
+@pytest.mark.parametrize("name", ["time(ms)", "tow [msec]"])
+def test_seconds_under_a_name_of_milliseconds_are_rejected_with_the_name_to_write(name):
+    with pytest.raises(gmwm.InputError, match="a rate of 100000 Hz") as caught:
+        gmwm.read(frame(0.01 * np.arange(N), name))
+    right = re.search("such as '(.*)'", str(caught.value))[1]
+    assert gmwm.read(frame(0.01 * np.arange(N), right)).rate == pytest.approx(100.0)
+
+
+@pytest.mark.parametrize("rate", [100.0, 66.0])
+def test_a_given_rate_that_ignores_other_stamps_is_warned_of(rate):
+    k = np.arange(N)
+    lost = np.random.default_rng(1).random(N) < 1.0 / 3.0
+    data = frame(0.01 * k[~lost], "time [s]")
+    assert "rate-ignores-stamps" in codes(gmwm.read(data, rate=rate, time=False))
+    even = frame(0.01 * k, "time [s]")
+    assert "rate-ignores-stamps" not in codes(gmwm.read(even, rate=100.0, time=False))

@@ -132,7 +132,8 @@ class ArrayTable(Table):
                 named += _axes_or_itself(name, array)
         # Columns without names come first.
         is_one = len(matrices) == 1
-        columns = _unnamed(source, matrices[0][1]) + named if is_one else named + matrices
+        triads = [pair for name, array in matrices for pair in _axes_or_itself(name, array)]
+        columns = _unnamed(source, matrices[0][1]) + named if is_one else named + triads
         if not columns:
             text = f"{source} holds no column of more than one sample"
             raise InputError(f"{text}: save arrays of samples in it")
@@ -245,6 +246,6 @@ def _is_triad(name: str, array: Array) -> bool:
 
 
 def _axes_or_itself(name: str, array: Array) -> list[_Named]:
-    if _is_triad(name, array):
+    if array.like.ndim == 2 and array.like.shape[1] == len(AXES):
         return [(_of_axis(name, axis), array[:, i]) for i, axis in enumerate(AXES)]
     return [(name, array)]

@@ -9,6 +9,7 @@ field says that there is none.
 from __future__ import annotations
 
 import math
+import re
 from array import array
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
     import pyarrow
 
 _HEAD = 1 << 18
+_CHECKSUM = re.compile(r"\*[0-9A-Fa-f]{2,8}$")
 _ENOUGH_LINES = 16  # before one whose last field is shorter than that of each
 
 # What `number` takes for missing, as it is commonly written; Arrow knows NaN by itself.
@@ -130,6 +132,8 @@ class CsvTable(Table):
                 place = f"line {line}, column {label(self.names, column)}: {cell!r}"
                 if value is None:
                     hint = "correct the line, or choose other columns with channels= and time="
+                    if _CHECKSUM.search(fields[column]):
+                        hint = "remove the checksums, *hh, from the ends of the lines"
                     raise InputError(f"{self.source}, {place} {problem}: {hint}")
                 if math.isinf(value):
                     infinite.append(place)

@@ -27,6 +27,15 @@ _UTF16_MARKS = (b"\xff\xfe", b"\xfe\xff")
 _LINE = re.compile(rb"[^\r\n]*(?:\r\n|\n|\r|$)")
 
 
+# OEM7 manual, RAWIMUSX and INSPVAX: scale factors differ by the type of the IMU.
+_NOVATEL = {
+    "RAWIMU": "its last six fields are accelerometer z, -y, x and gyro z, -y, x, in counts of "
+    "velocity and angle: multiply them by the manual's scale factors of your IMU and by its rate, "
+    "and save them as CSV with the header time [s],gyro_x [rad/s],...,accel_x [m/s^2],...",
+    "INSPVA": "it has positions and attitudes but no samples of an IMU: log RAWIMUSXA",
+}
+
+
 def _axes(**prefixes: str) -> dict[str, str]:
     """Name of a column -> its meaning, for the three axes of a prefix."""
     return {
@@ -203,6 +212,9 @@ def _first_lines(source: str, head: bytes) -> tuple[list[_Line], list[_Line]]:
         else:
             comments.append(_Line(i, found.start(), text))
     if not lines:
+        for mark, hint in _NOVATEL.items():
+            if comments and comments[0].text[1:].startswith(mark):
+                raise InputError(f"{source} is a {mark} log of NovAtel: {hint}")
         what = "holds only comments" if comments else "is empty"
         raise InputError(f"{source} {what}: give a file with samples")
     return comments, lines
@@ -216,10 +228,11 @@ def _without_preamble(lines: list[_Line]) -> list[_Line]:
         return lines
     decimal = _decimal(rows, delimiter)
     with suppress(ValueError):  # quotes that do not match are reported where they are read
-        width = mode(len(split_line(row, delimiter)) for row in rows)
+        fields = [split_line(row, delimiter) for row in rows]
+        width, trailing = mode(map(len, fields)), all(len(f) > 1 and not f[-1] for f in fields)
         for i, line in enumerate(lines):
             cells = split_header(line.text, delimiter)
-            if len(cells) == width:
+            if len(cells) in (width, width - trailing):
                 return lines[i:] if i and _are_names(cells, decimal) else lines
             if all(number(cell, decimal) is not None for cell in cells):
                 return lines
