@@ -17,6 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gmwm._core import checks
+from gmwm._core.documents import read_arrays
 from gmwm._core.files import folder_to_fill, moved_into_place, one_writer
 from gmwm._core.jobs import results
 from gmwm._core.typing import Progress
@@ -115,8 +116,7 @@ class _Store:
         """Take the runs of a file, and write after it."""
         self._next = int(part.stem.rpartition("-")[2]) + 1
         try:
-            with part.open("rb") as file, np.load(file) as content:
-                values = dict(content)
+            values = read_arrays(part)
             study, runs = dict(json.loads(str(values.pop("study")))), values.pop("run")
             if any(each.shape[:1] != runs.shape for each in (runs.ravel(), *values.values())):
                 raise ValueError("arrays of other shapes than those of runs")
