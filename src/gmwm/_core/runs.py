@@ -71,7 +71,12 @@ def do_runs(
             for done, (run, values) in enumerate(found, runs - len(todo) + 1):
                 store.add(run, values)
                 progress(done, runs, "")
-    return _stacked([store.runs[run] for run in range(runs)])
+    try:
+        return _stacked([store.runs[run] for run in range(runs)])
+    except (LookupError, ValueError):  # of a file that others wrote
+        raise InputError(
+            f"{folder} holds runs with other values: give another folder", "other-runs"
+        ) from None
 
 
 class _Store:
@@ -114,8 +119,8 @@ class _Store:
 
     def read(self, part: Path) -> None:
         """Take the runs of a file, and write after it."""
-        self._next = int(part.stem.rpartition("-")[2]) + 1
         try:
+            self._next = max(self._next, int(part.stem.rpartition("-")[2]) + 1)
             values = read_arrays(part)
             study, runs = dict(json.loads(str(values.pop("study")))), values.pop("run")
             if any(each.shape[:1] != runs.shape for each in (runs.ravel(), *values.values())):

@@ -9,7 +9,7 @@ import pytest
 
 import gmwm
 from gmwm import InputError
-from gmwm._core import documents
+from gmwm._core import memory
 
 RNG = np.random.default_rng(3)
 X = RNG.normal(size=700) + np.cumsum(0.05 * RNG.normal(size=700))
