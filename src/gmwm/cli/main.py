@@ -106,9 +106,12 @@ def _told_apart(stream: TextIO) -> TextIO:
     """A stream whose errors are `_OutputError`; what its encoding lacks is written as an escape."""
     if not isinstance(stream, TextIOWrapper):
         return stream
+    stream.reconfigure(errors="backslashreplace")
+    if not isinstance(getattr(stream.buffer, "raw", stream.buffer), FileIO):
+        return stream
     raw = BufferedWriter(_Output(stream.fileno(), "wb", closefd=False))
     encoding, flushes = stream.encoding, stream.line_buffering
-    return TextIOWrapper(raw, encoding, "backslashreplace", line_buffering=flushes)
+    return TextIOWrapper(raw, encoding, stream.errors, line_buffering=flushes)
 
 
 @contextmanager

@@ -131,9 +131,9 @@ def test_what_is_nested_deeply_is_refused(tmp_path, depth):
 
 
 def test_a_file_that_no_result_has_is_not_read(stored, tmp_path, monkeypatch):
-    monkeypatch.setattr(documents, "_LARGEST", 1000)
+    monkeypatch.setenv(memory.VARIABLE, "1e-6")
     path = stored["calibration"].save(tmp_path / "stored.json")
-    assert "too large for a result" in refusal(path)
+    assert "of memory, and 1e-06 GB may be used" in refusal(path)
 
 
 def test_a_long_value_is_not_quoted_whole(stored, tmp_path):
