@@ -147,10 +147,8 @@ def read_hdf5(path: Path) -> ArrayTable:
             if name.startswith("#") or not isinstance(item, h5py.Dataset):
                 return
             if item.external or item.is_virtual:
-                other = (
-                    item.external[0][0] if item.external else item.virtual_sources()[0].file_name
-                )
-                text = f"{path.name}: {name} is in another file, {other!r}"
+                text = f"{path.name}: {name} is in another file"
+                text += f", {item.external[0][0]!r}" if item.external else ""
                 raise InputError(f"{text}, which is not opened: save its samples in this one")
             if item.dtype.kind in "iufV" and item.shape:
                 like = np.broadcast_to(np.empty((), item.dtype), item.shape)
