@@ -397,5 +397,9 @@ class _Series:
         fits = np.all(rows) and np.sum(used) == len(arrays["present"])
         fits &= 0 <= run <= missing <= n == origin[0] + filled[0] <= checks.MOST_SAMPLES
         fits &= 0 <= blocks <= kernels.MOST_BLOCKS and 0 <= octave < len(filled)
+        numbers = (self.rows.data[: np.sum(used)], self.sums.levels, self.sums.blocks)
+        fits &= not any(np.isnan(each).any() for each in numbers)
+        limits = self.sums.totals[[REFERENCE, LOWEST, HIGHEST]]
+        fits &= missing == n or bool(np.all(np.isfinite(limits)))
         if not (fits and np.all((gaps >= 0) & (gaps <= n))):
             raise ValueError("counts that are not those of a series")
