@@ -415,6 +415,10 @@ def load_and_show(rng: random.Random, path: Path) -> Any:
     if isinstance(found, gmwm.Calibration) and rng.random() < 0.2:
         write_report(found, path.with_suffix(".html"))
         export(found, "kalibr", path=path.with_suffix(".yaml"))
+    if isinstance(found, gmwm.FilterNumbers) and rng.random() < 0.2:
+        export(found, rng.choice(sorted(TARGETS)))
+    if isinstance(found, gmwm.FilterNumbers) and rng.random() < 0.05:
+        gmwm.certify(gmwm.Calibration.from_dict(json.loads(documents()[0])), found)
     return found
 
 
@@ -481,7 +485,22 @@ def make_checkpoint(rng: random.Random, folder: Path) -> Path:
     values = noise(rng.choice((1, 64, 700)))[:, : 2 if stream.channels else 1]
     stream.update(values if stream.channels else values[:, 0])
     path = stream.save(folder / "checkpoint.npz")
-    path.write_bytes(formats.damaged(rng, path.read_bytes()))
+    if rng.random() < 0.5:
+        path.write_bytes(formats.damaged(rng, path.read_bytes()))
+        return path
+    with np.load(path) as stored:
+        arrays = dict(stored)
+    for _ in range(rng.choice((1, 1, 3))):
+        name = rng.choice(sorted(name for name, each in arrays.items() if each.size))
+        values = arrays[name].reshape(-1)
+        ends = (0, 1, 2, -1, 63, 5000, 10**9, 2**31, 2**62, -(2**63))
+        with np.errstate(all="ignore"), suppress(ValueError):
+            values[rng.randrange(values.size)] = rng.choice(
+                ends if values.dtype == int else HOSTILE
+            )
+        if rng.random() < 0.1:
+            arrays[name] = arrays[name].reshape(-1)[: rng.randrange(4)]
+    np.savez(path, **arrays)
     return path
 
 

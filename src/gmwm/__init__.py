@@ -42,12 +42,15 @@ def _public() -> dict[str, list[str]]:
 __getattr__, __dir__, __all__ = lazy_loader.attach(__name__, ["ins"], _public())
 
 
-def _load_pages() -> None:
-    """Import what writes pages of results, which stand below the room of pages."""
+def _load_rooms() -> None:
+    """Import what writes pages of results, and each room, which may have documents of its own."""
     from gmwm.report import calibration, compared, fleet, navigation  # noqa: F401
 
+    for room in _public():
+        import_module(f"gmwm.{room}")
 
-_provide(_load_pages)
+
+_provide(_load_rooms)
 
 # Functions that use the package go to other processes with it, by name. Only plain modules do so by
 # themselves, and this one guards functions from modules of their name.

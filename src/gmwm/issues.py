@@ -17,7 +17,7 @@ from functools import partial
 from string import Formatter
 from typing import Any, Literal
 
-from gmwm.errors import printable
+from gmwm.errors import MissingNameError, printable
 
 Severity = Literal["good", "note", "warning", "bad"]
 
@@ -63,6 +63,13 @@ class Issue:
     masks: bool = False
     user_only: bool = False
     repeats: Literal["", "reader", "diagnosis"] = ""
+
+
+class _Stored(dict[str, Any]):
+    """Values of a notice from a file, some of which may be missing."""
+
+    def __missing__(self, name: str) -> Any:
+        raise MissingNameError(f"a notice has no {name!r}: make the result again")
 
 
 @dataclass(frozen=True)
@@ -132,10 +139,12 @@ class Notice:
         if content["severity"] not in SEVERITIES:
             raise ValueError(f"severity = {str(content['severity'])[:20]!r}")
         found: dict[str, Any] = {name: str(content[name])[:10_000] for name in own}
-        found["values"] = {
-            str(name): float("nan") if value is None else value
+        if not all(isinstance(v, float | int | str | None) for v in content["values"].values()):
+            raise ValueError("values that are neither numbers nor text")
+        found["values"] = _Stored(
+            (str(name), float("nan") if value is None else value)
             for name, value in content["values"].items()
-        }
+        )
         return cls(**found)
 
 

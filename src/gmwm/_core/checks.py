@@ -16,6 +16,12 @@ from gmwm.errors import InputError
 SHORTEST_INTERVAL, LONGEST_INTERVAL = 1e-9, 1e6
 """Sampling intervals that a sensor may have, s."""
 
+LONGEST_TIME = 1e9
+"""Without aiding, s: 30 years."""
+
+LARGEST = 1e20
+"""Of numbers of a filter, SI, and times, s: beyond, powers of them leave the range of floats."""
+
 MOST_SAMPLES = 10**11
 """800 GB."""
 
@@ -62,6 +68,13 @@ def positive(name: str, value: Any, hint: str = "give a positive number") -> flo
     """
     if not is_number(value) or not value > 0.0:
         raise _wrong(name, value, hint)
+    return plausible(name, value)
+
+
+def plausible(name: str, value: Any) -> float:
+    """A number whose powers can be computed, zero or more."""
+    if not is_number(value) or not 0.0 <= value <= LARGEST:
+        raise _wrong(name, value, f"give a number from 0 to {LARGEST:g}")
     return float(value)
 
 

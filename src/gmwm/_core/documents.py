@@ -7,7 +7,7 @@ import math
 import os
 import re
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from dataclasses import fields
 from functools import cache
@@ -16,10 +16,11 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self
 
 import numpy as np
+import numpy.typing as npt
 from annotated_types import Ge, Gt, Le, Lt
 
-from gmwm._core import checks
-from gmwm._core.files import opened, write_text
+from gmwm._core import checks, memory
+from gmwm._core.files import content_of, opened, write_text
 from gmwm._core.pages import provided
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError, printable
@@ -28,8 +29,8 @@ if TYPE_CHECKING:
     from pydantic import TypeAdapter, ValidationError
 
 
-_LARGEST = 1 << 25
-"""Bytes of a document: forty times those of six channels; read, it needs thirty times as many."""
+_TIMES = 30  # bytes of memory that a byte of a result needs while it is read
+_MOST_NODES = 100_000  # of one: an alias of YAML counts as what it stands for
 
 _being_adapted: ContextVar[type | None] = ContextVar("_being_adapted", default=None)
 """The class of documents whose adapter is made."""
@@ -324,24 +325,74 @@ def check_covariance(matrix: Any, size: int, name: str = "covariance") -> None:
 def read_json(path: str | os.PathLike[str]) -> Any:
     """Content of a JSON file.
 
-    Raises InputError if the file is missing or too large, is not JSON, or is nested too deeply.
+    Raises InputError if the file is missing, needs more memory than may be used, is not JSON, or is
+        nested too deeply.
     """
     from pydantic_core import from_json
 
-    try:
-        with opened(path) as stream:
-            text = stream.read(_LARGEST + 1)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror}): check the path") from None
-    if len(text) > _LARGEST:
-        raise InputError(
-            f"{path}: has more than {_LARGEST >> 20} MB, too large for a result: check the path"
-        )
+    with suppress(OSError, ValueError):  # the next line says it
+        memory.require(_TIMES * os.path.getsize(path), os.fspath(path))
+    text = content_of(path, memory.budget())
     try:
         return from_json(text, allow_inf_nan=False)
     except ValueError as error:
         which = checks.line(str(error))
         raise InputError(f"{path}: is not JSON ({which}): give a file that was saved") from None
+
+
+def read_yaml(path: str | os.PathLike[str]) -> Any:
+    """Content of a YAML file.
+
+    Raises InputError if it cannot be read, is too large, is not YAML, or has a key twice.
+    """
+    import yaml
+
+    content = content_of(path)
+    try:
+        loader = yaml.SafeLoader(content.decode("utf-8-sig"))
+        root = loader.get_single_node()
+        _check_nodes(root)
+        return None if root is None else loader.construct_document(root)
+    except Exception as error:  # PyYAML raises KeyError, AttributeError, ... for odd tags
+        mark, text = getattr(error, "problem_mark", None), getattr(error, "problem", None)
+        if mark is not None and text is not None:  # without the parser's own picture of it
+            text = f"line {mark.line + 1}, column {mark.column + 1}: {text}"
+        else:
+            text = checks.shown(" ".join(str(error).split())).strip("'\"")
+            fits = isinstance(error, ValueError | RecursionError | yaml.YAMLError)
+            text = text if fits else f"a value does not fit its tag, {text}"
+        raise InputError(f"{path}: invalid YAML ({text}): correct the file") from None
+
+
+def _check_nodes(root: Any) -> None:
+    """Raise ValueError if YAML has too many nodes, or a key twice, whose value would be lost."""
+    left = [] if root is None else [root]
+    for node in left:  # grows
+        parts = node.value if isinstance(node.value, list) else []
+        if node.id == "mapping":
+            seen: set[str] = set()
+            for key, _ in parts:
+                name = str(key.value)
+                if key.tag != "tag:yaml.org,2002:merge" and name in seen:
+                    raise ValueError(f"line {key.start_mark.line + 1}: {name!r} appears twice")
+                seen.add(name)
+            parts = [each for pair in parts for each in pair]
+        left += parts
+        if len(left) > _MOST_NODES:
+            raise ValueError(f"has more than {_MOST_NODES:,} values")
+
+
+def read_arrays(path: str | os.PathLike[str]) -> dict[str, npt.NDArray[Any]]:
+    """Arrays of a file as `numpy.savez` writes it, which compresses nothing.
+
+    Raises whatever numpy and zipfile do for another file.
+    """
+    with opened(path) as stream, np.load(stream, allow_pickle=False) as stored:
+        size = sum(each.file_size for each in stored.zip.infolist())
+        if size > os.fstat(stream.fileno()).st_size:
+            raise ValueError("holds less than it promises")
+        memory.require(size, os.fspath(path))
+        return dict(stored)
 
 
 def load_document(path: str | os.PathLike[str]) -> Any:

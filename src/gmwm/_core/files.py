@@ -1,17 +1,43 @@
-"""Output files that appear whole or not at all."""
+"""Files: opened if they are regular ones, written so that they appear whole or not at all."""
 
 from __future__ import annotations
 
 import os
+import platform
+import re
+import shutil
 import stat
 import tempfile
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
+from functools import cache
 from io import BufferedReader
 from pathlib import Path
 from typing import TextIO
 
 from gmwm.errors import InputError
+
+_PREFIX = f".gmwm-{re.sub('[^A-Za-z0-9]', '', platform.node())}-"
+"""Of temporary files and folders of this machine; the number of their process follows."""
+
+
+def _own_prefix(folder: Path) -> str:
+    """How a process begins temporary names in a folder, after those of killed ones are gone."""
+    if os.name == "posix":  # elsewhere the question whether a process lives would end it
+        _remove_left_over(folder.absolute(), os.getpid())
+    return f"{_PREFIX}{os.getpid()}-"
+
+
+@cache  # once a process: a folder may hold thousands of files
+def _remove_left_over(folder: Path, _: int) -> None:
+    for each in folder.glob(f"{_PREFIX}*-*"):
+        try:
+            os.kill(int(each.name.removeprefix(_PREFIX).partition("-")[0]), 0)
+        except ProcessLookupError:
+            shutil.rmtree(each, ignore_errors=True)
+            each.unlink(missing_ok=True)
+        except (OSError, ValueError, OverflowError):  # it lives, or the name is another's
+            continue
 
 
 @contextmanager
@@ -22,7 +48,7 @@ def moved_into_place(path: str | os.PathLike[str]) -> Iterator[Path]:
     """
     target = Path(path)
     try:
-        handle, name = tempfile.mkstemp(prefix=f".{target.name}.", dir=target.parent)
+        handle, name = tempfile.mkstemp(prefix=_own_prefix(target.parent), dir=target.parent)
         os.close(handle)
     except OSError as error:
         raise _not_written(target, error) from None
@@ -62,12 +88,16 @@ def write_text(path: str | os.PathLike[str], text: str) -> Path:
 def moved_together(folder: Path) -> Iterator[Path]:
     """A temporary folder to be filled; its files take their places together when all went well.
 
+    Earlier files go first: after a kill some are missing, and none is of another run.
     Raises InputError if it cannot be written.
     """
     try:
-        with tempfile.TemporaryDirectory(prefix=".gmwm-", dir=folder) as name:
+        with tempfile.TemporaryDirectory(prefix=_own_prefix(folder), dir=folder) as name:
             yield Path(name)
-            for each in sorted(Path(name).iterdir()):
+            made = sorted(Path(name).iterdir())
+            for each in made:
+                (folder / each.name).unlink(missing_ok=True)
+            for each in made:
                 os.replace(each, folder / each.name)
     except OSError as error:
         raise _not_written(folder, error) from None
@@ -91,13 +121,31 @@ def existing_file(path: str | os.PathLike[str]) -> Path:
 
 
 def opened(path: str | os.PathLike[str]) -> BufferedReader:
-    """A file, open for reading.
+    """A file, open for reading: the only function that opens one.
 
     Raises OSError if it cannot be opened.
     Raises InputError if it is a pipe or a device.
     """
     _check_regular(Path(path))
     return open(path, "rb")
+
+
+def content_of(path: str | os.PathLike[str], most: int = 1 << 20) -> bytes:
+    """The bytes of a document, by default of one that a person writes.
+
+    Raises InputError if it cannot be read, is a pipe or a device, or has more than ``most``.
+    """
+    try:
+        with opened(path) as stream:
+            content = stream.read(most + 1)
+    except (OSError, ValueError) as error:  # ValueError: a null character in the name
+        if isinstance(error, InputError):
+            raise
+        why = getattr(error, "strerror", error)
+        raise InputError(f"{path}: cannot be read ({why}): check the path") from None
+    if len(content) > most:
+        raise InputError(f"{path}: has more than {most / 2**20:.3g} MB: check the path")
+    return content
 
 
 def _check_regular(path: Path) -> None:

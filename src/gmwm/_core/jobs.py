@@ -86,15 +86,28 @@ _pool: ContextVar[tuple[Any, Sequence[Future[Any]]]] = ContextVar("pool", defaul
 """The pool, and what each of its processes begins with."""
 
 
+_has_pool = Lock()
+
+
 @contextmanager
 def worker_pool(others: int, first: str) -> Iterator[None]:
     """Processes for `shared` that end with the block, unless there are some already.
 
     first: "module:function", what they import and call while this process does something else.
     """
-    if not others or _pool.get()[0] is not None:
+    # One pool for a process: of threads side by side, the others work alone.
+    if not others or _pool.get()[0] is not None or not _has_pool.acquire(blocking=False):
         yield
         return
+    try:
+        with _new_pool(others, first):
+            yield
+    finally:
+        _has_pool.release()
+
+
+@contextmanager
+def _new_pool(others: int, first: str) -> Iterator[None]:
     from joblib.externals.loky import ProcessPoolExecutor
 
     before = threads()

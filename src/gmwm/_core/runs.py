@@ -17,6 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gmwm._core import checks
+from gmwm._core.documents import read_arrays
 from gmwm._core.files import folder_to_fill, moved_into_place, one_writer
 from gmwm._core.jobs import results
 from gmwm._core.typing import Progress
@@ -70,7 +71,12 @@ def do_runs(
             for done, (run, values) in enumerate(found, runs - len(todo) + 1):
                 store.add(run, values)
                 progress(done, runs, "")
-    return _stacked([store.runs[run] for run in range(runs)])
+    try:
+        return _stacked([store.runs[run] for run in range(runs)])
+    except (LookupError, ValueError):  # of a file that others wrote
+        raise InputError(
+            f"{folder} holds runs with other values: give another folder", "other-runs"
+        ) from None
 
 
 class _Store:
@@ -113,10 +119,9 @@ class _Store:
 
     def read(self, part: Path) -> None:
         """Take the runs of a file, and write after it."""
-        self._next = int(part.stem.rpartition("-")[2]) + 1
         try:
-            with part.open("rb") as file, np.load(file) as content:
-                values = dict(content)
+            self._next = max(self._next, int(part.stem.rpartition("-")[2]) + 1)
+            values = read_arrays(part)
             study, runs = dict(json.loads(str(values.pop("study")))), values.pop("run")
             if any(each.shape[:1] != runs.shape for each in (runs.ravel(), *values.values())):
                 raise ValueError("arrays of other shapes than those of runs")

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from gmwm._core.files import folder_to_fill, moved_together, replaceable
+from gmwm._core.files import folder_to_fill, moved_together, opened, replaceable
 from gmwm.cli.console import command_line, in_options, print_result, progress_bar
 from gmwm.cli.options import FILE_TO_WRITE, PATH, folder_to_write, options, read_recording
 from gmwm.errors import InputError
@@ -252,7 +252,7 @@ def _hashes(files: Iterable[Path]) -> dict[str, str]:
     for file in files:
         for one in sorted(file.rglob("*")) if file.is_dir() else [file]:
             if one.is_file():
-                with one.open("rb") as stream:
+                with opened(one) as stream:
                     digest = hashlib.file_digest(stream, "sha256").hexdigest()
                 found[f"sha256 of {one.relative_to(file.parent)}"] = digest
     return found

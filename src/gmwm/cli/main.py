@@ -9,7 +9,8 @@ import signal
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from io import StringIO, TextIOWrapper
+from io import BufferedWriter, FileIO, StringIO, TextIOWrapper
+from typing import TYPE_CHECKING, TextIO
 
 import click
 
@@ -23,10 +24,33 @@ from gmwm.cli.navigate import navigate
 from gmwm.cli.numbers import bound, budget, certify, export, reduce
 from gmwm.errors import InputError, printable
 
+if TYPE_CHECKING:
+    from _typeshed import ReadableBuffer as Buffer
+
 _EXIT_INPUT, _EXIT_INTERRUPTED, _EXIT_PIPE = 2, 130, 141  # the latter two as shells have them
 
 
-@click.group(invoke_without_command=True, context_settings={"help_option_names": ["-h", "--help"]})
+class _Group(click.Group):
+    """Commands, of which the system may refuse a file or a process."""
+
+    def invoke(self, context: click.Context) -> object:
+        try:
+            return super().invoke(context)
+        except _OutputError:
+            raise
+        except OSError as error:  # click takes a broken pipe for that of its output
+            place = "" if error.filename is None else f"{error.filename}: "
+            raise InputError(
+                f"{place}the system refuses a file or a process ({error.strerror or error}): "
+                "close other programs, or check the path"
+            ) from error
+
+
+@click.group(
+    cls=_Group,
+    invoke_without_command=True,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
 @click.version_option(__version__, prog_name="gmwm")
 @click.pass_context
 def cli(context: click.Context) -> None:
@@ -49,24 +73,45 @@ def main() -> None:
     os.environ.setdefault("OMP_NUM_THREADS", "1")
     # None where who started us closed them: what is printed then goes nowhere.
     sys.stdout, sys.stderr = sys.stdout or StringIO(), sys.stderr or StringIO()
-    for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, TextIOWrapper):
-            # What the encoding of a terminal lacks is written as an escape.
-            stream.reconfigure(errors="backslashreplace")
+    sys.stdout, sys.stderr = map(_told_apart, (sys.stdout, sys.stderr))
     try:
         with _ended_as_interrupted() as ended:
             status = _run()
         sys.stdout.flush()
         if status == _EXIT_INTERRUPTED and ended:
             status = 128 + ended[0]
-    except OSError as error:
-        if error.filename is not None:
-            raise
+    except _OutputError as error:
         _discard_output()
         status = _EXIT_PIPE
         if error.errno not in (errno.EPIPE, errno.EINVAL):
             status = _failed(f"the output cannot be written ({error.strerror}): send it elsewhere")
     sys.exit(status)
+
+
+class _OutputError(OSError):
+    """What is printed cannot be written."""
+
+
+class _Output(FileIO):
+    """Standard output, or that of errors: its own trouble is told apart from that of files."""
+
+    def write(self, data: Buffer, /) -> int:
+        try:
+            return super().write(data)
+        except OSError as error:
+            raise _OutputError(*error.args) from None
+
+
+def _told_apart(stream: TextIO) -> TextIO:
+    """A stream whose errors are `_OutputError`; what its encoding lacks is written as an escape."""
+    if not isinstance(stream, TextIOWrapper):
+        return stream
+    stream.reconfigure(errors="backslashreplace")
+    if not isinstance(getattr(stream.buffer, "raw", stream.buffer), FileIO):
+        return stream
+    raw = BufferedWriter(_Output(stream.fileno(), "wb", closefd=False))
+    encoding, flushes = stream.encoding, stream.line_buffering
+    return TextIOWrapper(raw, encoding, stream.errors, line_buffering=flushes)
 
 
 @contextmanager

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from gmwm._core.files import content_of
 from gmwm._core.tables import plain_table
 from gmwm._core.text import bullets
 from gmwm.cli.console import print_result, progress_bar, with_option
@@ -235,8 +236,8 @@ def _numbers(
     if (imu is None) == (white is None and walk is None):
         raise InputError("the numbers in use: give --imu FILE, or -N GYRO,ACCEL and -K GYRO,ACCEL")
     if imu is not None:
-        is_basalt = imu.is_file() and b"gyro_noise_std" in imu.read_bytes()
-        is_saved = imu.suffix.lower() == ".json" and not is_basalt
+        is_json = imu.suffix.lower() == ".json"
+        is_saved = is_json and b"gyro_noise_std" not in content_of(imu, 1 << 25)  # of Basalt
         return FilterNumbers.load(imu) if is_saved else read_numbers(imu, calibration.rate)
     if white is None or walk is None:
         raise InputError("-N and -K belong together: give both")

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
 from gmwm._core import checks
-from gmwm._core.files import writable_file
+from gmwm._core.files import content_of, writable_file
 from gmwm.calibration import Calibration
 from gmwm.errors import InputError
 from gmwm.export.keys import Keys, Pair, entries
@@ -101,11 +100,7 @@ def read_numbers(
         (u/sqrt(Hz)) and K (u/s/sqrt(Hz)), or a model with a Gauss-Markov process.
     Raises InputError if the file cannot be read, has no known keys, or its numbers need a rate.
     """
-    try:
-        text = Path(path).read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: cannot be read ({error}): check the path") from None
-    values = entries(text)
+    values = entries(content_of(path).decode("utf-8-sig", errors="replace"))
     layouts: dict[Keys, None] = {each.keys: None for each in TARGETS.values() if each.keys}
     keys = next((each for each in layouts if any(name in values for name in each.names)), None)
     if keys is None:

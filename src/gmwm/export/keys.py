@@ -103,11 +103,13 @@ class MemoryKeys(Keys):
 
 _COMMENT = re.compile(r"(#|//).*$", re.MULTILINE)
 _ENTRY = re.compile(
-    r"""^\s*(?:\d+\s+\d+\s+)?(?:\w+->|\w+\.(?=set))?["']?([A-Za-z_][\w.]*)["']?\s*[:=(\t](.*)$""",
+    # Blanks, not line ends: where each line may begin with those of the next, time is squared.
+    r"""^[ \t]*(?:\d+[ \t]+\d+[ \t]+)?(?:\w+->|\w+\.(?=set))?"""
+    r"""["']?([A-Za-z_][\w.]*)["']?[ ]*[:=(\t](.*)$""",
     re.MULTILINE,
 )
 _ALONE = re.compile(r"\s*([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*(?:,|\t\d+)?\s*")
-_NUMBER = re.compile(r"(?<![\w.])[-+]?\d+\.?\d*(?:[eE][-+]?\d+)?(?![\w.])")
+_NUMBER = re.compile(r"(?<![\w.])[-+]?\d+(?:\.\d*)?(?:[eE][-+]?\d+)?(?![\w.])")
 
 
 def entries(text: str) -> dict[str, FloatArray]:

@@ -141,6 +141,8 @@ class SensorAxes:
             raise InputError(
                 f"{name} = {shortest:g} s: give two sampling intervals or more, {least:g} s"
             )
+        if shortest > checks.LONGEST_TIME:
+            raise InputError(f"{name} = {shortest:g} s: give at most {checks.LONGEST_TIME:g} s")
 
     @property
     def groups(self) -> tuple[tuple[AxisModel, ...], ...]:

@@ -115,6 +115,11 @@ class Certificate(Document, InUnits):
     causes: Annotated[tuple[Cause, ...], MaxLen(1000)]
     notices: tuple[Notice, ...] = ()
 
+    def __post_init__(self) -> None:
+        kinds = [cause.quantity for cause in self.causes]
+        if any(kinds.count(kind) < 2 for kind in kinds):
+            raise InputError("causes begin with the numbers in use and the error model")
+
     def of(self, consumer: str) -> tuple[Check, ...]:
         """The checks of a consumer; see `CONSUMERS`."""
         return tuple(check for check in self.checks if check.consumer == consumer)

@@ -94,11 +94,7 @@ class Imperfections:
 
     def __post_init__(self) -> None:
         for field in fields(self):
-            value = getattr(self, field.name)
-            if not checks.is_number(value) or value < 0.0:
-                raise InputError(
-                    f"{field.name} = {checks.shown(value)}: give a number, zero or more"
-                )
+            checks.plausible(field.name, getattr(self, field.name))
 
     @property
     def needs_motion(self) -> bool:

@@ -114,6 +114,10 @@ class AxisFilterNumbers(Document, InUnits):
 
     def __post_init__(self) -> None:
         freeze(self, "stderr")
+        for name, value in {"initial_sd": self.initial_sd, **self.model.params}.items():
+            checks.plausible(name, abs(value or 0.0))
+        for name in self.stderr:
+            checks.choice("a key of stderr", name, ("N", "K"))
         checks.choice("form", self.form, FORMS)
         checks.choice("method", self.method, METHODS)
 

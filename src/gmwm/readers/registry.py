@@ -111,7 +111,7 @@ def is_text(path: Path) -> bool:
 
 
 def _format_of(path: Path, name: str | None = None) -> Format:
-    from gmwm._core.files import existing_file
+    from gmwm._core.files import existing_file, opened
 
     if name is not None:
         if name != "rosbag2":  # a bag of ROS 2 may be a folder, which its reader checks
@@ -124,7 +124,7 @@ def _format_of(path: Path, name: str | None = None) -> Format:
         ):
             return next(each for each in FORMATS if each.name == "rosbag2")
     suffix, head = existing_file(path).suffix.lower(), b""
-    with suppress(OSError), path.open("rb") as stream:
+    with suppress(OSError), opened(path) as stream:
         head = stream.read(max(len(magic) for each in FORMATS for magic in each.magic))
     by_content = [each for each in FORMATS if each.magic and head.startswith(each.magic)]
     by_name = [each for each in FORMATS if suffix in each.suffixes]

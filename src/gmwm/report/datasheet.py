@@ -9,8 +9,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 
+from gmwm._core.checks import shown
+from gmwm._core.documents import read_yaml
 from gmwm._core.typing import FloatArray
 from gmwm._core.units import SI_UNIT, factor, si_parameter_unit
 from gmwm.errors import InputError
@@ -63,22 +64,18 @@ def read_datasheet(
 
     Raises InputError if it cannot be read or has anything else.
     """
-    try:
-        content = yaml.safe_load(Path(path).read_text(encoding="utf-8"))
-    except Exception as error:  # PyYAML raises a dozen types for values of a wrong tag
-        what = " ".join(str(error).split())[:200]
-        raise InputError(f"{path}: cannot be read as YAML ({what}): {_HINT}") from None
+    content = read_yaml(path)
     if not isinstance(content, dict) or not content:
         raise InputError(f"{path}: holds no sensors: begin with 'gyro:' or 'accel:', and {_HINT}")
     if channels is None:
-        kinds = {name: str(name).partition("_")[0] for name in content}
+        kinds = {name: name.partition("_")[0] for name in content if isinstance(name, str)}
         channels = {name: kind for name, kind in kinds.items() if kind in SI_UNIT}
     known = {**{quantity: quantity for quantity in SI_UNIT}, **channels}
     entries: dict[str, dict[str, float]] = {}
     for name, values in content.items():
         if not isinstance(name, str) or name not in known:
             raise InputError(
-                f"{path}: {str(name)[:40]!r} is not a sensor of the recording; there are "
+                f"{path}: {shown(name)} is not a sensor of the recording; there are "
                 f"{', '.join(known)}"
             )
         if not isinstance(values, dict):
@@ -92,7 +89,7 @@ def read_datasheet(
 
 def _value(where: str, key: Any, value: Any, quantity: str) -> float:
     if key not in UNITS:
-        raise InputError(f"{where}: {str(key)[:40]!r} is not one of {', '.join(UNITS)}: {_HINT}")
+        raise InputError(f"{where}: {shown(key)} is not one of {', '.join(UNITS)}: {_HINT}")
     found = _VALUE.fullmatch(value) if isinstance(value, str) else None
     try:
         if found is None:
@@ -100,7 +97,7 @@ def _value(where: str, key: Any, value: Any, quantity: str) -> float:
         number = float(found[1])
     except ValueError:
         raise InputError(
-            f"{where}: {key} = {str(value)[:40]!r} is not a number with a unit: {_HINT}"
+            f"{where}: {key} = {shown(value)} is not a number with a unit: {_HINT}"
         ) from None
     unit = si_parameter_unit(UNITS[key], quantity)
     si = number * factor(found[2], unit)

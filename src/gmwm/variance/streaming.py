@@ -15,6 +15,7 @@ from typing import Any, Self
 import numpy as np
 
 from gmwm._core import checks
+from gmwm._core.documents import read_arrays
 from gmwm._core.files import existing_file, moved_into_place
 from gmwm._core.typing import ArrayLike, FloatArray, IntArray
 from gmwm._core.units import SI_UNIT
@@ -315,9 +316,7 @@ class StreamingVariance:
         """
         file = existing_file(Path(path))
         with suppress(Exception):  # whatever damaged bytes raise
-            # numpy leaves a file open that it cannot read.
-            with file.open("rb") as stream, np.load(stream, allow_pickle=False) as stored:
-                arrays = {name: stored[name] for name in stored.files}
+            arrays = read_arrays(file)
             if arrays["format"].tolist() != [_FORMAT, str(_VERSION)]:
                 raise ValueError("another kind of file")
             units = dict(zip(arrays["names"].tolist(), arrays["units"].tolist(), strict=True))
@@ -380,7 +379,8 @@ class _Series:
     def set(self, arrays: Mapping[str, FloatArray]) -> None:
         """Inverse of `arrays`.
 
-        Raises ValueError if they do not have the shapes and types of a series.
+        Raises ValueError if they do not have the shapes and types of a series, or counts and places
+            in them lie outside these arrays.
         """
         for name, own in (self.rows._asdict() | self.sums._asdict()).items():
             given = arrays[name]
@@ -389,3 +389,17 @@ class _Series:
             if given.dtype != own.dtype or own.shape != given.shape:
                 raise ValueError(f"{name} is not an array of a series")
             own[...] = given
+        filled, origin, gappy, old = self.rows.state.T
+        n, missing, run, blocks, octave = self.sums.tallies.tolist()
+        gaps, used = self.sums.gaps, np.arange(len(filled)) < arrays["data"].shape[0]
+        rows = (old >= 0) & (old <= filled) & (old <= kernels.HALO) & (filled - old < kernels.CHUNK)
+        rows &= (origin >= 0) & (origin <= n) & (gappy >> 1 == 0) & ((filled > 0) == used)
+        fits = np.all(rows) and np.sum(used) == len(arrays["present"])
+        fits &= 0 <= run <= missing <= n == origin[0] + filled[0] <= checks.MOST_SAMPLES
+        fits &= 0 <= blocks <= kernels.MOST_BLOCKS and 0 <= octave < len(filled)
+        numbers = (self.rows.data[: np.sum(used)], self.sums.levels, self.sums.blocks)
+        fits &= not any(np.isnan(each).any() for each in numbers)
+        limits = self.sums.totals[[REFERENCE, LOWEST, HIGHEST]]
+        fits &= missing == n or bool(np.all(np.isfinite(limits)))
+        if not (fits and np.all((gaps >= 0) & (gaps <= n))):
+            raise ValueError("counts that are not those of a series")

@@ -8,7 +8,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
-from annotated_types import Gt, Le
+from annotated_types import Ge, Le
 
 from gmwm._core.distributions import chi2
 from gmwm._core.documents import (
@@ -98,7 +98,7 @@ class WaveletVariance(Printed, Document):
     quantity: Text | None = None
     unit: Text = "u"
     wavelet: Text = "haar"
-    efficiency: Annotated[float, Gt(0.0), Le(1.0)] = 1.0
+    efficiency: Annotated[float, Ge(1e-6), Le(1.0)] = 1.0
     driftless: Array | None = None
     gaps: GapEffects | None = None
     fourth_cumulant: Annotated[NotNegative, Le(tuning.LARGEST_VARIANCE**2)] = 0.0

@@ -9,7 +9,7 @@ import pytest
 
 import gmwm
 from gmwm import InputError
-from gmwm._core import documents
+from gmwm._core import memory
 
 RNG = np.random.default_rng(3)
 X = RNG.normal(size=700) + np.cumsum(0.05 * RNG.normal(size=700))
@@ -131,9 +131,9 @@ def test_what_is_nested_deeply_is_refused(tmp_path, depth):
 
 
 def test_a_file_that_no_result_has_is_not_read(stored, tmp_path, monkeypatch):
-    monkeypatch.setattr(documents, "_LARGEST", 1000)
+    monkeypatch.setenv(memory.VARIABLE, "1e-6")
     path = stored["calibration"].save(tmp_path / "stored.json")
-    assert "too large for a result" in refusal(path)
+    assert "of memory, and 1e-06 GB may be used" in refusal(path)
 
 
 def test_a_long_value_is_not_quoted_whole(stored, tmp_path):

@@ -547,7 +547,7 @@ def test_models_that_tie_and_the_data_sheet_are_drawn(calibration, tmp_path):
         ("magnetometer: {N: 1 deg}", "is not a sensor"),
         ("gyro: 3", "has no numbers"),
         ("- 1", "holds no sensors"),
-        ("{", "cannot be read as YAML"),
+        ("{", "invalid YAML"),
     ],
 )
 def test_data_sheets_that_cannot_be_used(calibration, tmp_path, text, what):

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from gmwm._core.files import existing_file
+from gmwm._core.files import existing_file, opened
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.ins import tuning
@@ -172,7 +172,7 @@ def _as_table(path: Path) -> Iterator[tuple[Path, str]]:
     since 1970-01-01 on its own calendar: GPS time is ahead of UTC by the leap seconds.
     """
     existing_file(path)
-    with path.open("rb") as stream:
+    with opened(path) as stream:
         head = stream.read(_HEAD).decode(errors="replace")
     scale = next((found[1] for line in head.splitlines() if (found := _RTKLIB.match(line))), "")
     if not scale:
@@ -182,7 +182,8 @@ def _as_table(path: Path) -> Iterator[tuple[Path, str]]:
     def seconds(week: re.Match[str]) -> str:
         return f"{_GPS_EPOCH + int(week[1]) * _WEEK_LENGTH + float(week[2]):.6f}"
 
-    text = path.read_text(errors="replace")
+    with opened(path) as stream:
+        text = stream.read().decode(errors="replace")
     text = _RTKLIB.sub(lambda head: "time_s" + head[2].replace(" ns ", " satellites "), text)
     text = _DAY.sub(r"\1-\2-\3T", _WEEK.sub(seconds, re.sub("(?m)^%.*", "#", text)))
     with tempfile.TemporaryDirectory() as folder:

@@ -10,7 +10,6 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Self, TypeVar
 
-import yaml
 from pydantic import (
     BaseModel,
     BeforeValidator,
@@ -29,7 +28,7 @@ from pydantic import (
 )
 
 from gmwm._core import checks
-from gmwm._core.files import opened
+from gmwm._core.documents import read_yaml
 from gmwm._core.units import SI_UNIT, factor, si_parameter_unit
 from gmwm.calibration import load
 from gmwm.errors import InputError
@@ -49,7 +48,6 @@ FILE, RECORDINGS, MODELS, REDUCED = TAGS = ("<file>", "<recordings>", "<models>"
 """Forms that one key may have; pydantic puts them into the place of an error."""
 
 _LEAST, _LARGEST = 1e-60, 1e60  # SI: beyond, powers overflow or vanish
-_LARGEST_FILE = 1 << 20  # bytes of a document that a person writes
 _NUMBER = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*)")
 
 
@@ -168,18 +166,7 @@ FileName = Annotated[str, StringConstraints(pattern=r"^[^\x00]+$"), written("the
 
 def read_document(path: Path) -> dict[str, Any]:
     """Content of a YAML file, a mapping; keys without a value are left out."""
-    try:
-        with opened(path) as stream:
-            text = stream.read(_LARGEST_FILE + 1)
-        if len(text) > _LARGEST_FILE:
-            raise InputError(f"{path}: has more than {_LARGEST_FILE:,} bytes: check the path")
-        content = yaml.load(text.decode("utf-8-sig"), Loader=_UniqueKeys)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror}): check the path") from None
-    except InputError:
-        raise
-    except Exception as error:  # PyYAML raises KeyError, AttributeError, ... for odd tags
-        raise InputError(f"{path}: invalid YAML ({_reason(error)}): correct the file") from None
+    content = read_yaml(path)
     if content is None:
         raise InputError(f"{path} is empty: write trajectory:, truth:, filters: into it")
     if not isinstance(content, Mapping):
@@ -187,30 +174,6 @@ def read_document(path: Path) -> dict[str, Any]:
             f"{path}: {checks.shown(content)} is not a mapping: write KEY: VALUE lines"
         )
     return {name: each for name, each in content.items() if each is not None}
-
-
-class _UniqueKeys(yaml.SafeLoader):  # type: ignore[misc]
-    """Rejects a key given twice, which YAML would replace."""
-
-    def compose_mapping_node(self, anchor: Any) -> Any:
-        node = super().compose_mapping_node(anchor)
-        seen: set[str] = set()
-        for key, _ in node.value:
-            name = str(key.value)
-            if key.tag != "tag:yaml.org,2002:merge" and name in seen:
-                raise ValueError(f"line {key.start_mark.line + 1}: {name!r} appears twice")
-            seen.add(name)
-        return node
-
-
-def _reason(error: Exception) -> str:
-    """The error and its line, without the parser's own picture of it."""
-    mark, problem = getattr(error, "problem_mark", None), getattr(error, "problem", None)
-    if mark is not None and problem is not None:
-        return f"line {mark.line + 1}, column {mark.column + 1}: {problem}"
-    text = checks.shown(" ".join(str(error).split())).strip("'\"")
-    fits = isinstance(error, ValueError | RecursionError | yaml.YAMLError)
-    return text if fits else f"a value does not fit its tag, {text}"
 
 
 _KINDS: dict[str, type[Process]] = {

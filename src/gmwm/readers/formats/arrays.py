@@ -20,6 +20,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gmwm._core import memory
+from gmwm._core.files import opened
 from gmwm._core.spool import is_spooled, release
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
@@ -42,7 +43,7 @@ _KINDS |= {"S": "text", "U": "text", "M": "dates", "m": "time spans"}
 def open_numpy(path: Path, wanted: Wanted) -> tuple[ArrayTable, ...]:
     """Open an NPY or NPZ file."""
     is_archive = path.suffix.lower() == ".npz"
-    with damage_named(path.name), path.open("rb") as stream:
+    with damage_named(path.name), opened(path) as stream:
         head = stream.read(len(_NPY_MAGIC))
     if not head.startswith(b"PK" if is_archive else _NPY_MAGIC):
         kind, writer = ("NPZ", "savez") if is_archive else ("NPY", "save")
@@ -51,8 +52,15 @@ def open_numpy(path: Path, wanted: Wanted) -> tuple[ArrayTable, ...]:
         if is_archive:
             return (ArrayTable.of_entries(path.name, _entries(path)),)
         # Mapped: a header that promises more than there is asks for no memory.
+        size = path.stat().st_size
         array: AnyArray = np.load(path, mmap_mode="r", allow_pickle=False)
-        return (ArrayTable.of_array(path.name, array_of(array)),)
+
+    def read() -> AnyArray:
+        if path.stat().st_size < size:  # the system ends a process that reads on in a map
+            raise InputError(f"{path.name} became shorter while it was read: get a whole copy")
+        return array
+
+    return (ArrayTable.of_array(path.name, Array(array, read)),)
 
 
 def _entries(path: Path) -> dict[str, Array]:

@@ -29,6 +29,7 @@ from typing import Any
 import numpy as np
 
 from gmwm._core import memory
+from gmwm._core.files import opened
 from gmwm.errors import InputError
 from gmwm.readers.formats.arrays import AnyArray, Array, ArrayTable, array_of, is_sensor
 from gmwm.readers.names import bare, meaning
@@ -37,6 +38,8 @@ from gmwm.readers.table import damage_named, library
 
 _LARGEST = 64 << 20  # bytes of a file whose arrays are read too; of others only their headers
 _SECONDS, _PER_SECOND = 6, 4 << 20  # of the processor, and bytes of the file for each one more
+_WALL = 5  # seconds that pass for each one of the processor: others keep it busy
+_DEEPEST = 32  # groups: what reading their names takes grows with the square
 _MEMORY, _UNPACKED = 512 << 20, 40  # bytes, and of each byte of the file, which may be compressed
 _MARK = "gmwm: "  # before the answer: libraries print too
 _PROGRAM = "from gmwm.readers.formats.hdf5 import answer; answer()"
@@ -94,6 +97,9 @@ def answer() -> None:
             seconds = int(used.ru_utime + used.ru_stime) + _SECONDS + size // _PER_SECOND
             resource.setrlimit(resource.RLIMIT_CPU, (seconds, resource.RLIM_INFINITY))
             signal.signal(signal.SIGXCPU, signal.SIG_DFL)
+            # It ends even where the library waits, and where this process's parent was killed.
+            signal.signal(signal.SIGALRM, signal.SIG_DFL)
+            signal.alarm(_WALL * seconds)
             most = min(memory.budget(), _MEMORY + _UNPACKED * size)
             resource.setrlimit(resource.RLIMIT_DATA, (most, resource.RLIM_INFINITY))
         found: dict[str, Any] = {"unread": {}}
@@ -131,15 +137,18 @@ def read_hdf5(path: Path) -> ArrayTable:
             array: AnyArray = file[name][()]
         return array
 
-    with damage_named(path.name), path.open("rb") as stream, h5py.File(path, "r") as file:
+    with damage_named(path.name), opened(path) as stream, h5py.File(path, "r") as file:
         is_mat = stream.read(len(_MAT_73)) == _MAT_73
 
         def add(name: str, item: Any) -> None:
+            if name.count("/") > _DEEPEST:
+                raise InputError(f"{path.name} has groups in groups, {_DEEPEST} deep: flatten it")
             # What MATLAB refers to, cells and structure arrays, hides in #refs#.
             if name.startswith("#") or not isinstance(item, h5py.Dataset):
                 return
-            if item.external:
-                text = f"{path.name}: {name} is in another file, {item.external[0][0]!r}"
+            if item.external or item.is_virtual:
+                text = f"{path.name}: {name} is in another file"
+                text += f", {item.external[0][0]!r}" if item.external else ""
                 raise InputError(f"{text}, which is not opened: save its samples in this one")
             if item.dtype.kind in "iufV" and item.shape:
                 like = np.broadcast_to(np.empty((), item.dtype), item.shape)

@@ -19,6 +19,7 @@ import numpy.typing as npt
 
 from gmwm._core import memory
 from gmwm._core.compiled import compiled
+from gmwm._core.files import opened
 from gmwm.errors import InputError
 from gmwm.readers.formats.arrays import AnyArray
 from gmwm.readers.logs import topics
@@ -125,7 +126,7 @@ class Log:
 
     def __iter__(self) -> Iterator[Messages]:
         before, rest, end = 0, b"", 0
-        with self.path.open("rb") as stream:
+        with opened(self.path) as stream:
             while fresh := stream.read(_BLOCK):
                 data = np.frombuffer(rest + fresh, np.uint8)
                 at, count = 0, 1
@@ -274,7 +275,7 @@ def _contents(
     order = sorted(counts, key=lambda each: (list(_RANKS).index(each.kind), each.instance or 0))
     seconds = (stamps[-1] - stamps[0]) * 1e-6 if stamps else 0.0
     end = topics.end_of_content(path)
-    with path.open("rb") as stream:
+    with opened(path) as stream:
         stream.seek(log.end)
         rest = stream.read(max(min(end - log.end, _REMAINS), 0))
     is_cut = bool(rest) and rest[:2] == _MARKS[: len(rest)]

@@ -24,6 +24,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from gmwm._core.files import opened
 from gmwm._core.typing import FloatArray
 from gmwm._core.units import SI_UNIT
 from gmwm.errors import InputError
@@ -135,8 +136,10 @@ class _Bag:
     def _reader(self) -> Any:
         """Open until the bag is dropped: its index may take as long to read as its messages."""
         kind = "rosbag1" if self.is_ros1 else "rosbag2"
-        for file in sorted(self.path.glob("*.db3")) if self.path.is_dir() else [self.path]:
-            with file.open("rb") as stream:
+        for file in sorted(self.path.iterdir()) if self.path.is_dir() else [self.path]:
+            if file.is_dir():
+                continue
+            with opened(file) as stream:
                 head = stream.read(18)
             # SQLite takes the rest of its last page for zeros (Database File Format, 1.3.2).
             size = int.from_bytes(head[16:], "big")
@@ -249,7 +252,7 @@ def open_bag(path: Path, wanted: Wanted) -> tuple[BagTable, ...]:
 
 
 def _is_ros1(path: Path) -> bool:
-    with damage_named(path.name), path.open("rb") as stream:
+    with damage_named(path.name), opened(path) as stream:
         head = stream.read(len(_SQLITE))
     for magic, suffix in ((b"\x89MCAP", ".mcap"), (_SQLITE, ".db3")):
         if head.startswith(magic) and path.suffix.lower() != suffix:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import mmap
 from abc import abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from gmwm._core.files import opened
 from gmwm._core.units import SI_UNIT
 from gmwm.errors import InputError
 from gmwm.issues import Notice, notice
@@ -91,13 +91,14 @@ def left_out(ranks: Sequence[Sequence[Topic]], chosen: Sequence[Topic]) -> tuple
 
 def end_of_content(path: Path) -> int:
     """Byte after the last one that may be something else than padding, zeros or 0xFF."""
-    if not (end := path.stat().st_size):
-        return 0
-    with path.open("rb") as stream, mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ) as data:
-        last = data[end - 1 :]
-        while end and last in (b"\0", b"\xff"):
+    last, end = b"", path.stat().st_size
+    with opened(path) as stream:
+        while end:
             start = max(end - _BLOCK, 0)
-            end = start + len(data[start:end].rstrip(last))
+            stream.seek(start)
+            data = stream.read(end - start)
+            last = last or data[-1:]
+            end = start + len(data.rstrip(last) if last in (b"\0", b"\xff") else data)
             if end > start:
                 break
     return end

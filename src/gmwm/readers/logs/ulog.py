@@ -8,6 +8,7 @@ sensor; `sensor_gyro` and `sensor_accel` are thinned to about 1 Hz unless one as
 from __future__ import annotations
 
 import io
+import re
 from collections.abc import Mapping, Sequence
 from contextlib import redirect_stdout
 from pathlib import Path
@@ -33,6 +34,9 @@ _SINGLE = {"sensor_gyro": "gyro", "sensor_accel": "accel"}
 _TIME = "time [us]"
 _NO_TIME = 2**31 - 1  # RELATIVE_TIMESTAMP_INVALID of SensorCombined.msg
 _HEAD = 3  # bytes of a message before its content
+_FORMAT = ord("F")  # kind of the messages that define others
+_PLAIN = re.compile(r"(?:u?int(?:8|16|32|64)_t|float|double|bool|char)(?:\[(\d{1,5})\])?")
+_MOST_NUMBERS = 1 << 16
 _PADDING = (b"\0" * _HEAD, b"\xff" * _HEAD)
 _HINT = "log sensor_combined, which the default SDLOG_PROFILE has, or the raw FIFO topics"
 _HINT += " (bits 8 and 9 of SDLOG_PROFILE)"
@@ -92,16 +96,32 @@ class _Stream(io.BufferedReader):
 
     def __init__(self, path: Path):
         super().__init__(io.FileIO(path))
-        self.is_cut = False
+        self.is_cut, self._kind = False, 0
         self._end = topics.end_of_content(path)
 
     def read(self, size: int | None = -1) -> bytes:
         found = super().read(size)
+        if self._kind == _FORMAT:
+            _check_format(found)
+        self._kind = found[-1] if size == _HEAD == len(found) else 0
         if found in _PADDING or len(found) < (size or 0):
             if size == _HEAD and self.tell() - len(found) >= self._end:
                 return b""
             self.is_cut |= len(found) < (size or 0)
         return found
+
+
+def _check_format(text: bytes) -> None:
+    """Raise ValueError if messages of an IMU would have more numbers than a message has bytes.
+
+    pyulog writes out each element of arrays, and of messages within messages.
+    """
+    name, _, fields = text.decode(errors="replace").partition(":")
+    if name in (_COMBINED, *_FIFO, *_SINGLE):
+        types = [field.split(" ")[0] for field in fields.split(";") if field]
+        plain = [_PLAIN.fullmatch(each) for each in types]
+        if not all(plain) or sum(int(each[1] or 1) for each in plain if each) > _MOST_NUMBERS:
+            raise ValueError(f"{name} is no message of an IMU")
 
 
 def _data_sets(path: Path, is_taken: bool) -> tuple[list[Any], tuple[Notice, ...]]:

@@ -101,6 +101,9 @@ def _renamed(layout: Layout, meant: dict[str, str]) -> Layout:
     return replace(layout, names=tuple(meant.get(name, name) for name in layout.names))
 
 
+_LONGEST_HEADER = 1 << 16  # characters
+
+
 @dataclass(frozen=True)
 class Layout:
     """How to read a delimited text."""
@@ -144,6 +147,9 @@ def find_layout(source: str, head: bytes) -> Layout:
     delimiter = _delimiter(sample)
     if delimiter is None and following:
         raise InputError(f"{source} holds no numbers in its first lines: {READABLE}")
+    if delimiter is None and len(first.text) > _LONGEST_HEADER:
+        text = f"{source}, line {first.number}, has {len(first.text):,} characters"
+        raise InputError(f"{text}, too many for a header: keep the columns of the IMU")
     if delimiter is None:
         raise InputError(f"{source} has a header (line {first.number}) but no data: add samples")
     decimal = _decimal(sample, delimiter)

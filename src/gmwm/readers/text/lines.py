@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import BinaryIO, cast
 
+from gmwm._core.files import opened
 from gmwm.errors import InputError
 
 BLOCK = 1 << 20  # bytes read at once
@@ -63,7 +64,7 @@ def blocks(
 def content_size(path: Path) -> int:
     """Bytes after decompression, at least, as far as that is known before reading."""
     size = path.stat().st_size
-    with path.open("rb") as stream:
+    with opened(path) as stream:
         if stream.read(len(_GZIP_MAGIC)) == _GZIP_MAGIC:
             stream.seek(-min(_SIZE_AT_END, size), 2)
             # Modulo 4 GB, and of the last part only if there are several.
@@ -87,13 +88,13 @@ def _end_of_content(text: bytes) -> int:
 
 def _open(path: Path) -> BinaryIO:
     try:
-        with path.open("rb") as stream:
+        with opened(path) as stream:
             magic = stream.read(len(_GZIP_MAGIC))
         is_packed = magic == _GZIP_MAGIC
         if magic and not is_packed and path.suffix.lower() == ".gz":
             text = f"{path.name} is not a gzip file although its name ends in .gz"
             raise InputError(f"{text}: compress it with gzip, or remove .gz from its name")
-        return cast(BinaryIO, gzip.open(path, "rb")) if is_packed else path.open("rb")
+        return cast(BinaryIO, gzip.open(path, "rb")) if is_packed else opened(path)
     except OSError as error:
         raise _unreadable(path.name, error) from error
 

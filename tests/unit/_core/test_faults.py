@@ -1,0 +1,231 @@
+"""Files that others damaged, and what a machine refuses: one sentence, no signal, no traceback."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+import zipfile
+
+import numpy as np
+import pytest
+
+import gmwm
+from gmwm import InputError
+from gmwm._core import jobs
+from gmwm._core.documents import read_yaml
+from gmwm._core.files import moved_into_place, moved_together
+from gmwm._core.runs import do_runs
+from gmwm.export import read_numbers
+from gmwm.report import read_datasheet
+
+SI = {"gyro": "rad/s", "accel": "m/s^2"}
+
+
+def program(text, *args):
+    done = subprocess.run(
+        [sys.executable, "-c", text, *map(str, args)], capture_output=True, text=True, check=False
+    )
+    return done.returncode, done.stdout, done.stderr
+
+
+# -- checkpoints -----------------------------------------------------------------------------------
+
+
+def edited(path, name, place, value):
+    with np.load(path) as stored:
+        arrays = dict(stored)
+    arrays[name][place] = value
+    np.savez(path, **arrays)
+    return path
+
+
+COUNTS = [("0.state", (row, column)) for row in (0, 1, 31) for column in range(4)]
+COUNTS += [("0.tallies", place) for place in range(5)]
+
+
+@pytest.mark.parametrize("value", [10**9, 2**62, -1])
+@pytest.mark.parametrize(("name", "place"), COUNTS)
+def test_a_checkpoint_counts_within_its_arrays(tmp_path, name, place, value):
+    stream = gmwm.StreamingVariance(0.01)
+    stream.update(np.random.default_rng(0).normal(size=9000))
+    path = edited(stream.save(tmp_path / "a.npz"), name, place, value)
+    with pytest.raises(InputError, match="is not a saved streaming variance"):
+        gmwm.StreamingVariance.load(path)
+
+
+def test_a_checkpoint_is_not_larger_than_its_file(tmp_path):
+    path = gmwm.StreamingVariance(0.01).save(tmp_path / "a.npz")
+    with zipfile.ZipFile(path, "a", zipfile.ZIP_DEFLATED) as out:
+        out.writestr("other.npy", bytes(1 << 26))
+    with pytest.raises(InputError, match="is not a saved streaming variance"):
+        gmwm.StreamingVariance.load(path)
+
+
+# -- documents -------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def calibration():
+    x = 1e-3 * np.random.default_rng(1).normal(size=(700, 2))
+    data = {"gyro_x": x[:, 0], "accel_x": x[:, 1]}
+    given = gmwm.Recording.from_arrays(data, rate=100.0, units=SI)
+    return gmwm.calibrate(given, gmwm.WhiteNoise() + gmwm.RandomWalk(K=1e-6))
+
+
+def test_filter_numbers_load_in_a_fresh_process(calibration, tmp_path):
+    path = gmwm.bound(calibration).save(tmp_path / "numbers.json")
+    text = "import gmwm, sys; print(type(gmwm.load(sys.argv[1])).__name__)"
+    assert program(text, path)[:2] == (0, "FilterNumbers\n")
+
+
+def test_what_is_saved_is_read_whatever_its_size(calibration, tmp_path):
+    content = calibration.to_dict() | {"of a later version": ["x" * 1000] * 34_000}
+    path = tmp_path / "large.json"
+    path.write_text(json.dumps(content))
+    assert path.stat().st_size > 1 << 25
+    assert gmwm.load(path).to_dict() == calibration.to_dict()
+
+
+BOMB = "a0: &a0 [x, x, x, x, x, x, x, x, x]\n" + "".join(
+    f"a{i}: &a{i} [{', '.join([f'*a{i - 1}'] * 9)}]\n" for i in range(1, 9)
+)
+
+
+@pytest.mark.parametrize("text", [BOMB, "a: &a [*a, *a]\n", BOMB + "gyro: {N: *a8}\n"])
+def test_aliases_of_yaml_count_as_what_they_stand_for(tmp_path, text):
+    path = tmp_path / "bomb.yaml"
+    path.write_text(text)
+    for read in (read_yaml, read_datasheet):
+        with pytest.raises(InputError, match="more than 100,000 values"):
+            read(path)
+
+
+@pytest.mark.parametrize("name", ["pipe", "/dev/zero"])
+def test_only_regular_files_are_opened(tmp_path, name):
+    path = tmp_path / name
+    if name == "pipe":
+        os.mkfifo(path)
+    for read in (read_numbers, read_datasheet, read_yaml, gmwm.load, gmwm.read):
+        with pytest.raises(InputError, match="is a pipe or a device"):
+            read(path)
+
+
+@pytest.mark.parametrize("text", ["\n" * 200_000, "a: " + "9" * 200_000 + "x", "a" + " " * 200_000])
+def test_numbers_of_programs_are_found_in_a_time_that_grows_with_the_file(tmp_path, text):
+    path = tmp_path / "imu.yaml"
+    path.write_text(text)
+    start = time.process_time()
+    with pytest.raises(InputError, match="no noise parameters"):
+        read_numbers(path)
+    assert time.process_time() - start < 5.0  # it was a minute
+
+
+# -- absurd numbers --------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("use", [(1e200, 1e-6), (1e-3, 1e200)])
+def test_absurd_numbers_are_named(calibration, use):
+    with pytest.raises(InputError, match=r"= 1e\+200: give a number from 0 to 1e\+20"):
+        gmwm.certify(calibration, {"gyro": use, "accel": (1e-3, 1e-6)})
+    with pytest.raises(InputError, match="scale_error"):
+        gmwm.Imperfections(scale_error=1e200)
+    with pytest.raises(InputError, match="horizon = 1e"):
+        gmwm.bound(calibration, horizon=1e300)
+
+
+@pytest.mark.parametrize(
+    ("place", "value"),
+    [("initial_sd", 1e200), ("stderr", {"x": 1.0}), ("initial_sd", 10**59)],
+)
+def test_absurd_numbers_of_a_file_are_rejected(calibration, tmp_path, place, value):
+    content = gmwm.bound(calibration).to_dict()
+    content["channels"]["gyro_x"][place] = value
+    path = tmp_path / "numbers.json"
+    path.write_text(json.dumps(content))
+    with pytest.raises(InputError, match=place):
+        gmwm.load(path)
+
+
+def test_parts_of_a_study_that_others_wrote(tmp_path):
+    def values(run):
+        return {"a": np.zeros(3)}
+
+    do_runs(values, 2, {"seed": 1}, folder=tmp_path)
+    (part,) = tmp_path.glob("part-*.npz")
+    (tmp_path / "part-x.npz").write_bytes(part.read_bytes())
+    assert do_runs(values, 3, {"seed": 1}, folder=tmp_path)["a"].shape == (3, 3)
+    with pytest.raises(InputError, match="holds runs with other values"):
+        do_runs(lambda run: {"a": np.zeros(4)}, 9, {"seed": 1}, folder=tmp_path)
+
+
+# -- files that change, and what a kill leaves -----------------------------------------------------
+
+
+def test_an_array_that_becomes_shorter_while_it_is_read(tmp_path):
+    path = tmp_path / "a.npy"
+    np.save(path, np.random.default_rng(0).normal(size=(200_000, 3)))
+    text = """
+import os, sys
+from pathlib import Path
+from gmwm.readers.registry import Wanted
+from gmwm.readers.formats.arrays import open_numpy
+(table,) = open_numpy(Path(sys.argv[1]), Wanted())
+os.truncate(sys.argv[1], 4096)
+table.load([0])
+"""
+    code, _, err = program(text, path)
+    assert code == 1
+    assert "became shorter while it was read: get a whole copy" in err
+
+
+@pytest.mark.skipif(os.name != "posix", reason="a question about a process ends it elsewhere")
+def test_what_a_kill_leaves_is_removed_by_the_next_run(tmp_path):
+    text = """
+import os, signal, sys
+from pathlib import Path
+from gmwm._core.files import moved_into_place, moved_together
+with moved_together(Path(sys.argv[1])) as new, moved_into_place(Path(sys.argv[1]) / "b") as b:
+    (new / "a").write_text("half")
+    os.kill(os.getpid(), signal.SIGKILL)
+"""
+    assert program(text, tmp_path)[0] == -signal.SIGKILL
+    assert len(list(tmp_path.iterdir())) == 2
+    with moved_together(tmp_path) as new, moved_into_place(tmp_path / "c"):
+        (new / "a").write_text("whole")
+    assert sorted(each.name for each in tmp_path.iterdir()) == ["a", "c"]
+
+
+def test_files_of_two_runs_are_never_side_by_side(tmp_path, monkeypatch):
+    for name in "ab":
+        (tmp_path / name).write_text("old")
+    replace, seen = os.replace, []
+
+    def watched(*args):
+        replace(*args)
+        seen.append({each.read_text() for each in tmp_path.iterdir() if each.is_file()})
+
+    monkeypatch.setattr(os, "replace", watched)
+    with moved_together(tmp_path) as new:
+        for name in "ab":
+            (new / name).write_text("new")
+    assert seen == [{"new"}, {"new"}]
+
+
+def test_threads_side_by_side_have_one_pool():
+    before, pools = threading.Barrier(3), []
+
+    def work():
+        before.wait()
+        with jobs.worker_pool(1, "os:getpid"):
+            before.wait()
+            pools.append(jobs._pool.get()[0])
+
+    threads = [threading.Thread(target=work) for _ in range(3)]
+    for each in threads:
+        each.start()
+    for each in threads:
+        each.join()
+    assert sum(pool is not None for pool in pools) == 1
