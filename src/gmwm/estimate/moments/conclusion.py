@@ -62,6 +62,8 @@ def conclude_moments(
     design, point, moments = end.design, end.point, end.moments(wv)
     target, implied = moments.target, design.implied(point.x, point.shapes)
     curves, amplitudes = design.curves(point.shapes), design.amplitudes(point.x)
+    lost = moments.lost(design.unit_terms(point.shapes))
+    curves = curves if lost is None else curves - lost
     absent = [i for i in design.linear if amplitudes[i] == 0.0]
     jacobian = _jacobian(design, point, curves, absent)
     processes = design.fitted_processes(point.x, point.shapes)
