@@ -30,7 +30,6 @@ from gmwm.estimate.problem.ramp import (
     gls_slope,
     ols_slope,
     slope_variances,
-    slope_variances,
 )
 from gmwm.process import PSD, Model, Process, Shape
 from gmwm.variance import WaveletVariance, pilot_psd, wavelet_variance
@@ -181,17 +180,22 @@ class Moments:
 
     @property
     def target(self) -> FloatArray:
-        """Wavelet variances of the noise alone, u^2, (J,): what an estimated slope takes is added."""
+        """Wavelet variances of the noise alone, u^2, (J,): what the slope takes is added."""
         if self.slope is None:
             return self.detrended
         return self.detrended + bias_of_detrending(self.wv, self.slope)
 
-    def lost(self, terms: Sequence[Process]) -> FloatArray | None:
-        """What the estimated slope takes of each term, u^2, (J, terms); None where none is."""
+    def slope_variances(self, terms: Sequence[Process]) -> FloatArray | None:
+        """What each term adds to the variance of the estimated slope; None where none is."""
         if self.slope is None or not self.slope_is_free:
             return None
         psds = [self.scales.spectrum(Model((term,))) for term in terms]
-        return np.outer(self.wv.drift_response**2, slope_variances(self.wv, self.slope, psds))
+        return slope_variances(self.wv, self.slope, psds)
+
+    def lost(self, terms: Sequence[Process]) -> FloatArray | None:
+        """What the estimated slope takes of each term, u^2, (J, terms); None where none is."""
+        variances = self.slope_variances(terms)
+        return None if variances is None else np.outer(self.wv.drift_response**2, variances)
 
     def under(self, noise: Model, part: float = 1.0) -> Moments:
         """The moments with the slope moved by ``part`` of the way to its estimate under a noise."""
