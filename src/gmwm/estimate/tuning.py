@@ -94,6 +94,10 @@ SETTLED = 1e-4  # change of the implied curve, in standard errors, that ends the
 
 # -- the rate ramp --------------------------------------------------------------------------------
 
+MEAN_OF_LIMIT = 0.41
+"""Mean amplitude of a term that comes out as zero, as a share of its 95 % limit: of a half-normal
+distribution. So much of it counts in the error of a slope."""
+
 LEAST_WALK = 0.03
 """Smallest random walk beside which a slope is judged, as its share of the variance that the noise
 gives the slope: below, a walk changes nothing."""

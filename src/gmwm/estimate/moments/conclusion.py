@@ -62,6 +62,10 @@ def conclude_moments(
     design, point, moments = end.design, end.point, end.moments(wv)
     target, implied = moments.target, design.implied(point.x, point.shapes)
     curves, amplitudes = design.curves(point.shapes), design.amplitudes(point.x)
+    terms, slope = design.unit_terms(point.shapes), moments.slope
+    variances = moments.slope_variances(terms)
+    if variances is not None:
+        curves = curves - np.outer(wv.drift_response**2, variances)
     absent = [i for i in design.linear if amplitudes[i] == 0.0]
     jacobian = _jacobian(design, point, curves, absent)
     processes = design.fitted_processes(point.x, point.shapes)
@@ -69,7 +73,10 @@ def conclude_moments(
     for i in absent:
         estimate = _unrestricted(jacobian, curves[:, i], target - implied, end.covariance)
         limit = upper_amplitude(design.coordinates, processes, i, (*estimate, 0.0), wv, absent)
-        limits[i] = float(max(limit, 0.0) ** (1.0 / design.terms[i].linear.power))
+        limit = float(max(limit, 0.0))
+        limits[i] = limit ** (1.0 / design.terms[i].linear.power)
+        if variances is not None and slope is not None and np.isfinite(limit):
+            slope = slope.with_variance(tuning.MEAN_OF_LIMIT * limit * float(variances[i]))
     notices = limit_notices(design, point)
     if target.size < design.n_free:
         values = {"levels": target.size, "parameters": design.n_free}
@@ -79,7 +86,7 @@ def conclude_moments(
         processes=processes,
         covariance=_sandwich(jacobian, end.covariance, weights),
         absent=limits,
-        slope=moments.slope if moments.slope_is_free else None,
+        slope=None if variances is None else slope,
         method=method,
         weights=weights.name,
         discrepancy=end.discrepancy,

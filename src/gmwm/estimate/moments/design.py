@@ -81,6 +81,10 @@ class Design:
             values[term.linear.name] = 1.0
         return term.process.with_values(**values)
 
+    def unit_terms(self, shapes: Sequence[Shape]) -> list[Process]:
+        """`at_shape` of all terms."""
+        return [self.at_shape(i, shape) for i, shape in enumerate(shapes)]
+
     def curve(self, i: int, shape: Shape) -> FloatArray:
         """Wavelet variance of `at_shape`, (J,)."""
         known = self._last.get(i)

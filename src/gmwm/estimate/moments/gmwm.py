@@ -208,7 +208,9 @@ def _iterate(problem: _Problem, relaxed: FloatArray, level: Discrepancy) -> Conv
         if rounds == 1:  # weights from a first fit may point elsewhere: search anew, then follow
             point = problem.search(target, relaxed)
         else:
-            profile = Profile(design, target, problem.weights.root(relaxed))
+            lost = moments.lost(design.unit_terms(point.shapes))
+            given = target if lost is None else moments.detrended
+            profile = Profile(design, given, problem.weights.root(relaxed), lost=lost)
             point = profile.refine(profile.at(point.shapes))
         previous, curve = curve, design.implied(point.x, point.shapes)
         before, step = step, (curve - previous) / np.sqrt(np.diag(covariance))

@@ -45,12 +45,18 @@ class Profile:
     root: (J, J), L with L'L the weight matrix.
     beside: (J, k), further curves that the series may hold, each with an amplitude of its own, at
         the end of `Point.x`.
+    lost: (J, terms), what the target lacks of each curve because a slope was removed from the data.
     """
 
     def __init__(
-        self, design: Design, target: FloatArray, root: FloatArray, beside: FloatArray | None = None
+        self,
+        design: Design,
+        target: FloatArray,
+        root: FloatArray,
+        beside: FloatArray | None = None,
+        lost: FloatArray | None = None,
     ) -> None:
-        self.design = design
+        self.design, self._lost = design, lost
         self._beside = np.zeros((target.size, 0)) if beside is None else np.array(beside, order="C")
         linear = np.ones(len(design.terms) + self._beside.shape[1], dtype=bool)
         linear[: len(design.terms)] = False
@@ -68,6 +74,8 @@ class Profile:
     def _curves(self, shapes: Sequence[Shape]) -> FloatArray:
         """Curves of the terms, and those beside them, (J, terms + k)."""
         curves = self.design.curves(shapes)
+        if self._lost is not None:
+            curves -= self._lost
         return np.hstack([curves, self._beside]) if self._beside.size else curves
 
     def refine(self, start: Point, reach: float = np.inf) -> Point:
@@ -78,7 +86,7 @@ class Profile:
             return self.at(shapes)
         low, high = design.bounds
         bounds = np.maximum(low, z0 - reach), np.minimum(high, z0 + reach)
-        compiled = design.compiled
+        compiled = design.compiled if self._lost is None else None
         own, fixed = self._start_of_compiled(shapes)
         visited: dict[bytes, list[Any]] = {}  # the last point, of which MINPACK asks repeatedly
 

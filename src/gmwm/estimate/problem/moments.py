@@ -12,7 +12,7 @@ S85-S118; eq. (13) ff. of Stebler et al. 2012).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 from typing import Any
@@ -29,6 +29,7 @@ from gmwm.estimate.problem.ramp import (
     detrended_covariance,
     gls_slope,
     ols_slope,
+    slope_variances,
 )
 from gmwm.process import PSD, Model, Process, Shape
 from gmwm.variance import WaveletVariance, pilot_psd, wavelet_variance
@@ -173,11 +174,28 @@ class Moments:
         return cls(wv, ols_slope(wv), True, scales)
 
     @property
+    def detrended(self) -> FloatArray:
+        """Wavelet variances without the drift, u^2, (J,): less than those of the noise."""
+        return self.wv.variance if self.slope is None else self.wv.detrended(self.slope.value)
+
+    @property
     def target(self) -> FloatArray:
-        """Wavelet variances of the noise alone, u^2, (J,): the drift is removed, the loss added."""
+        """Wavelet variances of the noise alone, u^2, (J,): what the slope takes is added."""
         if self.slope is None:
-            return self.wv.variance
-        return self.wv.detrended(self.slope.value) + bias_of_detrending(self.wv, self.slope)
+            return self.detrended
+        return self.detrended + bias_of_detrending(self.wv, self.slope)
+
+    def slope_variances(self, terms: Sequence[Process]) -> FloatArray | None:
+        """What each term adds to the variance of the estimated slope; None where none is."""
+        if self.slope is None or not self.slope_is_free:
+            return None
+        psds = [self.scales.spectrum(Model((term,))) for term in terms]
+        return slope_variances(self.wv, self.slope, psds)
+
+    def lost(self, terms: Sequence[Process]) -> FloatArray | None:
+        """What the estimated slope takes of each term, u^2, (J, terms); None where none is."""
+        variances = self.slope_variances(terms)
+        return None if variances is None else np.outer(self.wv.drift_response**2, variances)
 
     def under(self, noise: Model, part: float = 1.0) -> Moments:
         """The moments with the slope moved by ``part`` of the way to its estimate under a noise."""
@@ -187,6 +205,7 @@ class Moments:
         moved = Slope(
             (1.0 - part) * old.value + part * new.value,
             (1.0 - part) * old.variance + part * new.variance,
+            new.weights,
         )
         return replace(self, slope=moved)
 

@@ -12,7 +12,8 @@ regressors' wavelet coefficients, here ``var(slope)`` and ``r_j^2`` with r_j = t
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,10 +38,16 @@ class Slope:
 
     value: u/s.
     variance: Of the estimate, (u/s)^2.
+    weights: Of the steps between neighbouring block means, 1/s; ``None`` if it is no sum of them.
     """
 
     value: float
     variance: float
+    weights: FloatArray | None = field(default=None, compare=False, repr=False)
+
+    def with_variance(self, more: float) -> Slope:
+        """The same slope, less certain."""
+        return replace(self, variance=self.variance + more)
 
 
 def ols_slope(wv: WaveletVariance) -> Slope:
@@ -62,8 +69,7 @@ def gls_slope(wv: WaveletVariance, psd: PSD) -> Slope:
 
     Differences across a gap are left out: the wavelet variances do not see them either.
     """
-    index = _existing(wv)
-    first = _beside(index)
+    first = _beside(_existing(wv))
     y = wv.blocks[first + 1] - wv.blocks[first]
     x = np.full(first.size, wv.block * wv.dt)
     column = difference_covariance(psd, wv.dt, wv.block, wv.blocks.size)
@@ -74,7 +80,23 @@ def gls_slope(wv: WaveletVariance, psd: PSD) -> Slope:
             f"block means of {wv.name or 'the series'} over {x[0]:.3g} s differ only by rounding, "
             "so no ramp can be estimated: fit a model without RateRamp"
         )
-    return Slope(float(solved @ y) / information, _growth(wv) / information)
+    weights = np.zeros(column.size)
+    weights[first] = solved / information
+    return Slope(float(weights[first] @ y), _growth(wv) / information, weights)
+
+
+def slope_variances(wv: WaveletVariance, slope: Slope, terms: Sequence[PSD]) -> FloatArray:
+    """Variance of an estimated slope that each noise alone gives it, (u/s)^2, (terms,).
+
+    For the terms of the noise of which the slope is estimated they sum to its variance, and are the
+    derivatives of that by their amplitudes: the weights are those of least variance.
+    """
+    if slope.weights is None:
+        return np.zeros(len(terms))
+    products = np.correlate(slope.weights, slope.weights, "full")[slope.weights.size - 1 :]
+    products[1:] *= 2.0
+    columns = (difference_covariance(each, wv.dt, wv.block, wv.blocks.size) for each in terms)
+    return _growth(wv) * np.array([products @ column for column in columns])
 
 
 def slope_p_value(wv: WaveletVariance, psd: PSD) -> float:
