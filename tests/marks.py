@@ -2,7 +2,18 @@
 
 import pytest
 
+from gmwm.process import CATALOGUE
+
 
 def slow(*values, **named):
     """A case for ``pytest -m slow``: one like it is always run."""
     return pytest.param(*values, marks=pytest.mark.slow, **named)
+
+
+EXAMPLES = [process for kind in CATALOGUE for process in kind.examples()]
+FIRST = [
+    (slow if i else pytest.param)(process, id=repr(process))
+    for kind in CATALOGUE
+    for i, process in enumerate(kind.examples())
+]
+"""One of each kind, where a law that all of them obey would show no other fault."""

@@ -31,6 +31,11 @@ def test_filters_are_those_of_pywavelets_in_the_normalisation_of_the_modwt(name)
     assert np.sum(filters.scaling) == pytest.approx(1.0, abs=1e-10)
     assert np.sum(filters.detail) == pytest.approx(0.0, abs=1e-10)
     assert np.sum(filters.detail**2) == pytest.approx(0.5, abs=1e-10)
+    # Polynomials below the vanishing moments leave nothing, that of this degree does.
+    t = np.linspace(-1.0, 1.0, filters.detail.size)
+    for degree in range(filters.vanishing_moments):
+        assert abs(filters.detail @ t**degree) < 1e-9
+    assert abs(filters.detail @ t**filters.vanishing_moments) > 1e-8
 
 
 def test_db2_is_d4_as_daubechies_gives_it():
@@ -38,15 +43,6 @@ def test_db2_is_d4_as_daubechies_gives_it():
     d4 = np.array([1 + root, 3 + root, 3 - root, 1 - root]) / 8.0
     np.testing.assert_allclose(wavelet("db2").scaling, d4, rtol=1e-14)
     np.testing.assert_allclose(wavelet("db2").detail, d4[::-1] * [1, -1, 1, -1], rtol=1e-14)
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_detail_filter_kills_polynomials_below_its_vanishing_moments_and_no_others(name):
-    filters = wavelet(name)
-    t = np.linspace(-1.0, 1.0, filters.detail.size)
-    for degree in range(filters.vanishing_moments):
-        assert abs(filters.detail @ t**degree) < 1e-9
-    assert abs(filters.detail @ t**filters.vanishing_moments) > 1e-8
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -60,11 +56,6 @@ def test_gain_is_the_squared_transfer_function_of_the_equivalent_filter(name):
         np.testing.assert_allclose(found, np.abs(response) ** 2, atol=1e-9)
         np.testing.assert_allclose(wavelet(name).transfer(level, f), response, atol=1e-11)
         np.testing.assert_allclose(wavelet(name).gain(level, -f), found, rtol=1e-12, atol=1e-300)
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_gains_of_all_levels_and_the_last_smooth_add_up_to_one(name):
-    f = np.linspace(0.0, 0.5, 1001)
     filters = wavelet(name)
     smooth = np.prod([filters.scaling_gain(2.0**j * f) for j in range(7)], axis=0)
     np.testing.assert_allclose(np.sum(filters.gains(7, f), axis=0) + smooth, 1.0, atol=1e-9)
@@ -122,12 +113,10 @@ def test_haar_and_db1_are_one():
     assert wavelet("haar") is wavelet("haar")
 
 
-@pytest.mark.parametrize(
-    "name", ["", "db0", "db11", "DB2", "sym1", "coif6", "bior2.2", "daubechies"]
-)
-def test_unknown_names_are_refused_with_those_there_are(name):
-    with pytest.raises(InputError, match="db10"):
-        wavelet(name)
+def test_unknown_names_are_refused_with_those_there_are():
+    for name in ("", "db0", "db11", "DB2", "sym1", "coif6", "bior2.2", "daubechies"):
+        with pytest.raises(InputError, match="db10"):
+            wavelet(name)
 
 
 def test_filters_cannot_be_changed():

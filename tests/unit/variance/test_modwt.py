@@ -19,7 +19,7 @@ def by_definition(x, name, level):
     return np.fft.ifft(transfer * np.fft.fft(x)).real
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=80, deadline=None)
 @given(st.sampled_from(NAMES), st.integers(1, 700), st.integers(0, 2**32 - 1))
 def test_reconstruction_is_exact_at_any_length(name, n, seed):
     x = np.random.default_rng(seed).standard_normal(n) + 5.0
@@ -30,14 +30,14 @@ def test_reconstruction_is_exact_at_any_length(name, n, seed):
     np.testing.assert_array_equal(again, transform.inverse())
 
 
-@pytest.mark.parametrize("n", [1, 2, 3, 10, 63, 256, 1001, 9001])
 @pytest.mark.parametrize("name", SOME)
-def test_levels_are_the_equivalent_filters_applied_circularly(name, n):
-    x = np.random.default_rng(n).standard_normal(n)
-    transform = modwt(x, name, levels=n.bit_length())
-    assert transform.detail.shape == (n.bit_length(), n)
-    for level, found in enumerate(transform.detail, 1):
-        np.testing.assert_allclose(found, by_definition(x, name, level), atol=1e-12)
+def test_levels_are_the_equivalent_filters_applied_circularly(name):
+    for n in (1, 2, 3, 10, 63, 256, 1001, 9001):
+        x = np.random.default_rng(n).standard_normal(n)
+        transform = modwt(x, name, levels=n.bit_length())
+        assert transform.detail.shape == (n.bit_length(), n)
+        for level, found in enumerate(transform.detail, 1):
+            np.testing.assert_allclose(found, by_definition(x, name, level), atol=1e-12)
 
 
 @pytest.mark.parametrize("name", ["haar", "db2", "db4", "sym5", "coif1", "coif3"])
