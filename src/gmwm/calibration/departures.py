@@ -12,10 +12,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from scipy.linalg import cholesky_banded, solve_banded
+from scipy.linalg import eigh
 
 from gmwm._core.distributions import norm
 from gmwm._core.text import brief, readable
@@ -80,16 +81,18 @@ def departures(fitted: Fit, wv: WaveletVariance | None = None) -> tuple[Departur
     Returns: clearest first.
     """
     means = Means.of(wv or fitted.wv, tuning.MOST_MEANS)
-    fixed = _known_rows(fitted, means)
-    if means.first.size - len(fixed) < tuning.FEWEST_DIFFERENCES:
+    known = _known_curves(fitted, means)
+    if means.first.size - len(known) < tuning.FEWEST_DIFFERENCES:
         return ()
     data = means.differences(means.blocks)
     if np.max(np.abs(data)) <= tuning.NO_INFORMATION * np.nanmax(np.abs(means.blocks)):
         return ()
-    shapes = _shapes(means)
+    axes = _Axes.of(tuple(np.diff(np.flatnonzero(~np.isnan(means.blocks))).tolist()))
+    data, fixed = data @ axes.turn, means.differences(known) @ axes.turn
+    shapes = _shapes(means, axes)
     found: list[_Test] = []
     while len(found) < tuning.MOST_DEPARTURES:
-        noises = _noises(means, [fixed, *(each.neighbours for each in found)])
+        noises = _noises(axes, [fixed, *(each.neighbours for each in found)])
         best = max((_tested(shape, data, noises) for shape in shapes), key=lambda test: test.excess)
         if best.excess <= 0.0:
             break
@@ -100,7 +103,7 @@ def departures(fitted: Fit, wv: WaveletVariance | None = None) -> tuple[Departur
     measured = []
     for each in found:
         others = [other.neighbours for other in found if other is not each]
-        again = _tested(each.shape, data, _noises(means, [fixed, *others]))
+        again = _tested(each.shape, data, _noises(axes, [fixed, *others]))
         if again.excess > 0.0:
             measured.append(again.departure(fitted, means))
     return tuple(measured)
@@ -113,11 +116,11 @@ class _Shape:
     kind: str
     times: FloatArray  # (G,), when, how long or how slow each is, s
     curves: FloatArray  # (G, r, B), block means at unit size; cosine and sine of a period
-    rows: FloatArray  # (G, r, D), their differences
+    rows: FloatArray  # (G, r, D), their differences along the axes
     limit: float  # see `tuning.LIMITS`
 
 
-def _shapes(means: Means) -> list[_Shape]:
+def _shapes(means: Means, axes: _Axes) -> list[_Shape]:
     """All departures that are looked for, and a straight drift of the whole record.
 
     Steps at all edges and middles of blocks; transients with a time constant of one block to a
@@ -148,72 +151,80 @@ def _shapes(means: Means) -> list[_Shape]:
     found = []
     for kind, (times, parts) in integrals.items():
         curves = np.diff(np.stack(parts, axis=1))
-        rows = means.differences(curves)
+        rows = means.differences(curves) @ axes.turn
         found.append(_Shape(kind, times * means.step, curves, rows, tuning.LIMITS[kind]))
     return found
 
 
-def _known_rows(fitted: Fit, means: Means) -> FloatArray:
-    """Differences of the curves that a model has beside its noise, (k, D)."""
+def _known_curves(fitted: Fit, means: Means) -> FloatArray:
+    """The curves that a model has beside its noise, (k, B)."""
     curves = [np.empty((0, means.blocks.size))]
     if any(term.is_drift for term in fitted.model.terms):
         curves.append(means.time[None, :])
     for frequency, _ in fitted.model.lines():
         phase = 2.0 * np.pi * frequency * means.time
         curves.append(np.array([np.sin(phase), np.cos(phase)]))
-    return means.differences(np.vstack(curves))
+    return np.vstack(curves)
+
+
+@dataclass(frozen=True, eq=False)
+class _Axes:
+    """Axes along which differences of block means are independent for every ratio of noises.
+
+    Both covariances are diagonal along the generalized eigenvectors of the two matrices.
+    """
+
+    white: FloatArray  # (D,), variances of white noise, where those of a random walk are one
+    turn: FloatArray  # (D, D), from differences to the axes
+
+    @classmethod
+    @lru_cache(maxsize=8)
+    def of(cls, steps: tuple[int, ...]) -> _Axes:
+        """steps: Blocks from each that exists to the next that does."""
+        beside = np.eye(len(steps), k=1) + np.eye(len(steps), k=-1)
+        white, walk = 2.0 * np.eye(len(steps)) - beside, np.diag(np.array(steps) - 1.0 / 3.0)
+        return cls(*eigh(white, walk + beside / 6.0))
 
 
 @dataclass(frozen=True, eq=False)
 class _Noise:
     """White noise beside a random walk, in one ratio, with what is known beside it."""
 
-    factor: FloatArray  # (2, D), Cholesky factor of the tridiagonal covariance, in bands
+    scale: FloatArray  # (D,), one over the standard deviation along each axis
     basis: FloatArray  # (k, D), orthonormal, what is known, whitened
-    log_weight: float  # logarithm of the likelihood, without the part of the data
+    log_weight: float  # logarithm of the likelihood, without the part of the data, up to a constant
 
     @classmethod
-    def of(cls, white: float, walk: float, steps: FloatArray, known: FloatArray) -> _Noise:
+    def of(cls, white: float, walk: float, axes: _Axes, known: FloatArray) -> _Noise:
         """Noise of two sizes.
 
         white, walk: Variance of a block mean, and of the walk from one block to the next.
-        steps: (D,), blocks from each that exists to the next that does.
         known: (k, D), independent rows.
         """
-        bands = np.full((2, steps.size), walk / 6.0 - white)
-        bands[0] = 2.0 * white + (steps - 1.0 / 3.0) * walk
-        factor = np.asarray(cholesky_banded(bands, lower=True))
-        basis, triangle = np.linalg.qr(_whitened(factor, known).T)
-        weight = np.sum(np.log(factor[0])) + np.sum(np.log(np.abs(np.diag(triangle))))
-        return cls(factor, basis.T, -float(weight))
+        scale = 1.0 / np.sqrt(white * axes.white + walk)
+        basis, triangle = np.linalg.qr((known * scale).T)
+        weight = np.sum(np.log(scale)) - np.sum(np.log(np.abs(np.diag(triangle))))
+        return cls(scale, basis.T, float(weight))
 
     def without_known(self, rows: FloatArray) -> FloatArray:
         """Rows as independent numbers of one size, without what is known."""
-        white = _whitened(self.factor, rows)
+        white = rows * self.scale
         if len(self.basis):
             white -= (white @ self.basis.T) @ self.basis
         return white
 
 
-def _whitened(factor: FloatArray, rows: FloatArray) -> FloatArray:
-    flat = rows.reshape(-1, rows.shape[-1])
-    if not len(flat):
-        return flat
-    return np.ascontiguousarray(solve_banded((1, 0), factor, flat.T).T).reshape(rows.shape)
-
-
-def _noises(means: Means, known: Sequence[FloatArray]) -> list[_Noise]:
+def _noises(axes: _Axes, known: Sequence[FloatArray]) -> list[_Noise]:
     """White noise alone, with more and more of a random walk, and a random walk alone.
 
-    known: Rows of differences, (k, D), which need not be independent.
+    known: Rows, (k, D), which need not be independent.
     """
     rows = np.vstack(known)
     norms = np.linalg.norm(rows, axis=1)[:, None]
     _, sizes, spanned = np.linalg.svd(rows / np.where(norms > 0.0, norms, 1.0), full_matrices=False)
     spanned = spanned[sizes > tuning.SPANNED * np.max(sizes, initial=0.0)]
-    steps = np.diff(np.flatnonzero(~np.isnan(means.blocks))).astype(float)
     ratios = [(1.0, 0.0), *((1.0, ratio) for ratio in tuning.WALKS), (0.0, 1.0)]
-    return [_Noise.of(white, walk, steps, spanned) for white, walk in ratios]
+    return [_Noise.of(white, walk, axes, spanned) for white, walk in ratios]
 
 
 @dataclass(frozen=True, eq=False)
