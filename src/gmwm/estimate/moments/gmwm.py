@@ -105,12 +105,14 @@ class GMWM:
     def _solve(self, model: Model, wv: WaveletVariance) -> Converged:
         """The minimum under weights that belong to it."""
         scales = self.scales(wv)
-        problem = _Problem(
-            Design(model, scales), Moments.of(wv, model, scales), Weights.of(self.weights, wv)
-        )
-        noise = problem.design.coordinates.noise
-        reference = dictionary_fit(wv, problem.moments.target, noise)
-        level = Discrepancy(self.discrepancy, wv.tau.size - problem.design.n_free)
+        design, moments = Design(model, scales), Moments.of(wv, model, scales)
+        noise = design.coordinates.noise
+        # A slope is least certain under noise fitted with the drift in it. Started as if it were
+        # known, a walk can stay at zero, which makes it known.
+        moments = moments.under(dictionary_fit(wv, wv.variance, noise).mixture)
+        problem = _Problem(design, moments, Weights.of(self.weights, wv))
+        reference = dictionary_fit(wv, moments.target, noise)
+        level = Discrepancy(self.discrepancy, wv.tau.size - design.n_free)
         first = [level.value]
         if not any(process.is_line for process in noise):
             # The misfit of a sum of all kinds is discrepancy from the start. But processes that are
