@@ -69,7 +69,7 @@ def test_numbers_of_every_type_are_taken(value):
         ("a", 1.0, "n = 'a': give an integer number of samples, 8 or more"), (7, 1.0, "n = 7"),
         (100.5, 1.0, "n = 100.5"), (1e13, 1.0, "too long"), (100, None, "rate is missing"),
         (100, "a", "dt = 'a': give a positive sampling interval"), (100, -1.0, "dt = -1.0"),
-        (100, 1e300, "1e-09 to 1e+06"),
+        (100, 1e300, "from 0 to 1e+20"), (100, 1e7, "1e-09 to 1e+06"),
     ],
 )  # fmt: skip
 def test_bound_of_no_record(n, dt, words):

@@ -74,7 +74,7 @@ def left_open(fit: Fit, level: float = 0.95) -> tuple[Model, ...]:
         error, found = squared**-0.5, float(own @ residual) / squared
         added = found + error * (width if found > 0.0 else np.hypot(width, found / error))
         move = -added * solve_triangular(triangle, known)
-        share = min(1.0, tuning.OPEN_MOVE / float(np.max(np.abs(move))))
+        share = tuning.OPEN_MOVE / max(tuning.OPEN_MOVE, float(np.max(np.abs(move))))
         moved = (1.0 + share * powers * move) ** (1.0 / powers)
         values = {key: fit.params[key] * float(x) for key, x in zip(keys, moved, strict=True)}
         term = GaussMarkov(float(np.sqrt(share * added)), float(tau))
