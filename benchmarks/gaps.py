@@ -63,6 +63,7 @@ PATTERNS = {
     "0.1 % single": singles(0.001),
     "1 % single": singles(0.01),
     "10 % single": singles(0.1),
+    "30 % single": singles(0.3),
     "50 shocks": shocks(50),
     "400 shocks": shocks(400),
 }

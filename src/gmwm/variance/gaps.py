@@ -1,27 +1,26 @@
 """Missing samples: the runs between them, what they add to wavelet variances, and what they cost.
 
 A coefficient of averaging time m is half the difference of two neighbouring means of m samples.
-Where some are missing, each is the mean of those that exist. Gaps longer than m/4 split the record,
+Where some are missing, each is the mean of those that exist. Gaps of m/4 and more split the record,
 and so do gaps in which the level changes by more than the noise explains: coefficients that contain
 them are left out.
 
 The mean of C of m samples differs from the mean of all by a random part. As windows slide over a
-gap, samples are missing at any place equally often, so that its variance is
+gap, samples are missing at any place equally often, so that its variance is (1/C - 1/m) S with
 
-    (1/C - 1/m) L V(L, m) m / (m - L)
+    S = sum_k r(k) (V(1, m) - D(k)/2) / r(0)
 
-for gaps of L samples. V(L, m) is the variance of means of L samples about the mean of m: the sum of
-the Haar wavelet variances of averaging times from L to m/2, whatever the spectrum (analysis of
-variance; Percival & Walden 2000, sec. 8.1). For white noise that is (1/C - 1/m) times the variance
-of a sample, exactly. Gaps that follow each other closely count as shorter ones: with a share p
-missing at random, runs of missing samples have the mean 1/(1 - p) but the effect of single ones, so
-L is the length times 1 - p. All variances needed are those of finer levels, so the part is
-subtracted level by level.
+over lags k of either sign. r is the autocovariance of what is missing, D(k) the mean square of
+differences of samples k apart, and V(1, m) the variance of samples about the mean of m: the sum of
+the Haar wavelet variances of averaging times up to m/2, whatever the spectrum (analysis of
+variance; Percival & Walden 2000, sec. 8.1). All of them are known without a model, so the part is
+subtracted level by level. Where single samples are missing at random S is V(1, m), exactly; where
+gaps have L samples it is L times V(L, m), the variance of means of L samples.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -98,53 +97,81 @@ class GapEffects:
         check_covariance(self.inflation.tolist(), levels, "inflation")
 
 
-def bridged(runs: IntArray, apart: BoolArray, longest: float) -> IntArray:
-    """Runs to which gaps of up to ``longest`` samples belong, (P, 2), unless they are apart."""
-    split = apart | (runs[1:, 0] - runs[:-1, 1] > longest)
+def bridged(runs: IntArray, apart: BoolArray, limit: float) -> IntArray:
+    """Runs to which gaps of fewer than ``limit`` samples belong, (P, 2), unless they are apart."""
+    split = apart | (runs[1:, 0] - runs[:-1, 1] >= limit)
     return np.stack([runs[np.append(True, split), 0], runs[np.append(split, True), 1]], axis=1)
 
 
 def unmasked(
-    square: FloatArray, scarcity: FloatArray, gaps: IntArray, missing: float, longest: float
+    square: FloatArray, scarcity: FloatArray, spread: Callable[[FloatArray], float]
 ) -> tuple[FloatArray, FloatArray]:
     """Variances without what missing samples add, and that relative to them, (J,) each.
 
     square: (J,), mean squares of the coefficients.
     scarcity: (J,), mean over windows of a quarter of 1/C - 1/m, for both halves together.
-    gaps: (G, 2), number of gaps of about the same length, and samples they have.
-    missing: Share of the samples that are missing.
-    longest: Longest gap within half a window, as a share of it.
+    spread: S of a level from the variances of the finer ones.
     """
-    samples = gaps[:, 1].astype(float)
-    length = np.maximum(samples / gaps[:, 0] * (1.0 - missing), 1.0)
     variance, change, usual = np.zeros(square.size), np.zeros(square.size), 0.0
     for j in range(square.size):
-        m = 2.0**j
-        within = length <= longest * m
-        added = 0.0
-        if np.any(within) and scarcity[j] > 0.0:
-            own = length[within]
-            spread = np.array([_spread(variance[:j], each) for each in own])
-            each = own * spread * m / (m - own)
-            added = scarcity[j] * float(np.average(each, weights=samples[within]))
+        added = scarcity[j] * spread(variance[:j]) if scarcity[j] > 0.0 else 0.0
         variance[j] = max(square[j] - added, square[j] / (1.0 + tuning.LARGEST_CHANGE))
         # Relative to what is expected: few windows that came out small by chance would weigh least.
-        # No level is below half of the one before but by chance, or where steps are rounded.
-        usual = max(variance[j], 0.5 * usual)
+        # Levels fall by 4 from one to the next (quantization) or less, the last ones by 2 or less.
+        usual = max(variance[j], usual * (0.5 if j >= square.size - tuning.FEW_WINDOWS else 0.25))
         change[j] = added / usual if usual > 0.0 else 0.0
     return variance, change
 
 
-def _spread(variance: FloatArray, length: float) -> float:
-    """Variance of means of ``length`` samples within the next averaging time.
+def lags_to(longest: int) -> IntArray:
+    """Lags from 0 to that of the longest gap, the longer ones some an octave."""
+    lags = [0, 1]
+    while lags[-1] < longest:
+        lags.append(lags[-1] + max(lags[-1] // tuning.LAGS_PER_OCTAVE, 1))
+    return np.array(lags)
 
-    Between octaves as for white noise.
+
+def spread_by_lags(
+    finer: FloatArray, there: IntArray, runs: IntArray, lags: IntArray, squares: FloatArray
+) -> float:
+    """S of the level after the finer ones, of windows within some runs.
+
+    finer: (j,), variances of the finer levels.
+    there: (Q, 2), intervals of samples that exist within the runs.
+    runs: (P, 2), intervals with windows.
+    lags: (K,), from 0 on; shorter than an averaging time.
+    squares: (K,), mean squares of differences at these lags.
     """
-    octave = int(np.log2(length))
-    if octave >= variance.size:
+    m = 2.0**finer.size
+    share = np.array([pairs_at_lag(there, there, k) / pairs_at_lag(runs, runs, k) for k in lags])
+    weight = share - share[0] ** 2
+    own = weight[0]
+    weight *= np.diff(lags, prepend=0) + np.diff(lags, append=lags[-1] + 1)
+    # Within m samples there are m - k pairs; k more lie on both sides of the centre of a window.
+    spread = weight * (1.0 - 1.5 * lags / m) @ (np.sum(finer) - 0.5 * squares)
+    return float(spread / (own - weight @ (1.0 - lags / m) / m))
+
+
+def spread_by_lengths(finer: FloatArray, gaps: IntArray, missing: float, longest: float) -> float:
+    """S of the level after the finer ones where only lengths of gaps are known.
+
+    Gaps that follow each other closely count as shorter ones: with a share p missing at random,
+    gaps have the mean 1/(1 - p) but the effect of single ones.
+
+    gaps: (G, 2), number of gaps of about the same length, and samples they have.
+    missing: Share of the samples that are missing.
+    longest: Longest gap within half a window, as a share of it.
+    """
+    m, samples = 2.0**finer.size, gaps[:, 1].astype(float)
+    length = np.maximum(samples / gaps[:, 0] * (1.0 - missing), 1.0)
+    within = length <= longest * m
+    if not np.any(within):
         return 0.0
-    part = 2.0 ** (octave + 1) / length - 1.0
-    return float(part * variance[octave] + np.sum(variance[octave + 1 :]))
+    octave = np.log2(length[within]).astype(int)
+    after = np.cumsum(finer[::-1])[::-1] - finer  # of averaging times beyond each
+    own = length[within]
+    means = (2.0 ** (octave + 1) / own - 1.0) * finer[octave] + after[octave]  # V, as white noise
+    return float(np.average(own * means * m / (m - own), weights=samples[within]))
 
 
 def window_count(runs: IntArray, width: float) -> float:

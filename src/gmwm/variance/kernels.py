@@ -265,6 +265,28 @@ def difference_powers(values: FloatArray) -> tuple[int, float, float]:
 
 
 @compiled(fastmath=ANY_ORDER)
+def lagged_squares(values: FloatArray, parts: IntArray, lags: IntArray, slope: float) -> FloatArray:
+    """Mean squares of differences of existing samples of a part, without the line, (K,).
+
+    values: (n,), NaN where missing.
+    parts: (P, 2), first sample of each part, and the one after its last.
+    lags: (K,), in samples.
+    slope: Of the line, per sample.
+    """
+    found = np.zeros(lags.size)
+    for i in range(lags.size):
+        count, square, step = 0, 0.0, slope * lags[i]
+        for part in range(parts.shape[0]):
+            for t in range(parts[part, 0], parts[part, 1] - lags[i]):
+                difference = values[t + lags[i]] - values[t] - step
+                there = difference == difference  # NaN is not
+                count += there
+                square += difference * difference if there else 0.0
+        found[i] = square / max(count, 1)
+    return found
+
+
+@compiled(fastmath=ANY_ORDER)
 def survey(values: FloatArray) -> tuple[int, float, float, float]:
     """Number of missing samples; sum, smallest and largest of the others."""
     missing, total = 0, 0.0

@@ -20,7 +20,9 @@ from gmwm.variance.gaps import (
     Runs,
     bridged,
     common_share,
+    lags_to,
     pair_factor,
+    spread_by_lags,
     unmasked,
     window_centres,
     window_count,
@@ -31,6 +33,7 @@ from gmwm.variance.kernels import (
     cumulative,
     fine_moments,
     haar_coefficients,
+    lagged_squares,
     masked_coefficients,
     slope,
 )
@@ -238,7 +241,7 @@ class Levels:
 
     @property
     def _longest_gap(self) -> float:
-        """Longest gap in a coefficient, as a share of the averaging time."""
+        """Gaps in a coefficient are shorter than this share of the averaging time."""
         return tuning.LONGEST_GAP if self.wavelet == "haar" else 0.0
 
     @property
@@ -259,7 +262,7 @@ class Levels:
         """Number of levels, the finest, whose coefficients contain no missing sample."""
         gaps = self.runs.edges[1:, 0] - self.runs.edges[:-1, 1]
         shortest = np.min(gaps, initial=self.runs.n, where=~self.apart)
-        return int(np.sum(self._longest_gap * self.averaging < shortest))
+        return int(np.sum(self._longest_gap * self.averaging <= shortest))
 
     @cached_property
     def _integral(self) -> FloatArray:
@@ -332,11 +335,23 @@ class Levels:
             return np.zeros(scarcity.size), np.zeros(scarcity.size)
         step = self._step
         square = moments[:, 1] - 2.0 * step * moments[:, 0] + step**2 if level is None else level
-        gaps = self.runs.edges[1:, 0] - self.runs.edges[:-1, 1]
-        lengths, number = np.unique(gaps[~self.apart], return_counts=True)
-        pairs = np.stack([number, lengths * number], axis=1)
-        missing = 1.0 - self.runs.present / self.runs.n
-        variance, change = unmasked(square, scarcity, pairs, missing, tuning.LONGEST_GAP)
+        there = self.runs.edges
+        gaps = (there[1:, 0] - there[:-1, 1])[~self.apart]
+        longest = self._longest_gap * self.averaging
+        lags = lags_to(int(np.max(gaps, initial=1, where=gaps < longest[-1])))
+        parts = bridged(there, self.apart, np.inf)
+        squares = lagged_squares(self.values, parts, lags, self.slope)
+        squares *= 4.0 * square[0] / max(squares[1], np.finfo(float).tiny)  # robust ones are others
+
+        def spread(finer: FloatArray) -> float:
+            j = finer.size
+            runs = self.edges(j)
+            used = runs[:, 1] - runs[:, 0] >= self.width[j]
+            own = there[used[np.searchsorted(runs[:, 0], there[:, 0], side="right") - 1]]
+            k = int(np.searchsorted(lags, longest[j]))
+            return spread_by_lags(finer, own, runs[used], lags[:k], squares[:k])
+
+        variance, change = unmasked(square, scarcity, spread)
         return square - variance, change
 
     def effects(self, change: FloatArray) -> GapEffects | None:

@@ -40,8 +40,8 @@ def wavelet_variance(
     All levels with at least one coefficient free of end effects are given; the mean of the series
     does not matter. Missing samples are NaN: a Haar coefficient is the difference of means of the
     samples that exist, and what missing ones add to its variance is subtracted
-    (`gmwm.variance.gaps`). Coefficients with a gap of more than a quarter of the averaging time,
-    or with any gap for other wavelets, are left out.
+    (`gmwm.variance.gaps`). Coefficients with a gap of a quarter of the averaging time or more, or
+    with any gap for other wavelets, are left out.
 
     Parameters
     ----------
@@ -90,7 +90,8 @@ def wavelet_variance(
         moments = _robust_moments(levels.coefficients(), efficiency)
         level = _robust_moments(levels.coefficients(level=True), efficiency)[:, 1]
     added, change = levels.added(moments, scarcity, level)
-    variance = np.maximum(moments[:, 1] - added, 0.0)
+    least = moments[:, 1] / (1.0 + tuning.LARGEST_CHANGE)
+    variance = np.maximum(moments[:, 1] - added, least)
     blocks, block = levels.block_means()
     release(channel.values)
     found = None

@@ -23,7 +23,7 @@ from gmwm.errors import InputError
 from gmwm.readers import Channel
 from gmwm.variance import stream_kernels as kernels, tuning
 from gmwm.variance.covariance.haar import dyadic_levels
-from gmwm.variance.gaps import GapEffects, unmasked
+from gmwm.variance.gaps import GapEffects, spread_by_lengths, unmasked
 from gmwm.variance.series import MIN_SAMPLES, check_varies, cumulant_of_powers, where_of
 from gmwm.variance.stream_kernels import (
     BLOCKS,
@@ -75,13 +75,9 @@ def variance_of(sums: Sums, channel: Channel, confidence: float) -> WaveletVaria
     cumulant = cumulant_of_powers(4.0 * float(square[0]), fourth, float(windows[0]))
     gaps = None
     if missing:
-        square, change = unmasked(
-            square,
-            levels[:, SCARCITY] / windows,
-            sums.gaps[sums.gaps[:, 0] > 0],
-            missing / n,
-            tuning.LONGEST_WITHIN,
-        )
+        given = sums.gaps[sums.gaps[:, 0] > 0], missing / n, tuning.LONGEST_WITHIN
+        scarcity = levels[:, SCARCITY] / windows
+        square, change = unmasked(square, scarcity, lambda finer: spread_by_lengths(finer, *given))
         gaps = effects(n, missing, sums.gaps, windows, change)
     blocks, block = _block_means(sums)
     return WaveletVariance(
