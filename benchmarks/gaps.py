@@ -62,6 +62,7 @@ def shocks(number: int) -> Callable[[np.random.Generator, int], np.ndarray]:
 PATTERNS = {
     "0.1 % single": singles(0.001),
     "1 % single": singles(0.01),
+    "3 % single": singles(0.03),
     "10 % single": singles(0.1),
     "30 % single": singles(0.3),
     "50 shocks": shocks(50),

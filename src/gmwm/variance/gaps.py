@@ -153,25 +153,21 @@ def spread_by_lags(
 
 
 def spread_by_lengths(finer: FloatArray, gaps: IntArray, missing: float, longest: float) -> float:
-    """S of the level after the finer ones where only lengths of gaps are known.
+    """S from lengths of gaps: L m/(m - L) V(L, m), where a share ``missing`` of samples is.
 
-    Gaps that follow each other closely count as shorter ones: with a share p missing at random,
-    gaps have the mean 1/(1 - p) but the effect of single ones.
+    With a share p missing at random, gaps have the mean 1/(1 - p) but the effect of single ones.
 
     gaps: (G, 2), number of gaps of about the same length, and samples they have.
-    missing: Share of the samples that are missing.
     longest: Longest gap within half a window, as a share of it.
     """
-    m, samples = 2.0**finer.size, gaps[:, 1].astype(float)
-    length = np.maximum(samples / gaps[:, 0] * (1.0 - missing), 1.0)
+    m = 2.0**finer.size
+    length = np.maximum(gaps[:, 1] / gaps[:, 0] * (1.0 - missing), 1.0)
     within = length <= longest * m
-    if not np.any(within):
-        return 0.0
-    octave = np.log2(length[within]).astype(int)
-    after = np.cumsum(finer[::-1])[::-1] - finer  # of averaging times beyond each
-    own = length[within]
-    means = (2.0 ** (octave + 1) / own - 1.0) * finer[octave] + after[octave]  # V, as white noise
-    return float(np.average(own * means * m / (m - own), weights=samples[within]))
+    own, samples = length[within], gaps[within, 1]
+    octave = np.log2(own).astype(int)
+    beyond = np.cumsum(finer[::-1])[::-1] - finer
+    means = (2.0 ** (octave + 1) / own - 1.0) * finer[octave] + beyond[octave]  # as of white noise
+    return float(own * means * m / (m - own) @ samples / max(np.sum(samples), 1))
 
 
 def window_count(runs: IntArray, width: float) -> float:

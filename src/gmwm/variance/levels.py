@@ -235,9 +235,11 @@ class Levels:
         """Coefficients of the line, (J,)."""
         return 0.5 * self.slope * self.averaging
 
-    def edges(self, level: int) -> IntArray:
-        """Runs within which the coefficients of a level lie, (P, 2)."""
-        return bridged(self.runs.edges, self.apart, self._longest_gap * self.averaging[level])
+    @cached_property
+    def edges(self) -> list[IntArray]:
+        """Runs within which the coefficients of each level lie, (P, 2)."""
+        limits = self._longest_gap * self.averaging
+        return [bridged(self.runs.edges, self.apart, limit) for limit in limits]
 
     @property
     def _longest_gap(self) -> float:
@@ -255,7 +257,7 @@ class Levels:
     @cached_property
     def counts(self) -> FloatArray:
         """Number of coefficients, (J,)."""
-        return np.array([window_count(self.edges(j), width) for j, width in enumerate(self.width)])
+        return np.array([window_count(self.edges[j], width) for j, width in enumerate(self.width)])
 
     @cached_property
     def plain(self) -> int:
@@ -282,7 +284,7 @@ class Levels:
         """Coefficients of a level without the line, and their mean scarcity."""
         found = np.empty(int(self.counts[level]))
         m = int(self.averaging[level])
-        scarcity = masked_coefficients(self._integral, self._there, self.edges(level), m, found)
+        scarcity = masked_coefficients(self._integral, self._there, self.edges[level], m, found)
         return found, scarcity / found.size
 
     def moments(self) -> tuple[FloatArray, FloatArray]:
@@ -320,7 +322,7 @@ class Levels:
         own = cumulative(self.values - line, 0.0)
         for j, m in enumerate(self.averaging.astype(int).tolist()):
             if j < self.plain:
-                yield np.concatenate([haar_coefficients(own, a, b, m) for a, b in self.edges(j)])
+                yield np.concatenate([haar_coefficients(own, a, b, m) for a, b in self.edges[j]])
             else:
                 yield self._masked(j)[0] + (0.0 if level else self._step[j])
 
@@ -345,7 +347,7 @@ class Levels:
 
         def spread(finer: FloatArray) -> float:
             j = finer.size
-            runs = self.edges(j)
+            runs = self.edges[j]
             used = runs[:, 1] - runs[:, 0] >= self.width[j]
             own = there[used[np.searchsorted(runs[:, 0], there[:, 0], side="right") - 1]]
             k = int(np.searchsorted(lags, longest[j]))
@@ -360,7 +362,7 @@ class Levels:
         if self.runs.is_complete:
             return None
         widths = self.width
-        centres = [window_centres(self.edges(j), int(width)) for j, width in enumerate(widths)]
+        centres = [window_centres(self.edges[j], int(width)) for j, width in enumerate(widths)]
         if self.wavelet == "haar":
             pairs = zip(centres, self.averaging.astype(int).tolist(), strict=True)
             growth = np.array([pair_factor(own, m, n) for own, m in pairs])
@@ -377,7 +379,7 @@ class Levels:
         between means over as long a time beside the gap; those with samples of longer gaps are NaN.
         """
         n = self.runs.n
-        edges = np.concatenate([[0], self.edges(self.averaging.size - 1).ravel(), [n]])
+        edges = np.concatenate([[0], self.edges[self.averaging.size - 1].ravel(), [n]])
         longer = [(start, stop) for start, stop in edges.reshape(-1, 2).tolist() if stop > start]
         block = -(-n // (tuning.MOST_BLOCKS_WITH_GAPS if longer else tuning.MOST_BLOCKS))
         ends = slice(0, (n // block) * block + 1, block)

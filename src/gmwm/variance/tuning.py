@@ -29,9 +29,7 @@ LARGEST_CHANGE = 10.0
 """Largest relative change of a variance by gaps: half of white noise missing singly has 1, so few
 windows may come out at less. Bounded by 1.5, three coarse levels were 11 % too large."""
 
-FEW_WINDOWS = (
-    4  # levels, the last, with at most 16 windows without overlap, which may be low by chance
-)
+FEW_WINDOWS = 4  # last levels, of at most 16 windows without overlap: they may be low by chance
 
 STRETCH_OF_GAP, LEAST_STRETCH = 4, 32
 """Lengths of a gap, and fewest samples, on either side that show whether the level changes."""
@@ -40,7 +38,7 @@ APART = 1e-3  # probability that noise has a gap in a series that passes for a c
 WIDER = 16  # a change of the level must also show over stretches 16 times as wide
 PILOT_WINDOWS = 8.0  # windows without overlap of a level whose noise is known
 
-LAGS_PER_OCTAVE = 12  # lags at which samples are compared, from twice as many samples on
+LAGS_PER_OCTAVE = 6  # lags at which samples are compared, from twelve samples on
 LAGS_PER_AVERAGE = 8  # lags per averaging time at which pairs of coefficients are counted
 MOST_BLOCKS = 2048  # means of blocks from which a drift is estimated
 MOST_BLOCKS_WITH_GAPS = 512  # the same where some are missing, which needs a dense matrix of them

@@ -4,18 +4,24 @@ import numpy as np
 import pytest
 
 from gmwm.variance import tuning
-from gmwm.variance.gaps import unmasked
+from gmwm.variance.gaps import spread_by_lengths, unmasked
 from gmwm.variance.streaming import effects
 
 J = 12
 M = 2.0 ** np.arange(J)
 
 
+def without(square, scarcity, gaps):
+    """Variances of a stream with such gaps, and their change."""
+    longest = tuning.LONGEST_WITHIN
+    return unmasked(square, scarcity, lambda finer: spread_by_lengths(finer, gaps, 0.0, longest))
+
+
 @pytest.mark.parametrize("length", [1, 4])
 def test_of_white_noise_what_is_added_is_the_variance_of_the_samples_that_are_gone(length):
     gaps = np.array([[100, 100 * length]])
     truth, scarcity = 0.5 / M, 1e-3 / M
-    found, change = unmasked(truth + scarcity, scarcity, gaps, 0.0, tuning.LONGEST_WITHIN)
+    found, change = without(truth + scarcity, scarcity, gaps)
     long = length < tuning.LONGEST_WITHIN * M
     assert np.any(long) and not np.all(long)
     np.testing.assert_allclose(found[long], truth[long], rtol=2e-2 if length == 1 else 5e-2)
@@ -27,7 +33,7 @@ def test_of_white_noise_what_is_added_is_the_variance_of_the_samples_that_are_go
 
 def test_without_gaps_nothing_is_added():
     none = np.zeros((20, 2), dtype=np.int64)
-    found, change = unmasked(1.0 / M, np.ones(J), none[:0], 0.0, tuning.LONGEST_WITHIN)
+    found, change = without(1.0 / M, np.ones(J), none[:0])
     np.testing.assert_allclose(found, 1.0 / M)
     assert np.all(change == 0.0)
     n = 10_000
@@ -40,6 +46,6 @@ def test_without_gaps_nothing_is_added():
 
 def test_what_is_taken_off_leaves_a_part():
     square, gaps = 1.0 / M, np.array([[1000, 1000]])
-    found, _ = unmasked(square, 100.0 * np.ones(J), gaps, 0.0, tuning.LONGEST_WITHIN)
+    found, _ = without(square, 100.0 * np.ones(J), gaps)
     least = square / (1.0 + tuning.LARGEST_CHANGE)
     assert np.all(found >= least * (1.0 - 1e-12)) and np.any(np.isclose(found, least))
