@@ -277,8 +277,10 @@ def lagged_squares(values: FloatArray, parts: IntArray, lags: IntArray, slope: f
     for i in range(lags.size):
         count, square, step = 0, 0.0, slope * lags[i]
         for part in range(parts.shape[0]):
-            for t in range(parts[part, 0], parts[part, 1] - lags[i]):
-                difference = values[t + lags[i]] - values[t] - step
+            first = values[parts[part, 0] : parts[part, 1]]
+            second = first[lags[i] :]
+            for t in range(second.size):
+                difference = second[t] - first[t] - step
                 there = difference == difference  # NaN is not
                 count += there
                 square += difference * difference if there else 0.0

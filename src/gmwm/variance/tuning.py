@@ -38,7 +38,7 @@ APART = 1e-3  # probability that noise has a gap in a series that passes for a c
 WIDER = 16  # a change of the level must also show over stretches 16 times as wide
 PILOT_WINDOWS = 8.0  # windows without overlap of a level whose noise is known
 
-LAGS_PER_OCTAVE = 6  # lags at which samples are compared, from twelve samples on
+LAGS_PER_OCTAVE = 12  # lags at which samples are compared, all below 24 samples
 LAGS_PER_AVERAGE = 8  # lags per averaging time at which pairs of coefficients are counted
 MOST_BLOCKS = 2048  # means of blocks from which a drift is estimated
 MOST_BLOCKS_WITH_GAPS = 512  # the same where some are missing, which needs a dense matrix of them
