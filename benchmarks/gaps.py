@@ -8,7 +8,8 @@ Series of 100,000 samples at 100 Hz, the same with and without gaps:
 - variance: predicted over observed sampling variance against that of the complete record, the
   lowest and highest level of those with ten degrees of freedom or more;
 - time: of the variance, of its covariance under a model and of a fit, against the complete record,
-  side by side.
+  side by side;
+- coverage: of the 95 % intervals of fits of two models, with 10 % missing.
 """
 
 from __future__ import annotations
@@ -121,6 +122,18 @@ def times(model: Model, lost: Callable) -> tuple[float, float, float]:
     )
 
 
+def coverage(model: Model, lost: Callable, runs: int) -> dict[str, float]:
+    """Share of runs in which the 95 % intervals of fits contain the truth."""
+    inside = dict.fromkeys(model.params, 0)
+    for seed in range(runs):
+        rng = np.random.default_rng(seed)
+        x = model.simulate(SAMPLES, DT, rng)
+        fit = gmwm.fit(model.opened(), np.where(lost(rng, x.size), np.nan, x), dt=DT)
+        for name, (low, high) in fit.interval(0.95).items():
+            inside[name] += low <= model.params[name] <= high
+    return {name: count / runs for name, count in inside.items()}
+
+
 def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser()
@@ -137,6 +150,8 @@ def main() -> None:
                 f"{variance:15.1f} {covariance:5.1f} {fit:4.1f}",
                 flush=True,
             )
+    for name in ("Q + N", "N + K"):
+        print(f"{name:10} 10 % single: coverage", coverage(MODELS[name], singles(0.1), runs))
 
 
 if __name__ == "__main__":
