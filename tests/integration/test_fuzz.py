@@ -9,7 +9,8 @@ import pytest
 import fuzz
 from marks import slow
 
-SOME = {"npy": 150, "odd": 2, "document": 10, "study": 12, "field": 12, "fleet": 4, "gzip": 40, "datasheet": 60}
+SOME = {"npy": 150, "odd": 2, "document": 10, "study": 12, "field": 12, "fleet": 4}
+SOME |= {"gzip": 40, "datasheet": 60}
 SOME |= dict.fromkeys(("mat", "mat73", "hdf5"), 9)  # each is first tried in a process of its own
 
 
