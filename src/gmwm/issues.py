@@ -632,6 +632,8 @@ _INS = (
     _navigation("fixes-left-out", "{count} fixes before or after the IMU's record are left out"),
     _navigation("fixes-rejected", "{count} of {of} are rejected; the farthest is {size:.3g} sigma "
         "off at {time:.10g} s", severity="warning"),
+    _navigation("fixes-repeated", "{count} position{count:s?} that repeat the one before while the "
+        "vehicle moves are left out", severity="warning"),
     _navigation("heading", {
         "": "{source}: {degrees:.2f} deg, 1 sigma {sd_deg:.2g} deg",
         "wrong": "the heading that the filter started with is wrong by {by:.1f} deg (standard "

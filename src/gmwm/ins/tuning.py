@@ -40,7 +40,9 @@ SPECIFIC_FORCE = (0.5, 2.0)  # mean over standard gravity, beyond which its unit
 # s between fixes whose distance is compared with their velocities; how many are needed; and the
 # ratio of mismatches above which two columns are exchanged or a unit is wrong: right ones never
 # reach it.
-WAY, FEWEST_WAYS, MIXED_UP = 20.0, 8, 3.0
+WAY, FEWEST_WAYS, MIXED_UP = 10.0, 8, 3.0
+# m in the time of a repeated position, and how often: the noise of a receiver that stands is less.
+REPEATED_WAY, REPEATS = 5.0, 3
 # Scatter of an IMU at rest, over where the vehicle stood at the start, and the length looked at, s:
 # engines and roads shake it far more.
 ZERO_VELOCITY = (2.0, 1.0)
