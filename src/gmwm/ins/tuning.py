@@ -35,6 +35,9 @@ BAROMETER_SD = 0.5  # m, of one height: a few Pa of noise and gusts
 # rad/s and m/s^2, of a turn-on bias where nobody gives one: a static calibration cannot know it.
 TURN_ON_SD = {"gyro": math.radians(0.1), "accel": 0.1}
 LONGEST_FILLED = 0.1  # s of missing IMU samples that are interpolated: short against a manoeuvre
+# Samples at an end of the range: how many show it, and the share above which no filter is right;
+# times and plus how often other neighbours are equal, equal ones are chance.
+FEWEST_CUT_OFF, MOST_CUT_OFF, EQUAL = 8, 0.01, (2.0, 0.01)
 LONGEST_HELD = 5.0  # s of one value, beyond which a channel is stuck: a second of noise has others
 SPECIFIC_FORCE = (0.5, 2.0)  # mean over standard gravity, beyond which its unit is wrong
 # s between fixes whose distance is compared with their velocities; how many are needed; and the
@@ -46,6 +49,9 @@ REPEATED_WAY, REPEATS = 5.0, 3
 # Scatter of an IMU at rest, over where the vehicle stood at the start, and the length looked at, s:
 # engines and roads shake it far more.
 ZERO_VELOCITY = (2.0, 1.0)
+# Standard deviations (and m/s^2 of acceleration) beyond which positions step; fixes after which they
+# have not come back.
+STEP, STEP_STAYS = (10.0, 5.0), 10
 LEAP_SECONDS = 18.0  # s, by which GPS time is ahead of UTC since 2017
 
 # -- own logs: alignment --------------------------------------------------------------------------

@@ -280,14 +280,18 @@ class Faults:
     resolution: dict[str, float]
 
     @classmethod
-    def of(cls, whole: Replay, measured: Measured | None = None) -> Faults:
-        """Look for faults.
+    def of(
+        cls, whole: Replay, measured: Measured | None = None, *, search: bool = True
+    ) -> Faults:
+        """Look for faults; without a search only for the ones that this motion can show.
 
         measured: The log as it was, to be aligned anew without leap seconds where the filter is
             lost: the start is as wrong as the stamps.
         """
         span = tuning.LARGEST_OFFSET + tuning.OFFSET_MARGIN, tuning.DIAGNOSED
         base = whole.within(*span)
+        if not search:
+            return cls((), not contradicted(base), base, constant_errors(base)[1])
         near = cls._near(base)
         if measured is None or near.explained or not base.is_lost:
             return near
