@@ -558,6 +558,7 @@ _SELECTION = (
         "({slow}); the model leaves out the ramp", topic="selection"),
     Issue("tie", {
         "": "{text}",
+        "wrong": "Use none of {names}: errors are equal within the resolution of this log{but}.",
         "log": "Errors of {names} are equal within the resolution of this log{but}. {resolution}"},
         topic="selection"),
 )  # fmt: skip

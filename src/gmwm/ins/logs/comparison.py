@@ -73,11 +73,6 @@ class Outcome:
         """Mean squares of the true errors, (K, 3), m^2."""
         return np.asarray(self.error**2 + self.reference_variance)
 
-    @property
-    def contradicted(self) -> bool:
-        """Whether predicted errors are wrong by more than chance and `gmwm.ins.tuning.MILD`."""
-        return not self.nees.within and abs(np.log(self.nees.value)) > 2.0 * np.log(tuning.MILD)
-
 
 @dataclass(frozen=True)
 class Paired:
@@ -210,11 +205,6 @@ class Comparison:
             return "more-honest" if honest and pair.score < 0.0 else ""
 
         unbeaten = [a for a in names if not any(beats(b, a) for b in names if b != a)]
-        # Equal errors do not excuse a model that predicts them badly where another predicts well.
-        far = [n for n in unbeaten if self.outcomes[n].contradicted]
-        right = [n for n in unbeaten if n not in far]
-        if far and right:
-            return self._honest(right, far)
         shown = unbeaten or names
         wrong = {n: nees.value for n in shown if not (nees := self.outcomes[n].nees).within}
         values = {
@@ -232,6 +222,14 @@ class Comparison:
         if "" not in codes:
             code = "better" if "better" in codes else "more-honest"
             return notice(code, unbeaten[0], values, but=but)
+        # Equal errors do not excuse a model that predicts them badly.
+        far = [n for n, nees in wrong.items() if abs(np.log(nees)) > 2.0 * np.log(tuning.MILD)]
+        honest = [name for name in shown if name not in far]
+        if not honest:
+            return notice("tie", values=values, variant="wrong", names=" and ".join(shown), but=but)
+        if len(honest) < len(shown):
+            values["models"] = ", ".join(honest)
+            return notice("more-honest", " or ".join(honest), values, but=but)
         resolution = "Errors that differ by 10 % would have been found."
         if self.resolved <= tuning.WORTH:
             resolution = (
@@ -242,14 +240,6 @@ class Comparison:
         return notice(
             "tie", values=values, variant="log", names=tied, but=but, resolution=resolution
         )
-
-    def _honest(self, right: list[str], far: list[str]) -> Notice:
-        """The verdict where errors are equal, and some models predict them badly."""
-        sizes = {name: self.outcomes[name].nees.value for name in far}
-        but = ", but not " + " or ".join(f"{name} (NEES {nees:.3g})" for name, nees in sizes.items())
-        values = {"models": ", ".join(right), "resolved": self.resolved}
-        values |= {"length needed": self.length_needed, "contradicted": ", ".join(far)}
-        return notice("more-honest", " or ".join(right), values, but=but)
 
     @property
     def resolved(self) -> float:

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 from numpy.lib.stride_tricks import sliding_window_view
 
 from gmwm._core.files import existing_file, opened
@@ -271,7 +270,7 @@ def _repeated(time: FloatArray, position: FloatArray) -> BoolArray:
     again[1:] = np.all(position[1:] == position[:-1], axis=1)
     new = np.flatnonzero(~again & np.isfinite(position[:, 0]))
     if new.size < 2:
-        return again & False
+        return np.zeros_like(again)
     first, last = new[:-1], new[1:]
     way = np.linalg.norm(ned_difference(position[last], position[first])[:, :2], axis=1)
     moved = (way > tuning.REPEATED_WAY) & (time[last] - time[first] <= tuning.CHORD)
@@ -290,12 +289,13 @@ def step_notices(aiding: Aiding, start: float) -> list[Notice]:
         return []
     time, sd = position.time, position.sd
     step, way = np.diff(time)[:, None], ned_difference(position.value[1:], position.value[:-1])
-    if velocity is not None and np.array_equal(velocity.time, time):
+    if is_known := velocity is not None and np.array_equal(velocity.time, time):
+        assert velocity is not None
         speed = 0.5 * (velocity.value[1:] + velocity.value[:-1])
     else:
         near = np.arange(step.size)[:, None] + np.delete(np.arange(-3, 4), 3)
         speed = np.median((way / step)[np.clip(near, 0, step.size - 1)], axis=1)
-        sd = sd + [np.inf, np.inf, 0.0]  # a turn is no step; heights alone are looked at
+        sd = sd + np.array([np.inf, np.inf, 0.0])  # a turn is no step; heights alone are looked at
     off = way - speed * step
     # What the motion leaves, by medians of some fixes on both sides, which outliers do not move.
     left = np.cumsum(np.vstack([np.zeros(3), off]), axis=0)
@@ -309,7 +309,9 @@ def step_notices(aiding: Aiding, start: float) -> list[Notice]:
     if not found.size:
         return []
     first = int(found[0])
-    steps = dict(zip(_NED, np.where(is_step, size, 0.0)[first].tolist(), strict=True))
+    # Guessed velocities move the levels by more than the noise of two fixes.
+    size = np.where(is_step, size if is_known else off[inside], 0.0)
+    steps = dict(zip(_NED, size[first].tolist(), strict=True))
     moved = " and ".join(f"{each:.3g} m {axis}" for axis, each in steps.items() if each)
     values = {**steps, "count": int(found.size), "time": float(time[first + stays] + start)}
     return [notice("fixes-step", "position", values, moved=moved)]
@@ -346,7 +348,8 @@ def _check_axes(source: str, time: FloatArray, position: FloatArray, velocity: F
 
     better: dict[str, float] = {}
     by_velocity = gone(velocity)[last] - gone(velocity)[first]
-    course = np.gradient(ned_difference(position, position[0])[:, :2], time, axis=0) @ [1.0, 1.0j]
+    north, east = np.gradient(ned_difference(position, position[0])[:, :2], time, axis=0).T
+    course = np.arctan2(east, north)
     for what, part, here, factor in _misreadings(position, course):
         if np.all(np.abs(here[:, 0]) < 0.5 * np.pi):
             turned = gone((velocity[:, None] @ factor)[:, 0])
@@ -360,12 +363,12 @@ def _check_axes(source: str, time: FloatArray, position: FloatArray, velocity: F
 
 
 def _misreadings(
-    position: FloatArray, course: npt.NDArray[np.complex128]
+    position: FloatArray, course: FloatArray
 ) -> Iterator[tuple[str, slice, FloatArray, FloatArray]]:
     """Each possible mistake with its hint, the axes that show it, right positions and velocities.
 
     The velocities are those of the file times a matrix, or one for each fix. The course is that of
-    the positions, north + i east.
+    the positions, rad.
     """
     level, vertical = slice(0, 2), slice(2, 3)
     same, which = np.eye(3), "check which column is which"
@@ -380,8 +383,8 @@ def _misreadings(
     for unit, factor in _SPEEDS.items():
         yield f"velocities are in {unit}: convert them to m/s", level, position, factor * same
     turn = np.tile(same, (course.size, 1, 1))
-    turn[:, 0, 0] = turn[:, 1, 1] = np.cos(np.angle(course))
-    turn[:, 0, 1] = np.sin(np.angle(course))
+    turn[:, 0, 0] = turn[:, 1, 1] = np.cos(course)
+    turn[:, 0, 1] = np.sin(course)
     turn[:, 1, 0] = -turn[:, 0, 1]
     text = "velocities are forward, right, down: turn them to north, east, down, or leave them out"
     yield text, level, position, turn

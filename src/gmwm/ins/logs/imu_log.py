@@ -197,7 +197,7 @@ def _cut_off(samples: FloatArray) -> dict[float, int]:
     """
     parts = list(windows(samples.size))
     ends = [min(np.min(samples[p]) for p in parts), max(np.max(samples[p]) for p in parts)]
-    at, again, equal = np.zeros(2), np.zeros(2), 0
+    at, again, equal = np.zeros(2, dtype=int), np.zeros(2, dtype=int), 0
     for part in parts:
         own = samples[part]
         same = own[1:] == own[:-1]
@@ -205,8 +205,8 @@ def _cut_off(samples: FloatArray) -> dict[float, int]:
         at += [np.count_nonzero(own == end) for end in ends]
         again += [np.count_nonzero(same & (own[1:] == end)) for end in ends]
         release(samples)
-    usual = (equal - again.sum()) / max(samples.size - at.sum(), 1.0)
-    chance = binom.sf(again - 1, at, min(tuning.EQUAL[0] * usual + tuning.EQUAL[1], 1.0))
+    usual = tuning.EQUAL * (equal - again.sum() + 1) / max(samples.size - at.sum(), 1)
+    chance = binom.sf(again - 1, at, min(usual, 1.0))
     is_cut = (chance < tuning.GATE) & (at >= tuning.FEWEST_CUT_OFF)
     return {float(ends[i]): int(at[i]) for i in np.flatnonzero(is_cut)}
 

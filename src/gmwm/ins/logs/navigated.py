@@ -223,6 +223,8 @@ class Navigated:
             if is_explained
             else ". That does not explain all: something else is wrong too."
         )
+        if self.faults.alike and first.code in ("time-offset", "lever-arm"):
+            text += f" This motion hardly distinguishes {self.faults.alike}: measure the lever arm."
         values = {**first.values, "explained": is_explained, "faults": len(faults)}
         severity = worst_first(faults)[0].severity
         return replace(first, severity=severity, text=text, values=values, hint="", source="")
