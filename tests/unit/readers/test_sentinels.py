@@ -109,6 +109,6 @@ def test_a_sensor_that_stays_at_the_end_of_its_range_is_none(leading):
     values = samples()
     values[300:400] = 2.0 * REACH
     if leading:
-        values[[299, 400]] = 1.2 * REACH
+        values[[299, 400]] = 1.7 * REACH
     rows, _ = found(values)
     assert rows == ([] if leading else [*range(300, 400)])
