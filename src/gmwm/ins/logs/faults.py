@@ -291,8 +291,8 @@ class Faults:
     def of(cls, whole: Replay, measured: Measured | None = None, *, search: bool = True) -> Faults:
         """Look for faults; without a search only for the ones that this motion can show.
 
-        measured: The log as it was, to be aligned anew without leap seconds where the filter is
-            lost: the start is as wrong as the stamps.
+        measured: The log as it was, to be aligned anew without a time offset at its limit, or leap
+            seconds where the filter is lost: the start is as wrong as the stamps.
         """
         span = tuning.LARGEST_OFFSET + tuning.OFFSET_MARGIN, tuning.DIAGNOSED
         base = whole.within(*span)

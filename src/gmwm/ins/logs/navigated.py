@@ -253,8 +253,9 @@ class Navigated:
     def notices(self) -> tuple[Notice, ...]:
         """Notices of the sensor models, the files, the start, and of rejected fixes."""
         given = (*self.measured.sensors.notices, *self.measured.notices)
-        if any(each.code == "axis-signs" for each in self.faults.found):
-            given = tuple(each for each in given if each.code != "axis-up")  # the fault says which
+        up = [each for each in given if each.code == "axis-up"]
+        if up and any(each.code == "axis-signs" for each in self.faults.found):
+            given = tuple(each for each in given if each not in up)  # the fault says which axes
         return (*given, *self.alignment.notices, *self.rejections)
 
     @property
