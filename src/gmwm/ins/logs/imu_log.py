@@ -208,7 +208,8 @@ def _cut_off(samples: FloatArray) -> dict[float, int]:
     usual = tuning.EQUAL * (equal - again.sum() + 1) / max(samples.size - at.sum(), 1)
     chance = binom.sf(again - 1, at, min(usual, 1.0))
     is_cut = (chance < tuning.GATE) & (at >= tuning.FEWEST_CUT_OFF)
-    return {float(ends[i]): int(at[i]) for i in np.flatnonzero(is_cut)}
+    # A dead band is no end.
+    return {float(ends[i]): int(at[i]) for i in np.flatnonzero(is_cut) if ends[i] != 0.0}
 
 
 def _first_stamp(
