@@ -558,6 +558,7 @@ _SELECTION = (
         "({slow}); the model leaves out the ramp", topic="selection"),
     Issue("tie", {
         "": "{text}",
+        "wrong": "Use none of {names}: errors are equal within the resolution of this log{but}.",
         "log": "Errors of {names} are equal within the resolution of this log{but}. {resolution}"},
         topic="selection"),
 )  # fmt: skip
@@ -612,8 +613,10 @@ _INS = (
         "because a drive does not show them all: it is positive while the right side goes down "
         "(x), the front goes up (y), it turns right (z)", severity="bad"),
     _navigation("axis-up", "its mean is positive: the axis points up, and roll is near 180 deg",
-        "correct if the sensor is mounted upside down; otherwise reverse gyro_z and accel_z, and "
-        "also gyro_y and accel_y if y points left", severity="warning"),
+        "correct if the sensor is mounted upside down. If its z axis points up, reverse gyro_z and "
+        "accel_z, and gyro_y and accel_y if y points left. If its accelerometers read the force of "
+        "gravity instead of the reaction to it, reverse accel_x, accel_y and accel_z, and no gyro: "
+        "the verdict distinguishes these", severity="warning"),
     _navigation("barometer-set", "barometric heights are set to the first position fix, by "
         "{shift:.3g} m"),
     _navigation("better", "Use {where}: its errors after the outages are smaller{but}.",
@@ -632,6 +635,11 @@ _INS = (
     _navigation("fixes-left-out", "{count} fixes before or after the IMU's record are left out"),
     _navigation("fixes-rejected", "{count} of {of} are rejected; the farthest is {size:.3g} sigma "
         "off at {time:.10g} s", severity="warning"),
+    _navigation("fixes-repeated", "{count} position{count:s?} that repeat the one before while the "
+        "vehicle moves are left out", severity="warning"),
+    _navigation("fixes-step", "the fixes step by {moved} at {time:.10g} s and stay there, {count} "
+        "time{count:s?} in this log: another height datum or base station", "subtract the step "
+        "from the later fixes, or use the part of the log before or after it", severity="bad"),
     _navigation("heading", {
         "": "{source}: {degrees:.2f} deg, 1 sigma {sd_deg:.2g} deg",
         "wrong": "the heading that the filter started with is wrong by {by:.1f} deg (standard "

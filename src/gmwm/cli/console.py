@@ -144,8 +144,9 @@ def with_option(notice: Notice, span: Span = None, lost: float = 0.0, longest: s
     values = notice.values
     always = {
         "sd-assumed": f"give --{notice.where}-sd",
-        "axis-up": "correct if the sensor is mounted upside down; otherwise give --channel "
-        "gyro_z=-NAME --channel accel_z=-NAME, and also y if it points left",
+        "axis-up": "correct if the sensor is mounted upside down. If z points up give --channel "
+        "gyro_z=-NAME --channel accel_z=-NAME, and also y if it points left; if accelerometers "
+        "read gravity instead of the reaction to it, reverse accel_x, accel_y and accel_z only",
         "vibration": "leave it out with --start and --stop, or record again",
     }
     if notice.code in always:

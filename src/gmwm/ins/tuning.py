@@ -35,15 +35,22 @@ BAROMETER_SD = 0.5  # m, of one height: a few Pa of noise and gusts
 # rad/s and m/s^2, of a turn-on bias where nobody gives one: a static calibration cannot know it.
 TURN_ON_SD = {"gyro": math.radians(0.1), "accel": 0.1}
 LONGEST_FILLED = 0.1  # s of missing IMU samples that are interpolated: short against a manoeuvre
+# Samples at an end of the range: how many show it, and the share above which no filter is right;
+# times as often as others are equal, equal neighbours are chance.
+FEWEST_CUT_OFF, MOST_CUT_OFF, EQUAL = 8, 0.01, 3.0
 LONGEST_HELD = 5.0  # s of one value, beyond which a channel is stuck: a second of noise has others
 SPECIFIC_FORCE = (0.5, 2.0)  # mean over standard gravity, beyond which its unit is wrong
 # s between fixes whose distance is compared with their velocities; how many are needed; and the
 # ratio of mismatches above which two columns are exchanged or a unit is wrong: right ones never
 # reach it.
-WAY, FEWEST_WAYS, MIXED_UP = 20.0, 8, 3.0
+WAY, FEWEST_WAYS, MIXED_UP = 10.0, 8, 3.0
+# m in the time of a repeated position, and how often: the noise of a receiver that stands is less.
+REPEATED_WAY, REPEATS = 5.0, 3
 # Scatter of an IMU at rest, over where the vehicle stood at the start, and the length looked at, s:
 # engines and roads shake it far more.
 ZERO_VELOCITY = (2.0, 1.0)
+# Standard deviations (and m/s^2 of acceleration) beyond which positions step; fixes on both sides.
+STEP, STEP_STAYS = (10.0, 5.0), 10
 LEAP_SECONDS = 18.0  # s, by which GPS time is ahead of UTC since 2017
 
 # -- own logs: alignment --------------------------------------------------------------------------
@@ -86,6 +93,9 @@ FINE_HEADING = math.radians(0.5)  # of the estimated one: the data and not the s
 DIAGNOSED = 3600.0  # s from the start in which faults are looked for, by tens of runs
 MOST_FAULTS = 4  # at once: with more, nothing can be known
 ROUNDS, SETTLED_GAIN = 6, 0.05  # Gauss-Newton steps; the gain in log-likelihood that ends them
+# Shares of LARGEST_OFFSET and times LARGEST_ARM from which more of a time offset may be behind it;
+# the correlation of the two above which the motion hardly distinguishes them.
+FAR_OFFSET, FAR_ARM, ALIKE = 0.9, 2.0, 0.95
 AMBIGUOUS = 3.0  # of log-likelihood, within which two faults explain a log equally well
 MOST_OUTLIERS = 0.1  # fraction of the fixes, above which the filter and not the fixes is wrong
 # m, 1 sigma of a start whose fix is an outlier: farther ones count as outliers too, and more would

@@ -120,12 +120,15 @@ def _are_isolated(
     again = counts >= tuning.LEAST_REPEATS
     if not np.any(again):
         return again
-    # Beside another code, or the same one, is no transition.
+    # Beside another code, or the same one, is no transition. A sensor at the end of its range stays
+    # there: transitions are counted at the ends of each run of equal numbers.
     passing = np.zeros(values.size + 2, dtype=bool)
     passing[far + 1] = ~again[which]
-    beside = passing[far] | passing[far + 2]
-    transitions = np.bincount(which, beside, minlength=numbers.size)
-    again &= transitions <= tuning.TRANSITIONS * counts
+    begins = np.diff(far, prepend=-2) > 1
+    begins[1:] |= np.diff(which) != 0
+    runs = np.bincount(which, begins, minlength=numbers.size)
+    transitions = np.bincount(which, passing[far] | passing[far + 2], minlength=numbers.size)
+    again &= transitions <= tuning.TRANSITIONS * runs
     others = np.sort(values[far[~again[which]]])
     reach = 0.5 * np.abs(numbers - middle)
     near = np.searchsorted(others, numbers + reach) - np.searchsorted(others, numbers - reach)

@@ -101,3 +101,14 @@ def test_without_any_nothing_is_copied():
     assert without_sentinels("x", nothing, LARGEST, str)[0] is nothing
     codes = np.full(5, 999.0)
     assert without_sentinels("x", codes, LARGEST, str)[0] is codes
+
+
+@pytest.mark.parametrize("leading", [True, False])
+def test_a_sensor_that_stays_at_the_end_of_its_range_is_none(leading):
+    """Samples of turns that clipped were missing: what leads to a run counts, not its length."""
+    values = samples()
+    values[300:400] = 2.0 * REACH
+    if leading:
+        values[[299, 400]] = 1.7 * REACH
+    rows, _ = found(values)
+    assert rows == ([] if leading else [*range(300, 400)])

@@ -222,6 +222,14 @@ class Comparison:
         if "" not in codes:
             code = "better" if "better" in codes else "more-honest"
             return notice(code, unbeaten[0], values, but=but)
+        # Equal errors do not excuse a model that predicts them badly.
+        far = [n for n, nees in wrong.items() if abs(np.log(nees)) > 2.0 * np.log(tuning.MILD)]
+        honest = [name for name in shown if name not in far]
+        if not honest:
+            return notice("tie", values=values, variant="wrong", names=" and ".join(shown), but=but)
+        if len(honest) < len(shown):
+            values["models"] = ", ".join(honest)
+            return notice("more-honest", " or ".join(honest), values, but=but)
         resolution = "Errors that differ by 10 % would have been found."
         if self.resolved <= tuning.WORTH:
             resolution = (

@@ -185,7 +185,11 @@ def constant_errors(
         own = np.isin(_CODES, codes)
         _, covariance, gain = gauss_newton(base, columns[:, own], none[own], own)
         # Of stamps and antenna the errors of both together: one could be taken for the other.
-        errors |= zip(_NAMES[own].tolist(), np.sqrt(np.diag(covariance)).tolist(), strict=True)
+        sd = np.sqrt(np.diag(covariance))
+        errors |= zip(_NAMES[own].tolist(), sd.tolist(), strict=True)
+        if len(codes) > 1:
+            errors |= {"alike": float(abs(covariance[0, 1]) / (sd[0] * sd[1]))}
+            errors |= {"forward per second": float(abs(covariance[0, 1]) / sd[0] ** 2)}
         if gain > cost(1) and not any(code in known for code in codes):
             found.append(fitted(base, base, codes))
     return found, errors
@@ -229,7 +233,11 @@ def fitted(
     if start != 0.0:
         theta[-1] = (theta[-1] + start + np.pi) % (2.0 * np.pi) - np.pi
     found = []
-    for part in (code == _CODES for code in codes):
+    for part in (np.equal(_CODES, code) for code in codes):
+        # A part of both that chance explains has not earned it, whatever the other one gains.
+        size = theta[part] @ np.linalg.solve(covariance[np.ix_(part[own], part[own])], theta[part])
+        if len(codes) > 1 and 0.5 * size < cost(int(np.count_nonzero(part))):
+            return ()
         values, spread = (
             dict(zip(_NAMES[part].tolist(), each[part].tolist(), strict=True))
             for each in (theta, errors)
@@ -280,26 +288,46 @@ class Faults:
     resolution: dict[str, float]
 
     @classmethod
-    def of(cls, whole: Replay, measured: Measured | None = None) -> Faults:
-        """Look for faults.
+    def of(cls, whole: Replay, measured: Measured | None = None, *, search: bool = True) -> Faults:
+        """Look for faults; without a search only for the ones that this motion can show.
 
-        measured: The log as it was, to be aligned anew without leap seconds where the filter is
-            lost: the start is as wrong as the stamps.
+        measured: The log as it was, to be aligned anew without a time offset at its limit, or leap
+            seconds where the filter is lost: the start is as wrong as the stamps.
         """
         span = tuning.LARGEST_OFFSET + tuning.OFFSET_MARGIN, tuning.DIAGNOSED
         base = whole.within(*span)
+        if not search:
+            return cls((), not contradicted(base), base, constant_errors(base)[1])
         near = cls._near(base)
-        if measured is None or near.explained or not base.is_lost:
+        if measured is None or not (near._is_far or (base.is_lost and not near.explained)):
             return near
-        for offset in (tuning.LEAP_SECONDS, -tuning.LEAP_SECONDS):
+        own = [each.values["time offset"] for each in near.found if each.code == "time-offset"]
+        for offset in (*own, tuning.LEAP_SECONDS, -tuning.LEAP_SECONDS):
             try:
                 replay = Replay.of(_earlier(measured, offset)).within(*span)
             except InputError:  # no fix or no heading is left
                 continue
             far = cls._near(replay)
-            if far.explained:
+            if far.explained and not far._is_far:
                 return far._with_offset(offset)
-        return near
+        # Errors beyond their limits that do not explain all are no findings.
+        return near if near.explained or not near._is_far else replace(near, found=(), replay=base)
+
+    @property
+    def _is_far(self) -> bool:
+        """Whether an error is so large that more of a time offset may be behind it."""
+        largest = {"time offset": tuning.FAR_OFFSET * tuning.LARGEST_OFFSET}
+        largest |= dict.fromkeys(("forward", "right"), tuning.FAR_ARM * tuning.LARGEST_ARM)
+        values = [(name, size) for each in self.found for name, size in each.values.items()]
+        return any(abs(size) > largest.get(name, np.inf) for name, size in values)
+
+    @property
+    def alike(self) -> str:
+        """The two errors that this motion hardly distinguishes; empty if it does."""
+        if self.resolution["alike"] < tuning.ALIKE:
+            return ""
+        way = self.resolution["forward per second"]
+        return f"a time offset of 1 s from a lever arm of {way:.3g} m forward"
 
     @classmethod
     def _near(cls, base: Replay) -> Faults:
@@ -425,4 +453,5 @@ def resolution_notice(faults: Faults) -> Notice:
             seen.append(f"{what} of {least * factor:.2g} {unit}")
     shown = "from here on: " + "; ".join(seen) if seen else "no constant error"
     missing = "; it would not show " + ", ".join(unseen) if unseen else ""
+    missing += f"; it hardly distinguishes {faults.alike}" if faults.alike else ""
     return notice("resolution", values=dict(faults.resolution), shown=shown, missing=missing)

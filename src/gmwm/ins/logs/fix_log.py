@@ -11,9 +11,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from gmwm._core.files import existing_file, opened
-from gmwm._core.typing import FloatArray
+from gmwm._core.typing import BoolArray, FloatArray
 from gmwm.errors import InputError
 from gmwm.ins import tuning
 from gmwm.ins.filter import Aiding, Fixes
@@ -150,6 +151,12 @@ def read_fix_log(path: str | os.PathLike[str]) -> FixLog:
         position[no_fix] = np.nan
         values_at_zero = {"count": int(np.count_nonzero(no_fix))}
         notices.append(notice("positions-at-zero", values=values_at_zero))
+    again = _repeated(time, position)
+    if np.any(again):
+        position[again] = np.nan
+        if velocity is not None:
+            velocity[1:][again[1:] & np.all(velocity[1:] == velocity[:-1], axis=1)] = np.nan
+        notices.append(notice("fixes-repeated", values={"count": int(np.count_nonzero(again))}))
     if velocity is not None:
         _check_axes(source, time, position, velocity)
     position_sd = _deviations(log, values, "sd ", position)
@@ -253,6 +260,63 @@ def _deviations(
     return np.stack([values[name] for name in names], axis=1)
 
 
+def _repeated(time: FloatArray, position: FloatArray) -> BoolArray:
+    """Whether each position is the one before, written again, of a vehicle that moves.
+
+    A receiver at rest may hold its position, so that nothing is left out unless positions repeat in
+    motion: until the next one the vehicle has gone farther than ``tuning.REPEATED_WAY``.
+    """
+    again = np.zeros(time.size, dtype=bool)
+    again[1:] = np.all(position[1:] == position[:-1], axis=1)
+    new = np.flatnonzero(~again & np.isfinite(position[:, 0]))
+    if new.size < 2:
+        return np.zeros_like(again)
+    first, last = new[:-1], new[1:]
+    way = np.linalg.norm(ned_difference(position[last], position[first])[:, :2], axis=1)
+    moved = (way > tuning.REPEATED_WAY) & (time[last] - time[first] <= tuning.CHORD)
+    held = again[np.minimum(first + 1, time.size - 1)]
+    return again & (np.count_nonzero(moved & held) >= tuning.REPEATS)
+
+
+def step_notices(aiding: Aiding, start: float) -> list[Notice]:
+    """A step of the positions that the motion around it does not explain, and that stays.
+
+    Heights above the ellipsoid and the sea, or another base station, make one.
+    """
+    position, velocity = aiding.of("position"), aiding.of("velocity")
+    stays = tuning.STEP_STAYS
+    if position is None or position.time.size < 2 * stays:
+        return []
+    time, sd = position.time, position.sd
+    step, way = np.diff(time)[:, None], ned_difference(position.value[1:], position.value[:-1])
+    if is_known := velocity is not None and np.array_equal(velocity.time, time):
+        assert velocity is not None
+        speed = 0.5 * (velocity.value[1:] + velocity.value[:-1])
+    else:
+        near = np.arange(step.size)[:, None] + np.delete(np.arange(-3, 4), 3)
+        speed = np.median((way / step)[np.clip(near, 0, step.size - 1)], axis=1)
+        sd = sd + np.array([np.inf, np.inf, 0.0])  # a turn is no step; heights alone are looked at
+    off = way - speed * step
+    # What the motion leaves, by medians of some fixes on both sides, which outliers do not move.
+    left = np.cumsum(np.vstack([np.zeros(3), off]), axis=0)
+    levels = np.median(sliding_window_view(left, stays, axis=0), axis=-1)
+    size, inside = levels[stays:] - levels[:-stays], slice(stays - 1, step.size - stays + 1)
+    sigmas, by = tuning.STEP
+    limit = (sigmas * np.hypot(sd[1:], sd[:-1]) + by * step**2)[inside]
+    is_step = (np.abs(off[inside]) > limit) & (np.abs(size) > limit) & (size * off[inside] > 0.0)
+    is_step &= step[inside] <= tuning.CHORD
+    found = np.flatnonzero(np.any(is_step, axis=1))
+    if not found.size:
+        return []
+    first = int(found[0])
+    # Guessed velocities move the levels by more than the noise of two fixes.
+    size = np.where(is_step, size if is_known else off[inside], 0.0)
+    steps = dict(zip(_NED, size[first].tolist(), strict=True))
+    moved = " and ".join(f"{each:.3g} m {axis}" for axis, each in steps.items() if each)
+    values = {**steps, "count": int(found.size), "time": float(time[first + stays] + start)}
+    return [notice("fixes-step", "position", values, moved=moved)]
+
+
 # -- axes and units -------------------------------------------------------------------------------
 
 
@@ -263,8 +327,11 @@ def _check_axes(source: str, time: FloatArray, position: FloatArray, velocity: F
     if time.size < 2:
         return
     step = np.diff(time)[:, None]
-    steps = 0.5 * (velocity[1:] + velocity[:-1]) * step
-    gone = np.concatenate([np.zeros((1, 3)), np.cumsum(steps, axis=0)])
+
+    def gone(velocity: FloatArray) -> FloatArray:
+        steps = 0.5 * (velocity[1:] + velocity[:-1]) * step
+        return np.concatenate([np.zeros((1, 3)), np.cumsum(steps, axis=0)])
+
     gaps = np.concatenate([[0], np.cumsum(step[:, 0] > tuning.CHORD)])
     marks = np.searchsorted(time, np.arange(time[0], time[-1], 0.5 * tuning.WAY))
     first, last = marks[:-2], marks[2:]
@@ -280,10 +347,13 @@ def _check_axes(source: str, time: FloatArray, position: FloatArray, velocity: F
         return float(np.median(np.sum(off**2, axis=1))) / size
 
     better: dict[str, float] = {}
-    by_velocity = gone[last] - gone[first]
-    for what, part, here, factor in _misreadings(position):
+    by_velocity = gone(velocity)[last] - gone(velocity)[first]
+    north, east = np.gradient(ned_difference(position, position[0])[:, :2], time, axis=0).T
+    course = np.arctan2(east, north)
+    for what, part, here, factor in _misreadings(position, course):
         if np.all(np.abs(here[:, 0]) < 0.5 * np.pi):
-            left = mismatch(here, by_velocity @ factor, part)
+            turned = gone((velocity[:, None] @ factor)[:, 0])
+            left = mismatch(here, turned[last] - turned[first], part)
             now = mismatch(position, by_velocity, part)
             if now > tuning.MIXED_UP**2 * left:
                 better[what] = left / now
@@ -292,10 +362,13 @@ def _check_axes(source: str, time: FloatArray, position: FloatArray, velocity: F
         raise InputError(f"{source}: positions agree with velocities only if {what}")
 
 
-def _misreadings(position: FloatArray) -> Iterator[tuple[str, slice, FloatArray, FloatArray]]:
+def _misreadings(
+    position: FloatArray, course: FloatArray
+) -> Iterator[tuple[str, slice, FloatArray, FloatArray]]:
     """Each possible mistake with its hint, the axes that show it, right positions and velocities.
 
-    The velocities are those of the file times a matrix.
+    The velocities are those of the file times a matrix, or one for each fix. The course is that of
+    the positions, rad.
     """
     level, vertical = slice(0, 2), slice(2, 3)
     same, which = np.eye(3), "check which column is which"
@@ -309,3 +382,9 @@ def _misreadings(position: FloatArray) -> Iterator[tuple[str, slice, FloatArray,
     yield "latitude and longitude are in rad: give that unit", level, position * degrees, same
     for unit, factor in _SPEEDS.items():
         yield f"velocities are in {unit}: convert them to m/s", level, position, factor * same
+    turn = np.tile(same, (course.size, 1, 1))
+    turn[:, 0, 0] = turn[:, 1, 1] = np.cos(course)
+    turn[:, 0, 1] = np.sin(course)
+    turn[:, 1, 0] = -turn[:, 0, 1]
+    text = "velocities are forward, right, down: turn them to north, east, down, or leave them out"
+    yield text, level, position, turn

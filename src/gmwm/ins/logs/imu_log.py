@@ -10,15 +10,17 @@ from typing import Any
 
 import numpy as np
 
+from gmwm._core.distributions import binom
 from gmwm._core.files import existing_file
 from gmwm._core.spool import Spool, is_spooled, release, windows
 from gmwm._core.typing import FloatArray
+from gmwm._core.units import SI_UNIT
 from gmwm.errors import InputError
 from gmwm.ins import tuning
 from gmwm.ins.geometry import STANDARD_GRAVITY
 from gmwm.ins.imu import AXES, Imu
 from gmwm.ins.trajectory import is_time
-from gmwm.issues import Notice, notice
+from gmwm.issues import Notice, Severity, notice
 from gmwm.readers import CsvTable, Recording, bare, is_text, load_columns, read
 
 _UNITS_OF_CLOCKS = (1.0, 1e-3, 1e-6, 1e-9)  # s
@@ -104,7 +106,18 @@ def read_imu_log(
             "unit of the accelerometers, and that gravity is not subtracted"
         )
     for axis, name in enumerate(AXES):
-        at, count = longest_run((rotation if axis < 3 else velocity)[:, axis % 3])
+        samples = (rotation if axis < 3 else velocity)[:, axis % 3]
+        if cut := _cut_off(samples):
+            share = sum(cut.values()) / len(samples)
+            unit = SI_UNIT[name.partition("_")[0]]
+            values = {"samples": sum(cut.values()), "share": share}
+            ends = f"{' and '.join(f'{end:.5g}' for end in cut)} {unit}"
+            severity: Severity = "bad" if share > tuning.MOST_CUT_OFF else "warning"
+            hint = "record with a wider range, or use a part of the log without them"
+            found = notice("saturation", name, values, severity=severity, hint=hint, ends=ends)
+            notices.append(found)
+            continue
+        at, count = longest_run(samples)
         if count > 1 and count * dt > tuning.LONGEST_HELD:
             values = {"start": first + at * dt, "length": count * dt}
             hint = "leave out that part of the log, or check the column"
@@ -174,6 +187,29 @@ def longest_run(samples: FloatArray) -> tuple[int, int]:
         begin, last = int(starts[-1]), own[-1]
         release(samples)
     return first, most
+
+
+def _cut_off(samples: FloatArray) -> dict[float, int]:
+    """Ends of the range at which samples stay -> how many.
+
+    Samples at an extreme that is none of the range are as often equal to the one before as others,
+    up to chance (binomial test).
+    """
+    parts = list(windows(samples.size))
+    ends = [min(np.min(samples[p]) for p in parts), max(np.max(samples[p]) for p in parts)]
+    at, again, equal = np.zeros(2, dtype=int), np.zeros(2, dtype=int), 0
+    for part in parts:
+        own = samples[part]
+        same = own[1:] == own[:-1]
+        equal += int(np.count_nonzero(same))
+        at += [np.count_nonzero(own == end) for end in ends]
+        again += [np.count_nonzero(same & (own[1:] == end)) for end in ends]
+        release(samples)
+    usual = tuning.EQUAL * (equal - again.sum() + 1) / max(samples.size - at.sum(), 1)
+    chance = binom.sf(again - 1, at, min(usual, 1.0))
+    is_cut = (chance < tuning.GATE) & (at >= tuning.FEWEST_CUT_OFF)
+    # A dead band is no end.
+    return {float(ends[i]): int(at[i]) for i in np.flatnonzero(is_cut) if ends[i] != 0.0}
 
 
 def _first_stamp(

@@ -97,7 +97,13 @@ class Navigated:
     @cached_property
     def faults(self) -> Faults:
         """Faults of the log, by tens of runs of the filter, or five if nothing contradicts it."""
-        return Faults.of(Replay.of(self.measured, self.alignment), self.measured)
+        replay = Replay.of(self.measured, self.alignment)
+        return Faults.of(replay, self.measured, search=not self._bad_inputs)
+
+    @property
+    def _bad_inputs(self) -> list[Notice]:
+        """Faults that the files show before any filter; others would only imitate them."""
+        return [each for each in self.measured.notices if each.severity == "bad"]
 
     @property
     def fault_notices(self) -> tuple[Notice, ...]:
@@ -166,6 +172,9 @@ class Navigated:
 
         A fault of the log comes before a fault of the sensor models.
         """
+        if (bad := self._bad_inputs) and not self.fits:
+            text = "The filter cannot fit these data: " + "; ".join(map(str, bad))
+            return replace(bad[0], text=text, hint="")
         sizes = self._misfits
         largest = max(sizes.values(), default=1.0)
         if self.faults.found and (self.faults.explained or largest <= tuning.LOST):
@@ -214,6 +223,8 @@ class Navigated:
             if is_explained
             else ". That does not explain all: something else is wrong too."
         )
+        if self.faults.alike and first.code in ("time-offset", "lever-arm"):
+            text += f" This motion hardly distinguishes {self.faults.alike}: measure the lever arm."
         values = {**first.values, "explained": is_explained, "faults": len(faults)}
         severity = worst_first(faults)[0].severity
         return replace(first, severity=severity, text=text, values=values, hint="", source="")
@@ -242,6 +253,9 @@ class Navigated:
     def notices(self) -> tuple[Notice, ...]:
         """Notices of the sensor models, the files, the start, and of rejected fixes."""
         given = (*self.measured.sensors.notices, *self.measured.notices)
+        up = [each for each in given if each.code == "axis-up"]
+        if up and any(each.code == "axis-signs" for each in self.faults.found):
+            given = tuple(each for each in given if each not in up)  # the fault says which axes
         return (*given, *self.alignment.notices, *self.rejections)
 
     @property

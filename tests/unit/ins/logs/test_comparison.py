@@ -101,6 +101,20 @@ def test_a_tie_names_the_models_whose_own_prediction_is_contradicted(drive):
     assert "NEES" not in replace(found, outcomes=outcomes).verdict.text
 
 
+def test_a_model_that_predicts_its_errors_badly_is_no_tie(drive):
+    """The headline was a tie, with a NEES of 3.4 behind it."""
+    found = compare(drive[0], {"right": sensors(), "sure": sensors()})
+    honest = Ratio(1.0, 0.8, 1.2, 1.0)
+    outcomes = {name: replace(each, nees=honest) for name, each in found.outcomes.items()}
+    outcomes["sure"] = replace(outcomes["sure"], nees=replace(honest, value=3.4))
+    verdict = replace(found, outcomes=outcomes).verdict
+    assert (verdict.code, verdict.where) == ("more-honest", "right")
+    assert "sure is overconfident, NEES 3.4" in verdict.text
+    outcomes["right"] = replace(outcomes["right"], nees=replace(honest, value=0.2))
+    verdict = replace(found, outcomes=outcomes).verdict
+    assert verdict.text.startswith("Use none of right and sure")
+
+
 def test_equal_models_are_a_tie(alike):
     assert alike.verdict.code == "tie"
     assert alike.pairs["a", "b"].ratio == 1.0

@@ -95,6 +95,22 @@ def test_stamps_that_are_late_in_a_start_in_motion():
     assert within(fault, "time offset", 0.2) < 0.02
 
 
+@pytest.mark.parametrize("vehicle", ["loiter", slow("car")])
+def test_stamps_that_are_farther_off_than_one_search_reaches(vehicle):
+    """Of circles, 1.5 s and an antenna 14 m behind "explained" 2.2 s, which are the same there."""
+    log, _ = emulated_log(1000, vehicle, duration=300.0, rate=10.0)
+    fixes = [
+        replace(each, time=each.time + 2.2).part(each.time < 297.0) for each in log.aiding.fixes
+    ]
+    navigated = Navigated.of(replace(log, aiding=replace(log.aiding, fixes=tuple(fixes))))
+    (fault,) = navigated.fault_notices
+    assert within(fault, "time offset", 2.2) < 0.03
+    assert navigated.faults.explained
+    hardly = "hardly distinguishes a time offset of 1 s from a lever arm of 2"
+    assert (hardly in navigated.verdict.text) is (vehicle == "loiter")
+    assert (hardly in navigated.resolution.text) is (vehicle == "loiter")
+
+
 @pytest.mark.parametrize("by", [-0.15, 0.15])
 def test_fixes_along_the_track_are_as_good_as_stamps_where_a_vehicle_rolls(by):
     """The attitude was that of the next second of the track."""
