@@ -38,6 +38,7 @@ from gmwm.variance.kernels import (
     slope,
 )
 from gmwm.variance.modwt import coefficients
+from gmwm.variance.periodogram import law_values, missing, power_laws
 
 
 def pilot_psd(variance: FloatArray, averaging: FloatArray, dt: float) -> PSD:
@@ -51,7 +52,12 @@ def pilot_psd(variance: FloatArray, averaging: FloatArray, dt: float) -> PSD:
     x, weight = _points(tuple(averaging.tolist()))
     knots = np.log(tuning.HAAR_PEAK / averaging)[::-1]  # rising frequency
     places = _Places(x, knots)
-    level = np.log(2.0 * variance * averaging)
+    laws = law_values(np.exp(x))
+    basis, count = laws @ weight.T, averaging[-1] / averaging
+    powers = power_laws(variance, count, basis)
+    implied = powers @ basis
+    variance = implied * np.exp(missing(variance / implied, count))
+    level = np.log(powers @ law_values(np.exp(knots)))[::-1]
     largest = tuning.PILOT_STEEPEST * float(np.log(2.0))
     for _ in range(tuning.PILOT_ITERATIONS):
         implied = weight @ np.exp(places.interpolated(level[::-1]))

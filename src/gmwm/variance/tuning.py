@@ -2,10 +2,18 @@
 
 # -- the Allan family -----------------------------------------------------------------------------
 
-LEAST_FOR_SLOPE = 100
-"""Averages needed to identify the kind of noise; with fewer, the level before decides."""
-
 LEAST_DOF_OF_FAMILY = 0.5  # degrees of freedom of an interval that says nothing
+
+TAPERS = 3
+BINS_OF_SPECTRUM = 8  # an octave
+LAWS = (2.0, 1.0, 0.0, -1.0, -2.0)
+LAW_ITERATIONS = 150
+LARGEST_MISFIT = 3.0
+ORDINATES_OF_BIN = 12.0  # whose mean is as certain as that power laws miss nothing
+LOBES = 32.0  # of a transfer function, beyond which their mean serves
+NODES_OF_ALLAN = 1024  # of the integral within these lobes, and beyond
+FEW_AVERAGES = 16  # of a series, where its ends matter
+BLOCKS_OF_ALLAN = 12  # in an averaging time
 
 # -- the spectrum implied by wavelet variances ----------------------------------------------------
 

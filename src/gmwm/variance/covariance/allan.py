@@ -1,0 +1,129 @@
+"""Mean and variance of the Allan family's estimates under a spectrum.
+
+Each is a mean of squares of filtered samples, a quadratic form. With M terms, transfer function H
+and spectrum S its variance is 2/M int |H|^4 S^2 df. At long averaging times, where few terms and
+the ends of the series matter, this is multiplied by a ratio of sums over means of blocks.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from math import comb
+
+import numpy as np
+
+from gmwm._core.typing import FloatArray
+from gmwm.variance import tuning
+from gmwm.variance.covariance.lags import LagGrid, block_spectrum
+from gmwm.variance.periodogram import Periodogram
+
+
+@dataclass(frozen=True)
+class AllanFilter:
+    """The filter of a deviation of the family.
+
+    differences: Of means over the averaging time, one after the other.
+    modified: Whether the differences are averaged over as long again.
+    reflected: Whether the series is continued by its reflection at both ends.
+    """
+
+    differences: int = 1
+    modified: bool = False
+    reflected: bool = False
+
+    @property
+    def reach(self) -> int:
+        """Averaging times that the filter spans."""
+        return 1 + self.differences + self.modified
+
+    def gain(self, m: float, f: FloatArray, power: int = 1) -> FloatArray:
+        """Squared gain to a power; beyond `tuning.LOBES` lobes their mean.
+
+        f: (K,), cycles per sample.
+        """
+        means = 2 * (1 + self.modified)  # powers of the sine of means
+        sines = power * (self.differences + 1 + self.modified)
+        resolved = np.sin(np.pi * m * f) ** (2 * sines)
+        lobes = np.where(m * f < tuning.LOBES, resolved, comb(2 * sines, sines) / 4.0**sines)
+        scale = 4.0**self.differences / comb(2 * self.differences, self.differences)
+        return np.asarray(scale**power * lobes / (m * np.sin(np.pi * f)) ** (means * power))
+
+    def rows(self, m: int, n: int) -> FloatArray:
+        """The filter at each place of a series of ``n`` samples, (M, n)."""
+        taps = np.full(m, 1.0 / m)
+        for _ in range(self.differences):
+            taps = np.append(taps, np.zeros(m)) - np.append(np.zeros(m), taps)
+        if self.modified:
+            taps = np.convolve(taps, np.full(m, 1.0 / m))
+        taps /= np.sqrt(comb(2 * self.differences, self.differences))
+        if not self.reflected:
+            places = np.arange(n - taps.size + 1)[:, None] + np.arange(taps.size)
+        else:
+            places = np.arange(1 - m, n - m)[:, None] + np.arange(taps.size)
+            places = np.where(places < 0, -1 - places, places)
+            places = np.where(places >= n, 2 * n - 1 - places, places)
+        found = np.zeros((places.shape[0], n))
+        np.add.at(found, (np.arange(places.shape[0])[:, None], places), taps)
+        return found
+
+
+def allan_dof(
+    kind: AllanFilter, spectrum: Periodogram, n: int, m: int
+) -> tuple[float, float]:
+    """Equivalent degrees of freedom 2 E^2 / Var of a variance, and E relative to its spectral mean.
+
+    n, m: Samples of the series, and in an averaging time.
+    """
+    f, weight = _nodes(m)
+    mean = weight @ (kind.gain(m, f) * spectrum.psd(f, 1.0))
+    square = weight @ (kind.gain(m, f, 2) * spectrum.square(f))
+    terms = n - kind.reach * m + 1
+    part = min(n, tuning.FEW_AVERAGES * m)  # the effects of the ends are as 1/n
+    bias, share, extra = _of_blocks(kind, spectrum, part, m)
+    bias = 1.0 + (bias - 1.0) * part / n
+    share = 1.0 + (share - 1.0) * part / n
+    return float((bias * mean) ** 2 / (square * share / terms + extra * (part / n) ** 2)), bias
+
+
+@lru_cache(maxsize=64)
+def _nodes(m: int) -> tuple[FloatArray, FloatArray]:
+    """Frequencies and weights of a spectral integral, both signs; steps within a lobe are equal."""
+    end = min(tuning.LOBES / m, 0.5)
+    count = tuning.NODES_OF_ALLAN
+    edges = np.append(np.linspace(0.0, end, count), np.geomspace(end, 0.5, count)[1:])
+    edges = edges[: count if end == 0.5 else None]
+    return 0.5 * (edges[1:] + edges[:-1]), 2.0 * np.diff(edges)
+
+
+def _of_blocks(
+    kind: AllanFilter, spectrum: Periodogram, n: int, m: int
+) -> tuple[float, float, float]:
+    """What the ends of a series do to an estimate.
+
+    Returns: the mean and half the variance relative to those of the filter without reflection and
+        of its spectral integral, and what reflection adds to half the variance, u^4.
+    """
+    block = max(m // tuning.BLOCKS_OF_ALLAN, 1)
+    size, average = round(n / block), round(m / block)
+    grid = LagGrid.holding(3 * size, block)
+    density = block_spectrum(spectrum.psd, 1.0, grid)
+    weight = np.full(density.size, 2.0 / grid.size)
+    weight[[0, -1]] *= 0.5
+    square = weight @ (kind.gain(average, grid.frequency) * density) ** 2
+    lag = np.arange(size)
+    # A level common to all samples does not matter; at zero frequency only its bend is left.
+    bend = 0.5 * (2.0 * np.pi * grid.frequency[0] * lag) ** 2 * density[0] / grid.size
+    density[0] = 0.0
+    covariance = (grid.transform(density)[:size] - bend)[np.abs(np.subtract.outer(lag, lag))]
+
+    def moments(kind: AllanFilter) -> tuple[float, float]:
+        rows = kind.rows(average, size)
+        found = rows @ covariance @ rows.T
+        return float(np.mean(np.diag(found))), float(np.mean(found**2))
+
+    plain = own = moments(replace(kind, reflected=False))
+    if kind.reflected:
+        own = moments(kind)
+    terms = size - kind.reach * average + 1
+    return own[0] / plain[0], plain[1] * terms / square, own[1] - plain[1]
