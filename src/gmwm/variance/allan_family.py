@@ -181,11 +181,11 @@ def deviations(
     Notes
     -----
     Riley (2008), *Handbook of Frequency Stability Analysis*, NIST SP 1065: eqs. (11), (14), (20)
-    and (25) for the deviations; equivalent degrees of freedom of Greenhall & Riley (2003), of the
-    total deviation by its table 7, for the power law that the lag-1 autocorrelation of the
-    averages shows (Riley & Greenhall 2004); with fewer than 100 averages that of the next shorter
-    averaging time. The total deviation follows its definition, low by up to 13 % where flicker
-    noise dominates and 21 % where a random walk does; its intervals allow for that.
+    and (25) for the deviations. Their equivalent degrees of freedom are those under the spectrum
+    of the series, a multitaper periodogram smoothed by power laws and bins, so that they do not
+    depend on which averaging times are asked for. The total deviation follows its definition, low
+    by up to 13 % where flicker noise dominates and 21 % where a random walk does; its intervals
+    allow for that.
 
     A million samples take some two seconds for all four kinds.
     """

@@ -38,7 +38,6 @@ from gmwm.variance.kernels import (
     slope,
 )
 from gmwm.variance.modwt import coefficients
-from gmwm.variance.periodogram import law_values, missing, power_laws
 
 
 def pilot_psd(variance: FloatArray, averaging: FloatArray, dt: float) -> PSD:
@@ -52,12 +51,7 @@ def pilot_psd(variance: FloatArray, averaging: FloatArray, dt: float) -> PSD:
     x, weight = _points(tuple(averaging.tolist()))
     knots = np.log(tuning.HAAR_PEAK / averaging)[::-1]  # rising frequency
     places = _Places(x, knots)
-    laws = law_values(np.exp(x))
-    basis, count = laws @ weight.T, averaging[-1] / averaging
-    powers = power_laws(variance, count, basis)
-    implied = powers @ basis
-    variance = implied * np.exp(missing(variance / implied, count))
-    level = np.log(powers @ law_values(np.exp(knots)))[::-1]
+    level = np.log(2.0 * variance * averaging)
     largest = tuning.PILOT_STEEPEST * float(np.log(2.0))
     for _ in range(tuning.PILOT_ITERATIONS):
         implied = weight @ np.exp(places.interpolated(level[::-1]))

@@ -16,15 +16,15 @@ class Periodogram:
     """A smooth spectrum from a multitaper periodogram.
 
     At low frequencies few ordinates tell of the spectrum. There it is a sum of power laws fitted
-    to all of them; at higher ones also what these miss in bins of a quarter octave.
+    to all of them; at higher ones also what these miss in bins of an eighth of an octave.
 
-    knots: (B,), lowest frequency of each bin, cycles per sample.
+    lowest: (B,), lowest frequency of each bin, cycles per sample.
     powers: (L,), of the power laws in 2 sin(pi f), u^2.
     missed: (B,), logarithm of the factor that the power laws miss.
     peaked: (B,), mean square of the spectrum in a bin over the square of its mean.
     """
 
-    knots: FloatArray
+    lowest: FloatArray
     powers: FloatArray
     missed: FloatArray
     peaked: FloatArray
@@ -45,65 +45,56 @@ class Periodogram:
             weight = np.sin(0.5 * np.pi * taper * (place * (n - 1) / (n + 1) + 1.0))
             power += np.abs(fft.rfft(series / scale * weight)[1 : power.size + 1]) ** 2
         power *= 2.0 / (n + 1) / tuning.TAPERS
-        f = np.arange(1, power.size + 1) / n
-        first = tuning.TAPERS // 2  # lower ones hold the line that was subtracted
-        number = np.floor(tuning.BINS_OF_SPECTRUM * np.log2(f / f[first])).astype(int)[first:]
-        start = first + np.flatnonzero(np.diff(number, prepend=-1))
+        # The first ordinate holds the line that was subtracted.
+        f, power = np.arange(2, power.size + 1) / n, power[1:]
+        bins = np.floor(tuning.SPECTRUM_BINS_PER_OCTAVE * np.log2(f / f[0]))
+        start = np.flatnonzero(np.diff(bins, prepend=-1.0))
         count = np.diff(start, append=power.size).astype(float)
-        mean, square, knots = (
-            np.add.reduceat(each, start) / count for each in (power, power**2, f)
-        )
-        edges = f[start]
+        sums = np.add.reduceat(np.stack([power, power**2, f]), start, axis=1)
+        mean, square, centre = sums / count
         mean = np.maximum(mean, 1e-12 * np.max(mean))
-        laws = law_values(knots)
-        powers = power_laws(mean, count, laws)
+        laws = _laws(centre)
+        powers = _fitted(mean, count, laws)
         excess = square / mean**2 / (1.0 + 1.0 / tuning.TAPERS) * (1.0 + 2.0 / count)
         peaked = np.where(count >= tuning.ORDINATES_OF_BIN, np.maximum(excess, 1.0), 1.0)
-        missed = missing(mean / (powers @ laws), count)
-        return cls(edges, scale**2 * powers, missed, peaked)
+        ratio = np.log(mean / (powers @ laws))
+        # Its spread, less what may be chance; small ones are as large as those of other bins.
+        spread = np.maximum(1.0 / tuning.ORDINATES_OF_BIN, ratio**2 - 4.0 / count)
+        missed = ratio * spread / (spread + 1.0 / count)
+        return cls(f[start], scale**2 * powers, missed, peaked)
 
     def psd(self, f: FloatArray, dt: float) -> FloatArray:
         """Two-sided spectrum, u^2/Hz."""
         missed = self.missed[self._bin(f * dt)]
-        return np.asarray(dt * (self.powers @ law_values(f * dt)) * np.exp(missed))
+        return np.asarray(dt * (self.powers @ _laws(f * dt)) * np.exp(missed))
 
     def square(self, f: FloatArray) -> FloatArray:
         """Mean square of the spectrum about a frequency in cycles per sample, u^4."""
         return np.asarray(self.psd(f, 1.0) ** 2 * self.peaked[self._bin(f)])
 
     def _bin(self, f: FloatArray) -> IntArray:
-        return np.maximum(np.searchsorted(self.knots, f, side="right") - 1, 0)
+        return np.maximum(np.searchsorted(self.lowest, f, side="right") - 1, 0)
 
 
-def power_laws(seen: FloatArray, count: FloatArray, laws: FloatArray) -> FloatArray:
-    """Non-negative powers (L,) of the likeliest sum of power laws.
+def _fitted(seen: FloatArray, count: FloatArray, laws: FloatArray) -> FloatArray:
+    """Powers (L,) of the likeliest sum of power laws, none negative.
 
-    The gamma likelihood by multiplicative steps, none of which lowers it (Fevotte & Idier 2011,
-    *Neural Computation* 23, 2421-2456); what no sum explains is bounded then.
+    The gamma likelihood by multiplicative steps (Fevotte & Idier 2011, *Neural Computation* 23,
+    2421-2456); then peaks, which no sum has, pull by no more than a factor.
 
-    seen: (B,), estimates, positive.
-    count: (B,), independent values of which each is the mean.
+    seen, count: (B,), means of so many ordinates.
     laws: (L, B), what a power of one gives.
     """
     powers = np.mean(seen) / np.mean(laws, axis=1) / len(laws)
     known = count / (count + tuning.ORDINATES_OF_BIN)
     for bound in (np.inf, tuning.LARGEST_MISFIT):
         for _ in range(tuning.LAW_ITERATIONS):
-            ratio = np.clip(seen / (powers @ laws), 1.0 / bound, bound)
-            share = laws * (known / (powers @ laws))
+            implied = powers @ laws
+            share = laws * (known / implied)
+            ratio = np.clip(seen / implied, 1.0 / bound, bound)
             powers = powers * np.sqrt(share @ ratio / np.sum(share, axis=1))
     return powers
 
 
-def missing(ratio: FloatArray, count: FloatArray) -> FloatArray:
-    """Logarithm of what power laws miss, less what may be chance, (B,).
-
-    ratio: (B,), of estimates to what the power laws imply.
-    """
-    log = np.log(ratio)
-    spread = np.maximum(1.0 / tuning.ORDINATES_OF_BIN, log**2 - 4.0 / count)
-    return np.asarray(log * spread / (spread + 1.0 / count))
-
-
-def law_values(f: FloatArray) -> FloatArray:
+def _laws(f: FloatArray) -> FloatArray:
     return (2.0 * np.sin(np.pi * f)) ** np.array(tuning.LAWS)[:, None]

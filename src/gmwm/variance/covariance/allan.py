@@ -12,6 +12,7 @@ from functools import lru_cache
 from math import comb
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from gmwm._core.typing import FloatArray
 from gmwm.variance import tuning
@@ -57,54 +58,44 @@ class AllanFilter:
         if self.modified:
             taps = np.convolve(taps, np.full(m, 1.0 / m))
         taps /= np.sqrt(comb(2 * self.differences, self.differences))
-        if not self.reflected:
-            places = np.arange(n - taps.size + 1)[:, None] + np.arange(taps.size)
-        else:
-            places = np.arange(1 - m, n - m)[:, None] + np.arange(taps.size)
-            places = np.where(places < 0, -1 - places, places)
-            places = np.where(places >= n, 2 * n - 1 - places, places)
-        found = np.zeros((places.shape[0], n))
-        np.add.at(found, (np.arange(places.shape[0])[:, None], places), taps)
-        return found
+        edge = m - 1 if self.reflected else 0
+        series = np.pad(np.eye(n), ((edge, edge), (0, 0)), mode="symmetric")
+        return np.asarray(sliding_window_view(series, taps.size, axis=0) @ taps)
 
 
-def allan_dof(
-    kind: AllanFilter, spectrum: Periodogram, n: int, m: int
-) -> tuple[float, float]:
-    """Equivalent degrees of freedom 2 E^2 / Var of a variance, and E relative to its spectral mean.
+def allan_dof(kind: AllanFilter, spectrum: Periodogram, n: int, m: int) -> tuple[float, float]:
+    """Equivalent degrees of freedom 2 E^2 / Var of an estimate, and its relative bias.
 
     n, m: Samples of the series, and in an averaging time.
+    Returns: the second is the mean over that of the filter without reflection.
     """
     f, weight = _nodes(m)
     mean = weight @ (kind.gain(m, f) * spectrum.psd(f, 1.0))
     square = weight @ (kind.gain(m, f, 2) * spectrum.square(f))
-    terms = n - kind.reach * m + 1
-    part = min(n, tuning.FEW_AVERAGES * m)  # the effects of the ends are as 1/n
-    bias, share, extra = _of_blocks(kind, spectrum, part, m)
-    bias = 1.0 + (bias - 1.0) * part / n
-    share = 1.0 + (share - 1.0) * part / n
-    return float((bias * mean) ** 2 / (square * share / terms + extra * (part / n) ** 2)), bias
+    part = min(n, tuning.FEW_AVERAGES * m)
+    bias, share, added = _of_blocks(kind, spectrum, part, m)
+    bias, share = (1.0 + (each - 1.0) * part / n for each in (bias, share))  # ends are 1/n of it
+    half = square * share / (n - kind.reach * m + 1) + added * (part / n) ** 2
+    return float((bias * mean) ** 2 / half), bias
 
 
 @lru_cache(maxsize=64)
 def _nodes(m: int) -> tuple[FloatArray, FloatArray]:
     """Frequencies and weights of a spectral integral, both signs; steps within a lobe are equal."""
-    end = min(tuning.LOBES / m, 0.5)
-    count = tuning.NODES_OF_ALLAN
-    edges = np.append(np.linspace(0.0, end, count), np.geomspace(end, 0.5, count)[1:])
-    edges = edges[: count if end == 0.5 else None]
+    end, count = min(tuning.LOBES / m, 0.5), tuning.NODES_OF_FAMILY
+    edges = np.append(np.linspace(0.0, end, count), np.geomspace(end, 0.5, count))
     return 0.5 * (edges[1:] + edges[:-1]), 2.0 * np.diff(edges)
 
 
 def _of_blocks(
     kind: AllanFilter, spectrum: Periodogram, n: int, m: int
 ) -> tuple[float, float, float]:
-    """What the ends of a series do to an estimate.
+    """What the ends of a series do to an estimate, from means of blocks.
 
-    Returns: the mean and half the variance relative to those of the filter without reflection and
-        of its spectral integral, and what reflection adds to half the variance, u^4.
+    Returns: what reflection does to the mean, a factor; half the variance without reflection,
+        relative to its spectral integral; what reflection adds to it, u^4.
     """
-    block = max(m // tuning.BLOCKS_OF_ALLAN, 1)
+    block = max(m // tuning.BLOCKS_OF_FAMILY, 1)
     size, average = round(n / block), round(m / block)
     grid = LagGrid.holding(3 * size, block)
     density = block_spectrum(spectrum.psd, 1.0, grid)
@@ -122,8 +113,7 @@ def _of_blocks(
         found = rows @ covariance @ rows.T
         return float(np.mean(np.diag(found))), float(np.mean(found**2))
 
-    plain = own = moments(replace(kind, reflected=False))
-    if kind.reflected:
-        own = moments(kind)
-    terms = size - kind.reach * average + 1
-    return own[0] / plain[0], plain[1] * terms / square, own[1] - plain[1]
+    mean, half = moments(replace(kind, reflected=False))
+    own = moments(kind) if kind.reflected else (mean, half)
+    share = half * (size - kind.reach * average + 1) / square
+    return own[0] / mean, float(share), own[1] - half
