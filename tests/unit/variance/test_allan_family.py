@@ -15,7 +15,16 @@ import pytest
 from scipy.stats import binom
 
 import gmwm
-from gmwm import BiasInstability, Channel, InputError, RandomWalk, RateRamp, WhiteNoise
+from gmwm import (
+    BiasInstability,
+    Channel,
+    InputError,
+    QuantizationNoise,
+    RandomWalk,
+    RateRamp,
+    Resonance,
+    WhiteNoise,
+)
 
 KINDS = ("overlapping", "modified", "hadamard", "total")
 
@@ -130,6 +139,38 @@ def test_intervals_hold_the_truth(process):
             truth = np.sqrt(2.0 * process.haar_variance(found[0].tau[kind], 1.0))
         held = [(f.lower[kind] <= truth) & (truth <= f.upper[kind]) for f in found]
         assert np.min(np.sum(held, axis=0)) >= least, kind
+
+
+QN = QuantizationNoise(1.0) + WhiteNoise(0.06)
+
+
+def test_an_interval_does_not_depend_on_the_other_averaging_times():
+    x = QN.simulate(2048, 1.0, 0)
+    found, alone = gmwm.deviations(x, 1.0), gmwm.deviations(x, 1.0, tau=[512.0])
+    for kind in KINDS:
+        place = found.tau[kind].tolist().index(512.0)
+        for part in ("lower", "upper"):
+            assert getattr(alone, part)[kind] == pytest.approx(getattr(found, part)[kind][place])
+
+
+@pytest.mark.parametrize(
+    "model",
+    [
+        QN,
+        QuantizationNoise(1.0) + RandomWalk(1e-3),
+        WhiteNoise(1.0) + Resonance(0.5, 0.05, 0.05),
+    ],
+    ids=["quantization and white", "quantization and walk", "resonance and white"],
+)
+def test_intervals_hold_the_truth_of_mixed_noise(model):
+    runs, n = 40, 4096
+    rng = np.random.default_rng(3)
+    found = [
+        gmwm.deviations(model.simulate(n, 1.0, rng), 1.0, ["overlapping"]) for _ in range(runs)
+    ]
+    truth = np.sqrt(2.0 * model.haar_variance(found[0].tau["overlapping"], 1.0))
+    held = [(f.lower["overlapping"] <= truth) & (truth <= f.upper["overlapping"]) for f in found]
+    assert np.min(np.sum(held, axis=0)) >= binom.ppf(1e-4, runs, 0.93)
 
 
 @pytest.mark.parametrize("n", [8, 9, 31, 100, 1000])
