@@ -1,4 +1,4 @@
-"""The Allan family of deviations, computed by allantools, with intervals of their own.
+"""The Allan family of deviations.
 
 They see the same noise through other filters: the modified deviation distinguishes quantization
 from white noise, the Hadamard deviation ignores a drift, the total deviation reaches long averaging
@@ -34,10 +34,9 @@ _TAUS = {"octave": (1.0,), "decade": (1.0, 2.0, 4.0)}
 
 @dataclass(frozen=True)
 class _Kind:
-    """How a deviation is computed: its label in legends, function of allantools and filter."""
+    """A deviation: its label in legends and its filter."""
 
     label: str
-    function: str
     filter: AllanFilter
 
     def longest(self, n: int) -> int:
@@ -46,10 +45,10 @@ class _Kind:
 
 
 _KINDS = {
-    "overlapping": _Kind("overlapping Allan", "oadev", AllanFilter()),
-    "modified": _Kind("modified Allan", "mdev", AllanFilter(modified=True)),
-    "hadamard": _Kind("overlapping Hadamard", "ohdev", AllanFilter(differences=2)),
-    "total": _Kind("total", "totdev", AllanFilter(reflected=True)),
+    "overlapping": _Kind("overlapping Allan", AllanFilter()),
+    "modified": _Kind("modified Allan", AllanFilter(modified=True)),
+    "hadamard": _Kind("overlapping Hadamard", AllanFilter(differences=2)),
+    "total": _Kind("total", AllanFilter(reflected=True)),
 }
 
 
@@ -155,7 +154,7 @@ def deviations(
     confidence: float = 0.95,
     rate: float | None = None,
 ) -> Deviations:
-    """Allan deviation and its relatives, by allantools (``pip install 'gmwm[allan]'``).
+    """Allan deviation and its relatives.
 
     Parameters
     ----------
@@ -175,8 +174,8 @@ def deviations(
     Raises
     ------
     InputError
-        If allantools is not installed, a kind or averaging time is not known or too long, or the
-        data are not one series of finite numbers.
+        If a kind or averaging time is not known or too long, or the data are not one series of
+        finite numbers.
 
     Notes
     -----
@@ -189,15 +188,8 @@ def deviations(
 
     A million samples take some two seconds for all four kinds.
     """
-    try:
-        import allantools
-    except ImportError:
-        raise InputError(
-            "these deviations are computed by allantools, which is not installed: install it with "
-            "pip install 'gmwm[allan]'"
-        ) from None
     channel = as_channel(data, dt, rate)
-    values, runs, _ = checked_samples(channel)
+    values, runs, mean = checked_samples(channel)
     if not runs.is_complete:
         raise InputError(
             f"{where_of(channel)} has {runs.n - runs.present:,} missing samples: cut it to a part "
@@ -206,7 +198,8 @@ def deviations(
     confidence = checks.share("confidence", confidence, 0.95)
     chosen = _chosen_kinds(kinds)
     averaging = _averaging(tau, channel)
-    spectrum = Periodogram.of(values)
+    centred = values - mean
+    spectrum = Periodogram.of(centred)
     found: dict[str, list[FloatArray]] = {}
     for name, kind in chosen.items():
         longest = kind.longest(values.size)
@@ -216,11 +209,9 @@ def deviations(
                 f"tau = {averaging[0] * channel.dt:g} s is too long for the {kind.label} deviation "
                 f"of {values.size:,} samples: give at most {longest * channel.dt:g} s"
             )
-        # Deviations of rates do not depend on the unit of time; at a rate of 1 the averaging times
-        # are whole numbers, which no rounding can spoil.
-        compute = getattr(allantools, kind.function)
-        estimate = np.asarray(compute(values, rate=1.0, data_type="freq", taus=m)[1], dtype=float)
         sizes = m.astype(int).tolist()
+        squares = [np.mean(kind.filter.applied(centred, each) ** 2) for each in sizes]
+        estimate = np.sqrt(squares)
         found_dof = [allan_dof(kind.filter, spectrum, values.size, each) for each in sizes]
         dof, bias = np.maximum(np.array(found_dof).T, tuning.LEAST_DOF_OF_FAMILY)
         found[name] = [m * channel.dt, estimate]

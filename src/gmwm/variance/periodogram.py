@@ -33,12 +33,11 @@ class Periodogram:
     def of(cls, values: FloatArray) -> Periodogram:
         """From a complete series, by sine tapers (Riedel & Sidorenko 1995).
 
-        values: (n,), any level.
+        values: (n,), about their mean.
         """
         n = values.size
         place = np.linspace(-1.0, 1.0, n)
-        series = values - np.mean(values)
-        series -= place * (place @ series) / (place @ place)
+        series = values - place * (place @ values) / (place @ place)
         scale = np.sqrt(np.mean(series**2)) or 1.0
         power = np.zeros((n - 1) // 2)
         for taper in range(1, tuning.TAPERS + 1):

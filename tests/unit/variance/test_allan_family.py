@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import sys
 
 import matplotlib
 
@@ -308,9 +307,3 @@ def test_bad_input(arguments, words):
 def test_confidence_that_is_none(confidence):
     with pytest.raises(InputError, match="give a number between 0 and 1"):
         gmwm.deviations(noise(100), 1.0, confidence=confidence)
-
-
-def test_without_allantools(monkeypatch):
-    monkeypatch.setitem(sys.modules, "allantools", None)
-    with pytest.raises(InputError, match=r"install it with pip install 'gmwm\[allan\]'"):
-        gmwm.deviations(noise(100), 1.0)

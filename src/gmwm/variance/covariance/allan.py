@@ -12,7 +12,6 @@ from functools import lru_cache
 from math import comb
 
 import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
 
 from gmwm._core.typing import FloatArray
 from gmwm.variance import tuning
@@ -50,17 +49,20 @@ class AllanFilter:
         scale = 4.0**self.differences / comb(2 * self.differences, self.differences)
         return np.asarray(scale**power * lobes / (m * np.sin(np.pi * f)) ** (means * power))
 
-    def rows(self, m: int, n: int) -> FloatArray:
-        """The filter at each place of a series of ``n`` samples, (M, n)."""
-        taps = np.full(m, 1.0 / m)
+    def applied(self, series: FloatArray, m: int) -> FloatArray:
+        """Its values along the first axis of a series or several, (M, ...)."""
+
+        def means(values: FloatArray) -> FloatArray:
+            total = np.cumsum(np.concatenate([np.zeros_like(values[:1]), values]), axis=0)
+            return (total[m:] - total[:-m]) / m
+
+        if self.reflected:
+            series = np.concatenate([series[: m - 1][::-1], series, series[::-1][: m - 1]])
+        found = means(series)
         for _ in range(self.differences):
-            taps = np.append(taps, np.zeros(m)) - np.append(np.zeros(m), taps)
-        if self.modified:
-            taps = np.convolve(taps, np.full(m, 1.0 / m))
-        taps /= np.sqrt(comb(2 * self.differences, self.differences))
-        edge = m - 1 if self.reflected else 0
-        series = np.pad(np.eye(n), ((edge, edge), (0, 0)), mode="symmetric")
-        return np.asarray(sliding_window_view(series, taps.size, axis=0) @ taps)
+            found = found[m:] - found[:-m]
+        found = means(found) if self.modified else found
+        return np.asarray(found / np.sqrt(comb(2 * self.differences, self.differences)))
 
 
 def allan_dof(kind: AllanFilter, spectrum: Periodogram, n: int, m: int) -> tuple[float, float]:
@@ -109,7 +111,7 @@ def _of_blocks(
     covariance = (grid.transform(density)[:size] - bend)[np.abs(np.subtract.outer(lag, lag))]
 
     def moments(kind: AllanFilter) -> tuple[float, float]:
-        rows = kind.rows(average, size)
+        rows = kind.applied(np.eye(size), average)
         found = rows @ covariance @ rows.T
         return float(np.mean(np.diag(found))), float(np.mean(found**2))
 
