@@ -24,6 +24,7 @@ from gmwm import (
     Resonance,
     WhiteNoise,
 )
+from places import SHARED
 
 KINDS = ("overlapping", "modified", "hadamard", "total")
 
@@ -170,6 +171,22 @@ def test_intervals_hold_the_truth_of_mixed_noise(model):
     truth = np.sqrt(2.0 * model.haar_variance(found[0].tau["overlapping"], 1.0))
     held = [(f.lower["overlapping"] <= truth) & (truth <= f.upper["overlapping"]) for f in found]
     assert np.min(np.sum(held, axis=0)) >= binom.ppf(1e-4, runs, 0.93)
+
+
+def test_intervals_of_stable32():
+    folder = SHARED / "reference" / "stable32"
+    if not folder.exists():
+        pytest.skip("Stable32's results are not on this machine")
+    expected = json.loads((folder / "expected.json").read_text())
+    names = ("stable32_phase.dat", "stable32_pink_frequency.txt")
+    phase, pink = (np.loadtxt(folder / name) for name in names)
+    for name, x in (("PHASE", np.diff(phase)), ("pink", pink)):
+        for kind in set(KINDS) & set(expected[name]):
+            _, tau, _, _, low, _, high = np.transpose(expected[name][kind])
+            found = gmwm.deviations(x, 1.0, [kind], tau, confidence=0.683)
+            reach = found.tau[kind].size
+            np.testing.assert_allclose(found.lower[kind], low[:reach], rtol=0.15)
+            np.testing.assert_allclose(found.upper[kind], high[:reach], rtol=0.15)
 
 
 @pytest.mark.parametrize("n", [8, 9, 31, 100, 1000])
