@@ -206,8 +206,6 @@ def test_sampling_interval_of_no_sensor(entrance, dt):
     ],
 )
 def test_what_is_no_series(entrance, values, words):
-    if entrance is gmwm.deviations:
-        pytest.importorskip("allantools")
     refused(lambda: entrance(values, 1.0), words)
 
 

@@ -1,4 +1,4 @@
-"""The Allan family of deviations, computed by allantools, with intervals of their own.
+"""The Allan family of deviations.
 
 They see the same noise through other filters: the modified deviation distinguishes quantization
 from white noise, the Hadamard deviation ignores a drift, the total deviation reaches long averaging
@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -23,44 +22,33 @@ from gmwm._core.units import shown_unit
 from gmwm.errors import InputError
 from gmwm.readers import Channel
 from gmwm.variance import tuning
+from gmwm.variance.covariance.allan import AllanFilter, allan_dof
+from gmwm.variance.periodogram import Periodogram
 from gmwm.variance.series import as_channel, checked_samples, where_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-# The total variance by power law of the spectrum: b T/tau - c degrees of freedom, bias 1 - a tau/T
-# (Greenhall, Howe & Percival 1999, IEEE Trans. UFFC 46, 1183-1191).
-_TOTAL = {0: (1.5, 0.0, 0.0), -1: (1.17, 0.22, 1.0 / (3.0 * np.log(2.0))), -2: (0.93, 0.36, 0.75)}
 _TAUS = {"octave": (1.0,), "decade": (1.0, 2.0, 4.0)}
 
 
 @dataclass(frozen=True)
 class _Kind:
-    """How a deviation is computed.
-
-    label: In legends.
-    function: Of allantools.
-    reach: Averaging times that its filter spans.
-    differences: Of the integrated series, that its filter takes.
-    modified: Whether the filter averages the integrated series too.
-    """
+    """A deviation: its label in legends and its filter."""
 
     label: str
-    function: str
-    reach: int
-    differences: int
-    modified: bool = False
+    filter: AllanFilter
 
     def longest(self, n: int) -> int:
         """Longest averaging time, in samples, with at least two terms."""
-        return (n - 1) // self.reach
+        return (n - 1) // self.filter.reach
 
 
 _KINDS = {
-    "overlapping": _Kind("overlapping Allan", "oadev", 2, 2),
-    "modified": _Kind("modified Allan", "mdev", 3, 2, modified=True),
-    "hadamard": _Kind("overlapping Hadamard", "ohdev", 3, 3),
-    "total": _Kind("total", "totdev", 2, 2),
+    "overlapping": _Kind("overlapping Allan", AllanFilter()),
+    "modified": _Kind("modified Allan", AllanFilter(modified=True)),
+    "hadamard": _Kind("overlapping Hadamard", AllanFilter(differences=2)),
+    "total": _Kind("total", AllanFilter(reflected=True)),
 }
 
 
@@ -157,18 +145,6 @@ class Deviations:
         )
 
 
-def _noise_slopes(values: FloatArray, averaging: FloatArray) -> list[int]:
-    """Powers of the frequency in the spectrum, -4 to 2, at each averaging time, in samples."""
-    slopes: list[int] = []
-    for m in averaging.astype(int):
-        count = values.size // m
-        if count >= tuning.LEAST_FOR_SLOPE or not slopes:
-            slopes.append(_noise_slope(values[: count * m].reshape(count, m).mean(axis=1)))
-        else:
-            slopes.append(slopes[-1])
-    return slopes
-
-
 def deviations(
     data: Channel | FloatArray,
     dt: float | None = None,
@@ -178,7 +154,7 @@ def deviations(
     confidence: float = 0.95,
     rate: float | None = None,
 ) -> Deviations:
-    """Allan deviation and its relatives, by allantools (``pip install 'gmwm[allan]'``).
+    """Allan deviation and its relatives.
 
     Parameters
     ----------
@@ -198,30 +174,22 @@ def deviations(
     Raises
     ------
     InputError
-        If allantools is not installed, a kind or averaging time is not known or too long, or the
-        data are not one series of finite numbers.
+        If a kind or averaging time is not known or too long, or the data are not one series of
+        finite numbers.
 
     Notes
     -----
     Riley (2008), *Handbook of Frequency Stability Analysis*, NIST SP 1065: eqs. (11), (14), (20)
-    and (25) for the deviations; equivalent degrees of freedom of Greenhall & Riley (2003), of the
-    total deviation by its table 7, for the power law that the lag-1 autocorrelation of the
-    averages shows (Riley & Greenhall 2004); with fewer than 100 averages that of the next shorter
-    averaging time. The total deviation follows its definition, low by up to 13 % where flicker
-    noise dominates and 21 % where a random walk does; its intervals allow for that.
+    and (25) for the deviations. Their equivalent degrees of freedom are those under the spectrum
+    of the series, a multitaper periodogram smoothed by power laws and bins, so that they do not
+    depend on which averaging times are asked for. The total deviation follows its definition, low
+    by up to 13 % where flicker noise dominates and 21 % where a random walk does; its intervals
+    allow for that.
 
     A million samples take some two seconds for all four kinds.
     """
-    try:
-        import allantools
-        import allantools.ci
-    except ImportError:
-        raise InputError(
-            "these deviations are computed by allantools, which is not installed: install it with "
-            "pip install 'gmwm[allan]'"
-        ) from None
     channel = as_channel(data, dt, rate)
-    values, runs, _ = checked_samples(channel)
+    values, runs, mean = checked_samples(channel)
     if not runs.is_complete:
         raise InputError(
             f"{where_of(channel)} has {runs.n - runs.present:,} missing samples: cut it to a part "
@@ -230,7 +198,8 @@ def deviations(
     confidence = checks.share("confidence", confidence, 0.95)
     chosen = _chosen_kinds(kinds)
     averaging = _averaging(tau, channel)
-    slopes = _noise_slopes(values, averaging)
+    centred = values - mean
+    spectrum = Periodogram.of(centred)
     found: dict[str, list[FloatArray]] = {}
     for name, kind in chosen.items():
         longest = kind.longest(values.size)
@@ -240,11 +209,11 @@ def deviations(
                 f"tau = {averaging[0] * channel.dt:g} s is too long for the {kind.label} deviation "
                 f"of {values.size:,} samples: give at most {longest * channel.dt:g} s"
             )
-        # Deviations of rates do not depend on the unit of time; at a rate of 1 the averaging times
-        # are whole numbers, which no rounding can spoil.
-        compute = getattr(allantools, kind.function)
-        estimate = np.asarray(compute(values, rate=1.0, data_type="freq", taus=m)[1], dtype=float)
-        dof, bias = _distribution(allantools, name, values.size, m, slopes[: m.size])
+        sizes = m.astype(int).tolist()
+        squares = [np.mean(kind.filter.applied(centred, each) ** 2) for each in sizes]
+        estimate = np.sqrt(squares)
+        found_dof = [allan_dof(kind.filter, spectrum, values.size, each) for each in sizes]
+        dof, bias = np.maximum(np.array(found_dof).T, tuning.LEAST_DOF_OF_FAMILY)
         found[name] = [m * channel.dt, estimate]
         for probability in (0.5 + 0.5 * confidence, 0.5 - 0.5 * confidence):
             found[name].append(estimate * np.sqrt(dof / bias / chi2.ppf(probability, dof)))
@@ -293,48 +262,3 @@ def _averaging(tau: str | Sequence[float] | FloatArray, channel: Channel) -> Flo
     if times.ndim != 1 or not times.size or not np.all((times > 0.0) & np.isfinite(times)):
         raise InputError("tau: give positive averaging times in seconds, in one sequence")
     return np.unique(np.maximum(np.rint(times / channel.dt), 1.0))
-
-
-def _noise_slope(averages: FloatArray) -> int:
-    """Riley & Greenhall (2004): from the lag-1 autocorrelation, differenced until it is short."""
-    if averages.size < 4:
-        return 0
-    place = np.linspace(-1.0, 1.0, averages.size)
-    series = averages - np.mean(averages)
-    series = series - place * (place @ series) / (place @ place)
-    for differences in range(3):
-        square = series @ series
-        # White noise less its mean and slope has a correlation of -2/n on average.
-        correlation = series[1:] @ series[:-1] / square if square > 0.0 else 0.0
-        correlation += 2.0 / series.size if differences == 0 else 0.0
-        fraction = correlation / max(1.0 + correlation, 0.1)
-        if fraction < 0.25 or differences == 2:
-            break
-        series = np.diff(series)
-    return int(np.clip(np.rint(-2.0 * (fraction + differences)), -4, 2))
-
-
-def _distribution(
-    allantools: ModuleType, name: str, n: int, m: FloatArray, slopes: Sequence[int]
-) -> tuple[FloatArray, FloatArray]:
-    """Degrees of freedom (Greenhall & Riley 2003) and bias of the variance by averaging time."""
-    kind = _KINDS[name]
-    pairs = list(zip(m.astype(int).tolist(), slopes, strict=True))
-    order, dof, bias = kind.differences, np.empty(m.size), np.ones(m.size)
-    for i, (size, slope) in enumerate(pairs):
-        known = max(slope, -order)  # all that allantools has a table for
-        few = (n + 1 - size * order) / size <= order
-        if known == 2 and few and not kind.modified:
-            known = 1  # the paper's sum for 2 is not in allantools
-        dof[i] = allantools.ci.edf_greenhall(
-            known, order, size, n + 1, overlapping=True, modified=kind.modified
-        )
-    if name == "total":
-        for i, (size, slope) in enumerate(pairs):
-            if slope > 0:  # not in the table
-                continue
-            b, c, a = _TOTAL[max(slope, -2)]
-            if size > n / 8:  # at shorter averaging times it is the Allan variance all but exactly
-                dof[i] = max(dof[i], b * n / size - c)
-            bias[i] -= a * size / n
-    return np.maximum(dof, tuning.LEAST_DOF_OF_FAMILY), bias

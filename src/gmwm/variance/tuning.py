@@ -2,10 +2,20 @@
 
 # -- the Allan family -----------------------------------------------------------------------------
 
-LEAST_FOR_SLOPE = 100
-"""Averages needed to identify the kind of noise; with fewer, the level before decides."""
-
 LEAST_DOF_OF_FAMILY = 0.5  # degrees of freedom of an interval that says nothing
+LOBES = 32.0  # of a transfer function, beyond which their mean serves
+NODES_OF_FAMILY = 1024  # of a spectral integral, within these lobes and beyond
+FEW_AVERAGES = 16  # averaging times of a record that shows what its ends do
+BLOCKS_OF_FAMILY = 12  # in an averaging time there
+
+# -- the spectrum of a series ---------------------------------------------------------------------
+
+TAPERS = 3
+LAWS = (2.0, 1.0, 0.0, -1.0, -2.0)  # powers of the frequency: quantization noise to random walk
+LAW_ITERATIONS = 150
+LARGEST_MISFIT = 3.0  # factor from which a bin no longer pulls at the power laws
+SPECTRUM_BINS_PER_OCTAVE = 8
+ORDINATES_OF_BIN = 12.0  # ordinates as certain as that a sum of power laws is right
 
 # -- the spectrum implied by wavelet variances ----------------------------------------------------
 

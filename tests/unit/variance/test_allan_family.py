@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import sys
 
 import matplotlib
 
@@ -15,7 +14,17 @@ import pytest
 from scipy.stats import binom
 
 import gmwm
-from gmwm import BiasInstability, Channel, InputError, RandomWalk, RateRamp, WhiteNoise
+from gmwm import (
+    BiasInstability,
+    Channel,
+    InputError,
+    QuantizationNoise,
+    RandomWalk,
+    RateRamp,
+    Resonance,
+    WhiteNoise,
+)
+from places import SHARED
 
 KINDS = ("overlapping", "modified", "hadamard", "total")
 
@@ -130,6 +139,54 @@ def test_intervals_hold_the_truth(process):
             truth = np.sqrt(2.0 * process.haar_variance(found[0].tau[kind], 1.0))
         held = [(f.lower[kind] <= truth) & (truth <= f.upper[kind]) for f in found]
         assert np.min(np.sum(held, axis=0)) >= least, kind
+
+
+QN = QuantizationNoise(1.0) + WhiteNoise(0.06)
+
+
+def test_an_interval_does_not_depend_on_the_other_averaging_times():
+    x = QN.simulate(2048, 1.0, 0)
+    found, alone = gmwm.deviations(x, 1.0), gmwm.deviations(x, 1.0, tau=[512.0])
+    for kind in KINDS:
+        place = found.tau[kind].tolist().index(512.0)
+        for part in ("lower", "upper"):
+            assert getattr(alone, part)[kind] == pytest.approx(getattr(found, part)[kind][place])
+
+
+@pytest.mark.parametrize(
+    "model",
+    [
+        QN,
+        QuantizationNoise(1.0) + RandomWalk(1e-3),
+        WhiteNoise(1.0) + Resonance(0.5, 0.05, 0.05),
+    ],
+    ids=["quantization and white", "quantization and walk", "resonance and white"],
+)
+def test_intervals_hold_the_truth_of_mixed_noise(model):
+    runs, n = 40, 4096
+    rng = np.random.default_rng(3)
+    found = [
+        gmwm.deviations(model.simulate(n, 1.0, rng), 1.0, ["overlapping"]) for _ in range(runs)
+    ]
+    truth = np.sqrt(2.0 * model.haar_variance(found[0].tau["overlapping"], 1.0))
+    held = [(f.lower["overlapping"] <= truth) & (truth <= f.upper["overlapping"]) for f in found]
+    assert np.min(np.sum(held, axis=0)) >= binom.ppf(1e-4, runs, 0.93)
+
+
+def test_intervals_of_stable32():
+    folder = SHARED / "reference" / "stable32"
+    if not folder.exists():
+        pytest.skip("Stable32's results are not on this machine")
+    expected = json.loads((folder / "expected.json").read_text())
+    names = ("stable32_phase.dat", "stable32_pink_frequency.txt")
+    phase, pink = (np.loadtxt(folder / name) for name in names)
+    for name, x in (("PHASE", np.diff(phase)), ("pink", pink)):
+        for kind in set(KINDS) & set(expected[name]):
+            _, tau, _, _, low, _, high = np.transpose(expected[name][kind])
+            found = gmwm.deviations(x, 1.0, [kind], tau, confidence=0.683)
+            reach = found.tau[kind].size
+            np.testing.assert_allclose(found.lower[kind], low[:reach], rtol=0.15)
+            np.testing.assert_allclose(found.upper[kind], high[:reach], rtol=0.15)
 
 
 @pytest.mark.parametrize("n", [8, 9, 31, 100, 1000])
@@ -267,9 +324,3 @@ def test_bad_input(arguments, words):
 def test_confidence_that_is_none(confidence):
     with pytest.raises(InputError, match="give a number between 0 and 1"):
         gmwm.deviations(noise(100), 1.0, confidence=confidence)
-
-
-def test_without_allantools(monkeypatch):
-    monkeypatch.setitem(sys.modules, "allantools", None)
-    with pytest.raises(InputError, match=r"install it with pip install 'gmwm\[allan\]'"):
-        gmwm.deviations(noise(100), 1.0)
