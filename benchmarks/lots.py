@@ -1,7 +1,7 @@
 """False findings in lots of equal units, and whether planted ones are found.
 
 Run with ``python benchmarks/lots.py`` (twenty lots of 30 units of an hour at 100 Hz, one axis;
-``--lots 2 --units 10`` for a first look). Of each kind of lot are printed: the largest error of N
+``--lots 2 --units 10`` for a first look, ``--seed 1`` for other noise). Of each kind of lot are printed: the largest error of N
 of any unit, the lots with a finding on a unit that is like the others, and the lots in which the
 planted unit is found.
 """
@@ -67,14 +67,16 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--lots", type=int, default=20)
     parser.add_argument("--units", type=int, default=30)
+    parser.add_argument("--seed", type=int, default=0)
     arguments = parser.parse_args()
+    fresh = (arguments.seed,) if arguments.seed else ()
     names = [f"unit-{i:02d}" for i in range(arguments.units)]
     print(f"{arguments.lots} lots of {arguments.units} units, one axis, {SECONDS} s at {RATE:g} Hz")
     print(f"{'':<28} {'error of N':>10} {'false':>10} {'planted':>10}  model")
 
     def lots(kind: int, truths: Sequence[Model]) -> list[dict[str, Fit]]:
         return [
-            {name: fitted(truth, (kind, lot, i))
+            {name: fitted(truth, (*fresh, kind, lot, i))
              for i, (name, truth) in enumerate(zip(names, truths, strict=True))}
             for lot in range(arguments.lots)
         ]  # fmt: skip
@@ -89,7 +91,7 @@ def main() -> None:
         truths = [N] * len(names)
         row(title.partition(",")[0], [fleet_of(each) for each in equal], truths)
         for lot, each in enumerate(equal):
-            each[names[-1]] = fitted(odd, (100 + kind, lot))
+            each[names[-1]] = fitted(odd, (*fresh, 100 + kind, lot))
         row(title, [fleet_of(each) for each in equal], truths, names[-1])
     rng = np.random.default_rng(7)
     sizes = N * np.exp(0.1 * rng.standard_normal(len(names)))
