@@ -1,9 +1,9 @@
 """False findings in lots of equal units, and whether planted ones are found.
 
 Run with ``python benchmarks/lots.py`` (twenty lots of 30 units of an hour at 100 Hz, one axis;
-``--lots 2 --units 10`` for a first look, ``--seed 1`` for other noise). Of each kind of lot are printed: the largest error of N
-of any unit, the lots with a finding on a unit that is like the others, and the lots in which the
-planted unit is found.
+``--lots 2 --units 10`` for a first look, ``--seed 1`` for other noise). Of each kind of lot are
+printed: the largest error of N of any unit, the lots with a finding on a unit that is like the
+others, and the lots in which the planted unit is found.
 """
 
 from __future__ import annotations
