@@ -288,6 +288,11 @@ def _check_jumps(clock: Clock, found: _Grid, seconds: float) -> None:
     """Reject a clock whose rate changes much, or whose jumps are not lost rows."""
     jumps, n = found.jumps, clock.stamps.size
     if found.is_lattice:
+        half = np.abs(jumps.steps - 1.0 - jumps.missing) > tuning.HALF_WAY
+        if np.count_nonzero(half) >= tuning.FEWEST_IN_RHYTHM:
+            text = f"steps are half-way between multiples of {jumps.interval:.6g} here and again"
+            row = int(jumps.rows[half][0])
+            raise clock.error(row, f"{text}, as if the stamps were rounded too coarsely")
         return
     off_grid = int(np.count_nonzero(jumps.is_off_grid))
     if found.change is not None:

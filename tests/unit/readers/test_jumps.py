@@ -176,3 +176,20 @@ def test_lost_rows_of_stamps_rounded_too_coarsely_are_not_placed_by_the_unit(sha
     times, _ = lossy(share, one_at_a_time=False, dt=1.0 / 700.0)
     with pytest.raises(InputError):
         timing_of(clock(np.round(times, 3)))
+
+
+@pytest.mark.parametrize("rate", [250.1, 333.3])
+@pytest.mark.parametrize("share", [0.02, 0.2, 0.5, 0.9])
+def test_lost_rows_of_rounded_stamps_leave_the_rate(share, rate):
+    times, _ = lossy(share, one_at_a_time=False, dt=1.0 / rate)
+    assert timing_of(clock(np.round(times, 3))).rate == pytest.approx(rate, rel=3e-6)
+
+
+@pytest.mark.parametrize("rate", [499.9, 500.1])
+@pytest.mark.parametrize("share", [0.02, 0.2, 0.5, 0.9])
+def test_lost_rows_of_stamps_rounded_to_half_a_step_are_right_or_rejected(share, rate):
+    times, _ = lossy(share, one_at_a_time=False, dt=1.0 / rate)
+    try:
+        assert timing_of(clock(np.round(times, 3))).rate == pytest.approx(rate, rel=3e-5)
+    except InputError as error:
+        assert "half-way" in str(error) or "not near a whole number" in str(error)
