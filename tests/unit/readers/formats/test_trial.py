@@ -2,6 +2,7 @@
 
 import os
 import struct
+import time
 from pathlib import Path
 
 import numpy as np
@@ -29,6 +30,11 @@ def ends(path):
 def goes_on(path):
     while True:
         pass
+
+
+def waits(path):
+    time.sleep(20.0)
+    return opened(path)
 
 
 def takes_memory(path):
@@ -143,3 +149,26 @@ def test_what_matlab_writes_ends_nothing():
             tried(read_mat, path)
             raise InputError("used")
         assert "its library" not in str(caught.value), path.name
+
+
+def test_virtual_data_sets_and_deep_groups_of_hdf5_are_rejected(tmp_path):
+    h5py = pytest.importorskip("h5py")
+    path = tmp_path / "a.h5"
+    layout = h5py.VirtualLayout(X.shape, "f8")
+    layout[:] = h5py.VirtualSource(tmp_path / "secret.h5", "x", X.shape)
+    with h5py.File(path, "w") as content:
+        content.create_virtual_dataset("gyro_x", layout)
+    with pytest.raises(InputError, match="gyro_x is in another file, which is not opened"):
+        gmwm.read(path, rate=100.0, units={"gyro": "rad/s"})
+    with h5py.File(path, "w") as content:
+        content["/".join("g" * 40) + "/gyro_x"] = X
+    with pytest.raises(InputError, match="groups in groups, 32 deep: flatten it"):
+        gmwm.read(path, rate=100.0, units={"gyro": "rad/s"})
+
+
+@pytest.mark.skipif(os.name != "posix", reason="needs limits")
+def test_a_process_that_waits_is_a_damaged_file(file, monkeypatch):
+    begin = "from gmwm.readers.formats import hdf5 as trial; trial._WALL, trial._SECONDS = 1, 1"
+    monkeypatch.setattr(trial, "_PROGRAM", f"{begin}; trial.answer()")
+    with pytest.raises(InputError, match=r"a\.mat is damaged"):
+        tried(waits, file)
