@@ -44,6 +44,24 @@ def test_an_interrupt_while_a_class_is_made_is_said_in_the_status(tmp_path):
     assert (done.returncode, done.stderr.split()[1]) == (130, b"interrupted,")
 
 
+@pytest.mark.parametrize("number", ["EPIPE", "ENOSPC"])
+def test_only_what_is_printed_is_trouble_with_the_output(tmp_path, number):
+    """A file or a pipe to a process that breaks inside a command is named as such."""
+    (tmp_path / "run.py").write_text(
+        "import errno, os\n"
+        "from gmwm.cli.main import cli, main\n"
+        "def fails(**_):\n"
+        f"    raise OSError(errno.{number}, os.strerror(errno.{number}))\n"
+        "cli.commands['budget'].callback = fails\n"
+        "main()\n"
+    )
+    command = [sys.executable, "run.py", "budget", "a.json"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert "gmwm: the system refuses a file or a process (" in done.stderr
+    assert "output" not in done.stderr and "Traceback" not in done.stderr
+
+
 def test_help_and_errors_name_every_term_that_a_model_may_have():
     from gmwm.cli.options import written_models
     from gmwm.process import CATALOGUE

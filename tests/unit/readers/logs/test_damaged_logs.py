@@ -104,3 +104,14 @@ def test_remains_of_a_page_at_the_end_of_dataflash(tmp_path):
     assert gmwm.read(path).n == len(X)
     path.write_bytes(whole + bytes(range(150)) * 4)
     assert "damaged in places" in refusal(path)
+
+
+@pytest.mark.parametrize("field", ["uint64_t[99999]", "sensor_combined"])
+def test_formats_of_absurd_messages_of_an_imu_are_rejected(tmp_path, field):
+    path = LOGS["ulog"](tmp_path / "a.ulg")
+    whole = path.read_bytes()
+    text = f"sensor_combined:uint64_t timestamp;{field} more;".encode()
+    header = len(text).to_bytes(2, "little") + b"F"
+    path.write_bytes(whole[:16] + header + text + whole[16:])
+    with pytest.raises(gmwm.InputError, match=r"a\.ulg is damaged in places"):
+        gmwm.read(path)
