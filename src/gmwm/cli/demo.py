@@ -210,7 +210,6 @@ def reproduce(
 def _simulated(
     experiment: str, folder: Path, *, runs: int | None, seed: int, method: Any, **work: Any
 ) -> Found:
-    """Tables and boxplots of simulated series."""
     import pyarrow.parquet as pq
 
     from gmwm.study import FIGURES, STUDIES, boxplots, run_study, summarise
@@ -240,7 +239,6 @@ def _navigated(experiment: str, folder: Path, rotate: bool, **work: Any) -> Foun
 
 
 def _tested(experiment: str, *, runs: int | None, seed: int, jobs: int) -> str:
-    """A table of its own kind."""
     from gmwm.study import choice_study, choice_table, converge, convergence_table
 
     if experiment == "selection":

@@ -86,17 +86,14 @@ def _group(declared: str, settings: dict[str, dict[str, Any]]) -> list[Decorator
     return [each for group in _declared(declared, settings).values() for each in group]
 
 
-def _terms() -> str:
-    from gmwm.process import CATALOGUE
-
-    return ", ".join(sorted((k.short_name for k in CATALOGUE), key=lambda name: (len(name), name)))
-
-
 class _ModelOption(click.Option):
     """An option whose help names the terms of a model, which take long to import."""
 
     def get_help_record(self, ctx: click.Context) -> tuple[str, str] | None:
-        self.help = (self.help or "").replace("{terms}", _terms())
+        from gmwm.process import CATALOGUE
+
+        terms = sorted((k.short_name for k in CATALOGUE), key=lambda name: (len(name), name))
+        self.help = (self.help or "").replace("{terms}", ", ".join(terms))
         return super().get_help_record(ctx)
 
 

@@ -161,7 +161,6 @@ def find_column(table: Table, reference: Reference, what: str) -> int:
 
 
 def _listed(table: Table, most: int = 12) -> str:
-    """Say which columns there are."""
     names = [name for name in table.names if name]
     if not names:
         return f"its {len(table.names)} columns have no names"

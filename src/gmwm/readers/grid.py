@@ -173,7 +173,7 @@ def find_lattice(stamps: FloatArray) -> Jumps | None:
     place = np.cumsum(np.append(0.0, number)).astype(np.int64)
     if _has_rhythm(place):
         return None
-    # Few steps are off this grid. Of rounded stamps all are so to one side: no new part begins there.
+    # Steps off the grid begin no new parts: rounded stamps slip, all to one side.
     line = interval_of(stamps, place, np.zeros(stamps.size, dtype=bool))
     return Jumps(rows, steps[rows - 1] / line, number[rows - 1] - 1.0, line)
 

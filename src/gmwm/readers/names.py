@@ -31,14 +31,7 @@ _SENSOR_WORDS = {
     for word in words.split()
 }
 # These mean a sensor only where nothing stands before them.
-_SENSOR_LETTERS = {
-    "g": "gyro",
-    "w": "gyro",
-    "wb": "gyro",
-    "a": "accel",
-    "f": "accel",
-    "fb": "accel",
-}
+_SENSOR_LETTERS = dict.fromkeys(("g", "w", "wb"), "gyro") | dict.fromkeys(("a", "f", "fb"), "accel")
 
 # Columns that say which of several sensors a row is of.
 NUMBERS_OF_SENSORS = frozenset(
@@ -51,8 +44,15 @@ _NO_SAMPLES = frozenset(
     {"bias", "offset", "std", "sigma", "var", "cov", "err", "error", "ref", "reference"}
     | {"cmd", "desired", "setpoint", "delta"}
 )
-_OTHER_MEANINGS = _NO_SAMPLES | {"covariance", "true", "truth", "temp", "temperature"}
-_OTHER_MEANINGS |= {"mag", "free"}
+_OTHER_MEANINGS = _NO_SAMPLES | {
+    "covariance",
+    "true",
+    "truth",
+    "temp",
+    "temperature",
+    "mag",
+    "free",
+}
 _OTHER_AUXILIARY = _NO_SAMPLES | _TIME_WORDS | {"limit", "alarm", "flag", "status", "valid"}
 
 _AUXILIARY_WORDS = dict.fromkeys(
@@ -73,19 +73,8 @@ _UNIT_WORDS = {
 
 _BEFORE_TIME = frozenset(
     {"header", "field", "imu", "sensor", "sample", "sampling", "system", "sys", "unix", "utc"}
-    | {
-        "gps",
-        "ros",
-        "elapsed",
-        "relative",
-        "boot",
-        "device",
-        "local",
-        "date",
-        "datetime",
-        "iso",
-        "gnss",
-    }
+    | {"gps", "gnss", "ros", "elapsed", "relative", "boot", "device", "local", "date", "datetime"}
+    | {"iso"}
 )
 _SECONDS = {
     word: seconds

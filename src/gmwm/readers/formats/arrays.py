@@ -33,7 +33,6 @@ from gmwm.readers.table import LARGEST, Columns, Table, damage_named, label
 AnyArray = npt.NDArray[Any]
 
 _NPY_MAGIC = b"\x93NUMPY"
-_HEADERS = {(1, 0): np.lib.format.read_array_header_1_0}
 _RATES = ("rate", "fs", "sampling_rate", "sample_rate")
 _INTERVALS = ("dt", "sampling_interval")
 _KINDS = {"O": "Python objects", "c": "complex numbers", "b": "booleans"}
@@ -84,9 +83,10 @@ def _entries(path: Path) -> dict[str, Array]:
                 if stream.read(len(_NPY_MAGIC)) != _NPY_MAGIC:
                     continue
             with archive.open(info) as stream:
-                version = np.lib.format.read_magic(stream)
-                header = _HEADERS.get(version, np.lib.format.read_array_header_2_0)(stream)
-            shape, _, dtype = header
+                form = np.lib.format
+                is_first = form.read_magic(stream) == (1, 0)
+                read_header = form.read_array_header_1_0 if is_first else form.read_array_header_2_0
+                shape, _, dtype = read_header(stream)
             if dtype.hasobject:
                 continue
             if math.prod(shape) * dtype.itemsize > info.file_size:
@@ -133,8 +133,9 @@ class ArrayTable(Table):
         named, matrices = list[_Named](), list[_Named]()
         for name, array in entries.items():
             if array.like.dtype.names and array.like.ndim == 1:
-                named += _fields(array)
-            elif array.like.ndim == 2 and not _is_triad(name, array):
+                for field_name in array.like.dtype.names:
+                    named += _axes_or_itself(field_name, array[field_name])
+            elif array.like.ndim == 2 and not (array.like.shape[1] == 3 and is_sensor(name)):
                 matrices.append((name, array))
             elif array.like.size != 1:
                 named += _axes_or_itself(name, array)
@@ -224,11 +225,6 @@ def _stated_rate(source: str, entries: Mapping[str, Array]) -> float | None:
     return next(iter(rates.values()), None)
 
 
-def _fields(array: Array) -> list[_Named]:
-    names = array.like.dtype.names or ()
-    return [pair for name in names for pair in _axes_or_itself(name, array[name])]
-
-
 def _unnamed(source: str, array: Array) -> list[_Named]:
     rows, width = array.like.shape
     if width > rows and width >= tuning.FEWEST_SAMPLES:
@@ -246,11 +242,6 @@ def _of_axis(name: str, axis: str) -> str:
     """The name with an axis before its unit."""
     unit = name[len(bare(name)) :].strip()
     return f"{bare(name)}_{axis} {unit}".rstrip()
-
-
-def _is_triad(name: str, array: Array) -> bool:
-    """Whether an array holds the three axes of a sensor, by its name."""
-    return array.like.ndim == 2 and array.like.shape[1] == 3 and is_sensor(name)
 
 
 def _axes_or_itself(name: str, array: Array) -> list[_Named]:

@@ -54,7 +54,7 @@ _FORM = "TYPE,GYRO_SCALE,ACCEL_SCALE[,rates][,little|big]"
 
 
 def layout_of(text: str) -> BinaryLayout:
-    """A layout by its name, or as ``TYPE,GYRO_SCALE,ACCEL_SCALE[,rates][,little|big]``."""
+    """A layout by its name, or of the form `_FORM`."""
     if text.upper() in LAYOUTS:
         return LAYOUTS[text.upper()]
     parts = [part.strip() for part in text.split(",")]

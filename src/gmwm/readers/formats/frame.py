@@ -27,9 +27,12 @@ class FrameTable(Table):
     parts: _Parts  # indices of columns and a number of rows -> their values, so many rows at a time
 
     def segments(self, columns: Sequence[int], rows: int) -> Iterator[Columns]:
+        from pyarrow import types
+
+        are_numbers = (types.is_integer, types.is_floating, types.is_decimal, _is_time)
         for column in columns:
             kind = self.types[column]
-            if not _is_number(kind):
+            if not any(each(kind) for each in are_numbers):
                 text = f"{self.source}, column {label(self.names, column)} holds {kind}"
                 raise InputError(f"{text}: give numbers, a column for each axis")
         first, row = dict[int, int](), 0
@@ -58,17 +61,10 @@ class FrameTable(Table):
         return np.where(missing, np.nan, (ticks - start).astype(float))
 
 
-def _is_number(kind: Any) -> bool:
+def _is_time(kind: Any) -> bool:
     from pyarrow import types
 
-    is_plain = types.is_integer(kind) or types.is_floating(kind) or types.is_decimal(kind)
-    return bool(is_plain or _is_time(kind))
-
-
-def _is_time(kind: Any) -> bool:
-    import pyarrow as pa
-
-    return bool(pa.types.is_timestamp(kind) or pa.types.is_duration(kind))
+    return bool(types.is_timestamp(kind) or types.is_duration(kind))
 
 
 def open_frame(data: Any, wanted: Wanted) -> tuple[FrameTable, ...]:

@@ -97,7 +97,8 @@ def answer() -> None:
             seconds = int(used.ru_utime + used.ru_stime) + _SECONDS + size // _PER_SECOND
             resource.setrlimit(resource.RLIMIT_CPU, (seconds, resource.RLIM_INFINITY))
             signal.signal(signal.SIGXCPU, signal.SIG_DFL)
-            # It ends even where the library waits, and where this process's parent was killed.
+            # Also where the library waits, or the parent was killed. Only the main thread may set
+            # signals: this is that of a process of its own.
             signal.signal(signal.SIGALRM, signal.SIG_DFL)
             signal.alarm(_WALL * seconds)
             most = min(memory.budget(), _MEMORY + _UNPACKED * size)

@@ -15,7 +15,7 @@ from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import cached_property
 from itertools import islice
 from operator import itemgetter
 from pathlib import Path
@@ -87,18 +87,16 @@ def decode(
             hint = "record the bag again, or cut it before that message"
             raise InputError(f"{where(group[0])} is cut off: {hint}")
         block, rows = b"".join([raw[i] for i in group]), np.array(group)
-        field = partial(_field, block, size)
+
+        def field(dtype: str, offset: int, block: bytes = block, size: int = size) -> Any:
+            return np.ndarray((len(block) // size,), dtype, block, offset, (size,))
+
         # Seconds after 2038 are unsigned in ROS 1, and in ROS 2 as drivers write them.
         seconds = field(f"{order}u4", offset=_STAMP).astype(np.int64)
         stamps[rows] = seconds * 10**9 + field(f"{order}u4", offset=_STAMP + 4)
         for values, index in zip(numbers, wanted, strict=True):
             values[rows] = field(f"{order}f8", offset=offset + 8 * index)
     return stamps, numbers
-
-
-def _field(block: bytes, size: int, dtype: str, offset: int) -> npt.NDArray[Any]:
-    """A number of each row of so many bytes, wherever it stands in it."""
-    return np.ndarray((len(block) // size,), dtype, block, offset, (size,))
 
 
 _BLOCK = 1024  # messages: 0.3 MB of sensor_msgs/Imu, which stay in the cache

@@ -27,7 +27,8 @@ _UTF16_MARKS = (b"\xff\xfe", b"\xfe\xff")
 _LINE = re.compile(rb"[^\r\n]*(?:\r\n|\n|\r|$)")
 
 
-# OEM7 manual, RAWIMUSX and INSPVAX: scale factors differ by the type of the IMU.
+# Scale factors by the type of the IMU: docs.novatel.com/OEM7, RAWIMUS and RAWIMUSX. The order of
+# the fields: RAWIMUS of the ROS package novatel_oem6_msgs.
 _NOVATEL = {
     "RAWIMU": "its last six fields are accelerometer z, -y, x and gyro z, -y, x, in counts of "
     "velocity and angle: multiply them by the manual's scale factors of your IMU and by its rate, "
