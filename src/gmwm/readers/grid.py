@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
@@ -139,10 +140,8 @@ def find_jumps(stamps: FloatArray) -> Jumps:
     number = np.ones(stamps.size, dtype=np.int64)
     number[found.rows] += found.missing.astype(np.int64)
     # A jump off the grid starts a part whose clock has an offset of its own.
-    starts = np.zeros(stamps.size, dtype=bool)
-    starts[found.rows[found.is_off_grid]] = True
-    line = interval_of(stamps, np.cumsum(number, out=number), starts)
-    return replace(found, interval=line)
+    starts = found.rows[found.is_off_grid]
+    return replace(found, interval=interval_of(stamps, np.cumsum(number, out=number), starts))
 
 
 def find_lattice(stamps: FloatArray) -> Jumps | None:
@@ -174,7 +173,7 @@ def find_lattice(stamps: FloatArray) -> Jumps | None:
     if _has_rhythm(place):
         return None
     # Steps off the grid begin no new parts: rounded stamps slip, all to one side.
-    line = interval_of(stamps, place, np.zeros(stamps.size, dtype=bool))
+    line = interval_of(stamps, place)
     return Jumps(rows, steps[rows - 1] / line, number[rows - 1] - 1.0, line)
 
 
@@ -257,7 +256,7 @@ def place_uneven(stamps: FloatArray) -> Uneven | int | None:
         if set_back is not None:
             return int(last[set_back] - sizes[set_back] + 1)
         number = last + np.cumsum(lost)
-        interval = interval_of(time, number, np.zeros(last.size, dtype=bool))
+        interval = interval_of(time, number)
     late = time / interval - number
     # Slow wander of the clock: the median drops what a stall delays, the mean its own noise.
     size = tuning.STAMPS_OF_WANDER
@@ -300,16 +299,16 @@ def _losses(late: FloatArray) -> tuple[IntArray, int | None]:
 def _early(late: FloatArray) -> FloatArray:
     """Lateness of the second earliest stamp: a host that stalls makes others late."""
     place = min(1, late.shape[-1] - 1)
-    return np.asarray(np.partition(late, place, axis=-1)[..., place])
+    return np.asarray(np.partition(late, place)[..., place])
 
 
-def interval_of(stamps: FloatArray, number: IntArray, starts: BoolArray) -> float:
+def interval_of(stamps: FloatArray, number: IntArray, starts: Iterable[int] = ()) -> float:
     """Sampling interval: slope of the robust line through the stamps over their sample numbers.
 
     From the median slope of rows half of the record apart, least squares with the residuals bounded
-    at three robust standard deviations. A new part, whose clock has an offset, ``starts`` at (n,).
+    at three robust standard deviations. At rows of ``starts`` new parts begin, with offsets.
     """
-    edges = [0, *np.flatnonzero(starts), stamps.size]
+    edges = [0, *starts, stamps.size]
     parts = [slice(a, b) for a, b in pairwise(edges) if b > a]
     lever = np.subtract(number, number[0], dtype=float)
     half = max(max(part.stop - part.start for part in parts) // 2, 1)

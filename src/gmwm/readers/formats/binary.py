@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from gmwm._core.typing import FloatArray
+from gmwm._core.units import SI_UNIT
 from gmwm.errors import InputError
 from gmwm.issues import notice
 from gmwm.readers import tuning
@@ -94,8 +95,7 @@ class BinaryTable(Table):
                 "layout",
             )
         notices = [notice("partial-record", "", {"bytes": rest}, size=record)] if rest else []
-        units = {"gyro": "rad/s", "accel": "m/s^2"}
-        names = ("time [s]", *(f"{name} [{units[name.partition('_')[0]]}]" for name in CANONICAL))
+        names = ("time [s]", *(f"{name} [{SI_UNIT[name.partition('_')[0]]}]" for name in CANONICAL))
         table = cls(
             source=path.name, names=names, notices=notices, path=path, layout=layout, rows=count
         )

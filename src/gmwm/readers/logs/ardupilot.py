@@ -20,6 +20,7 @@ import numpy.typing as npt
 from gmwm._core import memory
 from gmwm._core.compiled import compiled
 from gmwm._core.files import opened
+from gmwm._core.units import SI_UNIT
 from gmwm.errors import InputError
 from gmwm.readers.formats.arrays import AnyArray
 from gmwm.readers.logs import topics
@@ -42,7 +43,7 @@ _BLOCK = 1 << 22  # bytes read at a time
 
 _RANKS = {"IMU": 0, "IMU2": 0, "IMU3": 0, "GYR": 1, "ACC": 1}
 _HEADER, _DATA = "ISBH", "ISBD"
-_SENSORS = {"gyro": ("Gyr", "rad/s"), "accel": ("Acc", "m/s^2")}
+_SENSORS = {"gyro": "Gyr", "accel": "Acc"}
 _OF_BATCH = ("accel", "gyro")  # IMU_SENSOR_TYPE_ACCEL, IMU_SENSOR_TYPE_GYRO
 _TIME = "time [us]"
 _SAMPLES = 32  # of a message of a batch
@@ -166,7 +167,7 @@ class _Series:
         return self.kind if self.instance is None else f"{self.kind}[{self.instance}]"
 
     def fields_of(self, sensor: str) -> list[str]:
-        names = [f"{_SENSORS[sensor][0]}{axis.upper()}" for axis in AXES]
+        names = [f"{_SENSORS[sensor]}{axis.upper()}" for axis in AXES]
         return [name for name in names if name in self.fields]
 
     @property
@@ -174,7 +175,7 @@ class _Series:
         """Stamps, axes and temperature: column -> field."""
         # The stamp of the sample where there is one: TimeUS is when it was logged.
         found = {_TIME: "SampleUS" if "SampleUS" in self.fields else "TimeUS"}
-        for sensor, (_, unit) in _SENSORS.items():
+        for sensor, unit in SI_UNIT.items():
             for field in self.fields_of(sensor):
                 found[f"{sensor}_{field[-1].lower()} [{unit}]"] = field
         if "T" in self.fields:
@@ -316,6 +317,6 @@ def _batches(parts_of_header: Sequence[Messages], parts: Sequence[Messages]) -> 
             columns = {_TIME: (first + 1e6 * index / rate[header][:, None])[there]}
             for axis in AXES:
                 values = data[axis][mine] / scale[header][:, None]
-                columns[f"{sensor}_{axis} [{_SENSORS[sensor][1]}]"] = values[there]
+                columns[f"{sensor}_{axis} [{SI_UNIT[sensor]}]"] = values[there]
         found[f"batch_{sensor}[{number}]"] = (sensor, columns)
     return found

@@ -201,11 +201,8 @@ def open_bag(path: Path, wanted: Wanted) -> tuple[BagTable, ...]:
                 counts[each.msgtype][each.topic] += each.msgcount
         of_imu, warmth = (counts[kind] for kind in _TYPES)
         if not of_imu:
-            others = sorted(
-                f"{topic} ({kind.replace('/msg/', '/')})"
-                for kind, own in counts.items()
-                for topic in own
-            )
+            pairs = [(topic, kind) for kind, own in counts.items() for topic in own]
+            others = sorted(f"{topic} ({kind.replace('/msg/', '/')})" for topic, kind in pairs)
             listed = ", ".join(others[:8]) + (", ..." if len(others) > 8 else "")
             held = f"it has {listed}; record the topic of the IMU" if others else "it is empty"
             raise InputError(f"{path.name} has no messages of sensor_msgs/Imu: {held}")
@@ -264,10 +261,8 @@ def _is_ros1(path: Path) -> bool:
 
 
 def _messages(reader: Any, topic: str, start: int | None = None) -> Iterator[_Record]:
-    connections = [
-        each for each in reader.connections if each.topic == topic and each.msgtype in _TYPES
-    ]
-    return iter(reader.messages(connections, start=start))
+    own = [c for c in reader.connections if c.topic == topic and c.msgtype in _TYPES]
+    return iter(reader.messages(own, start=start))
 
 
 def _sensors(reader: Any, topic: str, bag: _Bag, head: Sequence[_Record]) -> frozenset[str]:

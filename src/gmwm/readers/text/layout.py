@@ -9,14 +9,13 @@ from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from statistics import mode
 
+from gmwm._core.units import SI_UNIT
 from gmwm.errors import InputError
 from gmwm.issues import Notice, notice
 from gmwm.readers import tuning
 from gmwm.readers.names import AXES, meaning, of_dates
 from gmwm.readers.registry import READABLE
 from gmwm.readers.text.cells import BLANKS, date_columns, number, split_header, split_line
-
-_UNITS = {"gyro": "rad/s", "accel": "m/s^2"}
 
 _COMMENT_MARKS = ("#", "%", "//")
 _BLACKBOX = re.compile(rb'"?Product"?\s*,\s*"?Blackbox')
@@ -40,7 +39,7 @@ _NOVATEL = {
 def _axes(**prefixes: str) -> dict[str, str]:
     """Name of a column -> its meaning, for the three axes of a prefix."""
     return {
-        f"{prefix}{axis}": f"{sensor}_{axis} [{_UNITS[sensor]}]"
+        f"{prefix}{axis}": f"{sensor}_{axis} [{SI_UNIT[sensor]}]"
         for sensor, prefix in prefixes.items()
         for axis in AXES
     }
@@ -89,9 +88,9 @@ def with_dialect(layout: Layout, source: str, head: bytes) -> Layout:
     for meant in _RENAMED:
         if set(meant) <= set(names):
             return _renamed(layout, meant)
-    sensor = next((each for each in _UNITS if each in source.lower()), "")
+    sensor = next((each for each in SI_UNIT if each in source.lower()), "")
     if sensor and {*AXES, "seconds_elapsed"} <= set(names):
-        meant = {axis: f"{sensor}_{axis} [{_UNITS[sensor]}]" for axis in AXES}
+        meant = {axis: f"{sensor}_{axis} [{SI_UNIT[sensor]}]" for axis in AXES}
         layout = _renamed(layout, {**meant, "time": "time [ns]"})
         if source.lower().startswith("accelerometer."):
             return replace(layout, notices=(*layout.notices, notice("gravity-absent", "accel")))
