@@ -330,8 +330,10 @@ def read_json(path: str | os.PathLike[str]) -> Any:
     """
     from pydantic_core import from_json
 
-    with suppress(OSError, ValueError):  # the next line says it
-        memory.require(_TIMES * os.path.getsize(path), os.fspath(path))
+    size = 0
+    with suppress(OSError, ValueError):  # `content_of` says it
+        size = os.path.getsize(path)
+    memory.require(_TIMES * size, os.fspath(path))
     text = content_of(path, memory.budget())
     try:
         return from_json(text, allow_inf_nan=False)

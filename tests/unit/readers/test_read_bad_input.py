@@ -66,7 +66,7 @@ def test_unreadable(tmp_path, monkeypatch):
     def refuse(*_args, **_kwargs):
         raise PermissionError(13, "Permission denied")
 
-    monkeypatch.setattr(type(path), "open", refuse)
+    monkeypatch.setattr("gmwm._core.files.open", refuse, raising=False)
     assert problem(path) == "a.csv cannot be read (Permission denied): check its permissions"
     npy = tmp_path / "a.npy"
     npy.touch()
