@@ -333,7 +333,7 @@ def read_json(path: str | os.PathLike[str]) -> Any:
     size = 0
     with suppress(OSError, ValueError):  # `content_of` says it
         size = os.path.getsize(path)
-    memory.require(_TIMES * size, os.fspath(path))
+    memory.require(_TIMES * size, f"{path}:")
     text = content_of(path, memory.budget())
     try:
         return from_json(text, allow_inf_nan=False)

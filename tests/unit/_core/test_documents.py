@@ -131,9 +131,9 @@ def test_what_is_nested_deeply_is_refused(tmp_path, depth):
 
 
 def test_a_file_that_no_result_has_is_not_read(stored, tmp_path, monkeypatch):
-    monkeypatch.setenv(memory.VARIABLE, "1e-6")
+    monkeypatch.setenv(memory.VARIABLE, "1e-5")
     path = stored["calibration"].save(tmp_path / "stored.json")
-    assert "of memory, and 1e-06 GB may be used" in refusal(path)
+    assert "of memory, and 1e-05 GB may be used" in refusal(path)
 
 
 def test_a_long_value_is_not_quoted_whole(stored, tmp_path):
