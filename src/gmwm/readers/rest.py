@@ -51,7 +51,7 @@ def rest_notices(
         others.append(_gyro_unit(rate))
     elif rate is not None and rate.size - tuning.SURE_MEAN * rate.size_error >= tuning.USUAL_BIAS:
         others.append(notice("mean-rate", "gyro", {"mean": rate.size}, size=rate.size / _DEGREE))
-    rest = [each for each in others if each.severity == "bad" or each.where not in are_counts]
+    rest = [each for each in others if each.code == "gravity" or each.where not in are_counts]
     return (*counts, *rest)
 
 

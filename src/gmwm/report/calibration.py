@@ -238,9 +238,7 @@ def _needed(seconds: float | None, duration: float) -> str:
     """Length of record that a parameter needs, in words; empty if it was not estimated."""
     if seconds is None:
         return ""
-    if seconds <= duration:
-        return "long enough"
-    if seconds == float("inf"):
-        return "not identified"
+    if seconds <= duration or seconds == float("inf"):
+        return "long enough" if seconds <= duration else "not identified"
     text = duration_text(seconds)
     return text if text == "centuries" else f"needs {text}"

@@ -152,7 +152,7 @@ def _effect(fit: Fit, rivals: Sequence[Model]) -> str:
 def _summary(notices: list[Notice]) -> str:
     if all(notice.severity not in ("bad", "warning") for notice in notices):
         return "No defect found."
-    parts = [part for severity in _COUNTED if (part := counted(notices, severity))]
+    parts = [part for each in _COUNTED if (part := counted(notices, each))]
     return f"{' and '.join([', '.join(parts[:-1]), parts[-1]] if parts[1:] else parts)}."
 
 

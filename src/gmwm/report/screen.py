@@ -104,13 +104,9 @@ def filter_table(calibration: Calibration, numbers: Certified) -> list[dict[str,
         fits = {axis.name: calibration[axis.name] for axis in triad.axes}
         texts = {k: text.replace("<=", "≤") for k, text in filter_values(triad).items()}
         keys = {letter: filter_key(triad.quantity, letter) for letter in KEYS}
-        about = {
-            "covers": covers(triad, calibration.numbers),
-            "warning": unusable(fits),
-            "keys": keys,
-        }
+        about = {"covers": covers(triad, calibration.numbers), "warning": unusable(fits)}
         mark = "*" * (use(fits) == "usable *")
-        rows.append({"name": triad.quantity, "mark": mark, **texts, **about})
+        rows.append({"name": triad.quantity, "mark": mark, **texts, **about, "keys": keys})
     return rows
 
 

@@ -217,14 +217,13 @@ def reason(name: str, calibration: Calibration) -> str:
 def _filter(calibration: Calibration) -> list[str]:
     """N and K of each sensor by key, the start bias, and what else they cover."""
     lines, starts, covered = [], [], []
-    for quantity in SENSORS:
+    there = {fit.wv.quantity for fit in calibration.values()}
+    for quantity in (each for each in SENSORS if each in there):
         fits = {name: fit for name, fit in calibration.items() if fit.wv.quantity == quantity}
         try:
-            triad = triad_of(quantity, fits) if fits else None
+            triad = triad_of(quantity, fits)
         except InputError as error:
             lines += wrapped(f"no filter numbers: {error}", f"{quantity:<6} ", 7)[:2]
-            continue
-        if triad is None:
             continue
         values = filter_values(triad)
         for letter in KEYS:
@@ -296,7 +295,7 @@ def actions(calibration: Calibration) -> list[str]:
     """
     groups: dict[str, list[Notice]] = {}
     found = [each for each in findings(calibration) if each.severity in ("bad", "warning")]
-    units = [n for n in found if n.issue.lacks == "units_agree"]
+    units = [each for each in found if each.issue.lacks == "units_agree"]
     found.sort(key=lambda n: (n not in units, not n.issue.spoils, n.code not in _DEPARTURES))
     departed = any(each.issue.topic == "departure" for each in found)
     for notice in worst_first(found):
