@@ -211,8 +211,8 @@ def worst_first(notices: Iterable[Notice]) -> list[Notice]:
 def cause(notices: Iterable[Notice]) -> Notice | None:
     """The bad one that explains the others: a wrong unit, else a departure from noise."""
     rank = {"units_agree": 0, "stationary": 1}
-    bad = (each for each in notices if each.severity == "bad")
-    return min(bad, key=lambda each: rank.get(each.issue.lacks, 2), default=None)
+    bad = (n for n in notices if n.severity == "bad")
+    return min(bad, key=lambda n: rank.get(n.issue.lacks, 2), default=None)
 
 
 def codes(**attributes: Any) -> frozenset[str]:

@@ -86,12 +86,11 @@ def verdict_line(calibration: Calibration) -> str:
     name = _shortened(PurePath(files[0]).name or "recording", _SOURCE)
     intervals = [fit.wv.dt for fit in calibration.values()]
     most = "up to " if max(intervals) > 1.001 * min(intervals) else ""
-    part = next((n.values for n in calibration.notices if n.code == "part"), None)
-    span = f" ({part['start']:.5g} to {part['stop']:.5g} s)" if part and joint == 1 else ""
+    parts = [n.values for n in calibration.notices if n.code == "part" and joint == 1]
+    span = "".join(f" ({part['start']:.5g} to {part['stop']:.5g} s)" for part in parts[:1])
     size = f"{duration_text(calibration.duration)}{span} at {most}{calibration.rate:.6g} Hz"
     word = "recordings" if len(files) > 1 else "parts at rest"
-    size += f" in {joint} {word}" if joint > 1 else ""
-    size += _subtracted(calibration)
+    size += (f" in {joint} {word}" if joint > 1 else "") + _subtracted(calibration)
     axes = {name: state(fit) for name, fit in calibration.items()}
     axes |= dict.fromkeys(calibration.skipped, "no model")
     found = {key: [n for n, own in axes.items() if own == key] for key in _STATES}
@@ -217,8 +216,7 @@ def reason(name: str, calibration: Calibration) -> str:
 def _filter(calibration: Calibration) -> list[str]:
     """N and K of each sensor by key, the start bias, and what else they cover."""
     lines, starts, covered = [], [], []
-    there = {fit.wv.quantity for fit in calibration.values()}
-    for quantity in (each for each in SENSORS if each in there):
+    for quantity in (q for q in SENSORS if q in {f.wv.quantity for f in calibration.values()}):
         fits = {name: fit for name, fit in calibration.items() if fit.wv.quantity == quantity}
         try:
             triad = triad_of(quantity, fits)
