@@ -208,6 +208,13 @@ def worst_first(notices: Iterable[Notice]) -> list[Notice]:
     return sorted(notices, key=lambda each: SEVERITIES.index(each.severity))
 
 
+def cause(notices: Iterable[Notice]) -> Notice | None:
+    """The bad one that explains the others: a wrong unit, else a departure from noise."""
+    rank = {"units_agree": 0, "stationary": 1}
+    bad = (n for n in notices if n.severity == "bad")
+    return min(bad, key=lambda n: rank.get(n.issue.lacks, 2), default=None)
+
+
 def codes(**attributes: Any) -> frozenset[str]:
     """Codes of the issues that have these values of attributes, e.g. ``topic="clock"``."""
     return frozenset(
@@ -266,7 +273,8 @@ _READERS = (
     _reading("gyro-unit", {
         "noise": "white noise of {size:.3g} deg/s/sqrt(Hz) is more than gyros at rest have",
         "mean": "a mean rate of {size:.3g} deg/s is more than gyros at rest have"}, "check the "
-        "unit and the sampling rate{explained}", severity="warning", topic="recording"),
+        "unit and the sampling rate{explained}", severity="warning", topic="recording",
+        lacks="units_agree", reason="likely another gyro unit", spoils=("gyro",)),
     _reading("log-dropouts", "the logger dropped {count} stretches, {duration:.3g} s in all",
         topic="recording"),
     _reading("mean-rate", "a mean rate of {size:.3g} deg/s is more than the bias of most gyros: "
@@ -463,9 +471,9 @@ _CALIBRATION = (
     Issue("departures-many", "{removed} departures were subtracted: a bias that changes so often "
         "is sensor noise", "fit a slow term instead, such as a Gauss-Markov process",
         severity="bad", lacks="stationary", reason="the bias keeps changing"),
-    Issue("departures-removed", "with the subtracted departures the deviation at tau = {tau:.3g} s "
-        "would be {times} times as large: the model is wrong if they recur", "find the cause, or "
-        "add a slow term to the model instead of subtracting", severity="warning"),
+    Issue("departures-removed", "if the subtracted departures recur the deviation at "
+        "tau = {tau:.3g} s is {times} times as large", "find their cause, or add a slow term to "
+        "the model instead of subtracting", severity="warning", topic="departure"),
     Issue("drift-at-start", "a drift by {height} from the start that ends at {when}{also}",
         "leave it out{back}", severity="bad", topic="departure", lacks="stationary",
         reason="drift after switching on"),

@@ -74,7 +74,11 @@ def stretches_at_rest(recording: Recording) -> tuple[Recording, ...]:
         )
         for part, (start, stop) in zip(parts, used, strict=True)
     ]
-    whole = [notice for notice in recording.notices if notice.code != "missing-samples"]
+    whole = [  # motion looks like noise of a gyro in another unit
+        replace(notice, severity="warning") if notice.code == "gyro-unit" else notice
+        for notice in recording.notices
+        if notice.code != "missing-samples"
+    ]
     first = replace(named[0], notices=(*whole, found.notice(), *named[0].notices))
     return (first, *named[1:])
 
@@ -219,8 +223,8 @@ def with_outcomes(
 
 def _outcome(notice: Notice, model: Model, offered: Sequence[Process]) -> str:
     if _holds(model.terms, notice):
-        left = ", which N and K of a filter leave out" if notice.code == "line" else ""
-        return f"a term of the model{left}"
+        is_line = notice.code == "line"
+        return "modelled, but not in filter N and K" if is_line else "a term of the model"
     if _holds(offered, notice):
         return "tried as a term of the model, which does not need it"
     return "not tried as a term of the model"

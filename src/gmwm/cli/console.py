@@ -149,6 +149,9 @@ def with_option(notice: Notice, span: Span = None, lost: float = 0.0, longest: s
         "read gravity instead of the reaction to it, reverse accel_x, accel_y and accel_z only",
         "vibration": "leave it out with --start and --stop, or record again",
     }
+    if unit := values.get("alike"):
+        sensor = "gyro" if notice.code == "gyro-unit" else "accel"
+        always[notice.code] = f"values look like {unit}: use --{sensor}-unit {unit}"
     if notice.code in always:
         return replace(notice, hint=always[notice.code])
     is_part = notice.code in ("not-static", "tilt") and "start" in values and not notice.source

@@ -246,7 +246,7 @@ def gathered(notices: Iterable[Notice]) -> list[Notice]:
         if len(group) > 1:
             best = max(group, key=lambda each: each.values["ratio"])
             where = ", ".join(each.where for each in group)
-            hints = "; ".join([_LOOK, *dict.fromkeys(each.hint for each in group if each.hint)])
+            hints = "; ".join([*dict.fromkeys(each.hint for each in group if each.hint), _LOOK])
             text = f"{best.text} (in {best.where}); {len(group)} channels have it"
             best = replace(best, where=where, text=text, hint=hints)
         found.append(best)

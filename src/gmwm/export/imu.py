@@ -17,7 +17,7 @@ from gmwm.calibration import Calibration
 from gmwm.errors import InputError
 from gmwm.estimate import Fit
 from gmwm.filter_numbers import HORIZON, AxisFilterNumbers, FilterNumbers, usable
-from gmwm.issues import Notice
+from gmwm.issues import Notice, cause
 
 SENSORS = {"gyro": "gyroscope", "accel": "accelerometer"}
 """Quantity -> how messages and most consumers call the sensor."""
@@ -212,9 +212,7 @@ def not_valid(given: Iterable[Any]) -> dict[str, Notice]:
             notices = [n for n in one.notices if n.severity == "bad" or n.code == _NOT_VALID]
             is_sensor = isinstance(one, AxisFilterNumbers) or one.wv.quantity in SENSORS
             if notices and is_sensor:
-                # A departure from noise is why the model misses levels too.
-                departures = (n for n in notices if n.issue.topic == "departure")
-                found[name] = next(departures, notices[0])
+                found[name] = cause(notices) or notices[0]
     return found
 
 
@@ -358,10 +356,13 @@ def _covered(numbers: AxisFilterNumbers, fitted: Fit | None) -> str:
         if notice.code in _COVERED:
             for label, share in notice.values.items():
                 shares[label] = max(share, shares.get(label, 0.0))
+    labels = fitted.model.term_labels() if fitted is not None else ()
+    for label, one in zip(labels, fitted.model.terms if fitted is not None else (), strict=True):
+        if one.is_white or one.is_band_limited:
+            shares.pop(label, None)
     if not shares:
         return ""
     label = max(shares, key=lambda each: shares[each])
-    labels = fitted.model.term_labels() if fitted is not None else ()
     if fitted is None or label not in labels:
         return label
     term = fitted.model.terms[labels.index(label)]

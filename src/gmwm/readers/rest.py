@@ -51,7 +51,7 @@ def rest_notices(
         others.append(_gyro_unit(rate))
     elif rate is not None and rate.size - tuning.SURE_MEAN * rate.size_error >= tuning.USUAL_BIAS:
         others.append(notice("mean-rate", "gyro", {"mean": rate.size}, size=rate.size / _DEGREE))
-    rest = [each for each in others if each.severity == "bad" or each.where not in are_counts]
+    rest = [each for each in others if each.code == "gravity" or each.where not in are_counts]
     return (*counts, *rest)
 
 
@@ -146,7 +146,7 @@ def _gravity(
     is_given = any(key in given for key in ("accel", *(f"accel_{axis}" for axis in AXES)))
     if not likely:
         return _scale(recording, force, must_show=has_layout and not is_given)
-    values = {"norm": force.size, "unit": force.unit, "likely": likely[0]}
+    values = {"norm": force.size, "unit": force.unit, "likely": likely[0], "alike": likely[0]}
     hint = f"check the unit: all accelerometer values are off by {_GRAVITY / force.size:.4g}"
     found = notice("gravity", "accel", values, variant="unit", hint=hint, in_file=in_file)
     if not is_given:
@@ -187,12 +187,13 @@ def _gyro_unit(rate: _Sensor) -> Notice:
     values: dict[str, object] = {"density": rate.density, "mean": rate.size, "unit": rate.unit}
     explained = ""
     if near:
-        values["likely"] = near[0]
-        explained = f": {' or '.join(near)}, not {rate.unit}, would explain it"
+        values |= {"likely": near[0], "alike": " or ".join(near)}
+        explained = f": {values['alike']}, not {rate.unit}, would explain it"
     is_noisy = rate.density > tuning.NOISIEST_GYRO
     size = (rate.density if is_noisy else rate.size) / _DEGREE
     variant = "noise" if is_noisy else "mean"
-    return notice("gyro-unit", "gyro", values, variant=variant, size=size, explained=explained)
+    words: dict[str, Any] = {"variant": variant, "size": size, "explained": explained}
+    return notice("gyro-unit", "gyro", values, severity="bad" if near else None, **words)
 
 
 def _is_plausible(density: float, mean: float) -> bool:

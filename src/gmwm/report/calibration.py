@@ -186,12 +186,9 @@ def _error_model(fit: Fit) -> list[tuple[Estimate, str]]:
         row = Estimate.of(WhiteNoise(), "estimated", total**0.5, error, interval, fit.wv)
         parts = []
         for term in (terms[i] for i in noise if terms[i].is_band_limited):
-            shape, share = (
-                term.shape_parameters[0],
-                per_cent((term.values["N"] or 0.0) ** 2 / total),
-            )
+            shape, share = term.shape_parameters[0], (term.values["N"] or 0.0) ** 2 / total
             size = f"a {shape.name} of {brief(term.values[shape.name] or 0.0, 3)} {shape.unit}"
-            parts.append(f"{share} of its power has {size}" if noise[1:] else size)
+            parts.append(f"{per_cent(share)} of its power has {size}" if noise[1:] else size)
         meaning = f"white noise: {', '.join(parts)}"
         rows = [replace(row, key="N, bandwidth", meaning=meaning), *rows]
         lengths[rows[0].key] = max((lengths[key] for key in merged & {*lengths}), default=np.inf)
@@ -241,9 +238,7 @@ def _needed(seconds: float | None, duration: float) -> str:
     """Length of record that a parameter needs, in words; empty if it was not estimated."""
     if seconds is None:
         return ""
-    if seconds <= duration:
-        return "long enough"
-    if seconds == float("inf"):
-        return "not identified"
+    if seconds <= duration or seconds == float("inf"):
+        return "long enough" if seconds <= duration else "not identified"
     text = duration_text(seconds)
     return text if text == "centuries" else f"needs {text}"

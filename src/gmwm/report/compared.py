@@ -19,15 +19,9 @@ from gmwm.report.datasheet import Datasheet, read_datasheet
 from gmwm.report.page import origin, write_page
 from gmwm.report.pictures import multiple
 
-_SIDE_BY_SIDE = 6
-"""Recordings whose values stand in columns of their own; of more the range is shown."""
-
-_ASIDE = ("not-noise", "channel-missing", "channel-skipped")
-"""Codes of notices that the verdicts have in a word."""
-
-_REPEATED = ("curves-differ", "curves-close")
-"""Codes of those that the verdicts repeat."""
-
+_SIDE_BY_SIDE = 6  # recordings with columns of their own; of more the range is shown
+_ASIDE = ("not-noise", "channel-missing", "channel-skipped")  # the verdicts have them in a word
+_REPEATED = ("curves-differ", "curves-close")  # the verdicts repeat them
 _MARKS = {"agree": "good", "close": "good", "differ": "care", "untested": "bad"}
 _LETTERS = ("N", "K")
 

@@ -114,14 +114,9 @@ def _row(spread: Spread) -> dict[str, Any]:
 
     bounds, share = int(np.count_nonzero(~spread.found)), spread.of_estimation
     is_uncertain = share > _MOSTLY and spread.sd > _WIDE
-    remarks = [
-        remark
-        for is_said, remark in (
-            (bounds, f"{bounds} of them upper limits"),
-            (is_uncertain, f"{100.0 * min(share, 1.0):.0f} % is estimation error: record longer"),
-        )
-        if is_said
-    ]
+    remarks = [f"{bounds} of them upper limits"] if bounds else []
+    if is_uncertain:
+        remarks.append(f"{100.0 * min(share, 1.0):.0f} % is estimation error: record longer")
     return {
         "channel": spread.channel,
         "n": spread.n,

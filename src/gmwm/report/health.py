@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -15,7 +15,7 @@ from gmwm.diagnosis import gathered
 from gmwm.errors import InputError
 from gmwm.estimate import Fit
 from gmwm.filter_numbers import bound
-from gmwm.issues import Notice, worst_first
+from gmwm.issues import Notice, cause, worst_first
 from gmwm.process import Model
 from gmwm.report.numbers import SHOWN
 from gmwm.report.page import begun, duration_text
@@ -109,11 +109,8 @@ def verdict(calibration: Calibration) -> dict[str, str]:
 
 def trust(name: str, fit: Fit, calibration: Calibration) -> tuple[bool, str]:
     """Whether the numbers of a channel can be used, and why, in about five words."""
-    bad = [notice.issue for notice in fit.notices if notice.severity == "bad"]
-    if bad:
-        # A departure from noise is why the model misses levels too.
-        issue = next((each for each in bad if each.topic == "departure"), bad[0])
-        return False, issue.reason or issue.code.replace("-", " ")
+    if (bad := cause(fit.notices)) is not None:
+        return False, bad.issue.reason or bad.code.replace("-", " ")
     at = fit.goodness
     fits = "fits the data"
     if at.worst is not None:
@@ -155,11 +152,16 @@ def _effect(fit: Fit, rivals: Sequence[Model]) -> str:
 def _summary(notices: list[Notice]) -> str:
     if all(notice.severity not in ("bad", "warning") for notice in notices):
         return "No defect found."
-    parts = [part for severity in _COUNTED if (part := counted(notices, severity))]
+    parts = [part for each in _COUNTED if (part := counted(notices, each))]
     return f"{' and '.join([', '.join(parts[:-1]), parts[-1]] if parts[1:] else parts)}."
 
 
 # -- length ----------------------------------------------------------------------------------------
+
+
+def is_short(fits: Iterable[Fit], horizon: float) -> bool:
+    """Whether a curve ends before the horizon, and is known there by the model alone."""
+    return any(fit.wv.tau[-1] < horizon for fit in fits)
 
 
 def known_at(fit: Fit, tau: float, rivals: Sequence[Model] = ()) -> float:
@@ -195,13 +197,14 @@ def length_sentence(calibration: Calibration, horizon: float) -> str:
     if found is None:
         return ""
     worst, error, least = found
-    # A curve that ends before the horizon is known there by the model alone.
-    covered = min(float(fit.wv.tau[-1]) for fit in calibration.values()) >= horizon
+    covered = not is_short(calibration.values(), horizon)
     share, text = per_cent(error), duration_text(least)
     if least <= calibration.duration and covered:
         return (
             f"long enough for {horizon:g} s outages: {worst} is known to +-{share} there; {text} "
             f"would give +-{100.0 * _AIM:g} %"
         )
-    why = f" ({worst} at {horizon:g} s: +-{share})" if error > _AIM else ""
-    return f"too short for {horizon:g} s outages: record {text}{why}"
+    if covered and error > _AIM:
+        aim = f"for +-{100.0 * _AIM:g} % record {text} in all"
+        return f"{worst}'s deviation at {horizon:g} s is known to +-{share}; {aim}"
+    return f"too short for {horizon:g} s outages: record {text}"

@@ -178,9 +178,4 @@ def write_comparison_report(comparison: Comparison, path: str | os.PathLike[str]
     Raises InputError if the file cannot be written.
     """
     path = writable_file(path)
-    return write_page(
-        path,
-        "comparison.html",
-        c=comparison,
-        errors=svg(comparison.plot()),
-    )
+    return write_page(path, "comparison.html", c=comparison, errors=svg(comparison.plot()))

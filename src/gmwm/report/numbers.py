@@ -17,8 +17,6 @@ SHOWN = HORIZON
 """s: length of outages of all filter numbers on a page."""
 
 _TITLES = {name: each.to_copy for name, each in TARGETS.items() if each.to_copy}
-"""Of the files of programs, by their languages."""
-
 _NOT_VALID = "the fit failed; do not use these numbers"
 
 

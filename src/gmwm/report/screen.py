@@ -83,7 +83,7 @@ def _row(name: str, calibration: Calibration) -> dict[str, Any]:
     axis, fit = calibration.numbers[name], calibration[name]
     cells = [_cell(axis, letter) for letter in axis.names]
     why = "" if fit.valid else reason(name, calibration)
-    mark = "*" * (state(fit) == "inflated")
+    mark = "*" * (state(fit) == "reserved")
     return {"name": name, "mark": mark, "why": why, "stated": False, "cells": cells}
 
 
@@ -104,9 +104,9 @@ def filter_table(calibration: Calibration, numbers: Certified) -> list[dict[str,
         fits = {axis.name: calibration[axis.name] for axis in triad.axes}
         texts = {k: text.replace("<=", "≤") for k, text in filter_values(triad).items()}
         keys = {letter: filter_key(triad.quantity, letter) for letter in KEYS}
-        about = {"covers": covers(fits)[1], "warning": unusable(fits), "keys": keys}
+        about = {"covers": covers(triad, calibration.numbers), "warning": unusable(fits)}
         mark = "*" * (use(fits) == "usable *")
-        rows.append({"name": triad.quantity, "mark": mark, **texts, **about})
+        rows.append({"name": triad.quantity, "mark": mark, **texts, **about, "keys": keys})
     return rows
 
 
@@ -123,6 +123,6 @@ def _by_axis(calibration: Calibration, numbers: Certified) -> list[dict[str, Any
             row[key] = {units: f"{limit}{each}" for units, each in text.items()}
         nees = axis.nees.get(SHOWN, float("nan"))
         row["nees"] = f"{nees:.2g}" if np.isfinite(nees) else "unknown"
-        row["covers"] = covers({name: fit})[1].removesuffix(f" ({name})")
+        row["covers"] = axis.covers
         rows.append(row)
     return rows

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from pathlib import PurePath
+
+import numpy as np
 
 from gmwm._core.text import WIDTH, brief, wrapped
 from gmwm._core.units import si_parameter_unit
@@ -11,22 +13,25 @@ from gmwm.calibration import Calibration, SensorNumbers
 from gmwm.errors import InputError
 from gmwm.estimate import Fit, JointFit
 from gmwm.export import SENSORS, Triad
-from gmwm.filter_numbers import bound
 from gmwm.issues import Notice, worst_first
 from gmwm.report.datasheet import UNITS
-from gmwm.report.health import findings, length_sentence, trust
+from gmwm.report.health import findings, is_short, length_sentence, trust
 from gmwm.report.numbers import SHOWN, triad_of
-from gmwm.report.page import duration_text, quantity_text
+from gmwm.report.page import duration_text
 
 _LINES = 30  # of the page, with those about files
 _ACTIONS = 3  # notices that matter most
 _AXES, _FEWEST = 6, 4  # lines of them beside the numbers of more axes
 _NAME, _SOURCE, _TEXT = 18, 40, 60  # characters; longer ones are shortened
+_NOTABLE = 1.1  # times the table's N or K
 _LEAST = 0.1  # smallest number without an exponent
 _LEGEND = "+-, (a to b): 95 % interval. <=: 95 % upper limit. B: lowest deviation / 0.664"
 _FILTER = "For your filter, outages up to {:g} s (keys of OpenVINS, Kalibr; GTSAM: N^2, K^2)"
 KEYS = {"N": "noise_density", "K": "random_walk"}
 """Ends of the keys of OpenVINS and Kalibr, which begin with the names of `SENSORS`."""
+_SHORT = (
+    "too short for {:g} s outages: use N alone, not K and the start bias; record an hour or more"
+)
 _DEPARTURES = {
     "step": "bias steps",
     "transient": "start transient",
@@ -37,7 +42,7 @@ _DONE = frozenset({"event", "outliers", "rounding", "crosstalk", "held"})
 """Codes of warnings that the calibration has allowed for: nothing is to be done."""
 _STATES = {
     "usable": "Usable",
-    "inflated": "Usable, but B and K inflated (*)",
+    "reserved": "Usable with reservation (*)",
     "not valid": "Not valid",
     "no model": "No model",
 }
@@ -65,11 +70,11 @@ def summary_text(calibration: Calibration, files: Iterable[str] = ()) -> str:
 
 
 def state(fit: Fit) -> str:
-    """Whether its numbers are "usable", B and K "inflated" by departures, or "not valid"."""
+    """Whether its numbers are "usable", "reserved" because of departures, or "not valid"."""
     if not fit.valid:
         return "not valid"
     departed = any(n.issue.topic == "departure" and n.severity != "note" for n in fit.notices)
-    return "inflated" if departed else "usable"
+    return "reserved" if departed else "usable"
 
 
 def verdict_line(calibration: Calibration) -> str:
@@ -81,9 +86,11 @@ def verdict_line(calibration: Calibration) -> str:
     name = _shortened(PurePath(files[0]).name or "recording", _SOURCE)
     intervals = [fit.wv.dt for fit in calibration.values()]
     most = "up to " if max(intervals) > 1.001 * min(intervals) else ""
-    size = f"{duration_text(calibration.duration)} at {most}{calibration.rate:.6g} Hz"
+    parts = [n.values for n in calibration.notices if n.code == "part" and joint == 1]
+    span = "".join(f" ({part['start']:.5g} to {part['stop']:.5g} s)" for part in parts[:1])
+    size = f"{duration_text(calibration.duration)}{span} at {most}{calibration.rate:.6g} Hz"
     word = "recordings" if len(files) > 1 else "parts at rest"
-    size += f" in {joint} {word}" if joint > 1 else ""
+    size += (f" in {joint} {word}" if joint > 1 else "") + _subtracted(calibration)
     axes = {name: state(fit) for name, fit in calibration.items()}
     axes |= dict.fromkeys(calibration.skipped, "no model")
     found = {key: [n for n, own in axes.items() if own == key] for key in _STATES}
@@ -93,9 +100,30 @@ def verdict_line(calibration: Calibration) -> str:
     if len(found["usable"]) == len(axes):
         all_of_them = {1: "The axis is", 2: "Both axes are"}
         texts = [f"{all_of_them.get(len(axes), f'All {len(axes)} axes are')} usable"]
-    elif not (found["usable"] or found["inflated"]):
+    elif not (found["usable"] or found["reserved"]):
         texts = ["No axis is usable"]
+    if is_short(calibration.values(), SHOWN) and "No axis" not in texts[0]:
+        texts.append(f"Too short for {SHOWN:g} s outages: use N alone")
     return ". ".join([f"{name}{more}: {size}", *texts, ""]).rstrip()
+
+
+def _subtracted(calibration: Calibration) -> str:
+    """What was subtracted before the fits, and how much of the recording is left."""
+    lost, kinds = 0.0, dict[str, None]()
+    for fit in calibration.values():
+        gone = [n for n in fit.notices if n.code in _DEPARTURES and n.values.get("removed")]
+        kinds |= dict.fromkeys(_DEPARTURES[n.code] for n in gone)
+        spans = [n.values["time_upper"] - n.values["time_lower"] for n in gone if n.code == "step"]
+        lost = max(lost, sum(spans))  # samples at which a step may be are left out
+    left = duration_text(calibration.duration - lost)
+    return f", {left} of it used, {_listed([*kinds])} subtracted" if kinds else ""
+
+
+def _whole(text: str, most: int) -> str:
+    """A text without its last clauses, if it is long."""
+    while len(text) > most and (", " in text or ": " in text):
+        text = text.rpartition(", " if ", " in text else ": ")[0]
+    return text
 
 
 def _shortened(text: str, most: int) -> str:
@@ -131,7 +159,8 @@ def _sensor(calibration: Calibration, most: int) -> list[str]:
     for name, notice in calibration.skipped.items():
         reasons.setdefault(notice.text, []).append(name)
     skipped = [
-        f"{_listed(names):<7}  no model: {text}"[:WIDTH].rstrip() for text, names in reasons.items()
+        _whole(f"{_listed(names):<7}  no model: {text}", WIDTH)[:WIDTH].rstrip()
+        for text, names in reasons.items()
     ]
     if len(skipped) > 2:
         skipped = [skipped[0], f"{len(calibration.skipped)} channels have no model"]
@@ -146,7 +175,7 @@ def _sensor(calibration: Calibration, most: int) -> list[str]:
 
 
 def _table(calibration: Calibration, names: Sequence[str]) -> list[str]:
-    marked = {n: f"{n}{'*' * (state(calibration[n]) == 'inflated')}" for n in names}
+    marked = {n: f"{n}{'*' * (state(calibration[n]) == 'reserved')}" for n in names}
     for short in ({marked[n]: n for n in names}, {_shortened(marked[n], _NAME): n for n in names}):
         numbers = SensorNumbers({each: calibration.numbers[name] for each, name in short.items()})
         units = {(axis.quantity, axis.B.usual.unit) for axis in numbers.values()}
@@ -163,7 +192,7 @@ def _table(calibration: Calibration, names: Sequence[str]) -> list[str]:
         name = short.get(line.partition(" ")[0], "")
         if name and not calibration[name].valid:
             text = f"{line.partition('not valid')[0]}not valid: {reason(name, calibration)}"
-            lines[place] = text[:WIDTH].rstrip()
+            lines[place] = _whole(text, WIDTH)
     return [each for line in lines for each in wrapped(line, indent=2) or [""]]
 
 
@@ -173,7 +202,7 @@ def reason(name: str, calibration: Calibration) -> str:
     cause = next((n for n in fit.notices if n.severity == "bad" and n.issue.spoils), None)
     steps = [n for n in fit.notices if n.code == "step" and n.severity in ("bad", "warning")]
     times = [f"{time:.0f} s" for time in sorted(n.values.get("time", 0.0) for n in steps)]
-    at = f"bias step{'s' if times[1:] else ''} at {_listed(times)}" if times else ""
+    at = f"bias step{'s' if times[1:] else ''} at {_listed(times, 2)}" if times else ""
     if cause is None and any(n.severity == "bad" for n in steps):
         return at
     return ", ".join(
@@ -186,24 +215,28 @@ def reason(name: str, calibration: Calibration) -> str:
 
 def _filter(calibration: Calibration) -> list[str]:
     """N and K of each sensor by key, the start bias, and what else they cover."""
-    lines, starts, largest = [], [], (0.0, "")
-    for quantity in SENSORS:
+    lines, starts, covered = [], [], []
+    for quantity in (q for q in SENSORS if q in {f.wv.quantity for f in calibration.values()}):
         fits = {name: fit for name, fit in calibration.items() if fit.wv.quantity == quantity}
         try:
-            values = filter_values(triad_of(quantity, fits)) if fits else {}
+            triad = triad_of(quantity, fits)
         except InputError as error:
             lines += wrapped(f"no filter numbers: {error}", f"{quantity:<6} ", 7)[:2]
             continue
-        for letter in KEYS if values else ():
+        values = filter_values(triad)
+        for letter in KEYS:
             row = f"{filter_key(quantity, letter):<27}  filter {letter} {values[letter]}"
-            lines.append(f"{row:<62}  {use(fits)}".rstrip())
-        starts += [f"{quantity} {values['start']}"] if values and values["start"][0] != "0" else []
-        largest = max(largest, covers(fits))
+            lines.append(f"{row:<62}  {use(fits, letter)}".rstrip())
+        starts += [f"{quantity} {values['start']}"] if values["start"][0] != "0" else []
+        if use(fits, "K") != "do not use":
+            covered += wrapped(covers(triad, calibration.numbers), indent=2)
     if not lines:
         return []
     if starts:
-        lines += wrapped(f"start bias, 1 sigma (add turn-on bias): {', '.join(starts)}", indent=2)
-    return [_FILTER.format(SHOWN), *lines, *wrapped(largest[1], indent=2)]
+        short = is_short(calibration.values(), SHOWN)
+        what = "too short: do not use" if short else "add turn-on bias"
+        lines += wrapped(f"start bias, 1 sigma ({what}): {', '.join(starts)}", indent=2)
+    return [_FILTER.format(SHOWN), *lines, *covered]
 
 
 def filter_key(quantity: str, letter: str) -> str:
@@ -221,42 +254,33 @@ def filter_values(triad: Triad) -> dict[str, str]:
     return texts
 
 
-def use(fits: Mapping[str, Fit]) -> str:
-    """Whether the numbers for all axes of a sensor can be used; empty if nothing is wrong."""
-    states = {state(fit) for fit in fits.values()}
-    return "do not use" if "not valid" in states else "usable *" * ("inflated" in states)
+def use(fits: Mapping[str, Fit], letter: str = "N") -> str:
+    """Whether N or K for all axes of a sensor can be used; empty if nothing is wrong."""
+    states, short = {state(fit) for fit in fits.values()}, is_short(fits.values(), SHOWN)
+    if "not valid" in states or (short and letter != "N"):
+        return "do not use"
+    return "usable *" if "reserved" in states else "usable" * short
 
 
 def unusable(fits: Mapping[str, Fit]) -> str:
     """For which axes the numbers of a sensor are not to be used yet; empty if for none."""
     invalid = [name for name, fit in fits.items() if not fit.valid]
     verb = "are" if len(invalid) > 1 else "is"
-    return f"do not use yet: {_listed(invalid)} {verb} not valid" if invalid else ""
+    short = f"use N alone: too short for {SHOWN:g} s" * is_short(fits.values(), SHOWN)
+    return f"do not use yet: {_listed(invalid)} {verb} not valid" if invalid else short
 
 
-def covers(fits: Mapping[str, Fit]) -> tuple[float, str]:
-    """Share of the largest slow term that the numbers of a sensor cover, and its text."""
-    return max(_covered(fits), default=(0.0, ""))
-
-
-def _covered(fits: Mapping[str, Fit]) -> Iterator[tuple[float, str]]:
-    """Slow terms that N or K cover: the share, and what covers which."""
-    for name, fit in fits.items():
-        shares: dict[str, dict[str, float]] = {}
-        for notice in bound(fits, horizon=SHOWN, shared=True)[name].notices:
-            letter = {"more-than-white-noise": "N", "more-than-random-walk": "K"}.get(notice.code)
-            for label, share in notice.values.items() if letter else ():
-                shares.setdefault(label, {})[letter or ""] = share
-        for label, by_letter in shares.items():
-            term = fit.model.terms[fit.model.term_labels().index(label)]
-            size, tau = term.linear_parameter, term.values.get("tau")
-            if term.is_band_limited or term.is_white or size is None:
-                continue
-            text = quantity_text(term.values[size.name] or 0.0, size.unit, fit)["field"]
-            text = f"{label.rstrip(' 0123456789')}, {text}"
-            text += f", tau {brief(tau)} s" if tau else ""
-            letters = f"filter {', '.join(sorted(by_letter, key='NK'.index))} raised to cover"
-            yield max(by_letter.values()), f"{letters} {text} ({name})"
+def covers(triad: Triad, numbers: SensorNumbers) -> str:
+    """The largest term that makes N or K exceed the table's, in a line; empty if none does."""
+    excess = []
+    for letter in KEYS:
+        own = max(getattr(numbers[axis.name], letter).value for axis in triad.axes)
+        ratio = getattr(triad, letter) / own if own else np.inf
+        axis = max(triad.axes, key=lambda each: float(getattr(each, letter)))
+        times = f", {brief(ratio)} times the table's," if own else ""
+        text = f"{triad.quantity} {letter}{times} also carries {axis.covers}"
+        excess.append((ratio, f"{text} ({_shortened(axis.name, _NAME)})" if axis.covers else ""))
+    return max(excess)[1] if max(excess)[0] > _NOTABLE else ""
 
 
 # -- what to do ------------------------------------------------------------------------------------
@@ -269,17 +293,22 @@ def actions(calibration: Calibration) -> list[str]:
     """
     groups: dict[str, list[Notice]] = {}
     found = [each for each in findings(calibration) if each.severity in ("bad", "warning")]
-    found.sort(key=lambda n: (not n.issue.spoils, n.issue.topic != "departure"))
+    units = [each for each in found if each.issue.lacks == "units_agree"]
+    found.sort(key=lambda n: (n not in units, not n.issue.spoils, n.code not in _DEPARTURES))
     departed = any(each.issue.topic == "departure" for each in found)
     for notice in worst_first(found):
-        topic = notice.issue.topic
+        key = "departure" if notice.code in _DEPARTURES else notice.code
         done = notice.code in _DONE and notice.severity != "bad"
         if not done and not (departed and notice.code == "unsteady"):  # that is the cause
-            groups.setdefault(topic if topic == "departure" else notice.code, []).append(notice)
+            groups.setdefault(key, []).append(notice)
     texts = [_action(group, calibration) for group in groups.values()]
     length = length_sentence(calibration, SHOWN)
-    if length.startswith("too short") and any(fit.valid for fit in calibration.values()):
-        texts[_ACTIONS - 1 :] = [f"later, {length.removeprefix('too short ')}"]
+    if not any(fit.valid for fit in calibration.values()):
+        return texts[:_ACTIONS]
+    if is_short(calibration.values(), SHOWN):
+        texts.insert(bool(units), _SHORT.format(SHOWN))
+    elif length and not length.startswith("long enough"):
+        texts[_ACTIONS - 1 :] = [f"optional: {length}"]
     return texts[:_ACTIONS]
 
 
@@ -296,23 +325,24 @@ def _to_do(texts: Sequence[str], most: int) -> list[str]:
 
 def _action(group: Sequence[Notice], calibration: Calibration) -> str:
     """What was found, where, and what to do."""
-    first, parameters = group[0], dict.fromkeys(n.where.partition(" ")[2] for n in group)
+    first = max(group, key=lambda n: n.values.get("ratio", 0.0))
+    parameters = dict.fromkeys(n.where.partition(" ")[2] for n in group)
     said = {place.partition(" ")[0] for each in group for place in each.where.split(", ")}
+    said |= {name for name, fit in calibration.items() if fit.wv.quantity in said}
     where = _places(said, calibration) or _shortened(first.where, _SOURCE)
     if first.issue.topic == "fit" and any(parameters):
         where = f"{', '.join(filter(None, parameters))} of {where}"
-    text, hint = first.text.partition("; ")[0], first.hint
+    text, hint = _whole(first.text.partition("; ")[0], _TEXT), first.hint
     hint = hint if len(hint) < WIDTH else hint.partition("; ")[0]
-    while len(text) > _TEXT and (", " in text or ": " in text):
-        text = text.rpartition(", " if ", " in text else ": ")[0]
-    if first.issue.topic == "departure":
+    if first.code in _DEPARTURES:
         kinds: dict[str, set[str]] = {}
         for each in group:
             kinds.setdefault(_DEPARTURES[each.code], set()).add(each.where.partition(" ")[0])
         where = "; ".join(f"{kind}: {_places(on, calibration)}" for kind, on in kinds.items())
         return "; ".join(filter(None, [where, hint]))
     if len({notice.text for notice in group}) > 1:
-        text = first.issue.reason or f"{text}, and more"
+        own = _places({*first.where.split(", ")}, calibration)
+        text = first.issue.reason or f"{text} in {own}"
     if not hint and first.severity == "bad":
         hint = "look at the plot in the report"
     return "; ".join(filter(None, [f"{where}: {text}" if where else text, hint]))

@@ -104,7 +104,7 @@ def test_a_gyro_in_another_unit_is_suspected(write, true, read_as, quality, is_g
     )
     units = {"gyro": read_as, "accel": "g"} if is_given else None
     (found,) = notices(read(path, rate=100.0, units=units))
-    assert (found.code, found.severity) == ("gyro-unit", "warning")
+    assert (found.code, found.severity) == ("gyro-unit", "bad")
     # Of milli-degrees per second and degrees per hour there is a factor of 3.6 between.
     assert true in found.hint
     assert factor(found.values["likely"], true) == pytest.approx(1.0, abs=0.75)

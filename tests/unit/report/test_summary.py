@@ -152,27 +152,63 @@ def test_all_places_show_the_same_digits(two, tmp_path):
 
 
 def test_the_verdict_counts_the_axes(two):
-    assert summary_text(two).startswith("bench.csv: 80 s at 100 Hz. Both axes are usable.\n")
+    assert summary_text(two).startswith(
+        "bench.csv: 80 s at 100 Hz. Both axes are usable. Too short"
+    )
     bad = with_defects(two)
     assert "No axis is usable." in summary_text(bad)
     one = replace(two, fits={**two.fits, "accel_x": bad["accel_x"]})
     assert "Usable: gyro_z. Not valid: accel_x." in summary_text(one)
-    assert re.search(r"^accel_x +not valid: bias steps at 30 s, 31 s, 32 s and 2 more$",
+    assert re.search(r"^accel_x +not valid: bias steps at 30 s and 4 more$",
                      summary_text(one), re.MULTILINE)  # fmt: skip
     states = dict(re.findall(r"^(\S+) +filter .*?(do not use|$)", summary_text(one), re.MULTILINE))
     assert [states[KEYS[each][0]] for each in UNITS] == ["", "do not use"]
     steps = replace(bad["accel_x"].notices[-10], severity="warning")
     inflated = replace(two["accel_x"], notices=(steps,))
     text = summary_text(replace(two, fits={**two.fits, "accel_x": inflated}))
-    assert "Usable: gyro_z. Usable, but B and K inflated (*): accel_x." in " ".join(text.split())
+    assert "Usable: gyro_z. Usable with reservation (*): accel_x." in " ".join(text.split())
     assert re.search(r"^accel_x\* ", text, re.MULTILINE)
-    assert len(re.findall(r"^accelerometer_.* usable \*$", text, re.MULTILINE)) == 2
+    assert len(re.findall(r"^accelerometer_noise.* usable \*$", text, re.MULTILINE)) == 1
 
 
 def test_departures_come_first_and_once(two):
     lines = summary_text(with_defects(two)).partition("What to do")[2].splitlines()[1:]
     assert lines[0].startswith("1. bias steps: gyro_z and accel_x; ")
     assert sum("bias step" in line for line in lines) == 1
+
+
+def with_notice(calibration, code, severity, **words):
+    values = {key: words[key] for key in ("removable", "ratio", "alike") if key in words}
+    found = gmwm.issues.notice(code, "", values, severity=severity, **words)
+    fits = {n: replace(f, notices=(found, *f.notices)) for n, f in calibration.items()}
+    return replace(calibration, fits=fits)
+
+
+def test_a_wrong_unit_comes_before_steps():
+    cal = gmwm.calibrate(of(*axes()[:1]), {"": WALK.opened()})
+    unit = with_notice(with_defects(cal), "gyro-unit", "bad", variant="noise", size=2.1,
+                       alike="deg/s", explained="")  # fmt: skip
+    text = printed(unit)
+    assert "No axis is usable." in text
+    assert re.search(r"^gyro_x +not valid: likely another gyro unit", text, re.MULTILINE)
+    (first,) = re.findall(r"^1\. (.*\n.*)", text, re.MULTILINE)
+    assert "use --gyro-unit deg/s" in " ".join(first.split())
+
+
+def test_what_would_recur_leaves_a_reservation(two):
+    text = printed(
+        with_notice(two, "departures-removed", "warning", tau=20.0, times="4.3", ratio=4.3)
+    )
+    assert "Usable with reservation (*): all axes" in text or "(*): gyro_z and accel_x" in text
+    assert "is 4.3 times as large" in " ".join(text.split())
+
+
+def test_of_a_short_record_only_n_is_usable(two):
+    text = printed(two)
+    assert re.search(r"^1\. too short for 60 s outages: use N alone", text, re.MULTILINE)
+    for quantity in UNITS:
+        for key, word in zip(KEYS[quantity], ("usable", "do not use"), strict=True):
+            assert re.search(rf"^{key} .*  {word}$", text, re.MULTILINE)
 
 
 def test_white_noise_behind_a_low_pass_is_one_row(capsys):
