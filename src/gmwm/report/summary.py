@@ -59,13 +59,16 @@ def summary_text(calibration: Calibration, files: Iterable[str] = ()) -> str:
     files : iterable of str, optional
         Lines about the files that were written.
     """
-    parts = [wrapped(verdict_line(calibration)), [], _filter(calibration), [], list(files)]
-    left = _LINES - sum(len(part) + 1 for part in (parts[0], parts[2], parts[4]) if part)
-    texts = actions(calibration)
-    least = len(_to_do(texts[:1], left))
-    many = min(len(_to_do(texts, left)), _FEWEST + 1) if len(calibration) > _AXES else 0
-    parts[1] = _sensor(calibration, left - 1 - max(least, many))
-    parts[3] = _to_do(texts, left - len(parts[1]) - 1)
+    first, last, texts = wrapped(verdict_line(calibration)), list(files), actions(calibration)
+    for is_explained in (True, False):  # rather every axis than what the numbers cover
+        numbers = _filter(calibration, is_explained)
+        left = _LINES - sum(len(part) + 1 for part in (first, numbers, last) if part)
+        least = len(_to_do(texts[:1], left))
+        many = min(len(_to_do(texts, left)), _FEWEST + 1) if len(calibration) > _AXES else 0
+        table = _sensor(calibration, left - 1 - max(least, many))
+        if all(any(line.startswith(name) for line in table) for name in calibration):
+            break
+    parts = [first, table, numbers, _to_do(texts, left - len(table) - 1), last]
     return "\n\n".join("\n".join(part) for part in parts if part)
 
 
@@ -213,8 +216,8 @@ def reason(name: str, calibration: Calibration) -> str:
 # -- filter numbers --------------------------------------------------------------------------------
 
 
-def _filter(calibration: Calibration) -> list[str]:
-    """N and K of each sensor by key, the start bias, and what else they cover."""
+def _filter(calibration: Calibration, is_explained: bool) -> list[str]:
+    """N and K of each sensor by key, the start bias, and if explained, what else they cover."""
     lines, starts, covered = [], [], []
     for quantity in (q for q in SENSORS if q in {f.wv.quantity for f in calibration.values()}):
         fits = {name: fit for name, fit in calibration.items() if fit.wv.quantity == quantity}
@@ -228,7 +231,7 @@ def _filter(calibration: Calibration) -> list[str]:
             row = f"{filter_key(quantity, letter):<27}  filter {letter} {values[letter]}"
             lines.append(f"{row:<62}  {use(fits, letter)}".rstrip())
         starts += [f"{quantity} {values['start']}"] if values["start"][0] != "0" else []
-        if use(fits, "K") != "do not use":
+        if is_explained and use(fits, "K") != "do not use":
             covered += wrapped(covers(triad, calibration.numbers), indent=2)
     if not lines:
         return []
