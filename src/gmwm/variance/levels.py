@@ -249,8 +249,6 @@ class Levels:
     @property
     def width(self) -> FloatArray:
         """Number of samples in a coefficient, (J,)."""
-        if self.wavelet == "haar":
-            return 2.0 * self.averaging
         kind = known_wavelet(self.wavelet)
         return np.array([kind.width(j + 1) for j in range(self.averaging.size)], dtype=float)
 

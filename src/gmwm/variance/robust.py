@@ -57,7 +57,6 @@ from scipy import fft
 from scipy.optimize import brentq
 
 from gmwm._core.typing import FloatArray
-from gmwm.errors import InputError
 from gmwm.process import PSD, legendre, quadrature
 from gmwm.variance import tuning
 from gmwm.variance.covariance.haar import centred_pairs, dyadic_levels, haar_counts
@@ -112,10 +111,7 @@ def tuning_constant(efficiency: float = EFFICIENCY) -> float:
 
     efficiency: Variance of the classical estimate over that of the robust one, for independent
         Gaussian coefficients; between 0 and 1.
-    Raises InputError for an efficiency outside (0, 1).
     """
-    if not 0.0 < efficiency < 1.0:
-        raise InputError(f"efficiency = {efficiency!r}: give a number between 0 and 1, e.g. 0.6")
     root = np.sqrt(efficiency)
     if root >= _root_of_efficiency(_LARGEST_C):
         return _LARGEST_C
@@ -136,18 +132,12 @@ def robust_variance(coefficients: FloatArray, efficiency: float = EFFICIENCY) ->
     non-linear function of them. Independent uniform rounding errors give 15 % more than their
     variance, a level that holds nothing but a periodic line 40 % more.
 
-    coefficients: (M,), free of end effects, in u; at least one.
+    coefficients: (M,), finite, free of end effects, in u; at least one.
     efficiency: See `tuning_constant`.
-    Raises InputError for coefficients that are not one series of finite numbers, or an efficiency
-        outside (0, 1).
     """
     c = tuning_constant(efficiency)
     w = np.ascontiguousarray(coefficients, dtype=float)
-    if w.ndim != 1 or w.size == 0:
-        raise InputError(f"coefficients of shape {w.shape}: give one series of 1 or more")
     largest = max(float(np.max(w)), -float(np.min(w)))
-    if not np.isfinite(largest):
-        raise InputError("the coefficients hold NaN or infinite values: remove or repair them")
     if largest == 0.0:
         return 0.0
     scale = _start(w, largest)
@@ -235,10 +225,9 @@ class _Grid:
     """Lags and frequencies for some levels and the coarser ones within reach.
 
     block: Samples between lags.
-    first, own, size: First level, number of levels whose pairs are summed here, number of levels in
-        all.
+    first, own: First level, and number of levels whose pairs are summed here.
     frequency: (L,), cycles per block.
-    amplitude: (size, L), gain of each level over its phase, on means of blocks.
+    amplitude: (K, L), gain of each level over its phase, on means of blocks.
     weight: (own, tuning.ROBUST_REACH + 1, L), share of the pairs of coefficients at each lag, both
         signs together, for each level and the ones from itself on.
     """
@@ -246,7 +235,6 @@ class _Grid:
     block: int
     first: int
     own: int
-    size: int
     frequency: FloatArray
     amplitude: FloatArray
     weight: FloatArray
@@ -278,34 +266,11 @@ def _grids(n: int, levels: int) -> tuple[_Grid, ...]:
         for j in range(own):
             for k in range(j, min(j + reach + 1, size)):
                 weight[j, k - j] = pair_shares(n, m[first + j], m[first + k], block, lags)
-        grids.append(_Grid(block, first, own, size, frequency, amplitude, weight))
+        grids.append(_Grid(block, first, own, frequency, amplitude, weight))
         first += own
         own = min(tuning.ROBUST_LEVELS_PER_GRID, m.size - first)
         block = int(m[first]) // tuning.ROBUST_BLOCKS_PER_AVERAGE if own else 0
     return tuple(grids)
-
-
-def excess_correlation(
-    amplitude: FloatArray, density: FloatArray, weight: FloatArray, series: FloatArray
-) -> FloatArray:
-    """Weighted sums over lags of ``series`` in the even powers, from 4, of the correlation.
-
-    amplitude: (K, L), zero-phase gains of the levels at L frequencies in the middle of their bins.
-    density: (L,), spectrum there.
-    weight: (O, D, L), of the lags 0 .. L-1 for level j < O and level j + d.
-    series: (P,), see `excess_series`.
-    Returns: (O, D).
-    """
-    deviation = np.sqrt(np.maximum(2.0 * amplitude**2 @ density, np.finfo(float).tiny))
-    scaled = amplitude / deviation[:, None]
-    weighted = scaled * density
-    own, reach, _ = weight.shape
-    result = np.zeros((own, reach))
-    for j in range(own):
-        correlation = fft.dct(weighted[j] * scaled[j : j + reach], type=2, axis=-1)
-        for d, row in enumerate(correlation):
-            result[j, d] = weighted_series(row, weight[j, d], series)
-    return result
 
 
 def _excess(psd: PSD, n: int, dt: float, series: FloatArray, levels: int) -> FloatArray:
@@ -313,11 +278,14 @@ def _excess(psd: PSD, n: int, dt: float, series: FloatArray, levels: int) -> Flo
     result = np.zeros((levels, levels))
     for grid in _grids(n, levels):
         density = block_density(psd, dt, grid.frequency, grid.block)
-        excess = excess_correlation(grid.amplitude, density, grid.weight, series)
+        power = np.maximum(2.0 * grid.amplitude**2 @ density, np.finfo(float).tiny)
+        scaled = grid.amplitude / np.sqrt(power)[:, None]
         for j in range(grid.own):
-            for d in range(min(tuning.ROBUST_REACH + 1, grid.size - j)):
+            product = scaled[j] * density * scaled[j : j + tuning.ROBUST_REACH + 1]
+            for d, correlation in enumerate(fft.dct(product, type=2, axis=-1)):
                 row, column = grid.first + j, grid.first + j + d
-                result[row, column] = result[column, row] = excess[j, d]
+                excess = weighted_series(correlation, grid.weight[j, d], series)
+                result[row, column] = result[column, row] = excess
     return result
 
 
@@ -347,8 +315,7 @@ def robust_covariance(
     classical: (J, J), covariance of the classical wavelet variances, u^4, of the first J levels of
         `dyadic_levels`. The result is at least that, and positive definite if that is.
     counts: (J,), numbers of coefficients, where samples are missing.
-    Raises InputError for an efficiency outside (0, 1), or a spectrum that is not finite and
-        non-negative.
+    Raises InputError for a spectrum that is not finite and non-negative.
     """
     levels = classical.shape[0]
     m = dyadic_levels(n)[:levels]

@@ -81,7 +81,12 @@ def wavelet_variance(
     if data_covariance is not None:
         checks.choice("data_covariance", data_covariance, WINDOWS)
     wavelet = "haar" if wavelet == "db1" else wavelet
-    _check_width(channel, runs, wavelet)
+    width = known_wavelet(wavelet).width(1)
+    if width > runs.longest:
+        raise InputError(
+            f"{where_of(channel)} has no {width} samples in a row, which {wavelet} needs: "
+            "take a shorter wavelet, e.g. haar"
+        )
     values = scaled(values, 1.0, -mean)
     levels = Levels.of(values, runs, wavelet)
     moments, scarcity = levels.moments()
@@ -122,15 +127,6 @@ def wavelet_variance(
         fourth_cumulant=0.0 if robust else fourth_cumulant(values),
         data_covariance=found,
     )
-
-
-def _check_width(channel: Channel, runs: Runs, wavelet: str) -> None:
-    width = known_wavelet(wavelet).width(1)
-    if width > runs.longest:
-        raise InputError(
-            f"{where_of(channel)} has no {width} samples in a row, which {wavelet} needs: "
-            "take a shorter wavelet, e.g. haar"
-        )
 
 
 def _robust_moments(parts: Iterable[FloatArray], efficiency: float) -> FloatArray:
@@ -262,10 +258,7 @@ def covariance_of_data(
         periodogram. "octave" averages the cross-spectra over an eighth of an octave first, a lag
         window whose length is proportional to the period: for long records.
     Returns: (J, J), u^4, positive semi-definite.
-    Raises InputError if ``window`` is unknown.
     """
-    if window not in WINDOWS:
-        raise InputError(f"window = {window!r}: choose from {', '.join(WINDOWS)}")
     size = fft.next_fast_len(longest, real=True)
     # The mean is not removed, frequency zero not left out: at coarse levels that would take most of
     # the power, and a level of no variance would have all the weight.
