@@ -26,8 +26,8 @@ polynomials of r = W/nu, orthogonal under the normal law,
 
     nu^2 (H_2(r) + b_4 H_4(r) + b_6 H_6(r) + ...),    b_q = (2 / q!) E[chi H_q] / E[chi H_2].
 
-The first term is the influence function of the classical variance. For coefficients of correlation
-rho, E[H_p H_q] = q! rho^q if p = q, else 0 (Mehler), so that for two levels
+The first term is that of the classical variance. With E[H_q H_q] = q! rho^q for coefficients of
+correlation rho (Mehler), for two levels
 
     cov_robust = cov_classical
                  + nu_j^2 nu_k^2 / (M_j M_k) sum_h c_jk(h) sum_{q=4,6,..} b_q^2 q! rho_jk(h)^q,
@@ -36,15 +36,12 @@ with c_jk(h) the number of pairs at lag h. For independent coefficients the sum 
 the classical variance over the efficiency. Each power of a correlation function is one itself
 (Schur), so the excess is positive semi-definite.
 
-The powers from the fourth on are local: two levels whose averaging times differ by 2^d have
-correlations of order 2^(-d/2), over a few times the longer averaging time, and share about
-2^(-3d/2) of the added variance (random walk) or less (2^(-5d/2) for white noise). Levels up to four
-apart are summed, on a common grid of lags. It is made of means over blocks of samples, which give
-the coefficients at every ``block``-th lag exactly; between these lags the sum of powers is taken as
-a straight line. Correlations are by cosine transform from frequencies in the middle of their bins:
-the transform then gives correlations less their first alias, and a spectrum that grows without
-bound towards zero frequency needs no care. Farther levels hardly matter unless one narrow resonance
-makes them all; they get a value of the right size.
+The powers from the fourth on are local: two levels whose averaging times differ by 2^d share about
+2^(-3d/2) of the added variance (random walk) or less. Levels up to four apart are summed, at lags
+of blocks of samples, whose means give these coefficients exactly; between these lags the sum of
+powers is taken as a straight line. Frequencies lie in the middle of their bins, so that a spectrum
+may grow without bound towards zero. Farther levels get a value of the right size, which matters
+only where one narrow resonance makes them all.
 """
 
 from __future__ import annotations
@@ -63,9 +60,7 @@ from gmwm.variance.covariance.haar import centred_pairs, dyadic_levels, haar_cou
 from gmwm.variance.covariance.lags import block_density
 from gmwm.variance.kernels import biweight_means, weighted_series
 
-EFFICIENCY = 0.6
-"""Efficiency at Gaussian data by default."""
-
+EFFICIENCY = 0.6  # at Gaussian data, by default
 _QUARTILE = 0.6744897501960817  # median of |Z|
 _TAIL = 13.0  # the normal density beyond is below double precision
 _NODES = 256

@@ -215,7 +215,7 @@ class StreamingVariance:
                     f"{bad[0]} (sample {self.n + bad[0]:,}): set it to NaN for missing"
                 )
         for series, column in zip(self._series, columns, strict=True):
-            series.absorb(column)
+            kernels.absorb(column, series.rows, series.sums, series.scratch)
 
     @property
     def channels(self) -> tuple[str, ...]:
@@ -327,17 +327,13 @@ class _Series:
         )
         limits = [kernels.REFERENCE, kernels.LOWEST, kernels.HIGHEST]
         self.sums.totals[limits] = np.nan, np.inf, -np.inf
-        self._scratch = np.empty((2, kernels.ROOM + 1))
-
-    def absorb(self, samples: FloatArray) -> None:
-        """Take in samples (n,), NaN where one is missing, none infinite."""
-        kernels.absorb(samples, self.rows, self.sums, self._scratch)
+        self.scratch = np.empty((2, kernels.ROOM + 1))
 
     def finished(self) -> _Series:
         """A copy with all samples worked off; it does not go on."""
         made = _Series()
         made.set(self.arrays())
-        kernels.work_off(1, made.rows, made.sums, made._scratch)
+        kernels.work_off(1, made.rows, made.sums, made.scratch)
         return made
 
     def arrays(self) -> dict[str, FloatArray]:

@@ -164,9 +164,7 @@ class Aiding:
 
     def without(self, outages: Iterable[Outage]) -> Aiding:
         """The same without the GNSS fixes of the outages."""
-        spans = [
-            (outage.start + tuning.SAME_TIME, outage.end - tuning.SAME_TIME) for outage in outages
-        ]
+        spans = [(o.start + tuning.SAME_TIME, o.end - tuning.SAME_TIME) for o in outages]
         result = []
         for fixes in self.fixes:
             kept = np.ones(fixes.time.size, dtype=bool)
