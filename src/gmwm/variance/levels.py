@@ -272,11 +272,9 @@ class Levels:
 
     def _masked(self, level: int) -> tuple[FloatArray, float]:
         """Coefficients of a level without the line, and their mean scarcity."""
-        found = np.empty(int(self.counts[level]))
-        m = int(self.averaging[level])
-        scarcity = kernels.masked_coefficients(
-            self._integral, self._there, self.edges[level], m, found
-        )
+        found, m = np.empty(int(self.counts[level])), int(self.averaging[level])
+        data = (self._integral, self._there, self.edges[level])
+        scarcity = kernels.masked_coefficients(*data, m, found)
         return found, scarcity / found.size
 
     def moments(self) -> tuple[FloatArray, FloatArray]:

@@ -140,10 +140,9 @@ class _LagSums:
         """Sums over the lags for a spectrum of block means, as `lag_sums` has them, (L, L)."""
         base = self.slopes * spectrum
         zero = np.outer(self.at_zero, self.at_zero * (spectrum[0] / self.grid.size))
-        found: tuple[FloatArray, FloatArray, FloatArray] = lag_sums(
-            self.grid.transform(base), self.averaging, zero, self.counts, self.weights
-        )
-        return found
+        once = self.grid.transform(base)
+        found = lag_sums(once, self.averaging, zero, self.counts, self.weights)
+        return found[0], found[1], found[2]
 
 
 @lru_cache(maxsize=16)  # recordings that are fitted jointly; 3 MB each
