@@ -20,8 +20,7 @@ from gmwm.variance.kernels import difference_powers, survey
 from gmwm.variance.levels import Levels
 from gmwm.variance.wavelet import WaveletVariance
 
-MIN_SAMPLES = 8
-"""Fewest samples for a wavelet variance."""
+MIN_SAMPLES = 8  # fewest for a wavelet variance
 
 
 def wavelet_variance(
@@ -81,12 +80,7 @@ def wavelet_variance(
     if data_covariance is not None:
         checks.choice("data_covariance", data_covariance, WINDOWS)
     wavelet = "haar" if wavelet == "db1" else wavelet
-    width = known_wavelet(wavelet).width(1)
-    if width > runs.longest:
-        raise InputError(
-            f"{where_of(channel)} has no {width} samples in a row, which {wavelet} needs: "
-            "take a shorter wavelet, e.g. haar"
-        )
+    _check_width(channel, runs, wavelet)
     values = scaled(values, 1.0, -mean)
     levels = Levels.of(values, runs, wavelet)
     moments, scarcity = levels.moments()
@@ -95,8 +89,7 @@ def wavelet_variance(
         moments = _robust_moments(levels.coefficients(), efficiency)
         level = _robust_moments(levels.coefficients(level=True), efficiency)[:, 1]
     added, change = levels.added(moments, scarcity, level)
-    least = moments[:, 1] / (1.0 + tuning.LARGEST_CHANGE)
-    variance = np.maximum(moments[:, 1] - added, least)
+    variance = np.maximum(moments[:, 1] - added, moments[:, 1] / (1.0 + tuning.LARGEST_CHANGE))
     blocks, block = levels.block_means()
     release(channel.values)
     found = None
@@ -127,6 +120,15 @@ def wavelet_variance(
         fourth_cumulant=0.0 if robust else fourth_cumulant(values),
         data_covariance=found,
     )
+
+
+def _check_width(channel: Channel, runs: Runs, wavelet: str) -> None:
+    width = known_wavelet(wavelet).width(1)
+    if width > runs.longest:
+        raise InputError(
+            f"{where_of(channel)} has no {width} samples in a row, which {wavelet} needs: "
+            "take a shorter wavelet, e.g. haar"
+        )
 
 
 def _robust_moments(parts: Iterable[FloatArray], efficiency: float) -> FloatArray:
