@@ -95,16 +95,16 @@ def bootstrap(fit: Fit, runs: int = 200, seed: int = 0) -> Bootstrap:
     at, root = fit.moments, _root(fit)
     design = Design(opened, at.scales)
     start = [shape_of(fit.model.terms[term.place]) for term in design.terms]
-    ramp = drift_key(fit.model)
+    ramp = str(drift_key(fit.model))
     slopes = np.zeros(runs)
     if ramp in fit.keys:
-        slopes = fit.params[str(ramp)] + fit.stderr[str(ramp)] * rng.standard_normal(runs)
+        slopes = fit.params[ramp] + fit.stderr[ramp] * rng.standard_normal(runs)
     for target, slope in zip(_targets(at, runs, rng), slopes, strict=True):
         profile = Profile(design, target, root)
         point = profile.refine(profile.at(start))
         fitted = Model(tuple(design.fitted_processes(point.x, point.shapes)))
         found = {key: float(value or 0.0) for key, value in fitted.params.items()}
-        draws.append(found | ({str(ramp): float(slope)} if ramp in fit.keys else {}))
+        draws.append(found | ({ramp: float(slope)} if ramp in fit.keys else {}))
     keys = tuple(key for key in fit.params if key in opened.params and opened.params[key] is None)
     table = np.array([[values.get(key, np.nan) for key in keys] for values in draws])
     return Bootstrap(keys, table)

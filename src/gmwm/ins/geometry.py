@@ -10,24 +10,12 @@ import numpy as np
 from gmwm._core.compiled import compiled
 from gmwm._core.typing import FloatArray
 
-RATE = 7.292115e-5
-"""Rotation rate, rad/s."""
-
-SEMI_MAJOR_AXIS = 6_378_137.0
-"""Equatorial radius, m."""
-
+RATE = 7.292115e-5  # of rotation, rad/s
+SEMI_MAJOR_AXIS = 6_378_137.0  # equatorial radius, m
 FLATTENING = 1.0 / 298.257223563
-"""Flattening of the ellipsoid."""
-
 ECCENTRICITY_SQUARED = FLATTENING * (2.0 - FLATTENING)
-"""Square of the ellipsoid's first eccentricity."""
-
-GRAVITATIONAL_CONSTANT = 3.986004418e14
-"""Of the Earth with its atmosphere, m^3/s^2."""
-
-STANDARD_GRAVITY = 9.80665
-"""m/s^2, the unit g."""
-
+GRAVITATIONAL_CONSTANT = 3.986004418e14  # of the Earth with its atmosphere, m^3/s^2
+STANDARD_GRAVITY = 9.80665  # m/s^2, the unit g
 _SEMI_MINOR_AXIS = SEMI_MAJOR_AXIS * (1.0 - FLATTENING)
 _EQUATORIAL_GRAVITY = 9.7803253359  # m/s^2
 _POLAR_GRAVITY = 9.8321849379  # m/s^2

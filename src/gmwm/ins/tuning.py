@@ -2,6 +2,7 @@
 
 import math
 
+SAME_TIME = 1e-6  # s: sums of sampling intervals are not exact
 COVARIANCE_STEP = 0.1  # s of the covariance: short against a manoeuvre and the time between fixes
 # m and m/s north, east and down, of fixes without their own: a good receiver in the open.
 POSITION_SD, VELOCITY_SD = (1.0, 1.0, 1.5), (0.1, 0.1, 0.15)

@@ -20,7 +20,6 @@ from gmwm.process.spectral import (
     PSD as PSD,
     Panels as Panels,
     evaluated as evaluated,
-    haar_gain as haar_gain,
     in_hertz as in_hertz,
     legendre as legendre,
     node_weights as node_weights,

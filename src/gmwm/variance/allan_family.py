@@ -32,24 +32,13 @@ if TYPE_CHECKING:
 _TAUS = {"octave": (1.0,), "decade": (1.0, 2.0, 4.0)}
 
 
-@dataclass(frozen=True)
-class _Kind:
-    """A deviation: its label in legends and its filter."""
-
-    label: str
-    filter: AllanFilter
-
-    def longest(self, n: int) -> int:
-        """Longest averaging time, in samples, with at least two terms."""
-        return (n - 1) // self.filter.reach
-
-
 _KINDS = {
-    "overlapping": _Kind("overlapping Allan", AllanFilter()),
-    "modified": _Kind("modified Allan", AllanFilter(modified=True)),
-    "hadamard": _Kind("overlapping Hadamard", AllanFilter(differences=2)),
-    "total": _Kind("total", AllanFilter(reflected=True)),
+    "overlapping": ("overlapping Allan", AllanFilter()),
+    "modified": ("modified Allan", AllanFilter(modified=True)),
+    "hadamard": ("overlapping Hadamard", AllanFilter(differences=2)),
+    "total": ("total", AllanFilter(reflected=True)),
 }
+"""Kind -> its label in legends and its filter."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,7 +118,7 @@ class Deviations:
 
         return plotting.deviations(
             {
-                _KINDS[kind].label: (
+                _KINDS[kind][0]: (
                     self.tau[kind],
                     factor * self.deviation[kind],
                     factor * self.lower[kind],
@@ -196,23 +185,23 @@ def deviations(
             "without any, or use gmwm.wavelet_variance, whose Allan deviation copes with gaps"
         )
     confidence = checks.share("confidence", confidence, 0.95)
-    chosen = _chosen_kinds(kinds)
     averaging = _averaging(tau, channel)
     centred = values - mean
     spectrum = Periodogram.of(centred)
     found: dict[str, list[FloatArray]] = {}
-    for name, kind in chosen.items():
-        longest = kind.longest(values.size)
+    for name in _chosen_kinds(kinds):
+        label, kind = _KINDS[name]
+        longest = (values.size - 1) // kind.reach  # with at least two terms
         m = averaging[averaging <= longest]
         if not m.size:
             raise InputError(
-                f"tau = {averaging[0] * channel.dt:g} s is too long for the {kind.label} deviation "
+                f"tau = {averaging[0] * channel.dt:g} s is too long for the {label} deviation "
                 f"of {values.size:,} samples: give at most {longest * channel.dt:g} s"
             )
         sizes = m.astype(int).tolist()
-        squares = [np.mean(kind.filter.applied(centred, each) ** 2) for each in sizes]
+        squares = [np.mean(kind.applied(centred, each) ** 2) for each in sizes]
         estimate = np.sqrt(squares)
-        found_dof = [allan_dof(kind.filter, spectrum, values.size, each) for each in sizes]
+        found_dof = [allan_dof(kind, spectrum, values.size, each) for each in sizes]
         dof, bias = np.maximum(np.array(found_dof).T, tuning.LEAST_DOF_OF_FAMILY)
         found[name] = [m * channel.dt, estimate]
         for probability in (0.5 + 0.5 * confidence, 0.5 - 0.5 * confidence):
@@ -234,7 +223,7 @@ def deviations(
     )
 
 
-def _chosen_kinds(kinds: Sequence[str]) -> dict[str, _Kind]:
+def _chosen_kinds(kinds: Sequence[str]) -> list[str]:
     if not isinstance(kinds, Iterable):
         raise InputError(f"kinds = {kinds!r}: choose from {', '.join(_KINDS)}")
     names = [kinds] if isinstance(kinds, str) else list(kinds)
@@ -243,7 +232,7 @@ def _chosen_kinds(kinds: Sequence[str]) -> dict[str, _Kind]:
             raise InputError(f"kind {name!r} is not known: choose from {', '.join(_KINDS)}")
     if not names:
         raise InputError(f"no kind of deviation is given: choose from {', '.join(_KINDS)}")
-    return {name: _KINDS[name] for name in names}
+    return list(dict.fromkeys(names))
 
 
 def _averaging(tau: str | Sequence[float] | FloatArray, channel: Channel) -> FloatArray:

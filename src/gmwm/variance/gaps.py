@@ -207,8 +207,7 @@ def common_share(centres: Sequence[IntArray], width: FloatArray, n: int) -> Floa
     For two levels the number of common centres over the geometric mean of both numbers, counted
     where a record of n samples without gaps has centres of both: 1 there, positive semi-definite.
     """
-    size = len(centres)
-    common = np.eye(size)
+    common = np.eye(len(centres))
     for k, second in enumerate(centres):
         whole = window_centres(np.array([[0, n]]), int(width[k]))
         number = pairs_at_lag(second, second, 0)

@@ -13,7 +13,7 @@ import numpy as np
 from gmwm._core.distributions import student
 from gmwm._core.typing import BoolArray, FloatArray, IntArray, inner
 from gmwm.process import PSD, Panels, node_weights, wavelet as known_wavelet
-from gmwm.variance import tuning
+from gmwm.variance import kernels, tuning
 from gmwm.variance.covariance.haar import dyadic_levels
 from gmwm.variance.gaps import (
     GapEffects,
@@ -26,16 +26,6 @@ from gmwm.variance.gaps import (
     unmasked,
     window_centres,
     window_count,
-)
-from gmwm.variance.kernels import (
-    ROW,
-    coarse_moments,
-    cumulative,
-    fine_moments,
-    haar_coefficients,
-    lagged_squares,
-    masked_coefficients,
-    slope,
 )
 from gmwm.variance.modwt import coefficients
 
@@ -117,14 +107,14 @@ def haar_moments(
     """Mean and mean square of the Haar MODWT coefficients that lie within runs, (L, 2).
 
     values: (n,), about their mean.
-    integral: (n + 1,), their cumulative sum, starting with 0.
+    integral: (n + 1,), their kernels.cumulative sum, starting with 0.
     runs: (P, 2), first sample of each run, and the one after its last.
     averaging: (L,), averaging times in samples: powers of two in a row, each with a coefficient.
     """
     m = averaging.astype(np.int64)
     first = int(m[0]).bit_length() - 1
-    fine = m[m < ROW]
-    coarse = m[m >= ROW]
+    fine = m[m < kernels.ROW]
+    coarse = m[m >= kernels.ROW]
     long = runs[runs[:, 1] - runs[:, 0] >= 2 * m[0]]
     levels = first + fine.size
 
@@ -133,10 +123,12 @@ def haar_moments(
         for start, stop in long.tolist():
             edges = [start + (stop - start) * i // parts for i in (part, part + 1)]
             if fine.size:
-                fine_moments(values, edges[0], edges[1], stop, levels, found[:levels])
+                kernels.fine_moments(values, edges[0], edges[1], stop, levels, found[:levels])
             if coarse.size and stop - start >= 2 * coarse[0]:
-                columns = (ROW * part // parts, ROW * (part + 1) // parts)
-                coarse_moments(integral, start, stop, columns, coarse, found[first + fine.size :])
+                columns = (kernels.ROW * part // parts, kernels.ROW * (part + 1) // parts)
+                kernels.coarse_moments(
+                    integral, start, stop, columns, coarse, found[first + fine.size :]
+                )
         return found[first:]
 
     has_affinity = hasattr(os, "sched_getaffinity")  # not on Windows
@@ -164,9 +156,9 @@ def level_changes(values: FloatArray, runs: Runs) -> BoolArray:
     m = dyadic_levels(runs.longest)
     counts = np.array([window_count(runs.edges, 2.0 * each) for each in m])
     m = m[: max(int(np.sum(np.cumprod(counts >= 2.0 * tuning.PILOT_WINDOWS * m))), 1)]
-    sums = cumulative(values, 0.0)
+    sums = kernels.cumulative(values, 0.0)
     mean, square = haar_moments(values, sums, runs.edges, m).T
-    drift = slope(values, runs.edges[:, 0])
+    drift = kernels.slope(values, runs.edges[:, 0])
     noise = np.pad(square - drift * m * mean + (0.5 * drift * m) ** 2, 1, mode="edge")
     noise = np.maximum(np.maximum(noise[:-2], noise[2:]), noise[1:-1])
     there = np.zeros(values.size + 1, dtype=np.int64)
@@ -228,7 +220,7 @@ class Levels:
 
         The line jumps in gaps in which the level does.
         """
-        return slope(self.values, self.runs.edges[np.append(True, self.apart), 0])
+        return kernels.slope(self.values, self.runs.edges[np.append(True, self.apart), 0])
 
     @property
     def _step(self) -> FloatArray:
@@ -249,8 +241,6 @@ class Levels:
     @property
     def width(self) -> FloatArray:
         """Number of samples in a coefficient, (J,)."""
-        if self.wavelet == "haar":
-            return 2.0 * self.averaging
         kind = known_wavelet(self.wavelet)
         return np.array([kind.width(j + 1) for j in range(self.averaging.size)], dtype=float)
 
@@ -270,8 +260,8 @@ class Levels:
     def _integral(self) -> FloatArray:
         """Cumulative sum of the series; where coefficients contain gaps, without its line."""
         if self.plain == self.averaging.size:
-            return cumulative(self.values, 0.0)
-        return cumulative(self.values - self.slope * np.arange(self.runs.n), 0.0)
+            return kernels.cumulative(self.values, 0.0)
+        return kernels.cumulative(self.values - self.slope * np.arange(self.runs.n), 0.0)
 
     @cached_property
     def _there(self) -> IntArray:
@@ -282,9 +272,9 @@ class Levels:
 
     def _masked(self, level: int) -> tuple[FloatArray, float]:
         """Coefficients of a level without the line, and their mean scarcity."""
-        found = np.empty(int(self.counts[level]))
-        m = int(self.averaging[level])
-        scarcity = masked_coefficients(self._integral, self._there, self.edges[level], m, found)
+        found, m = np.empty(int(self.counts[level])), int(self.averaging[level])
+        data = (self._integral, self._there, self.edges[level])
+        scarcity = kernels.masked_coefficients(*data, m, found)
         return found, scarcity / found.size
 
     def moments(self) -> tuple[FloatArray, FloatArray]:
@@ -297,7 +287,7 @@ class Levels:
             return np.array([(np.mean(w), np.mean(w * w)) for w in self.coefficients()]), scarcity
         moments = np.empty((self.averaging.size, 2))
         whole = self.plain == self.averaging.size
-        integral = self._integral if whole else cumulative(self.values, 0.0)
+        integral = self._integral if whole else kernels.cumulative(self.values, 0.0)
         plain = self.averaging[: self.plain]
         moments[: plain.size] = haar_moments(self.values, integral, self.runs.edges, plain)
         for j in range(self.plain, self.averaging.size):
@@ -319,10 +309,12 @@ class Levels:
             for _ in range(number):
                 yield np.concatenate([next(part, np.zeros(0)) for part in parts])
             return
-        own = cumulative(self.values - line, 0.0)
+        own = kernels.cumulative(self.values - line, 0.0)
         for j, m in enumerate(self.averaging.astype(int).tolist()):
             if j < self.plain:
-                yield np.concatenate([haar_coefficients(own, a, b, m) for a, b in self.edges[j]])
+                yield np.concatenate(
+                    [kernels.haar_coefficients(own, a, b, m) for a, b in self.edges[j]]
+                )
             else:
                 yield self._masked(j)[0] + (0.0 if level else self._step[j])
 
@@ -342,7 +334,7 @@ class Levels:
         longest = self._longest_gap * self.averaging
         lags = lags_to(int(np.max(gaps, initial=1, where=gaps < longest[-1])))
         parts = bridged(there, self.apart, np.inf)
-        squares = lagged_squares(self.values, parts, lags, self.slope)
+        squares = kernels.lagged_squares(self.values, parts, lags, self.slope)
         squares *= 4.0 * square[0] / max(squares[1], np.finfo(float).tiny)  # robust ones are others
 
         def spread(finer: FloatArray) -> float:

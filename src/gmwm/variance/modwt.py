@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -65,11 +64,10 @@ def modwt(x: FloatArray, wavelet: str = "haar", levels: int | None = None) -> Mo
     n = smooth.size
     count, most = max(filters.levels(n), 1), n.bit_length()
     if levels is not None:
-        if not (_is_count(levels) and levels <= most):
-            raise InputError(
-                f"levels = {levels!r}: give an integer from 1 to {most} for {n} samples"
-            )
-        count = int(levels)
+        hint = f"give an integer from 1 to {most} for {n} samples"
+        count = checks.whole("levels", levels, 1, hint)
+        if count > most:
+            raise InputError(f"levels = {levels!r}: {hint}")
     detail = np.zeros((count, n))
     for row in range(count):
         detail[row] = _circular(smooth, filters.detail, 1 << row)
@@ -111,24 +109,18 @@ def imodwt(detail: FloatArray, smooth: FloatArray, wavelet: str = "haar") -> Flo
     return result
 
 
-def coefficients(
-    values: FloatArray, wavelet: str, levels: int | None = None
-) -> Iterator[FloatArray]:
+def coefficients(values: FloatArray, wavelet: str, levels: int = 64) -> Iterator[FloatArray]:
     """Wavelet coefficients free of end effects, level by level; one level at a time is in memory.
 
     values: (n,), finite numbers.
-    levels: At most so many; by default all that have such a coefficient. A short series has fewer.
+    levels: At most so many. A short series has fewer that have such a coefficient.
     Yields: (n - width(j) + 1,), of level j = 1, 2, ..., in the order of time; element i stems from
         samples i to i + width(j) - 1.
-    Raises InputError for a series that cannot be used, an unknown wavelet, or no number of levels.
+    Raises InputError for a series that cannot be used, or an unknown wavelet.
     """
     filters = wavelet_of(wavelet)
     smooth = _series(values)
-    count = filters.levels(smooth.size)
-    if levels is not None:
-        if not _is_count(levels):
-            raise InputError(f"levels = {levels!r}: give an integer from 1")
-        count = min(count, int(levels))
+    count = min(filters.levels(smooth.size), levels)
 
     def level_by_level(smooth: FloatArray) -> Iterator[FloatArray]:
         for row in range(count):
@@ -169,8 +161,3 @@ def _series(x: FloatArray) -> FloatArray:
             "remove or repair them"
         )
     return values
-
-
-def _is_count(levels: Any) -> bool:
-    whole = isinstance(levels, int | np.integer) and not isinstance(levels, bool)
-    return whole and int(levels) >= 1

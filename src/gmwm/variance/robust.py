@@ -26,8 +26,8 @@ polynomials of r = W/nu, orthogonal under the normal law,
 
     nu^2 (H_2(r) + b_4 H_4(r) + b_6 H_6(r) + ...),    b_q = (2 / q!) E[chi H_q] / E[chi H_2].
 
-The first term is the influence function of the classical variance. For coefficients of correlation
-rho, E[H_p H_q] = q! rho^q if p = q, else 0 (Mehler), so that for two levels
+The first term is that of the classical variance. With E[H_q H_q] = q! rho^q for coefficients of
+correlation rho (Mehler), for two levels
 
     cov_robust = cov_classical
                  + nu_j^2 nu_k^2 / (M_j M_k) sum_h c_jk(h) sum_{q=4,6,..} b_q^2 q! rho_jk(h)^q,
@@ -36,15 +36,12 @@ with c_jk(h) the number of pairs at lag h. For independent coefficients the sum 
 the classical variance over the efficiency. Each power of a correlation function is one itself
 (Schur), so the excess is positive semi-definite.
 
-The powers from the fourth on are local: two levels whose averaging times differ by 2^d have
-correlations of order 2^(-d/2), over a few times the longer averaging time, and share about
-2^(-3d/2) of the added variance (random walk) or less (2^(-5d/2) for white noise). Levels up to four
-apart are summed, on a common grid of lags. It is made of means over blocks of samples, which give
-the coefficients at every ``block``-th lag exactly; between these lags the sum of powers is taken as
-a straight line. Correlations are by cosine transform from frequencies in the middle of their bins:
-the transform then gives correlations less their first alias, and a spectrum that grows without
-bound towards zero frequency needs no care. Farther levels hardly matter unless one narrow resonance
-makes them all; they get a value of the right size.
+The powers from the fourth on are local: two levels whose averaging times differ by 2^d share about
+2^(-3d/2) of the added variance (random walk) or less. Levels up to four apart are summed, at lags
+of blocks of samples, whose means give these coefficients exactly; between these lags the sum of
+powers is taken as a straight line. Frequencies lie in the middle of their bins, so that a spectrum
+may grow without bound towards zero. Farther levels get a value of the right size, which matters
+only where one narrow resonance makes them all.
 """
 
 from __future__ import annotations
@@ -57,16 +54,13 @@ from scipy import fft
 from scipy.optimize import brentq
 
 from gmwm._core.typing import FloatArray
-from gmwm.errors import InputError
 from gmwm.process import PSD, legendre, quadrature
 from gmwm.variance import tuning
 from gmwm.variance.covariance.haar import centred_pairs, dyadic_levels, haar_counts
 from gmwm.variance.covariance.lags import block_density
 from gmwm.variance.kernels import biweight_means, weighted_series
 
-EFFICIENCY = 0.6
-"""Efficiency at Gaussian data by default."""
-
+EFFICIENCY = 0.6  # at Gaussian data, by default
 _QUARTILE = 0.6744897501960817  # median of |Z|
 _TAIL = 13.0  # the normal density beyond is below double precision
 _NODES = 256
@@ -112,10 +106,7 @@ def tuning_constant(efficiency: float = EFFICIENCY) -> float:
 
     efficiency: Variance of the classical estimate over that of the robust one, for independent
         Gaussian coefficients; between 0 and 1.
-    Raises InputError for an efficiency outside (0, 1).
     """
-    if not 0.0 < efficiency < 1.0:
-        raise InputError(f"efficiency = {efficiency!r}: give a number between 0 and 1, e.g. 0.6")
     root = np.sqrt(efficiency)
     if root >= _root_of_efficiency(_LARGEST_C):
         return _LARGEST_C
@@ -136,18 +127,12 @@ def robust_variance(coefficients: FloatArray, efficiency: float = EFFICIENCY) ->
     non-linear function of them. Independent uniform rounding errors give 15 % more than their
     variance, a level that holds nothing but a periodic line 40 % more.
 
-    coefficients: (M,), free of end effects, in u; at least one.
+    coefficients: (M,), finite, free of end effects, in u; at least one.
     efficiency: See `tuning_constant`.
-    Raises InputError for coefficients that are not one series of finite numbers, or an efficiency
-        outside (0, 1).
     """
     c = tuning_constant(efficiency)
     w = np.ascontiguousarray(coefficients, dtype=float)
-    if w.ndim != 1 or w.size == 0:
-        raise InputError(f"coefficients of shape {w.shape}: give one series of 1 or more")
     largest = max(float(np.max(w)), -float(np.min(w)))
-    if not np.isfinite(largest):
-        raise InputError("the coefficients hold NaN or infinite values: remove or repair them")
     if largest == 0.0:
         return 0.0
     scale = _start(w, largest)
@@ -235,10 +220,9 @@ class _Grid:
     """Lags and frequencies for some levels and the coarser ones within reach.
 
     block: Samples between lags.
-    first, own, size: First level, number of levels whose pairs are summed here, number of levels in
-        all.
+    first, own: First level, and number of levels whose pairs are summed here.
     frequency: (L,), cycles per block.
-    amplitude: (size, L), gain of each level over its phase, on means of blocks.
+    amplitude: (K, L), gain of each level over its phase, on means of blocks.
     weight: (own, tuning.ROBUST_REACH + 1, L), share of the pairs of coefficients at each lag, both
         signs together, for each level and the ones from itself on.
     """
@@ -246,7 +230,6 @@ class _Grid:
     block: int
     first: int
     own: int
-    size: int
     frequency: FloatArray
     amplitude: FloatArray
     weight: FloatArray
@@ -278,34 +261,11 @@ def _grids(n: int, levels: int) -> tuple[_Grid, ...]:
         for j in range(own):
             for k in range(j, min(j + reach + 1, size)):
                 weight[j, k - j] = pair_shares(n, m[first + j], m[first + k], block, lags)
-        grids.append(_Grid(block, first, own, size, frequency, amplitude, weight))
+        grids.append(_Grid(block, first, own, frequency, amplitude, weight))
         first += own
         own = min(tuning.ROBUST_LEVELS_PER_GRID, m.size - first)
         block = int(m[first]) // tuning.ROBUST_BLOCKS_PER_AVERAGE if own else 0
     return tuple(grids)
-
-
-def excess_correlation(
-    amplitude: FloatArray, density: FloatArray, weight: FloatArray, series: FloatArray
-) -> FloatArray:
-    """Weighted sums over lags of ``series`` in the even powers, from 4, of the correlation.
-
-    amplitude: (K, L), zero-phase gains of the levels at L frequencies in the middle of their bins.
-    density: (L,), spectrum there.
-    weight: (O, D, L), of the lags 0 .. L-1 for level j < O and level j + d.
-    series: (P,), see `excess_series`.
-    Returns: (O, D).
-    """
-    deviation = np.sqrt(np.maximum(2.0 * amplitude**2 @ density, np.finfo(float).tiny))
-    scaled = amplitude / deviation[:, None]
-    weighted = scaled * density
-    own, reach, _ = weight.shape
-    result = np.zeros((own, reach))
-    for j in range(own):
-        correlation = fft.dct(weighted[j] * scaled[j : j + reach], type=2, axis=-1)
-        for d, row in enumerate(correlation):
-            result[j, d] = weighted_series(row, weight[j, d], series)
-    return result
 
 
 def _excess(psd: PSD, n: int, dt: float, series: FloatArray, levels: int) -> FloatArray:
@@ -313,11 +273,14 @@ def _excess(psd: PSD, n: int, dt: float, series: FloatArray, levels: int) -> Flo
     result = np.zeros((levels, levels))
     for grid in _grids(n, levels):
         density = block_density(psd, dt, grid.frequency, grid.block)
-        excess = excess_correlation(grid.amplitude, density, grid.weight, series)
+        power = np.maximum(2.0 * grid.amplitude**2 @ density, np.finfo(float).tiny)
+        scaled = grid.amplitude / np.sqrt(power)[:, None]
         for j in range(grid.own):
-            for d in range(min(tuning.ROBUST_REACH + 1, grid.size - j)):
+            product = scaled[j] * density * scaled[j : j + tuning.ROBUST_REACH + 1]
+            for d, correlation in enumerate(fft.dct(product, type=2, axis=-1)):
                 row, column = grid.first + j, grid.first + j + d
-                result[row, column] = result[column, row] = excess[j, d]
+                excess = weighted_series(correlation, grid.weight[j, d], series)
+                result[row, column] = result[column, row] = excess
     return result
 
 
@@ -347,8 +310,7 @@ def robust_covariance(
     classical: (J, J), covariance of the classical wavelet variances, u^4, of the first J levels of
         `dyadic_levels`. The result is at least that, and positive definite if that is.
     counts: (J,), numbers of coefficients, where samples are missing.
-    Raises InputError for an efficiency outside (0, 1), or a spectrum that is not finite and
-        non-negative.
+    Raises InputError for a spectrum that is not finite and non-negative.
     """
     levels = classical.shape[0]
     m = dyadic_levels(n)[:levels]

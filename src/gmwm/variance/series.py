@@ -20,8 +20,7 @@ from gmwm.variance.kernels import difference_powers, survey
 from gmwm.variance.levels import Levels
 from gmwm.variance.wavelet import WaveletVariance
 
-MIN_SAMPLES = 8
-"""Fewest samples for a wavelet variance."""
+MIN_SAMPLES = 8  # fewest for a wavelet variance
 
 
 def wavelet_variance(
@@ -90,8 +89,7 @@ def wavelet_variance(
         moments = _robust_moments(levels.coefficients(), efficiency)
         level = _robust_moments(levels.coefficients(level=True), efficiency)[:, 1]
     added, change = levels.added(moments, scarcity, level)
-    least = moments[:, 1] / (1.0 + tuning.LARGEST_CHANGE)
-    variance = np.maximum(moments[:, 1] - added, least)
+    variance = np.maximum(moments[:, 1] - added, moments[:, 1] / (1.0 + tuning.LARGEST_CHANGE))
     blocks, block = levels.block_means()
     release(channel.values)
     found = None
@@ -262,10 +260,7 @@ def covariance_of_data(
         periodogram. "octave" averages the cross-spectra over an eighth of an octave first, a lag
         window whose length is proportional to the period: for long records.
     Returns: (J, J), u^4, positive semi-definite.
-    Raises InputError if ``window`` is unknown.
     """
-    if window not in WINDOWS:
-        raise InputError(f"window = {window!r}: choose from {', '.join(WINDOWS)}")
     size = fft.next_fast_len(longest, real=True)
     # The mean is not removed, frequency zero not left out: at coarse levels that would take most of
     # the power, and a level of no variance would have all the weight.

@@ -14,7 +14,13 @@ import numpy as np
 from gmwm._core.compiled import compiled
 from gmwm._core.typing import FloatArray, IntArray
 from gmwm.variance import tuning
-from gmwm.variance.kernels import ANY_ORDER, summed, summed_with_moments
+from gmwm.variance.kernels import (
+    ANY_ORDER,
+    difference_powers,
+    summed,
+    summed_with_moments,
+    survey,
+)
 
 STARTS = tuning.STREAMING_STARTS
 FINE = STARTS.bit_length()  # levels of single samples: 1, 2, 4, ... STARTS
@@ -73,35 +79,6 @@ def sum_of(values: FloatArray) -> float:
     return total
 
 
-@compiled(fastmath=ANY_ORDER)
-def _fourth(values: FloatArray) -> float:
-    total = 0.0
-    for i in range(values.size - 1):
-        square = (values[i + 1] - values[i]) ** 2
-        total += square * square
-    return total
-
-
-@compiled(fastmath=ANY_ORDER)
-def _centred(out: FloatArray, samples: FloatArray, reference: float) -> float:
-    total = 0.0
-    for i in range(out.size):
-        value = samples[i] - reference
-        out[i] = value
-        total += value
-    return total
-
-
-@compiled(fastmath=True)
-def _range(values: FloatArray) -> tuple[float, float]:
-    """Lowest and highest of finite values."""
-    low, high = values[0], values[0]
-    for i in range(values.size):
-        low = min(low, values[i])
-        high = max(high, values[i])
-    return low, high
-
-
 @compiled()
 def add(array: FloatArray, place: int, lost: int, value: float) -> None:
     """Add with what earlier additions lost (Neumaier 1974)."""
@@ -144,7 +121,7 @@ def complete_windows(
             add(own, MEAN, LOST_MEAN, mean * (0.5 / m))
             add(own, SQUARE, LOST_SQUARE, square * (0.25 / m / m))
             if level == 0:
-                add(sums.totals, FOURTH, LOST_FOURTH, _fourth(now[begin:]) / 16.0)
+                add(sums.totals, FOURTH, LOST_FOURTH, difference_powers(now[begin:])[2] / 16.0)
         else:
             summed(following, now[:count], now[m : m + count])
         now = following
@@ -205,14 +182,14 @@ def gappy_windows(
 
 
 @compiled()
-def coarsened(values: FloatArray, present: FloatArray, count: int) -> int:
-    """Replace ``count`` values by the means of pairs of them, in place; returns their number."""
-    for i in range(count // 2):
+def coarsened(values: FloatArray, present: FloatArray, means: FloatArray, there: FloatArray) -> int:
+    """Means of pairs of values, and samples they have, which may go in place; returns how many."""
+    for i in range(values.size // 2):
         both = present[2 * i] + present[2 * i + 1]
         total = present[2 * i] * values[2 * i] + present[2 * i + 1] * values[2 * i + 1]
-        values[i] = total / both if both > 0.0 else 0.0
-        present[i] = both
-    return count // 2
+        means[i] = total / both if both > 0.0 else 0.0
+        there[i] = both
+    return values.size // 2
 
 
 @compiled()
@@ -225,7 +202,7 @@ def _keep_blocks(row: int, begin: int, end: int, rows: Rows, sums: Sums) -> None
         if rows.state[row, ORIGIN] + i < tallies[BLOCKS]:
             continue
         if tallies[BLOCKS] == MOST_BLOCKS:
-            tallies[BLOCKS] = coarsened(blocks[0], blocks[1], MOST_BLOCKS)
+            tallies[BLOCKS] = coarsened(blocks[0], blocks[1], blocks[0], blocks[1])
             tallies[OCTAVE] += 1
             return
         blocks[0, tallies[BLOCKS]] = rows.data[row, i]
@@ -278,13 +255,10 @@ def _pass_on(row: int, rows: Rows, sums: Sums) -> None:
         present[row + 1, :there] = 2.0 * full
         state[row + 1, GAPPY] = 1
     if state[row, GAPPY]:
-        for i in range(count):
-            p = begin + 2 * i
-            first, second = present[row, p], present[row, p + 1]
-            total = first * data[row, p] + second * data[row, p + 1]
-            both = first + second
-            data[row + 1, there + i] = total / both if both > 0.0 else 0.0
-            present[row + 1, there + i] = both
+        own = slice(begin, filled)
+        coarsened(
+            data[row, own], present[row, own], data[row + 1, there:], present[row + 1, there:]
+        )
     else:
         for i in range(count):
             p = begin + 2 * i
@@ -342,9 +316,10 @@ def _take_in(samples: FloatArray, rows: Rows, sums: Sums) -> None:
                 totals[REFERENCE] = samples[i]
                 break
     own = data[0, filled:end]
-    if np.isfinite(_centred(own, samples, totals[REFERENCE])):
+    own[:] = samples - totals[REFERENCE]
+    missing, _, low, high = survey(own)
+    if not missing:
         _close_gap(sums)
-        low, high = _range(own)
         tallies[N] += samples.size
         if state[0, GAPPY]:
             present[0, filled:end] = 1.0
@@ -352,7 +327,6 @@ def _take_in(samples: FloatArray, rows: Rows, sums: Sums) -> None:
         if not state[0, GAPPY]:
             present[0, :filled] = 1.0
             state[0, GAPPY] = 1
-        low, high = np.inf, -np.inf
         for i in range(samples.size):
             if np.isnan(samples[i]):
                 own[i], present[0, filled + i] = 0.0, 0.0
@@ -361,23 +335,10 @@ def _take_in(samples: FloatArray, rows: Rows, sums: Sums) -> None:
             else:
                 _close_gap(sums)
                 present[0, filled + i] = 1.0
-                low, high = min(low, own[i]), max(high, own[i])
             tallies[N] += 1
     totals[LOWEST] = min(totals[LOWEST], low)
     totals[HIGHEST] = max(totals[HIGHEST], high)
     state[0, FILLED] = end
-
-
-@compiled()
-def first_infinite(samples: FloatArray) -> int:
-    """Place of the first infinite sample, or -1."""
-    for begin in range(0, samples.size, CHUNK):
-        part = samples[begin : begin + CHUNK]
-        if not np.isfinite(sum_of(part)):
-            for i in range(part.size):
-                if np.isinf(part[i]):
-                    return begin + i
-    return -1
 
 
 @compiled()

@@ -25,43 +25,23 @@ from gmwm.variance import stream_kernels as kernels, tuning
 from gmwm.variance.covariance.haar import dyadic_levels
 from gmwm.variance.gaps import GapEffects, spread_by_lengths, unmasked
 from gmwm.variance.series import MIN_SAMPLES, check_varies, cumulant_of_powers, where_of
-from gmwm.variance.stream_kernels import (
-    BLOCKS,
-    COUNT,
-    FOURTH,
-    HIGHEST,
-    LOST_FOURTH,
-    LOST_MEAN,
-    LOST_SQUARE,
-    LOST_SUM,
-    LOWEST,
-    MEAN,
-    MISSING,
-    REFERENCE,
-    SCARCITY,
-    SQUARE,
-    SUM,
-    N,
-    Sums,
-    coarsened,
-)
 from gmwm.variance.wavelet import WaveletVariance
 
 
-def variance_of(sums: Sums, channel: Channel, confidence: float) -> WaveletVariance:
+def variance_of(sums: kernels.Sums, channel: Channel, confidence: float) -> WaveletVariance:
     """The wavelet variance of a stream that is worked off.
 
     channel: Without samples: its name, quantity, unit and sampling interval.
     Raises InputError if it is too short, constant or of no sensor's size.
     """
     where, totals = where_of(channel), sums.totals
-    n, missing = int(sums.tallies[N]), int(sums.tallies[MISSING])
+    n, missing = int(sums.tallies[kernels.N]), int(sums.tallies[kernels.MISSING])
     if n - missing < MIN_SAMPLES:
         raise InputError(f"{where} has {n - missing} samples: {MIN_SAMPLES} or more are needed")
-    low = float(totals[REFERENCE] + totals[LOWEST])
-    spread = max(float(totals[HIGHEST] - totals[LOWEST]), 0.0)
+    low = float(totals[kernels.REFERENCE] + totals[kernels.LOWEST])
+    spread = max(float(totals[kernels.HIGHEST] - totals[kernels.LOWEST]), 0.0)
     check_varies(Channel(channel.name, np.array([low, low + spread]), channel.dt))
-    windows = sums.levels[:, COUNT]
+    windows = sums.levels[:, kernels.COUNT]
     size = min(int(np.sum(np.cumprod(windows > 0.0))), dyadic_levels(n).size)
     if not size:
         raise InputError(
@@ -69,14 +49,14 @@ def variance_of(sums: Sums, channel: Channel, confidence: float) -> WaveletVaria
             "without gaps"
         )
     levels, windows = sums.levels[:size], windows[:size]
-    mean = (levels[:, MEAN] + levels[:, LOST_MEAN]) / windows
-    square = (levels[:, SQUARE] + levels[:, LOST_SQUARE]) / windows
-    fourth = 16.0 * float(totals[FOURTH] + totals[LOST_FOURTH]) / float(windows[0])
+    mean = (levels[:, kernels.MEAN] + levels[:, kernels.LOST_MEAN]) / windows
+    square = (levels[:, kernels.SQUARE] + levels[:, kernels.LOST_SQUARE]) / windows
+    fourth = 16.0 * float(totals[kernels.FOURTH] + totals[kernels.LOST_FOURTH]) / float(windows[0])
     cumulant = cumulant_of_powers(4.0 * float(square[0]), fourth, float(windows[0]))
     gaps = None
     if missing:
         given = sums.gaps[sums.gaps[:, 0] > 0], missing / n, tuning.LONGEST_WITHIN
-        scarcity = levels[:, SCARCITY] / windows
+        scarcity = levels[:, kernels.SCARCITY] / windows
         square, change = unmasked(square, scarcity, lambda finer: spread_by_lengths(finer, *given))
         gaps = effects(n, missing, sums.gaps, windows, change)
     blocks, block = _block_means(sums)
@@ -97,20 +77,21 @@ def variance_of(sums: Sums, channel: Channel, confidence: float) -> WaveletVaria
     )
 
 
-def _block_means(sums: Sums) -> tuple[FloatArray, int]:
+def _block_means(sums: kernels.Sums) -> tuple[FloatArray, int]:
     """Means of blocks about the mean of the series, NaN where half of one is missing; their size.
 
     There are fewer of them where samples are missing, for the covariance of blocks with gaps.
     """
     n, missing, _, count, octave = sums.tallies.tolist()
     most = tuning.MOST_BLOCKS_WITH_GAPS if missing else tuning.MOST_BLOCKS
-    values, there = sums.blocks[:, : sums.tallies[BLOCKS]].copy()
-    while count > most:
-        count = coarsened(values, there, count)
+    values, there = sums.blocks[:, :count].copy()
+    while values.size > most:
+        count = kernels.coarsened(values, there, values, there)
+        values, there = values[:count], there[:count]
         octave += 1
-    mean = float(sums.totals[SUM] + sums.totals[LOST_SUM]) / (n - missing)
-    enough = there[:count] >= tuning.LEAST_OF_BLOCK * 2**octave
-    return np.where(enough, values[:count] - mean, np.nan), 1 << octave
+    mean = float(sums.totals[kernels.SUM] + sums.totals[kernels.LOST_SUM]) / (n - missing)
+    enough = there >= tuning.LEAST_OF_BLOCK * 2**octave
+    return np.where(enough, values - mean, np.nan), 1 << octave
 
 
 def effects(
@@ -227,14 +208,14 @@ class StreamingVariance:
             raise InputError(f"the block has shape {values.shape}: give one of shape {wanted}")
         columns = [np.ascontiguousarray(column) for column in columns]
         for name, column in zip(self._units, columns, strict=True):
-            bad = kernels.first_infinite(column)
-            if bad >= 0:
+            bad = np.flatnonzero(np.isinf(column))
+            if bad.size:
                 raise InputError(
-                    f"the block{f', channel {name!r},' if name else ''} is infinite at index {bad} "
-                    f"(sample {self.n + bad:,}): set it to NaN for missing"
+                    f"the block{f', channel {name!r},' if name else ''} is infinite at index "
+                    f"{bad[0]} (sample {self.n + bad[0]:,}): set it to NaN for missing"
                 )
         for series, column in zip(self._series, columns, strict=True):
-            series.absorb(column)
+            kernels.absorb(column, series.rows, series.sums, series.scratch)
 
     @property
     def channels(self) -> tuple[str, ...]:
@@ -346,17 +327,13 @@ class _Series:
         )
         limits = [kernels.REFERENCE, kernels.LOWEST, kernels.HIGHEST]
         self.sums.totals[limits] = np.nan, np.inf, -np.inf
-        self._scratch = np.empty((2, kernels.ROOM + 1))
-
-    def absorb(self, samples: FloatArray) -> None:
-        """Take in samples (n,), NaN where one is missing, none infinite."""
-        kernels.absorb(samples, self.rows, self.sums, self._scratch)
+        self.scratch = np.empty((2, kernels.ROOM + 1))
 
     def finished(self) -> _Series:
         """A copy with all samples worked off; it does not go on."""
         made = _Series()
         made.set(self.arrays())
-        kernels.work_off(1, made.rows, made.sums, made._scratch)
+        kernels.work_off(1, made.rows, made.sums, made.scratch)
         return made
 
     def arrays(self) -> dict[str, FloatArray]:
@@ -395,7 +372,7 @@ class _Series:
         fits &= 0 <= blocks <= kernels.MOST_BLOCKS and 0 <= octave < len(filled)
         numbers = (self.rows.data[: np.sum(used)], self.sums.levels, self.sums.blocks)
         fits &= not any(np.isnan(each).any() for each in numbers)
-        limits = self.sums.totals[[REFERENCE, LOWEST, HIGHEST]]
+        limits = self.sums.totals[[kernels.REFERENCE, kernels.LOWEST, kernels.HIGHEST]]
         fits &= missing == n or bool(np.all(np.isfinite(limits)))
         if not (fits and np.all((gaps >= 0) & (gaps <= n))):
             raise ValueError("counts that are not those of a series")

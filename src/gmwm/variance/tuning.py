@@ -20,13 +20,8 @@ ORDINATES_OF_BIN = 12.0  # ordinates as certain as that a sum of power laws is r
 # -- the spectrum implied by wavelet variances ----------------------------------------------------
 
 PILOT_ITERATIONS = 12  # rounds of scaling; the last changes no level by as much as its error
-
-PILOT_STEP = 0.8
-"""Share of a step, in logarithms: levels share frequencies, and whole steps oscillate."""
-
-PILOT_STEEPEST = 2.5
-"""Power of the frequency from level to level; the steepest process (a random walk) has 2."""
-
+PILOT_STEP = 0.8  # share of a step in logarithms: levels share frequencies, whole steps oscillate
+PILOT_STEEPEST = 2.5  # power of the frequency from level to level; that of a random walk is 2
 HAAR_PEAK = 0.37  # the Haar gain of averaging time tau peaks at f = 0.37/tau
 
 # -- gaps -----------------------------------------------------------------------------------------
@@ -55,14 +50,9 @@ MOST_BLOCKS_WITH_GAPS = 512  # the same where some are missing, which needs a de
 
 # -- covariances by lags --------------------------------------------------------------------------
 
-EXACT_SAMPLES = 2048
-"""Longest record with lags of single samples; longer records have lags of blocks."""
-
+EXACT_SAMPLES = 2048  # of the longest record with lags of single samples; others have blocks
 BLOCKS = 1024  # blocks of a longer record, whose means give its coarse levels
-
-BLOCKS_PER_AVERAGE = 8
-"""Blocks of the shortest averaging time of these; shorter ones have the spectral integral."""
-
+BLOCKS_PER_AVERAGE = 8  # of the shortest of these; finer levels have the spectral integral
 FOLDS = 2  # aliases on either side of a block's spectrum; the block mean suppresses farther ones
 LEAST_LAGS = 2048  # lags for other wavelets: memory may be longer than a short record
 BINS_PER_OCTAVE = 8  # of the smoothed empirical covariance
@@ -90,14 +80,10 @@ STREAMING_STARTS = 512
 """Windows that begin within an averaging time. The sampling variance of white noise is 1 +
 1.25/512^2 times that of all windows, which differ by 0.2 % of a standard error."""
 
-STREAMING_ROWS = 32
-"""Octaves beyond that: 2^32 averaging times of 512 samples are more than any recording has."""
-
+STREAMING_ROWS = 32  # octaves beyond that: more than any recording has
+# The first and the last 1/16 of half a window must have a sample, so that gaps lie within it.
 STREAMING_EDGE = 16
-"""The first and the last 1/16 of half a window must have a sample, so that gaps lie within it."""
-
 STREAMING_LEAST_EDGE = 4  # least samples of such a part, but for shorter averaging times
-
 STREAMING_LEAST = 0.375
 """Least share of the samples of half a window; with half of all samples missing singly, 32 of 64,
 that is four standard deviations less."""

@@ -122,8 +122,6 @@ class WaveletVariance(Printed, Document):
     @property
     def width(self) -> FloatArray:
         """Number of samples in a coefficient, (J,)."""
-        if self.wavelet == "haar":
-            return 2.0 * self.averaging
         kind = known_wavelet(self.wavelet)
         return np.array([kind.width(j + 1) for j in range(self.tau.size)], dtype=float)
 
@@ -147,9 +145,7 @@ class WaveletVariance(Printed, Document):
     @property
     def _complete_levels(self) -> int:
         """Levels of a record of as many samples without gaps."""
-        if self.wavelet == "haar":
-            return int(self.n).bit_length() - 1
-        return known_wavelet(self.wavelet).levels(self.n)
+        return known_wavelet(self.wavelet).levels(int(self.n))
 
     @property
     def notices(self) -> tuple[Notice, ...]:
@@ -190,16 +186,13 @@ class WaveletVariance(Printed, Document):
         if self.wavelet != "haar":
             from gmwm.variance.covariance.daubechies import wavelet_covariance
 
-            covariance = wavelet_covariance(
-                psd, self.n, self.dt, self.wavelet, self.tau.size, tuple(lines)
-            )
-            covariance = self._with_gaps(covariance)
+            complete = wavelet_covariance(psd, self.n, self.dt, self.wavelet, self.tau.size)
         else:
-            covariance = self._with_gaps(haar_covariance(psd, self.n, self.dt))
-            if lines:
-                covariance = covariance + line_covariance(
-                    tuple(lines), psd, self.dt, self.averaging, self.counts
-                )
+            complete = haar_covariance(psd, self.n, self.dt)
+        covariance = self._with_gaps(complete)
+        if lines:
+            of_lines = line_covariance(lines, psd, self.dt, self.wavelet, self.counts)
+            covariance = covariance + of_lines
         if self.efficiency < 1.0:
             from gmwm.variance.robust import robust_covariance
 

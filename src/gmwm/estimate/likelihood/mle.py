@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import ClassVar
 
 import numpy as np
@@ -110,11 +111,7 @@ class Whittle(MLE):
         if any(term.is_line for term in model.terms):
             raise InputError('method = "whittle" does not support a Sinusoid: use method="gmwm"')
         series = Series.of(model, channel, self.start, exact=False)
-
-        def climb(coordinates: Coordinates, first: tuple[Process, ...]) -> Top:
-            return _climb_whittle(series.columns, coordinates, first)
-
-        return _fit(series, climb, self.name)
+        return _fit(series, partial(_climb_whittle, series.columns), self.name)
 
 
 def _climb_whittle(columns: Columns, coordinates: Coordinates, first: tuple[Process, ...]) -> Top:

@@ -76,7 +76,8 @@ def conclude_moments(
         limit = float(max(limit, 0.0))
         limits[i] = limit ** (1.0 / design.terms[i].linear.power)
         if variances is not None and slope is not None and np.isfinite(limit):
-            slope = slope.with_variance(tuning.MEAN_OF_LIMIT * limit * float(variances[i]))
+            more = tuning.MEAN_OF_LIMIT * limit * float(variances[i])
+            slope = replace(slope, variance=slope.variance + more)
     notices = limit_notices(design, point)
     if target.size < design.n_free:
         values = {"levels": target.size, "parameters": design.n_free}

@@ -21,9 +21,7 @@ from gmwm.estimate.moments.kernels import Shaped
 from gmwm.estimate.problem import Coordinates, Scales, difference, is_plain, shape_of
 from gmwm.process import Model, Process, Shape, compiled_levels
 
-MOST_SHAPES = 3
-"""Shape parameters of the processes whose curves are known in compiled form."""
-
+MOST_SHAPES = 3  # parameters of the processes whose curves are known in compiled form
 _STEP = 1e-5  # of central differences in z, whose natural scale is 1
 _SIMULATED_STEP = 0.05  # where a simulation may move in jumps
 

@@ -15,8 +15,8 @@ _TOLERANCE = 1e-14  # of |y|: a correlation with the residuals that is rounding
 
 def solve_nonnegative(columns: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Amplitudes (k,) of columns (J, k) that come nearest to y (J,), and the residuals (J,)."""
-    amplitudes, residuals = solve_columns(np.ascontiguousarray(columns), np.ascontiguousarray(y))
-    return amplitudes, residuals
+    found: tuple[FloatArray, FloatArray] = solve_columns(*map(np.ascontiguousarray, (columns, y)))
+    return found
 
 
 def objectives_with(columns: FloatArray, candidates: FloatArray, y: FloatArray) -> FloatArray:

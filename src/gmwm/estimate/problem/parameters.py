@@ -60,13 +60,6 @@ class Term:
         """Number of free shape parameters."""
         return int(np.sum(self.free_shape))
 
-    @property
-    def free_names(self) -> list[str]:
-        """Names of the free parameters, the amplitude first."""
-        shapes = zip(self.process.shape_parameters, self.free_shape, strict=True)
-        scale = [self.linear.name] if self.free_scale else []
-        return scale + [p.name for p, free in shapes if free]
-
     def moved(self, shape: Shape, free: FloatArray) -> Shape:
         """A shape with its free part at other coordinates, fixed parameters exactly as they are."""
         if not free.size:
@@ -117,7 +110,9 @@ class Coordinates:
         self.owners: list[tuple[int, bool]] = []
         self._places: list[tuple[slice, slice]] = []  # coordinates of amplitude and shape, by term
         for i, term in enumerate(self.terms):
-            start, names = len(self.names), term.free_names
+            shapes = zip(term.process.shape_parameters, term.free_shape, strict=True)
+            start, names = len(self.names), [term.linear.name] if term.free_scale else []
+            names += [parameter.name for parameter, free in shapes if free]
             self.names += [(i, name) for name in names]
             self.owners += [(i, k == 0 and term.free_scale) for k in range(len(names))]
             middle = start + int(term.free_scale)

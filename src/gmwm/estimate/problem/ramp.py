@@ -13,7 +13,7 @@ regressors' wavelet coefficients, here ``var(slope)`` and ``r_j^2`` with r_j = t
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,10 +44,6 @@ class Slope:
     value: float
     variance: float
     weights: FloatArray | None = field(default=None, compare=False, repr=False)
-
-    def with_variance(self, more: float) -> Slope:
-        """The same slope, less certain."""
-        return replace(self, variance=self.variance + more)
 
 
 def ols_slope(wv: WaveletVariance) -> Slope:

@@ -10,7 +10,6 @@ from gmwm.estimate.result.conclusion import (
 )
 from gmwm.estimate.result.estimate import (
     Estimate as Estimate,
-    InUnit as InUnit,
     Kind as Kind,
     Region as Region,
     confidence_interval as confidence_interval,
@@ -19,12 +18,7 @@ from gmwm.estimate.result.estimate import (
     slope_name as slope_name,
     upper_amplitude as upper_amplitude,
 )
-from gmwm.estimate.result.fit import (
-    METHOD_NAMES as METHOD_NAMES,
-    Fit as Fit,
-    dense_curves as dense_curves,
-    plain as plain,
-)
+from gmwm.estimate.result.fit import Fit as Fit, dense_curves as dense_curves, plain as plain
 from gmwm.estimate.result.goodness import Goodness as Goodness
 from gmwm.estimate.result.joint import (
     JointFit as JointFit,

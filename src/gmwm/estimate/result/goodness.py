@@ -55,8 +55,7 @@ class Goodness:
     def of(cls, at: FittedMoments, wv: WaveletVariance, *, is_tested: bool) -> Goodness:
         """Compare wavelet variances with those of the model fitted to them."""
         target = np.maximum(at.target, 0.0)  # less drift than the noise of its slope has
-        level = np.full(target.size, np.nan)
-        misfit, residual, allowed, dof = (level.copy() for _ in range(4))
+        misfit, residual, allowed, dof = np.full((4, target.size), np.nan)
         variance = np.diag(at.statistical)
         has = (at.implied > 0.0) & (variance > 0.0)
         if np.any(has):

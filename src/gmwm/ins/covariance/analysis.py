@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from scipy.linalg import block_diag, eigh
@@ -27,8 +27,6 @@ from gmwm.ins.imu import Imu, SensorModels, emulate
 from gmwm.ins.simulation import Scenario, place_of
 from gmwm.issues import Notice, notice
 
-_ALL, _POSITION = slice(None), slice(0, 3)
-
 
 @dataclass(frozen=True, eq=False)
 class CovarianceErrors:
@@ -38,15 +36,18 @@ class CovarianceErrors:
     predicted, actual: (T, n, n), covariance of n errors: the filter's own, and the true one.
     """
 
+    USUAL_PART: ClassVar[slice] = slice(None)
+
     time: FloatArray
     predicted: FloatArray
     actual: FloatArray
 
-    def nees(self, part: slice = _ALL) -> FloatArray:
+    def nees(self, part: slice | None = None) -> FloatArray:
         """Expected normalised error squared per degree of freedom, (T,); 1 if consistent.
 
         Errors that the filter predicts to be exactly zero are left out.
         """
+        part = self.USUAL_PART if part is None else part
         predicted, actual = self.predicted[:, part, part], self.actual[:, part, part]
         size = np.sqrt(np.diagonal(predicted, axis1=1, axis2=2))
         scale = np.where(size > 0.0, size, 1.0)
@@ -59,8 +60,9 @@ class CovarianceErrors:
         pairs = zip(self.actual, self.predicted, strict=True)
         return np.array([eigh(a, p, eigvals_only=True)[-1] for a, p in pairs])
 
-    def score(self, part: slice = _ALL) -> FloatArray:
+    def score(self, part: slice | None = None) -> FloatArray:
         """Expected negative logarithm of the predicted density at the truth, (T,)."""
+        part = self.USUAL_PART if part is None else part
         predicted = self.predicted[:, part, part]
         size = predicted.shape[1]
         log_det = np.linalg.slogdet(predicted)[1]
@@ -86,6 +88,8 @@ class Analysis(CovarianceErrors):
         Outages that end with errors larger than can be predicted without runs.
     """
 
+    USUAL_PART = slice(0, 3)  # the position
+
     before: BoolArray
     sensor_predicted: FloatArray
     sensor_actual: FloatArray
@@ -104,14 +108,6 @@ class Analysis(CovarianceErrors):
     def index(self, time: float, *, before: bool = True) -> int:
         """Place of an epoch; InputError if it was not kept."""
         return place_of(time, self.time, self.before == before)
-
-    def nees(self, part: slice = _POSITION) -> FloatArray:
-        """Expected NEES per degree of freedom, (K,), of the position or another part."""
-        return super().nees(part)
-
-    def score(self, part: slice = _POSITION) -> FloatArray:
-        """Expected negative log density of the position or another part, (K,)."""
-        return super().score(part)
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,7 +15,6 @@ from gmwm.ins.filter.filter import (
     InitialSd as InitialSd,
     Outputs as Outputs,
     Solution as Solution,
-    modified as modified,
     navigate as navigate,
     unmodified as unmodified,
 )

@@ -17,7 +17,6 @@ from gmwm.ins.filter.records import Events
 from gmwm.ins.imu import Imu
 from gmwm.ins.trajectory import Trajectory, three_numbers
 
-_SAME_TIME = 1e-6  # s: sums of sampling intervals are not exact
 _STANDSTILL = 1e-3  # m/s, below which the vehicle of a simulated trajectory stands
 
 
@@ -165,7 +164,7 @@ class Aiding:
 
     def without(self, outages: Iterable[Outage]) -> Aiding:
         """The same without the GNSS fixes of the outages."""
-        spans = [(outage.start + _SAME_TIME, outage.end - _SAME_TIME) for outage in outages]
+        spans = [(o.start + tuning.SAME_TIME, o.end - tuning.SAME_TIME) for o in outages]
         result = []
         for fixes in self.fixes:
             kept = np.ones(fixes.time.size, dtype=bool)
@@ -208,7 +207,7 @@ class Aiding:
         kind = np.repeat([KINDS[each.kind] for each in fixes], [each.time.size for each in fixes])
         epoch = np.clip(np.rint(time / dt), 0, n).astype(np.int64)
         offset = time - epoch * dt
-        offset[np.abs(offset) <= _SAME_TIME] = 0.0
+        offset[np.abs(offset) <= tuning.SAME_TIME] = 0.0
         order = np.lexsort((kind, offset, epoch))
         kind = kind[order]
         value, sd = (

@@ -20,9 +20,7 @@ from gmwm._core.typing import FloatArray
 from gmwm.ins.filter.records import Kinematics, SensorTable, Transition
 from gmwm.ins.geometry import RATE, gravity_at, radii_at
 
-POSITION, VELOCITY, ATTITUDE, NAVIGATION = 0, 3, 6, 9
-"""First of each kind of navigation error, and how many there are."""
-
+VELOCITY, ATTITUDE, NAVIGATION = 3, 6, 9  # first of each kind of error, and how many there are
 _FAST = {"contract", "reassoc", "nsz"}
 
 

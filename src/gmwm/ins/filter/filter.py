@@ -219,15 +219,10 @@ class Filter:
         arm = np.asarray(aiding.lever_arm)
         return cls(states, dt, Settings(states.table, noise_states, arm, second_order, stride))
 
-    @property
-    def size(self) -> int:
-        """Number of states, those of navigation included."""
-        return NAVIGATION + self.states.m
-
     def covariance(self, initial: NavState, sd: InitialSd) -> FloatArray:
         """Covariance at the first epoch, (9 + m, 9 + m), with the modified velocity error."""
-        P = np.zeros((self.size, self.size))
-        P[:NAVIGATION, :NAVIGATION] = modified(np.diag(sd.deviations**2), initial.velocity)
+        P = np.zeros((NAVIGATION + self.states.m, NAVIGATION + self.states.m))
+        P[:NAVIGATION, :NAVIGATION] = unmodified(np.diag(sd.deviations**2), -initial.velocity)
         P[NAVIGATION:, NAVIGATION:] = self.states.covariance
         return P
 
@@ -316,13 +311,11 @@ class Outputs:
         return cls(epoch[order], flag[order])
 
 
-def modified(covariance: FloatArray, velocity: FloatArray) -> FloatArray:
-    """Covariance with the modified velocity error ``dv - v x phi``, from one with ``dv``."""
-    return unmodified(covariance, -velocity)
-
-
 def unmodified(covariance: FloatArray, velocity: FloatArray) -> FloatArray:
-    """Covariance with the velocity error ``dv = u + v x phi``, from one with ``u``."""
+    """Covariance with the velocity error ``dv = u + v x phi``, from one with ``u``.
+
+    With the velocity reversed, the other way round.
+    """
     T = np.tile(np.eye(9), (*covariance.shape[:-2], 1, 1))
     T[..., VELOCITY:ATTITUDE, ATTITUDE:] = skew(velocity)
     return T @ covariance @ np.swapaxes(T, -1, -2)

@@ -34,9 +34,7 @@ from gmwm.ins.filter.records import (
 )
 from gmwm.ins.geometry import gravity, orthonormalise, radii_at, turn_navigation
 
-PAUSED = -2
-"""Returned by `run` when it is to be called again."""
-
+PAUSED = -2  # returned by `run` when it is to be called again
 _LARGEST_POSITION_VARIANCE = 1e14  # m^2: beyond the Earth
 _HIGHEST_LATITUDE, _LARGEST_HEIGHT = 1.5533, 1e7  # rad, m: the filter has diverged
 _PATIENCE = tuning.GATE_PATIENCE

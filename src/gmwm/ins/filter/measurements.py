@@ -202,9 +202,8 @@ MEASUREMENTS: tuple[type[Measurement], ...] = (Position, Velocity, Height, Stand
 KINDS = {each.name: code for code, each in enumerate(MEASUREMENTS)}
 """Name of a kind -> its code."""
 
-IS_GNSS = np.array([each.is_gnss for each in MEASUREMENTS])
+IS_GNSS = np.array([each.is_gnss for each in MEASUREMENTS])  # by code
 IS_INFERRED = np.array([each.is_inferred for each in MEASUREMENTS])
-"""By code."""
 
 
 @compiled()

@@ -6,4 +6,5 @@ from gmwm.ins.imu.sensors import (
     Recorded as Recorded,
     SensorErrors as SensorErrors,
     SensorModels as SensorModels,
+    require_axes as require_axes,
 )

@@ -237,13 +237,18 @@ class Recorded:
         return SensorErrors(self.stretches[run][:n])
 
 
+def require_axes(recording: Recording) -> None:
+    """Reject a recording that lacks one of the six sensors."""
+    for axis in AXES:
+        if axis not in recording.names:
+            raise InputError(
+                f"{recording.source}: there is no channel {axis}: an IMU has {', '.join(AXES)}"
+            )
+
+
 def _errors(recording: Recording) -> FloatArray:
     """Samples of all six sensors less their mean, without gaps."""
-    missing = [axis for axis in AXES if axis not in recording.names]
-    if missing:
-        raise InputError(
-            f"{recording.source}: there is no channel {missing[0]}: an IMU has {', '.join(AXES)}"
-        )
+    require_axes(recording)
     columns = []
     for axis in AXES:
         values = np.array(recording[axis].values, dtype=float)

@@ -1,6 +1,6 @@
 """Own logs: an IMU's record and GNSS fixes, aligned, filtered, examined and compared."""
 
-from gmwm.ins.logs.alignment import Alignment as Alignment, align as align
+from gmwm.ins.logs.alignment import align as align
 from gmwm.ins.logs.attitude import standstills as standstills, steady as steady
 from gmwm.ins.logs.comparison import (
     Comparison as Comparison,
@@ -10,11 +10,7 @@ from gmwm.ins.logs.comparison import (
     paired as paired,
 )
 from gmwm.ins.logs.faults import Fault as Fault, Faults as Faults, fault_notice as fault_notice
-from gmwm.ins.logs.fix_log import (
-    read_fix_log as read_fix_log,
-    read_fixes as read_fixes,
-    read_heights as read_heights,
-)
+from gmwm.ins.logs.fix_log import read_fix_log as read_fix_log, read_fixes as read_fixes
 from gmwm.ins.logs.imu_log import read_imu as read_imu, read_imu_log as read_imu_log
 from gmwm.ins.logs.measured import LogSpec as LogSpec, Measured as Measured
 from gmwm.ins.logs.navigated import Navigated as Navigated

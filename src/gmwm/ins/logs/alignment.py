@@ -102,23 +102,20 @@ def _state(
     now = np.rint(positions.time[fix] / dt) * dt
     velocity = np.zeros(3)
     if not is_at_rest:
-        velocity, velocity_sd = _velocity(measured.aiding, now, dt)
-        sd = replace(sd, velocity=velocity_sd)
+        # Of the next fix, or of the way to the next position.
+        fixes = measured.aiding.of("velocity") or velocities_between(positions)
+        after = fixes.part((fixes.time > now - dt) & (fixes.time <= now + tuning.CHORD))
+        if not after.time.size:
+            raise InputError(
+                "no other fix near the first position fix: start where fixes are frequent"
+            )
+        # The vehicle may speed up by 1 m/s^2 until then.
+        error = np.hypot(np.sqrt(np.mean(after.sd[0] ** 2)), after.time[0] - now)
+        velocity, sd = after.value[0], replace(sd, velocity=float(error))
     later = velocity * (now - positions.time[fix])
     lla = offset(positions.value[fix], later - C @ np.asarray(measured.aiding.lever_arm))
     sd = replace(sd, position=float(np.sqrt(np.mean(positions.sd[fix] ** 2))))
     return NavState(lla, velocity, rpy_from_matrix(C)), sd
-
-
-def _velocity(aiding: Aiding, now: float, dt: float) -> tuple[FloatArray, float]:
-    """Velocity and its standard deviation: of the next fix, or of the way to the next position."""
-    velocity = aiding.of("velocity") or velocities_between(positions_of(aiding))
-    after = velocity.part((velocity.time > now - dt) & (velocity.time <= now + tuning.CHORD))
-    if not after.time.size:
-        raise InputError("no other fix near the first position fix: start where fixes are frequent")
-    # The vehicle may speed up by 1 m/s^2 until then.
-    sd = np.hypot(np.sqrt(np.mean(after.sd[0] ** 2)), after.time[0] - now)
-    return after.value[0], float(sd)
 
 
 def _levelled(

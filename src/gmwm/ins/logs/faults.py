@@ -369,12 +369,10 @@ def contradicted(replay: Replay, level: float = LEVEL) -> bool:
 
 def _earlier(measured: Measured, offset: float) -> Measured:
     """Fixes with earlier stamps, those in the time of the IMU."""
-    fixes = []
-    for each in measured.aiding.fixes:
-        time = each.time - offset
-        inside = (time > 0.0) & (time < measured.imu.n * measured.imu.dt)
-        fixes.append(replace(each.part(inside), time=time[inside]))
-    return replace(measured, aiding=replace(measured.aiding, fixes=tuple(fixes)))
+    end = measured.imu.n * measured.imu.dt
+    moved = (replace(each, time=each.time - offset) for each in measured.aiding.fixes)
+    fixes = tuple(each.part((each.time > 0.0) & (each.time < end)) for each in moved)
+    return replace(measured, aiding=replace(measured.aiding, fixes=fixes))
 
 
 def fault_notice(fault: Fault, start: float) -> Notice:

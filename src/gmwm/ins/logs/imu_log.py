@@ -18,7 +18,7 @@ from gmwm._core.units import SI_UNIT
 from gmwm.errors import InputError
 from gmwm.ins import tuning
 from gmwm.ins.geometry import STANDARD_GRAVITY
-from gmwm.ins.imu import AXES, Imu
+from gmwm.ins.imu import AXES, Imu, require_axes
 from gmwm.ins.trajectory import is_time
 from gmwm.issues import Notice, Severity, notice
 from gmwm.readers import CsvTable, Recording, bare, is_text, load_columns, read
@@ -86,11 +86,7 @@ def read_imu_log(
             columns[name] = int(plain) if plain.isascii() and plain.isdigit() else plain
     named = None if channels is None else columns
     recording = read(path, channels=named, time=time, **reading).of_one_rate("navigation")
-    missing = [axis for axis in AXES if axis not in recording.names]
-    if missing:
-        raise InputError(
-            f"{recording.source}: there is no channel {missing[0]}: an IMU has {', '.join(AXES)}"
-        )
+    require_axes(recording)
     dt, source = recording.dt, recording.source
     rotation = _joined(recording, AXES[:3], reversed_axes)
     velocity = _joined(recording, AXES[3:], reversed_axes)

@@ -17,9 +17,7 @@ from gmwm.errors import InputError
 from gmwm.ins import tuning
 from gmwm.ins.simulation.filter_errors import GROUPS, FilterErrors
 
-LEVELS = (0.5, 0.68, 0.95, 0.997)
-"""Levels at which coverage is counted."""
-
+LEVELS = (0.5, 0.68, 0.95, 0.997)  # at which coverage is counted
 _UPPER = 0.5 + 0.5 * tuning.CONFIDENCE
 _UNKNOWN = (float("nan"),) * 3
 

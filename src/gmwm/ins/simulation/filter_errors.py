@@ -26,8 +26,6 @@ GROUPS = {
 """Navigation errors that are judged together, and the two parts of the position: both can be right
 where their correlation is wrong."""
 
-_SAME_TIME = 1e-6  # s
-
 
 @dataclass(frozen=True, eq=False)
 class FilterErrors:
@@ -87,7 +85,7 @@ class FilterErrors:
 
 def place_of(time: float, kept: FloatArray, of_kind: BoolArray) -> int:
     """Place of a time among those that were kept and are of a kind."""
-    found = np.flatnonzero((np.abs(kept - time) < _SAME_TIME) & of_kind)
+    found = np.flatnonzero((np.abs(kept - time) < tuning.SAME_TIME) & of_kind)
     if found.size == 0:
         raise InputError(f"no errors were kept at {time:g} s: give the end of an outage")
     return int(found[0])

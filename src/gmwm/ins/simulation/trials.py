@@ -28,7 +28,6 @@ from gmwm.ins.simulation.filter_errors import (
 from gmwm.ins.trajectory import NavState, Trajectory
 from gmwm.issues import Notice, notice
 
-_SAME_TIME = 1e-6  # s
 _KEPT_EPOCHS = 300  # whose errors are kept, besides outages: a figure shows no more
 _OUTAGE_EPOCHS = 1.0  # s between epochs that are kept in an outage
 
@@ -85,7 +84,7 @@ class Scenario:
         dt = self.trajectory.dt
         for outage in self.outages:
             epoch = outage.end / dt
-            if abs(epoch - round(epoch)) * dt > _SAME_TIME:
+            if abs(epoch - round(epoch)) * dt > tuning.SAME_TIME:
                 raise InputError(
                     f"the outage from {outage.start:g} s ends at {outage.end:.9g} s, between two "
                     f"epochs of the trajectory: give multiples of its {dt:g} s"

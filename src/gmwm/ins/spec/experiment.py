@@ -49,7 +49,6 @@ MISSIONS: dict[str, Callable[..., Trajectory]] = {
 """Ready-made trajectories by name."""
 
 _LONGEST_NAME = 40
-_SAME_TIME = 1e-6  # s
 _SAME_RATE = 1e-3
 
 _NONE = BeforeValidator(lambda given: None if given == "none" else given)
@@ -200,7 +199,7 @@ def _trajectory(spec: ExperimentSpec, folder: Path) -> Trajectory:
     trajectory = Trajectory.read(folder / name)
     if duration is None:
         return trajectory
-    if duration > trajectory.duration + _SAME_TIME:
+    if duration > trajectory.duration + tuning.SAME_TIME:
         raise InputError(
             f"duration = {duration:g} s: {name} has {trajectory.duration:g} s, give at most that"
         )
@@ -211,7 +210,7 @@ def _scenario(spec: ExperimentSpec, trajectory: Trajectory) -> Scenario:
     """Reject outages that overlap or take no fix away, and a study without fixes."""
     outages = sorted((Outage(*each) for each in spec.outages), key=lambda outage: outage.start)
     for first, second in pairwise(outages):
-        if second.start < first.end - _SAME_TIME:
+        if second.start < first.end - tuning.SAME_TIME:
             raise InputError(
                 f"outages: the one from {second.start:g} s begins before the one from "
                 f"{first.start:g} s ends at {first.end:g} s: join or separate them"

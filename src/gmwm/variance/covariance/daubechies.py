@@ -14,14 +14,12 @@ not be symmetric: their transfer functions enter with their phases.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 
 from gmwm._core.typing import FloatArray
-from gmwm.errors import InputError
 from gmwm.process import PSD, ComplexArray, evaluated, pair_weights, unit_legendre, wavelet
 from gmwm.variance import tuning
 from gmwm.variance.covariance.haar import centred_pairs
@@ -107,28 +105,18 @@ def _at_zero(
     return np.asarray(np.maximum(12.0 * mean - neighbour, 0.0) / 11.0 / zero ** (2 * moments))
 
 
-def wavelet_covariance(
-    psd: PSD, n: int, dt: float, name: str, levels: int, lines: Sequence[tuple[float, float]] = ()
-) -> FloatArray:
+def wavelet_covariance(psd: PSD, n: int, dt: float, name: str, levels: int) -> FloatArray:
     """Covariance of the wavelet variance estimates of a Gaussian series.
 
     psd: ``psd(f, dt)``, two-sided, in u^2/Hz.
     n: Number of samples.
     dt: Sampling interval, s.
     name: Wavelet, see `gmwm.process.wavelets.wavelet`.
-    levels: Number of levels J.
-    lines: Spectral lines: frequency (Hz), amplitude a (u). Their product with the noise around them
-        adds 2 a^2 |H_j|^2 |H_k|^2 S(f) / max(M_j, M_k).
+    levels: Number of levels J, each with a coefficient free of end effects.
     Returns: (J, J), in u^4.
-    Raises InputError if the series has fewer levels with a coefficient free of end effects, for an
-        unknown wavelet, or a spectrum that is not finite and non-negative.
+    Raises InputError for an unknown wavelet, or a spectrum that is not finite and non-negative.
     """
     filters = wavelet(name)
-    if not 1 <= levels <= filters.levels(n):
-        raise InputError(
-            f"levels = {levels}: {n} samples have {filters.levels(n)} levels of wavelet "
-            f"{filters.name!r} with coefficients free of end effects"
-        )
     weights = pair_weights(filters.name, levels)
     density = evaluated(psd, weights.frequency / dt, dt) / dt
     integral = 4.0 * (weights.weight @ density**2)
@@ -139,10 +127,5 @@ def wavelet_covariance(
     if sums.transfer.size:
         coarse = slice(sums.first, None)
         result[coarse, coarse] *= _end_effects(psd, dt, sums, filters.vanishing_moments)
-    for frequency, amplitude in lines:
-        f = np.abs(frequency * dt - np.rint(frequency * dt))
-        gains = filters.gains(levels, f)
-        around = float(evaluated(psd, np.array([f]) / dt, dt)[0]) / dt
-        result += 2.0 * amplitude**2 * around * np.outer(gains, gains)
     counts = np.array([n - filters.width(j) + 1 for j in range(1, levels + 1)], dtype=float)
     return np.asarray(result / np.maximum.outer(counts, counts))

@@ -18,6 +18,7 @@ ratio is taken on means of blocks of samples, see `gmwm.variance.covariance.lags
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -28,7 +29,7 @@ import numpy.typing as npt
 from gmwm._core import checks
 from gmwm._core.compiled import compiled
 from gmwm._core.typing import FloatArray, IntArray
-from gmwm.process import PSD, Panels, evaluated, haar_gain, in_hertz, quadrature, resolved_share
+from gmwm.process import PSD, Panels, evaluated, in_hertz, quadrature, resolved_share, wavelet
 from gmwm.variance.covariance.lags import LagGrid, block_of, block_spectrum
 
 
@@ -139,10 +140,9 @@ class _LagSums:
         """Sums over the lags for a spectrum of block means, as `lag_sums` has them, (L, L)."""
         base = self.slopes * spectrum
         zero = np.outer(self.at_zero, self.at_zero * (spectrum[0] / self.grid.size))
-        found: tuple[FloatArray, FloatArray, FloatArray] = lag_sums(
-            self.grid.transform(base), self.averaging, zero, self.counts, self.weights
-        )
-        return found
+        once = self.grid.transform(base)
+        found = lag_sums(once, self.averaging, zero, self.counts, self.weights)
+        return found[0], found[1], found[2]
 
 
 @lru_cache(maxsize=16)  # recordings that are fitted jointly; 3 MB each
@@ -161,8 +161,9 @@ def _lag_sums(n: int) -> _LagSums:
             pairs = centred_pairs(own, other, lag, block) / (block * min(own, other))
             counts[j, k] = counts[k, j] = pairs
     averaging = m[first:] / block
-    amplitude = grid.haar_amplitude(averaging)
-    slopes = amplitude / np.sin(np.pi * grid.frequency)
+    sine, scaled = np.sin(np.pi * grid.frequency), averaging[:, None]
+    amplitude = np.sin(np.pi * scaled * grid.frequency) ** 2 / (scaled * sine)
+    slopes = amplitude / sine
     slopes[:, 0] = 0.0
     steps, at_zero = averaging.astype(np.intp), amplitude[:, 0].copy()
     return _LagSums(first, grid, steps, slopes, at_zero, weights, weights * counts)
@@ -329,18 +330,17 @@ def haar_covariance(
 
 
 def line_covariance(
-    lines: tuple[tuple[float, float], ...], psd: PSD, dt: float, m: FloatArray, counts: FloatArray
+    lines: Sequence[tuple[float, float]], psd: PSD, dt: float, name: str, counts: FloatArray
 ) -> FloatArray:
     """Contribution of spectral lines to the covariance: their product with the noise around them.
 
-    A line of amplitude a at frequency f adds 2 a^2 |H_j|^2 |H_k|^2 S(f) / max(M_j, M_k).
+    A line of amplitude a at frequency f adds 2 a^2 |H_j|^2 |H_k|^2 S(f) / max(M_j, M_k), with the
+    gains H of the wavelet of a name.
     """
-    total = np.zeros((m.size, m.size))
+    total = np.zeros((counts.size, counts.size))
     for frequency, amplitude in lines:
-        f = np.array([abs(frequency * dt - np.rint(frequency * dt))])
-        gain = np.array([haar_gain(value, f)[0] for value in m])
-        density = float(np.asarray(psd(f / dt, dt))[0]) / dt
-        total += (
-            2.0 * amplitude**2 * density * np.outer(gain, gain) / np.maximum.outer(counts, counts)
-        )
-    return total
+        f = np.abs(frequency * dt - np.rint(frequency * dt))
+        gain = wavelet(name).gains(counts.size, f)
+        density = float(evaluated(psd, np.array([f]) / dt, dt)[0]) / dt
+        total += 2.0 * amplitude**2 * density * np.outer(gain, gain)
+    return np.asarray(total / np.maximum.outer(counts, counts))

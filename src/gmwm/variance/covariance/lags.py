@@ -56,16 +56,6 @@ class LagGrid:
         result[self.size // 2 + 1 :] -= self.size
         return result
 
-    def haar_amplitude(self, averaging: FloatArray) -> FloatArray:
-        """Gain of Haar filters over their phase on block means, (len(averaging), F).
-
-        ``averaging`` are averaging times in blocks.
-        """
-        scaled = np.asarray(averaging)[:, None]
-        result = np.sin(np.pi * scaled * self.frequency) ** 2
-        result /= scaled * np.sin(np.pi * self.frequency)
-        return result
-
     def transform(self, spectrum: FloatArray) -> FloatArray:
         """Covariances at the lags from spectra at the frequencies, along the last axis."""
         return np.asarray(fft.irfft(spectrum, self.size, axis=-1))

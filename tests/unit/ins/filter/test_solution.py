@@ -5,7 +5,7 @@ import pytest
 
 from gmwm.errors import InputError
 from gmwm.ins import FilterInnovations, Solution, Trajectory
-from gmwm.ins.filter import modified, unmodified
+from gmwm.ins.filter import unmodified
 from gmwm.ins.geometry import matrix_from_rotation_vector, matrix_from_rpy
 
 
@@ -72,10 +72,10 @@ def test_modified_covariance_is_that_of_a_turned_velocity_error():
     u = draws[:, 3:6] - np.cross(v, draws[:, 6:])
     expected = np.cov(np.hstack([draws[:, :3], u, draws[:, 6:]]).T)
     unit = np.sqrt(np.diag(expected))
-    found = modified(P, v)
+    found = unmodified(P, -v)
     # A covariance of n draws scatters by sqrt(2/n), 0.3 %, of the standard deviations.
     assert np.abs((found - expected) / np.outer(unit, unit)).max() < 0.016
     np.testing.assert_allclose(unmodified(found, v), P, atol=1e-10)
     stack = unmodified(np.stack([P, P]), np.stack([v, 0.0 * v]))
     np.testing.assert_allclose(stack[1], P)
-    np.testing.assert_allclose(modified(stack[0], v), P, atol=1e-10)
+    np.testing.assert_allclose(unmodified(stack[0], -v), P, atol=1e-10)
