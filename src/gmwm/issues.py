@@ -584,8 +584,11 @@ _FILTER_NUMBERS = (
         "": "the {label} at {frequency:.4g} Hz, amplitude {size}, is left out",
         "slow": "the {label} at {frequency:.4g} Hz, amplitude {size}, is left out: it is slow for "
         "this horizon, and errors are larger than the numbers say"}),
-    _filter("loose-form", "after an outage of {time:g} s predicted errors are {tightness:.3g} "
-        "times the true ones; with {tightest}, {with_state:.3g} times"),
+    _filter("loose-form", {
+        "": "after an outage of {time:g} s predicted errors are {tightness:.3g} times the true "
+        "ones; with {tightest}, {with_state:.3g} times",
+        "tightest": "after an outage of {time:g} s predicted errors are {tightness:.3g} times the "
+        "true ones; no smaller form is closer by much"}),
     _filter("more-than-random-walk", {
         "": "the model has no random walk: K covers {parts}",
         "more": "K is {times:.3g} times that of the model's random walk: it also covers {parts}"}),
