@@ -143,9 +143,18 @@ def bound_of(
             values = {"tightness": found[0].tightness, "with_state": best.tightness}
             is_worth = best.tightness <= found[0].tightness / tuning.WORTH_A_STATE
             hint = f"use {TIGHTEST} where the filter has a state for it" if is_worth else ""
-            words = {"time": found[0].time, "tightest": TIGHTEST}
-            words["variant"] = "tightest" if form == TIGHTEST else ""
-            notices.append(notice("loose-form", "", values, hint=hint, **words))
+            variant, time = "tightest" if form == TIGHTEST else "", found[0].time
+            notices.append(
+                notice(
+                    "loose-form",
+                    "",
+                    values,
+                    variant=variant,
+                    hint=hint,
+                    time=time,
+                    tightest=TIGHTEST,
+                )
+            )
         notices += covered_terms_notices(axis, target, model, problem.targets)
         notices += fit_notices(axis, level)
         about = (form, model, horizon, sd, "bound", found, tuple(notices), axis.quantity, stderr)
