@@ -76,7 +76,10 @@ def test_families_are_named_by_their_strongest():
     assert len(line_notices("gyro_x", "rad/s", tuple(strong))) == tuning.NAMED_LINES
 
 
-@pytest.mark.parametrize(("frequency", "damping"), [(5.0, 0.05), (20.0, 0.1), (30.0, 0.02)])
+@pytest.mark.parametrize(
+    ("frequency", "damping"),
+    [(5.0, 0.05), (20.0, 0.1), (30.0, 0.02), (31.0, 0.0045), (31.0, 0.003), (31.0, 0.0015)],
+)
 def test_a_resonance_has_its_frequency_damping_and_size(frequency, damping):
     values = noise(2, 0.3) + Resonance(1.0, frequency, damping).simulate(N, DT, 3)
     lines, (bump,) = peaks(values, DT)
@@ -89,6 +92,13 @@ def test_a_resonance_has_its_frequency_damping_and_size(frequency, damping):
         "frequency": bump.frequency, "damping": bump.damping, "ratio": bump.ratio,
         "sigma": bump.sigma,
     }  # fmt: skip
+
+
+def test_a_line_of_one_amplitude_that_wanders_is_no_resonance():
+    phase = 2.0 * np.pi * (21.0 * TIME - 3.0 * np.cos(TIME / 30.0))
+    lines, _ = peaks(noise(2, 0.3) + np.sin(phase), DT)
+    assert [line.frequency for line in lines] == [pytest.approx(21.0, abs=0.1)]
+    assert lines[0].width > tuning.RESOLVED / (N * DT)
 
 
 def test_peaks_need_half_of_a_series_that_is_long_enough():
