@@ -472,8 +472,8 @@ _CALIBRATION = (
         "is sensor noise", "fit a slow term instead, such as a Gauss-Markov process",
         severity="bad", lacks="stationary", reason="the bias keeps changing"),
     Issue("departures-removed", "if the subtracted departures recur the deviation at "
-        "tau = {tau:.3g} s is {times} times as large", "find their cause, or add a slow term to "
-        "the model instead of subtracting", severity="warning", topic="departure"),
+        "tau = {tau:.3g} s is {times} times as large", "find their cause, or add a slow term",
+        severity="warning", topic="departure"),
     Issue("drift-at-start", "a drift by {height} from the start that ends at {when}{also}",
         "leave it out{back}", severity="bad", topic="departure", lacks="stationary",
         reason="drift after switching on"),
@@ -584,8 +584,11 @@ _FILTER_NUMBERS = (
         "": "the {label} at {frequency:.4g} Hz, amplitude {size}, is left out",
         "slow": "the {label} at {frequency:.4g} Hz, amplitude {size}, is left out: it is slow for "
         "this horizon, and errors are larger than the numbers say"}),
-    _filter("loose-form", "after an outage of {time:g} s predicted errors are {tightness:.3g} "
-        "times the true ones; with {tightest}, {with_state:.3g} times"),
+    _filter("loose-form", {
+        "": "after an outage of {time:g} s predicted errors are {tightness:.3g} times the true "
+        "ones; with {tightest}, {with_state:.3g} times",
+        "tightest": "after an outage of {time:g} s predicted errors are {tightness:.3g} times the "
+        "true ones"}),
     _filter("more-than-random-walk", {
         "": "the model has no random walk: K covers {parts}",
         "more": "K is {times:.3g} times that of the model's random walk: it also covers {parts}"}),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 
 import numpy as np
@@ -11,13 +12,13 @@ from gmwm._core.text import brief, readable
 from gmwm._core.typing import BoolArray, FloatArray
 from gmwm.diagnosis import tuning
 from gmwm.diagnosis.lines import Line, find_lines
-from gmwm.diagnosis.spectrum import Bands, Spectrum, background, bands, spectrum
+from gmwm.diagnosis.spectrum import POWER_INFLATION, Bands, Spectrum, background, bands, spectrum
 from gmwm.issues import Notice, notice
 from gmwm.process import Resonance
 
 # Logarithms of frequency over that of the band, of damping and of height; background.
-_LOW = np.array([-0.2, np.log(1e-3), -5.0, -8.0, -8.0, -8.0])
-_HIGH = np.array([0.2, np.log(0.9), 12.0, 8.0, 8.0, 8.0])
+_LOW = np.array([-0.2, np.log(1e-5), -5.0, -8.0, -8.0, -8.0])
+_HIGH = np.array([0.2, np.log(0.9), 16.0, 8.0, 8.0, 8.0])
 _STEP = 1e-4
 _ROUNDS = 60
 _MOST_DAMPED = 1e8
@@ -35,9 +36,13 @@ class Bump:
 
 
 def find_resonances(
-    spectrum: Spectrum, found: Bands, smooth: FloatArray, left_out: BoolArray
+    spectrum: Spectrum,
+    found: Bands,
+    smooth: FloatArray,
+    left_out: BoolArray,
+    known: tuple[Bump, ...] = (),
 ) -> tuple[Bump, ...]:
-    """Resonances by their height, highest first.
+    """Resonances by their height, highest first, with those that are known.
 
     Bands that stand out of the running median by more than Gaussian noise would, and by half, are
     candidates, around which a resonance on the background is fitted by Whittle's likelihood.
@@ -45,15 +50,15 @@ def find_resonances(
     height = found.level - found.smooth
     count = height.size
     if count < tuning.FEWEST_BANDS:
-        return ()
+        return known
     median_error = 0.5 * np.pi * np.mean(found.variance) / min(25, count)
     limit = norm.isf(tuning.FALSE_ALARM / count) * np.sqrt(found.variance + median_error)
     stands_out = height > np.maximum(limit, np.log(tuning.LEAST_PEAK))
     excess = np.where(stands_out & (found.edges[:-1] >= tuning.SLOWEST_BIN), height, 0.0)
-    bumps: list[Bump] = []
+    bumps = list(known)
     for _ in range(2 * tuning.MOST_RESONANCES):
         j = int(np.argmax(excess))
-        if excess[j] <= 0.0 or len(bumps) == tuning.MOST_RESONANCES:
+        if excess[j] <= 0.0 or len(bumps) >= tuning.MOST_RESONANCES:
             break
         low = np.flatnonzero(height[:j] < height[j] / 3.0)
         high = np.flatnonzero(height[j + 1 :] < height[j] / 3.0)
@@ -80,24 +85,42 @@ def _same(bump: Bump, other: Bump) -> bool:
 
 
 def _fitted(
-    spectrum: Spectrum, smooth: FloatArray, left_out: BoolArray, centre: float, height: float
+    spectrum: Spectrum,
+    smooth: FloatArray,
+    left_out: BoolArray,
+    centre: float,
+    height: float,
+    line: Line | None = None,
 ) -> Bump | None:
-    """Whittle fit of a resonance on a background whose logarithm is a parabola in log f."""
-    start = max(int(centre / tuning.FITTED_OCTAVES / spectrum.resolution), 1)
-    stop = min(int(centre * tuning.FITTED_OCTAVES / spectrum.resolution), spectrum.density.size - 1)
+    """Whittle fit of a resonance on a background whose logarithm is a parabola in log f.
+
+    line: What a narrow resonance was taken for; it must be all that is there.
+    """
+    ratio = 1.0 + tuning.FEET * line.width / centre if line else tuning.FITTED_OCTAVES
+    start = max(int(centre / ratio / spectrum.resolution), 1)
+    stop = min(int(centre * ratio / spectrum.resolution), spectrum.density.size - 1)
     f, power, weight = _points(spectrum, left_out, start, stop)
     level = float(np.interp(centre, spectrum.frequency, smooth))
     power = power / level
-    starts = np.zeros((len(tuning.DAMPING_STARTS), _LOW.size))
-    starts[:, 1], starts[:, 2] = np.log(tuning.DAMPING_STARTS), np.log(np.expm1(height))
+    # A resonance of half width g has the extent pi g, its bins being exponential variates.
+    dampings = [line.width / (np.pi * centre)] if line else tuning.DAMPING_STARTS
+    starts = np.zeros((len(dampings), _LOW.size))
+    starts[:, 1], starts[:, 2] = np.log(dampings), np.log(np.expm1(height))
+    if line:
+        starts[:, 2], starts[:, 3] = np.log(np.max(power)), np.log(np.median(power))
     fits = [_scored(start, f, power, weight, centre, spectrum.dt) for start in starts]
     free, _ = min(fits, key=lambda result: result[1])
     unit = _unit(free, centre, spectrum.dt)
     bottom = float(np.interp(unit.frequency, f, _floor(free, np.log(f / centre))))
     peak = float(np.exp(free[2]))
     ratio = (bottom + peak) / bottom
-    if ratio < tuning.LEAST_PEAK or not tuning.NARROWEST <= unit.damping <= tuning.WIDEST:
+    narrowest = 0.0 if line else tuning.NARROWEST
+    if ratio < tuning.LEAST_PEAK or not narrowest <= unit.damping <= tuning.WIDEST:
         return None
+    if line:
+        expected = _bump(free, f, centre, spectrum.dt) + _floor(free, np.log(f / centre))
+        if np.mean(weight * (power / expected - 1.0) ** 2) > tuning.MISFIT * POWER_INFLATION:
+            return None
     height_of_unit = 2.0 * float(unit.psd(np.array([unit.frequency]), spectrum.dt)[0])
     sigma = float(np.sqrt(peak * level / height_of_unit))
     return Bump(float(unit.frequency), float(unit.damping), sigma, ratio)
@@ -179,12 +202,26 @@ def peaks(values: FloatArray, dt: float) -> tuple[tuple[Line, ...], tuple[Bump, 
     power = spectrum(values, dt)
     if not np.any(power.density > 0.0):
         return (), ()
-    lines = find_lines(power, background(power, bands(power)))
+    smooth = background(power, bands(power))
+    lines = find_lines(power, smooth)
+    occupied = _occupied(power, lines)
+    narrow: dict[Line, Bump] = {}
+    for line in lines:
+        if line.width >= tuning.RESOLVED * power.resolution:
+            others = _occupied(power, [each for each in lines if each is not line])
+            bump = _fitted(power, smooth, others, line.frequency, np.log(line.ratio), line)
+            narrow |= {line: bump} if bump else {}
+    lines, bumps = tuple(line for line in lines if line not in narrow), tuple(narrow.values())
+    if 2 * np.count_nonzero(occupied) > occupied.size:
+        return lines, bumps  # a square wave: hardly anything is left to be a background
+    rest = bands(power, occupied)
+    return lines, find_resonances(power, rest, background(power, rest), occupied, bumps)
+
+
+def _occupied(power: Spectrum, lines: Iterable[Line]) -> BoolArray:
+    """Bins of lines, and half as many on both sides."""
     occupied = np.zeros(power.density.size, dtype=bool)
     for line in lines:
         margin = (line.stop - line.start) // 2
         occupied[max(line.start - margin, 0) : line.stop + margin] = True
-    if 2 * np.count_nonzero(occupied) > occupied.size:
-        return lines, ()  # a square wave: hardly anything is left to be a background
-    rest = bands(power, occupied)
-    return lines, find_resonances(power, rest, background(power, rest), occupied)
+    return occupied

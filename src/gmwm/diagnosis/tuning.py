@@ -138,7 +138,9 @@ LEAST_PEAK = 1.5  # ratio to the background that matters to a filter: 22 % of th
 SLOWEST_BIN = 64  # below it bands are wider than a peak
 FITTED_OCTAVES = 2.0  # frequencies from f/2 to 2 f are fitted ...
 FITTED_POINTS = 300  # ... by so many means of the periodogram
-NARROWEST, WIDEST = 0.005, 0.3  # damping: narrower is a line, wider has no peak
+NARROWEST, WIDEST = 0.003, 0.3  # damping: narrower is found as a line, wider has no peak
+RESOLVED, FEET = 200.0, 8.0  # bins of a line with a shape; widths on either side that show it
+MISFIT = 1.5  # chi-square of a degree of freedom up to which a line has the shape of a resonance
 MOST_RESONANCES = 4  # resonances of one channel
 DAMPING_STARTS = (0.01, 0.05, 0.15)  # where the fit starts
 

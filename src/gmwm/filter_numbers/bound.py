@@ -131,8 +131,8 @@ def bound_of(
     times = (horizon, 10.0 * horizon)
     errors = [predicted(axis, axis.chain, model, sd, times) for axis in group]
     tight: list[Predicted | None] = [None] * len(group)
-    if form != TIGHTEST and any(found[0].tightness > tuning.LOOSE for found in errors):
-        other = dominating(problem, TIGHTEST)
+    if any(found[0].tightness > tuning.LOOSE for found in errors):
+        other = model if form == TIGHTEST else dominating(problem, TIGHTEST)
         start = start_sd(biases, dominated, other, tuning.INITIAL_SHARE)
         tight = [predicted(axis, axis.chain, other, start, times[:1])[0] for axis in group]
     numbers = []
@@ -143,9 +143,17 @@ def bound_of(
             values = {"tightness": found[0].tightness, "with_state": best.tightness}
             is_worth = best.tightness <= found[0].tightness / tuning.WORTH_A_STATE
             hint = f"use {TIGHTEST} where the filter has a state for it" if is_worth else ""
-            time = found[0].time
+            variant, time = "tightest" if form == TIGHTEST else "", found[0].time
             notices.append(
-                notice("loose-form", "", values, hint=hint, time=time, tightest=TIGHTEST)
+                notice(
+                    "loose-form",
+                    "",
+                    values,
+                    variant=variant,
+                    hint=hint,
+                    time=time,
+                    tightest=TIGHTEST,
+                )
             )
         notices += covered_terms_notices(axis, target, model, problem.targets)
         notices += fit_notices(axis, level)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gmwm import Resonance
+from gmwm import GaussMarkov, Resonance
 from gmwm.diagnosis import tuning
 from gmwm.diagnosis.lines import Line, find_lines, line_notices
 from gmwm.diagnosis.resonances import peaks, resonance_notice
@@ -76,9 +76,14 @@ def test_families_are_named_by_their_strongest():
     assert len(line_notices("gyro_x", "rad/s", tuple(strong))) == tuning.NAMED_LINES
 
 
-@pytest.mark.parametrize(("frequency", "damping"), [(5.0, 0.05), (20.0, 0.1), (30.0, 0.02)])
-def test_a_resonance_has_its_frequency_damping_and_size(frequency, damping):
-    values = noise(2, 0.3) + Resonance(1.0, frequency, damping).simulate(N, DT, 3)
+@pytest.mark.parametrize(
+    ("frequency", "damping", "n"),
+    [(5.0, 0.05, N), (20.0, 0.1, N), (30.0, 0.02, N), (31.0, 0.0045, N), (31.0, 0.003, 6 * N)],
+)
+def test_a_resonance_has_its_frequency_damping_and_size(frequency, damping, n):
+    values = np.random.default_rng(2).normal(0.0, 0.3, n) + Resonance(
+        1.0, frequency, damping
+    ).simulate(n, DT, 3)
     lines, (bump,) = peaks(values, DT)
     assert lines == ()
     assert bump.frequency == pytest.approx(frequency, rel=0.02)
@@ -89,6 +94,15 @@ def test_a_resonance_has_its_frequency_damping_and_size(frequency, damping):
         "frequency": bump.frequency, "damping": bump.damping, "ratio": bump.ratio,
         "sigma": bump.sigma,
     }  # fmt: skip
+
+
+def test_a_line_of_one_amplitude_that_wanders_is_no_resonance():
+    wander = GaussMarkov(0.12, 20.0).simulate(12 * N, DT, 4)
+    phase = 2.0 * np.pi * DT * np.cumsum(41.0 + wander)
+    noisy = np.random.default_rng(2).normal(0.0, 0.3, phase.size) + np.sin(phase)
+    lines, bumps = peaks(noisy, DT)
+    assert lines[0].frequency == pytest.approx(41.0, abs=0.2)
+    assert not any(bump.damping < tuning.NARROWEST for bump in bumps)
 
 
 def test_peaks_need_half_of_a_series_that_is_long_enough():

@@ -547,6 +547,10 @@ def test_a_slow_resonance_and_a_slow_line_are_not_passed_over():
     assert (why.code, list(why.values)) == ("more-than-random-walk", ["resonance"])
     assert notice.values["tightness"] == found.tightness[60.0] > 1.2
     assert notice.values["with_state"] > 1.2
+    tightest = gmwm.bound(ONE + slow, "N+K+GM", 60.0)
+    (notice,) = (n for n in tightest.notices if n.code == "loose-form")
+    assert notice.values["tightness"] == tightest.tightness[60.0] > 1.2
+    assert "N+K+GM" not in str(notice)  # the form itself is no advice
     f = np.geomspace(1e-8, 50.0, 3000)
     assert np.min(found.model.psd(f, DT) / (ONE + slow).psd(f, DT)) > 1.0 - 1e-4
     _, notices = notices_of(Sinusoid(1e-4, 1e-3))
