@@ -43,7 +43,7 @@ def test_what_is_found_and_taken_off(report):
     assert re.search(r"gyro_x not valid : bias step at 30\S* s", text)
     assert re.search(r"severe gyro_x A step of .*? --remove-departures", text)
     text, _ = report("--remove-departures")
-    assert "static.csv: 50 s at 100 Hz. All 3 axes are usable." in text
+    assert "at 100 Hz, 49.7 s of it used, bias steps subtracted. Usable: gyro_y and" in text
     assert re.search(r"Notes .*?gyro_x A step of .*?subtracted", text)
     assert "not valid" not in text
     assert "calibrate static.csv" not in text  # the command has the path that was given
@@ -70,7 +70,8 @@ def test_a_data_sheet_and_an_exported_file(report, run, tmp_path):
 
 def test_channels_and_a_stretch(report):
     text, page = report("--channels", "gyro", "--start", "5", "--stop", "25", "--leave", "all")
-    assert "static.csv: 20 s at 100 Hz." in text and " 2,000 samples a channel" in text
+    assert "static.csv: 20 s (5 to 25 s) at 100 Hz." in text
+    assert " 2,000 samples a channel" in text
     assert "the part from 5 to 25 s is used" in text
     assert 'id="gyro_y"' in page and 'id="accel_z"' not in page
 

@@ -523,7 +523,7 @@ def test_issues_are_reported_and_screened():
     assert line["sinusoid_amplitude"] == pytest.approx(0.01, rel=0.1)
     told = " ".join(map(str, calibration.notices))
     assert "accel_x: a periodic line at 0.7" in told
-    assert "(a term of the model, which N and K of a filter leave out)" in told
+    assert "(modelled, but not in filter N and K)" in told
     assert "gyro_x: a spike or shock" in told
     assert f"(left out, {calibration['gyro_x'].wv.gaps.missing} samples)" in told
     assert calibration.notices[0].code == "events-left-out"

@@ -43,7 +43,7 @@ def test_what_became_of_a_line(off, near):
         assert second is other
         return first.hint
 
-    term = "a term of the model, which N and K of a filter leave out"
+    term = "modelled, but not in filter N and K"
     assert (said(with_it, {}) == term) is near
     assert (said(plain, offered) == "tried as a term of the model, which does not need it") is near
     assert said(plain, {}) == "not tried as a term of the model"

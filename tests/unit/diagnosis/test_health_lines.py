@@ -188,5 +188,5 @@ def test_a_line_of_three_axes_is_reported_once():
         "accel_x, accel_y, accel_z", "accel_x", "accel_x", "gyro_x", "accel_z",
     ]  # fmt: skip
     assert found[0].text.startswith("a line of accel_y (in accel_y); 3 channels have it")
-    assert found[0].hint == "check the mounting and the power supply; find what hums"
+    assert found[0].hint == "find what hums; check the mounting and the power supply"
     assert found[1] is other and found[-1] is weaker

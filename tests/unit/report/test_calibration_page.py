@@ -222,10 +222,11 @@ def test_numbers_that_are_not_valid_are_marked(calibration):
     assert not calibration["accel_x"].valid
     found = certified(calibration)
     warnings = [row["warning"] for row in first_screen(calibration, found)["filter"]]
-    assert warnings == ["", "do not use yet: accel_x is not valid"]
+    short = "use N alone: too short for 60 s"
+    assert warnings == [short, "do not use yet: accel_x is not valid"]
     fits = {name: replace(fit, notices=()) for name, fit in calibration.items()}
     right = first_screen(right := replace(calibration, fits=fits), certified(right))
-    assert [row["warning"] for row in right["filter"]] == ["", ""]
+    assert [row["warning"] for row in right["filter"]] == [short, short]
     assert all(row["why"] == "" for table in right["sensors"] for row in table["rows"])
     as_yaml, as_python = (found.texts[f"{each}, axis by axis"] for each in ("YAML", "Python"))
     for text in (as_yaml, as_python):
