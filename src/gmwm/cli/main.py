@@ -93,7 +93,7 @@ class _OutputError(OSError):
 
 
 class _Output(FileIO):
-    """Standard output, or that of errors: its own trouble is told apart from that of files."""
+    """Standard output or standard error, whose failures are distinguished from those of files."""
 
     def write(self, data: Buffer, /) -> int:
         try:

@@ -37,10 +37,9 @@ but 8 of 100 of white noise, which no parameter fits to the coarse levels
 
 OPEN_TIMES = 16  # correlation times at which a further Gauss-Markov process is tried
 OPEN_MOVE = 0.3
-"""Share by which parameters may move for a further Gauss-Markov process: larger ones are no longer
-linear. From 0.15 to 0.3 the coverage of selected models rises from 94.5 to 95.5 %
-(``python benchmarks/faint.py``)."""
-OPEN_APART = 1e-4  # share of a further process that is no copy of the others, below which it is one
+"""Share by which parameters may move for a further Gauss-Markov process; beyond it the linear
+approximation fails. ``python benchmarks/faint.py`` prints the coverage."""
+OPEN_APART = 1e-4  # a further process that differs by less from a sum of the terms is left out
 
 EXCLUDED_P = 0.001  # level of the test of every averaging time: 4 standard errors for twenty
 
@@ -65,9 +64,9 @@ DISCREPANCY_KNOWN = 0.3  # relative standard error of a variance that can show a
 DISCREPANCY_NOTABLE = 0.02  # of the reference mixture, to start a fit with: its grid has less
 
 DISCREPANCY_LARGE = 0.3
-"""A fit of a larger one starts again from a notable one, and the smaller of the two is taken: in
-units of a large discrepancy a level without any noise is off by little, so that it can grow until a
-model without amplitudes passes. That takes the root of the share of levels missed."""
+"""A fit with a larger discrepancy is repeated from DISCREPANCY_NOTABLE, and the smaller of the two
+is taken. A discrepancy near 1 allows for levels without any model noise, so that a model whose
+amplitudes are all zero would pass."""
 
 # -- search and iteration -------------------------------------------------------------------------
 

@@ -13,7 +13,7 @@ RAMP_MARGIN = 6.0
 """Of the criterion, by which a rate ramp must win: a straight line passes through any slow drift
 that is seen only once."""
 
-RAMP_P = 0.002  # level below which a slope is no accident of an unresolved random walk
+RAMP_P = 0.002  # level of the test that an unresolved random walk explains a slope
 RAMP_PLAUSIBLE = 2.0  # squared slope over its variance, below which no ramp is tried
 RAMP_ROUNDS = 3  # rounds of the slope under the mixture that is left without it
 USELESS = 1.0  # gain of a Gauss-Markov process in the objective that ends the search for more

@@ -38,7 +38,8 @@ class Slope:
 
     value: u/s.
     variance: Of the estimate, (u/s)^2.
-    weights: Of the steps between neighbouring block means, 1/s; ``None`` if it is no sum of them.
+    weights: Of the differences between neighbouring block means, 1/s; ``None`` for a given slope or
+        one by ordinary least squares.
     """
 
     value: float

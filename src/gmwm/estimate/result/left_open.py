@@ -21,8 +21,8 @@ _STEP = 1e-4  # relative, of central differences
 def left_open(fit: Fit, level: float = 0.95) -> tuple[Model, ...]:
     """Models with one more Gauss-Markov process, as large as the data leave open.
 
-    A term pays for its parameters only from some five standard errors on, so that a chosen model
-    lacks smaller ones, and its own intervals do not know them.
+    A selection includes a further Gauss-Markov process only if it exceeds some four standard
+    errors. The selected model lacks smaller ones, and its intervals do not cover them.
 
     Parameters
     ----------
@@ -41,8 +41,8 @@ def left_open(fit: Fit, level: float = 0.95) -> tuple[Model, ...]:
     g of the added process, all orthogonal to D, the added variance is estimated by g'r / g'g with
     variance 1 / g'g; the other parameters give way by D^+ g. A negative estimate is cut off at zero
     by its chi-square (Wilks 1938, *Annals of Mathematical Statistics* 9, 60-62). Parameters move
-    by at most a share of `tuning.OPEN_MOVE`: where the term could replace another, their own
-    intervals say so.
+    by at most a share of `tuning.OPEN_MOVE`: where the process could replace another term, the
+    intervals of that term cover it.
     """
     at, model = fit.moments, fit.model
     noise = Model(tuple(term for term in model.terms if not term.is_drift))
@@ -63,7 +63,7 @@ def left_open(fit: Fit, level: float = 0.95) -> tuple[Model, ...]:
     width = float(norm.ppf(0.5 + 0.5 * level))
     powers = np.array([1.0 if item.parameter.role == "shape" else 2.0 for item in free])
     models = []
-    # From no round number: a process of equal correlation time could not be told apart.
+    # Not at round numbers: a model must not hold two processes of equal correlation time.
     for tau in np.geomspace(np.sqrt(5.0) * fit.wv.dt, 2.0 * fit.wv.tau[-1], tuning.OPEN_TIMES):
         curve = root @ at.scales.curve(GaussMarkov(1.0, float(tau)))
         known = basis.T @ curve

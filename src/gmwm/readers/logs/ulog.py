@@ -121,7 +121,7 @@ def _check_format(text: bytes) -> None:
         types = [field.split(" ")[0] for field in fields.split(";") if field]
         plain = [_PLAIN.fullmatch(each) for each in types]
         if not all(plain) or sum(int(each[1] or 1) for each in plain if each) > _MOST_NUMBERS:
-            raise ValueError(f"{name} is no message of an IMU")
+            raise ValueError(f"{name} is not a message of an IMU")
 
 
 def _data_sets(path: Path, is_taken: bool) -> tuple[list[Any], tuple[Notice, ...]]:

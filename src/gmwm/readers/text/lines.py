@@ -109,7 +109,7 @@ def _read(stream: BinaryIO, size: int, name: str) -> tuple[bytes, str]:
             size -= len(part)
     except EOFError:
         damage = "ends before its gzip data are complete"
-    except (gzip.BadGzipFile, zlib.error) as error:  # which numbers are right cannot be told
+    except (gzip.BadGzipFile, zlib.error) as error:  # any of the numbers may be wrong
         raise InputError(f"{name} is a damaged gzip file ({error}): get a whole copy") from error
     except OSError as error:
         raise _unreadable(name, error) from error
