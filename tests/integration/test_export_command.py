@@ -91,6 +91,12 @@ def test_an_axis_that_is_not_valid_is_exported_by_force_only(run, calibration, t
     # The numbers have the mark too.
     bound(replace(calibration, fits=fits)).save(tmp_path / "numbers.json")
     assert run("export", "numbers.json", "--to", "kalibr")[0] == 1
+    # Each cause has its own way out.
+    other = Notice("unit", "bad", "", "a wrong unit", {}, "give the unit")
+    fits["gyro_x"] = replace(calibration["gyro_x"], notices=(other,))
+    replace(calibration, fits=fits).save(tmp_path / "bad.json")
+    said = run("export", "bad.json", "--to", "kalibr")[2]
+    assert said.endswith("; gyro_x: give the unit; accel_x: cut it off, or add --force\n")
 
 
 def test_the_explanation_is_printed_in_place_of_the_file(run, file, calibration):

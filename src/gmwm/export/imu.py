@@ -224,8 +224,12 @@ def reason(notice: Notice) -> str:
 def refusal(found: Mapping[str, Notice]) -> str:
     """Which axes are not valid, why, and what to do, by the notices of `not_valid`."""
     places = ", ".join(f"{name} ({reason(each)})" for name, each in found.items())
-    hints = [each.hint for each in found.values() if each.hint]
-    return f"not valid: {places}; {hints[0] if hints else 'read the notices of the calibration'}"
+    hints: dict[str, list[str]] = {}
+    for name, each in found.items():
+        hints.setdefault(each.hint or "read the notices of the calibration", []).append(name)
+    alone = len(hints) == 1
+    texts = [hint if alone else f"{', '.join(own)}: {hint}" for hint, own in hints.items()]
+    return "; ".join([f"not valid: {places}", *texts])
 
 
 def numbers_for(

@@ -51,7 +51,7 @@ _STATES = {
 def summary_text(calibration: Calibration, files: Iterable[str] = ()) -> str:
     """Verdict, sensor numbers, filter numbers, the worst notices with what to do, and the files.
 
-    At most 30 lines of 80 columns, unless what is said of files is longer.
+    At most 30 lines of 80 columns, unless six axes or what is said of files need more.
 
     Parameters
     ----------
@@ -168,11 +168,11 @@ def _sensor(calibration: Calibration, most: int) -> list[str]:
     if len(skipped) > 2:
         skipped = [skipped[0], f"{len(calibration.skipped)} channels have no model"]
     names = list(calibration)
-    while True:  # the first axes of very many
+    while True:  # all axes of one IMU, the first of very many
         lines = _table(calibration, names)
         missing = len(calibration) - len(names)
         lines += [f"and {missing} more channels"] if missing else []
-        if len(lines) + len(skipped) < most or len(names) == 1:
+        if len(lines) + len(skipped) < most or len(names) <= _AXES:
             return [*lines, *skipped, _LEGEND]
         names.pop()
 

@@ -94,6 +94,12 @@ def test_a_page_has_thirty_lines_of_eighty_columns(calibrated, change):
     assert not re.search(r"\bnan\b|\binf\b|None|…|\n\n\n", text)
 
 
+def test_all_axes_of_one_imu_are_shown_beside_a_long_path(calibrated):
+    text = summary_text(calibrated, [*FILES, *(f"in {'folder/' * 9}" for _ in range(6))])
+    if len(calibrated) <= 6:
+        assert all(re.search(rf"^{name}", text, re.MULTILINE) for name in calibrated)
+
+
 def test_every_sensor_has_filter_numbers(calibrated):
     text = summary_text(calibrated)
     for quantity in UNITS:
