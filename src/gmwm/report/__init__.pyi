@@ -1,6 +1,5 @@
 from .calibration import fragment as fragment, write_report as write_report
 from .compared import write_sensor_comparison_report as write_sensor_comparison_report
-from .datasheet import read_datasheet as read_datasheet
 from .fleet import write_fleet_report as write_fleet_report
 from .health import verdict as verdict
 from .navigation import (

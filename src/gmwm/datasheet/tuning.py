@@ -1,0 +1,18 @@
+"""Constants of models from data sheets, each with its reason or the study that set it."""
+
+# Least and greatest averaging time, over that at which white noise alone has the lowest deviation,
+# and how many between them; 100 a decade show a flat place to 0.1 %:
+AVERAGING_TIMES = (1e-2, 1e4, 601)
+FLAT = 0.04  # Slope of log Allan variance from which on a curve counts as flat: flicker at 96 %
+ALIKE = 0.01  # Relative difference of lowest deviations that counts as none
+# Correlation times of Gauss-Markov processes, over the same time; from 100 times on they are walks:
+TAU = (2.0, 60.0, 9)
+# Of those that make no flat place, with the largest Allan deviation over that of white noise there.
+# With 0.3 filters were overconfident (NEES up to 1.19), with 1 the median NEES of the bound was
+# 0.35 after 10 s, with this 0.50: benchmarks/sheets.py
+SHOULDER = 0.7
+SHOULDER_TAU = (0.02, 2.0, 5)
+FASTEST_SHOULDER = 1.0  # s, below which it counts as white noise, which is read at 1 s
+# Standard deviation of units over the typical values of a sheet. Four recordings of one ADIS16405:
+# N 1.15 to 1.5 times, B 1.6 to 2.3 times what its sheet states (docs/data-sheets.md):
+UNIT_SPREAD = 1.5
