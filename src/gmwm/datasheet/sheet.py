@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -22,6 +23,7 @@ from gmwm.filter_numbers import (
     InUnits,
     Predicted,
     bound,
+    certify,
     shown_unit,
 )
 from gmwm.issues import notice
@@ -173,16 +175,44 @@ class Datasheet(InUnits):
             found, f"{self.name}, from a data sheet: record an hour", rate, shared=True
         )
 
+    def judged(
+        self,
+        numbers: Mapping[str, Any],
+        horizon: float = HORIZON,
+        unit_spread: float = tuning.UNIT_SPREAD,
+    ) -> dict[str, tuple[float, float]]:
+        """Least and largest NEES of a filter with given numbers, by sensor.
+
+        Parameters
+        ----------
+        numbers : mapping
+            By sensor, as of `gmwm.certify`.
+        horizon : float, optional
+            Time without aiding, s.
+        unit_spread : float, optional
+            As of `models`; the least is that of a typical unit, the largest that of a noisy one.
+        """
+        found = {}
+        for sensor in (name for name in self.entries if name in numbers):
+            nees = [
+                check.nees
+                for spread in (1.0, unit_spread)
+                for check in certify(
+                    self.models(sensor, spread), {sensor: numbers[sensor]}, outages=(horizon,)
+                ).of("free")
+            ]
+            found[sensor] = (min(nees), max(nees))
+        return found
+
     def __repr__(self) -> str:
         return f"<Datasheet of {self.name}: {', '.join(self.entries)}>"
 
     def text(self, units: str = "field", form: str = "N+K", horizon: float = HORIZON) -> str:
         """Of each kind of model that agrees with the sheet, N and K that a filter needs."""
         about = f"{self.name} ({self.document})" if self.document else self.name
-        parts = ["\n".join(wrapped(
-            f"{about}: typical values of a data sheet. Models that agree with them, and N and K of a "
-            f"filter for each, for outages up to {horizon:g} s:"
-        ))]  # fmt: skip
+        what = "typical values of a data sheet. Models that agree with it, and N and K of a filter"
+        title = f"{about}: {what} for each, for outages up to {horizon:g} s:"
+        parts = ["\n".join(wrapped(title))]
         for sensor in self.entries:
             try:
                 models = self.models(sensor)
@@ -191,20 +221,19 @@ class Datasheet(InUnits):
                 continue
             kinds: dict[str, list[AxisFilterNumbers]] = {}
             for label, model in models.items():
-                kinds.setdefault(_kind(label), []).append(bound(model, form, horizon))
-            kinds["all"] = [each for kind in kinds.values() for each in kind]
-            shown = {key: shown_unit(key, sensor.partition("_")[0], units) for key in ("N", "K")}
-            rows = [
-                (
-                    kind,
-                    *(
-                        _ends([getattr(e, key) * scale for e in found])
-                        for key, (_, scale) in shown.items()
-                    ),
-                )
-                for kind, found in kinds.items()
-            ]
-            heads = (sensor, *(f"{key}, {unit}" for key, (unit, _) in shown.items()))
+                found = bound(model, form, horizon)
+                for kind in (_kind(label), "all"):
+                    kinds.setdefault(kind, []).append(found)
+            kinds["all"] = kinds.pop("all")
+            known = [shown_unit(key, sensor.partition("_")[0], units) for key in "NK"]
+            rows = []
+            for kind, same in kinds.items():
+                values = zip([[e.N for e in same], [e.K for e in same]], known, strict=True)
+                rows.append((kind, *(_ends(each, scale) for each, (_, scale) in values)))
+            heads = (
+                sensor,
+                *(f"{key}, {unit}" for key, (unit, _) in zip("NK", known, strict=True)),
+            )
             parts.append(plain_table(heads, rows).rstrip())
         return "\n\n".join(parts)
 
@@ -221,11 +250,11 @@ def _of_all(axes: Sequence[AxisFilterNumbers]) -> AxisFilterNumbers:
 
 def _kind(label: str) -> str:
     """The terms of a model without its correlation time."""
-    return re.sub(r" [\d.,e+]+ s", "", label.partition("_")[2]).replace("+", " + ")
+    return re.sub(r" [\d.,e+]+ s| \(.*\)", "", label.partition("_")[2]).replace("+", " + ")
 
 
-def _ends(values: Sequence[float]) -> str:
-    return " to ".join(dict.fromkeys(brief(end(values), 3) for end in (min, max)))
+def _ends(values: Sequence[float], scale: float) -> str:
+    return " to ".join(dict.fromkeys(brief(scale * end(values), 3) for end in (min, max)))
 
 
 def _white(where: str, values: Mapping[str, float]) -> dict[str, float]:

@@ -8,4 +8,4 @@ from .navigation import (
     write_validation_report as write_validation_report,
 )
 from .page import duration_text as duration_text
-from .summary import summary_text as summary_text
+from .summary import filter_key as filter_key, summary_text as summary_text
