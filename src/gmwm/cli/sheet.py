@@ -75,11 +75,12 @@ def sheet(
     numbers = found.numbers(form, horizon, **how)
     if output is not None:
         numbers.save(output)
+    answer = _for_filter(numbers, how["unit_spread"])
     if report is not None:
         from gmwm.report import write_sheet_report
 
-        write_sheet_report(found, report, form, horizon, **how)
-    parts = [found.text(units, form, horizon), _for_filter(numbers, how["unit_spread"])]
+        write_sheet_report(found, report, numbers, answer)
+    parts = [found.text(units, form, horizon), answer]
     if imu is not None:
         parts.append(
             _judged(found.judged(_in_use(imu, how["rate"]), horizon, how["unit_spread"]), imu)

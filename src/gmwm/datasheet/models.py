@@ -13,7 +13,7 @@ from gmwm.datasheet import tuning
 from gmwm.errors import InputError
 from gmwm.process import BiasInstability, GaussMarkov, Model, Process, RandomWalk, WhiteNoise
 
-FLICKER = float(np.sqrt(2.0 * np.log(2.0) / np.pi))
+_FLICKER = float(np.sqrt(2.0 * np.log(2.0) / np.pi))
 """Plateau of the Allan deviation over B, 0.664 (IEEE Std 952-1997, C.1.3)."""
 _PEAK_TIME, _PEAK = 1.89, 0.617
 """Of the Allan deviation of a Gauss-Markov process, over tau and sigma (the same, C.1.5)."""
@@ -31,7 +31,7 @@ def agreeing(where: str, values: Mapping[str, float], N: float) -> dict[str, Mod
     N: u/sqrt(Hz).
     Raises InputError if there is no such model, or no slow noise is stated.
     """
-    lowest = values.get("lowest_deviation", FLICKER * values.get("B", 0.0))
+    lowest = lowest_deviation(values)
     known: list[Process] = [WhiteNoise(N)]
     if "K" in values:
         known.append(RandomWalk(values["K"]))
@@ -59,6 +59,11 @@ def agreeing(where: str, values: Mapping[str, float], N: float) -> dict[str, Mod
             f"{lowest:.3g} (SI): leave out {'K' if 'K' in values else 'correlation_time'}"
         )
     return found
+
+
+def lowest_deviation(values: Mapping[str, float]) -> float:
+    """The lowest Allan deviation that is stated, u; zero if none is."""
+    return values.get("lowest_deviation", _FLICKER * values.get("B", 0.0))
 
 
 def _candidates(

@@ -5,16 +5,18 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from gmwm import plotting
 from gmwm._core import checks
 from gmwm._core.tables import plain_table
 from gmwm._core.text import brief, wrapped
 from gmwm._core.typing import FloatArray
+from gmwm._core.units import customary_unit
 from gmwm.datasheet import tuning
-from gmwm.datasheet.models import agreeing
+from gmwm.datasheet.models import agreeing, lowest_deviation
 from gmwm.errors import InputError
 from gmwm.filter_numbers import (
     HORIZON,
@@ -28,6 +30,9 @@ from gmwm.filter_numbers import (
 )
 from gmwm.issues import notice
 from gmwm.process import BiasInstability, Model, Process, RandomWalk, WhiteNoise
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 UNITS = {"N": "u/sqrt(Hz)", "B": "u", "K": "u/s/sqrt(Hz)"}
 """Of the numbers that most data sheets state."""
@@ -43,6 +48,7 @@ KEYS = {
 }
 """What an entry of a sensor may state, with units."""
 
+_FINE = 1e-3  # s, sampling interval of curves: that of the sensor does not matter
 _SHARED = ("bandwidth", "correlation_time")  # the same in noisier units
 _TERMS: dict[str, type[Process]] = {"N": WhiteNoise, "B": BiasInstability, "K": RandomWalk}
 _PER_DENSITY = np.sqrt(0.5)
@@ -203,6 +209,46 @@ class Datasheet(InUnits):
             ]
             found[sensor] = (min(nees), max(nees))
         return found
+
+    def plot(
+        self, sensor: str, numbers: FilterNumbers | None = None, ax: Axes | None = None
+    ) -> Axes:
+        """The Allan deviations of the models that agree with what is stated of a sensor.
+
+        Parameters
+        ----------
+        sensor : str
+            Key of ``entries``.
+        numbers : FilterNumbers, optional
+            Of a filter, drawn over them.
+        ax : matplotlib Axes, optional
+
+        Returns
+        -------
+        matplotlib Axes
+        """
+        quantity = sensor.partition("_")[0]
+        unit, scale = customary_unit("u", quantity, "u")
+        models = self.models(sensor)
+        first = next(iter(models.values()))
+        crossing = 2.0 * float(first.haar_variance(np.ones(1), _FINE)[0])
+        lowest = lowest_deviation(self.entries[sensor]) or np.sqrt(crossing)
+        tau = np.geomspace(0.1, 1e4, 121)
+        curves = {key: np.sqrt(2.0 * m.haar_variance(tau, _FINE)) for key, m in models.items()}
+        lines = {}
+        if numbers is not None and sensor in numbers:
+            own = numbers[sensor].model.haar_variance(tau, _FINE)
+            lines[f"filter, {numbers.form} for {numbers.horizon:g} s"] = scale * np.sqrt(2.0 * own)
+        title = f"{self.name}, {sensor}"
+        return plotting.model_set(
+            tau,
+            scale * np.stack([*curves.values()]),
+            lines,
+            scale * lowest,
+            unit=unit,
+            title=title,
+            ax=ax,
+        )
 
     def __repr__(self) -> str:
         return f"<Datasheet of {self.name}: {', '.join(self.entries)}>"

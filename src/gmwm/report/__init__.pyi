@@ -8,4 +8,5 @@ from .navigation import (
     write_validation_report as write_validation_report,
 )
 from .page import duration_text as duration_text
+from .sheet import write_sheet_report as write_sheet_report
 from .summary import filter_key as filter_key, summary_text as summary_text
