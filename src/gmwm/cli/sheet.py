@@ -104,9 +104,15 @@ def _for_filter(numbers: FilterNumbers, unit_spread: float) -> str:
             (unit, scale), value = shown_unit(letter, quantity, "field"), getattr(each, letter)
             si = f"{value:.2e} {shown_unit(letter, quantity, 'si')[0]}"
             key = filter_key(quantity, letter)
-            lines.append(f"{key:<27}  filter {letter} {si:<25} {value * scale:.3g} {unit}")
+            lines.append(f"{key:<27}  {letter} {si:<25}  {value * scale:.3g} {unit}")
     starts = [f"{k} {n.initial_sd:.2e} {SI_UNIT[k]}" for k, n in numbers.items() if n.initial_sd]
-    lines += wrapped(f"start bias, 1 sigma: {', '.join(starts)}") if starts else []
+    lines += (
+        wrapped(
+            f"start bias, 1 sigma (with the turn-on bias of the sheet, if any): {', '.join(starts)}"
+        )
+        if starts
+        else []
+    )
     worst = [f"{k} {max(n.nees.values()):.2g}" for k, n in numbers.items()]
     lines += wrapped(f"NEES at most {', '.join(worst)} (1: consistent, below: cautious)")
     return "\n".join([*lines, "", *wrapped("An hour of recording tells more: gmwm calibrate")])

@@ -24,7 +24,7 @@ _WORDS = {
     "bias_instability": "B",
     "rate_random_walk": "K",
 }
-_VALUE = re.compile(r"\s*([-+.\deE]+)\s+(\S.*?)(?:\s+\((p\. .+)\))?\s*")
+_VALUE = re.compile(r"\s*([-+.\deE]+)\s+(\S.*?)(?:\s+\((.+)\))?\s*")
 _HINT = "write it like 'N: 0.15 deg/sqrt(h)', 'B: 7 deg/h'"
 _SHEETS = files("gmwm.datasheet").joinpath("sheets")
 
@@ -36,8 +36,8 @@ def datasheet(source: str | os.PathLike[str] | Mapping[str, Any]) -> Datasheet:
     ----------
     source : str, path-like or mapping
         A sensor of `sheets`, a YAML file, or its content: by "gyro", "accel" or channel, values
-        with their units, such as ``{"gyro": {"N": "0.15 deg/sqrt(h)", "B": "7 deg/h"}}``. A page
-        in brackets may follow: ``7 deg/h (p. 3)``. Keys:
+        with their units, such as ``{"gyro": {"N": "0.15 deg/sqrt(h)", "B": "7 deg/h"}}``. The page
+        may follow in brackets: ``7 deg/h (p. 3)``. Keys:
 
         N, angle_random_walk, velocity_random_walk
             Where the Allan deviation is N / sqrt(tau).

@@ -290,8 +290,7 @@ def _of_all(axes: Sequence[AxisFilterNumbers]) -> AxisFilterNumbers:
         Predicted(same[0].time, max(e.nees for e in same), min(e.tightness for e in same))
         for same in zip(*(each.predicted for each in axes), strict=True)
     )
-    own = [n for n in axes[0].notices if n.code == "turn-on-left-out"]
-    return replace(axes[0], predicted=worst, notices=(notice("from-data-sheet"), *own))
+    return replace(axes[0], predicted=worst, notices=(notice("from-data-sheet"),))
 
 
 def _kind(label: str) -> str:
