@@ -23,7 +23,7 @@ from gmwm.filter_numbers import Chain
 DT, N_SAMPLES, HORIZON = 0.1, 144_000, 60.0
 TIMES = (10.0, 60.0, 600.0)
 TAU = np.geomspace(0.1, 1440.0, 800)
-SPREADS = (1.0, 1.25, 1.5)  # unit_spread; the last is the default
+SPREADS = (1.0, 1.25)  # unit_spread; the last is the default
 KINDS = ("N+K", "N+B", "N+GM", "N+GM+K", "N+B+K")
 
 

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     --json
     """,
     form={"default": "N+K"},
-    unit_spread={"type": float, "default": 1.5},
+    unit_spread={"type": float, "default": 1.25},
     rate={"type": float, "default": float("nan"), "show_default": False},
     imu={"type": PATH},
     report=FILE_TO_WRITE,

@@ -233,7 +233,7 @@ class Datasheet(InUnits):
         first = next(iter(models.values()))
         crossing = 2.0 * float(first.haar_variance(np.ones(1), _FINE)[0])
         lowest = lowest_deviation(self.entries[sensor]) or np.sqrt(crossing)
-        tau = np.geomspace(0.1, 1e4, 121)
+        tau = np.geomspace(0.1, 1e4, 81)
         curves = {key: np.sqrt(2.0 * m.haar_variance(tau, _FINE)) for key, m in models.items()}
         lines = {}
         if numbers is not None and sensor in numbers:

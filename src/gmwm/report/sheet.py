@@ -24,8 +24,14 @@ def write_sheet_report(
 
     Raises InputError if the file cannot be written.
     """
+    import matplotlib.pyplot as plt
+
     path = writable_file(path)
-    pictures = {sensor: svg(sheet.plot(sensor, numbers).figure) for sensor in numbers}
+    pictures = {}
+    for sensor in numbers:
+        figure, axes = plt.subplots(figsize=(7.0, 4.6), layout="constrained")
+        sheet.plot(sensor, numbers, ax=axes)
+        pictures[sensor] = svg(figure)
     known = {"data sheet": sheet.document or sheet.name}
     text = sheet.text(form=numbers.form, horizon=numbers.horizon)
     return write_page(
