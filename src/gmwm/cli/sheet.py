@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from gmwm._core.text import bullets, wrapped
+from gmwm._core.text import brief, bullets, wrapped
 from gmwm.cli.console import print_result
 from gmwm.cli.options import FILE_TO_WRITE, PATH, options
 from gmwm.errors import InputError
@@ -67,7 +67,8 @@ def sheet(
     from gmwm.datasheet import datasheet, sheets
 
     if listed:
-        click.echo("\n".join(f"{name:<12} {datasheet(name)}" for name in sheets()))
+        lines = (wrapped(datasheet(name).document, f"{name:<10} ", 11) for name in sheets())
+        click.echo("\n".join(line for each in lines for line in each))
         return
     if source is None:
         raise InputError("gmwm sheet needs a YAML file or a sensor (sensors: gmwm sheet --list)")
@@ -104,7 +105,7 @@ def _for_filter(numbers: FilterNumbers, unit_spread: float) -> str:
             (unit, scale), value = shown_unit(letter, quantity, "field"), getattr(each, letter)
             si = f"{value:.2e} {shown_unit(letter, quantity, 'si')[0]}"
             key = filter_key(quantity, letter)
-            lines.append(f"{key:<27}  {letter} {si:<25}  {value * scale:.3g} {unit}")
+            lines.append(f"{key:<27}  {letter} {si:<25}  {brief(value * scale, 3)} {unit}")
     starts = [f"{k} {n.initial_sd:.2e} {SI_UNIT[k]}" for k, n in numbers.items() if n.initial_sd]
     lines += (
         wrapped(

@@ -14,6 +14,6 @@ SHOULDER = 0.7
 SHOULDER_TAU = (0.02, 2.0, 5)
 FASTEST_SHOULDER = 1.0  # s, below which it counts as white noise, which is read at 1 s
 # Standard deviations of a unit over the typical ones of a sheet. The gyros of one ADIS16405 in four
-# recordings: N 1.08 to 1.24 times, lowest deviation 0.95 to 1.33 times its sheet's; with this, filters
-# of 200 simulated sensors are not overconfident, and not too cautious: benchmarks/sheets.py
+# recordings: N 1.08 to 1.24 times, lowest deviation 0.95 to 1.33 times its sheet's; with this, no
+# filter of 200 simulated sensors is overconfident: benchmarks/sheets.py
 UNIT_SPREAD = 1.25
