@@ -39,13 +39,14 @@ import fuzz_formats as formats
 import gmwm
 from fleets import QUICK
 from gmwm._core.runs import do_runs
+from gmwm.datasheet import read_datasheet
 from gmwm.diagnosis import health
 from gmwm.estimate import bootstrap, cramer_rao
 from gmwm.export import TARGETS, export, read_numbers
 from gmwm.ins.logs import Measured, read_fix_log, read_imu_log
 from gmwm.ins.spec import experiment_from, read_document
 from gmwm.ins.trajectory.trajectory_file import read_log
-from gmwm.report import read_datasheet, write_report
+from gmwm.report import write_report
 
 SECONDS, BYTES = 20, 2 << 30
 TOO_LARGE = "too large"

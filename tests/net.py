@@ -661,7 +661,7 @@ USES: dict[str, Callable[[Path, int], Any]] = {
         gmwm.calibrate(gmwm.read(path, units=SI), WhiteNoise() + RandomWalk(), jobs=1),
     ],
     "numbers": lambda path, case: read_numbers(path, 100.0 if case % 2 else None),
-    "datasheet": lambda path, case: gmwm.report.read_datasheet(
+    "datasheet": lambda path, case: gmwm.datasheet.read_datasheet(
         path, {"gyro_x": "gyro", "accel_x": "accel"}
     ),
     "checkpoint": lambda path, case: gmwm.StreamingVariance.load(path).results(),

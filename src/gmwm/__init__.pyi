@@ -6,6 +6,7 @@ from .calibration import (
     load as load,
     without_departures as without_departures,
 )
+from .datasheet import Datasheet as Datasheet, datasheet as datasheet
 from .diagnosis import (
     Health as Health,
     Still as Still,

@@ -608,6 +608,8 @@ _FILTER_NUMBERS = (
         "other units", "give it in {unit}/sqrt(Hz)", severity="warning"),
     _filter("ramp-as-constant", "the {label} counts as a constant of standard deviation {size}: "
         "|R| times the horizon", "for longer outages add a state for it", severity="warning"),
+    _filter("from-data-sheet", "a data sheet states typical values, not those of your unit",
+        "record an hour at rest: gmwm calibrate"),
     _filter("turn-on-left-out", "the start bias leaves out the turn-on bias, which a recording at "
         "rest cannot show", "add its variance"),
     _filter("uncertainty-not-covered", {

@@ -101,7 +101,7 @@ def calibrate(
     _start_workers(files, given["jobs"], memory)
     from gmwm._core.memory import limited
     from gmwm.calibration import Stopwatch, calibrate as run, stage
-    from gmwm.report import read_datasheet
+    from gmwm.datasheet import read_datasheet
 
     work = {name: given.pop(name) for name in ("screening", "still", "remove_departures", "jobs")}
     if target is not None:

@@ -52,8 +52,8 @@ def compare(
       gmwm compare monday/calibration.json friday/calibration.json -o compare.html
       gmwm compare unit-*/calibration.json --datasheet imu.yaml -o compare.html
     """
+    from gmwm.datasheet import read_datasheet
     from gmwm.population import compare as run, labelled
-    from gmwm.report import read_datasheet
 
     horizon, datasheet = given.pop("horizon"), given.pop("datasheet")
     if datasheet is not None:  # rejected before the work
@@ -117,12 +117,12 @@ def fleet(
       gmwm fleet 'lot-7/*.csv' --gyro-unit deg/s --accel-unit g -o lot-7-out \\
         --resume --limits limits.yaml
     """
+    from gmwm.datasheet import read_datasheet
     from gmwm.population import fleet as run
-    from gmwm.report import read_datasheet
 
     limits = given.pop("limits")
     work = {name: given.pop(name) for name in _PARTS}
-    work["limits"] = {} if limits is None else read_datasheet(limits).entries
+    work["limits"] = {} if limits is None else read_datasheet(limits).letters
     try:
         with progress_bar("fleet", "units", quiet=quiet) as bar:
             work |= {"folder": output, "progress": bar, **arguments_of_read(**given)}

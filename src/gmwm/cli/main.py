@@ -22,6 +22,7 @@ from gmwm.cli.console import with_hint
 from gmwm.cli.demo import demo, reproduce
 from gmwm.cli.navigate import navigate
 from gmwm.cli.numbers import bound, budget, certify, export, reduce
+from gmwm.cli.sheet import sheet
 from gmwm.errors import InputError, printable
 
 if TYPE_CHECKING:
@@ -60,7 +61,7 @@ def cli(context: click.Context) -> None:
 
 
 _COMMANDS = (calibrate, fleet, compare, demo, budget, health)
-for _command in (*_COMMANDS, bound, reduce, certify, export, navigate, reproduce):
+for _command in (*_COMMANDS, bound, reduce, certify, export, sheet, navigate, reproduce):
     cli.add_command(_command)
 
 

@@ -34,6 +34,8 @@ from gmwm.filter_numbers.result import (
     FORMS as FORMS,
     AxisFilterNumbers as AxisFilterNumbers,
     FilterNumbers as FilterNumbers,
+    InUnits as InUnits,
     Predicted as Predicted,
+    shown_unit as shown_unit,
 )
 from gmwm.filter_numbers.tuning import HORIZON as HORIZON

@@ -10,6 +10,7 @@ from gmwm.plotting.deviation import (
     deviation_range as deviation_range,
     deviations as deviations,
     intervals as intervals,
+    model_set as model_set,
     residuals as residuals,
     sensor_lines as sensor_lines,
     straight_lines as straight_lines,

@@ -170,6 +170,36 @@ def curves(
     ax.legend(fontsize="small", framealpha=0.9)
 
 
+def model_set(
+    tau: FloatArray,
+    models: FloatArray,
+    lines: Mapping[str, FloatArray],
+    lowest: float,
+    *,
+    unit: str,
+    title: str = "",
+    ax: Axes | None = None,
+) -> Axes:
+    """The Allan deviations of models that agree, as a band, and straight or curved lines over it.
+
+    tau: (J,), averaging times, s.
+    models: (M, J), deviations of the models, in ``unit``.
+    lines: Label -> deviations, (J,).
+    lowest: Deviation at which all of them are flat.
+    """
+    ax = ax or _new_axes(4.6)
+    ax.fill_between(tau, models.min(0), models.max(0), color="#808080", alpha=0.3, lw=0,
+                    label="models that agree")  # fmt: skip
+    ax.plot(tau, models.T, color="#808080", linewidth=0.5)
+    for (colour, turn), (label, value) in zip(styles(lines), lines.items(), strict=True):
+        ax.plot(tau, value, _DASHES[turn % len(_DASHES)], color=colour, linewidth=1.8, label=label)
+    ax.axhline(lowest, color=DATA_COLOUR, linewidth=1.0, linestyle=":", label="lowest deviation")
+    ax.set_ylim(lowest / 3.0, 1.5 * float(models.max(0)[0]))
+    _label(ax, f"Allan deviation [{unit}]", title)
+    ax.legend(fontsize="small", framealpha=0.9)
+    return ax
+
+
 def sensor_lines(
     numbers: Mapping[str, tuple[str, float]], tau: float
 ) -> dict[str, tuple[float, float, float, float]]:

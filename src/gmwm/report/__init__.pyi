@@ -1,6 +1,5 @@
 from .calibration import fragment as fragment, write_report as write_report
 from .compared import write_sensor_comparison_report as write_sensor_comparison_report
-from .datasheet import read_datasheet as read_datasheet
 from .fleet import write_fleet_report as write_fleet_report
 from .health import verdict as verdict
 from .navigation import (
@@ -9,4 +8,5 @@ from .navigation import (
     write_validation_report as write_validation_report,
 )
 from .page import duration_text as duration_text
-from .summary import summary_text as summary_text
+from .sheet import write_sheet_report as write_sheet_report
+from .summary import filter_key as filter_key, summary_text as summary_text

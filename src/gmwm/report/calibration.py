@@ -18,13 +18,13 @@ from gmwm._core.pages import page_of
 from gmwm._core.text import brief, per_cent
 from gmwm._core.typing import FloatArray
 from gmwm.calibration import AxisNumbers, Calibration
+from gmwm.datasheet import UNITS, Datasheet, read_datasheet
 from gmwm.estimate import Estimate, Fit
 from gmwm.estimate.result import confidence_interval
 from gmwm.issues import worst_first
 from gmwm.process import Model, WhiteNoise
 from gmwm.readers import Channel, Recording
 from gmwm.report.budget import navigation
-from gmwm.report.datasheet import UNITS, Datasheet, read_datasheet
 from gmwm.report.figure import (
     Spans,
     density_figure,

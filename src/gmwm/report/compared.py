@@ -13,9 +13,9 @@ from gmwm._core.files import writable_file
 from gmwm._core.pages import page_of
 from gmwm._core.text import brief, with_error
 from gmwm._core.units import customary_unit
+from gmwm.datasheet import Datasheet, read_datasheet
 from gmwm.issues import worst_first
 from gmwm.population import LETTERS, STATES, AxisComparison, Number, SensorComparison
-from gmwm.report.datasheet import Datasheet, read_datasheet
 from gmwm.report.page import origin, write_page
 from gmwm.report.pictures import multiple
 

@@ -14,6 +14,7 @@ import numpy as np
 
 from gmwm._core.typing import FloatArray
 from gmwm.calibration import AxisNumbers, Calibration
+from gmwm.datasheet import Datasheet
 from gmwm.diagnosis import spectrum
 from gmwm.estimate import Fit
 from gmwm.estimate.result import dense_curves
@@ -21,7 +22,6 @@ from gmwm.filter_numbers import FIELD_UNITS, ErrorBudget, root_sum
 from gmwm.plotting import COMPONENT_COLOURS, DATA_COLOUR, SUM_COLOUR, deviation_range, styles
 from gmwm.process import Model
 from gmwm.readers import Channel
-from gmwm.report.datasheet import Datasheet
 from gmwm.report.page import units_of
 
 Figure = dict[str, Any]

@@ -30,7 +30,7 @@ _MANY_YEARS = 100.0
 if TYPE_CHECKING:
     from jinja2 import Environment
 
-    from gmwm.report.datasheet import Datasheet
+    from gmwm.datasheet import Datasheet
 
 
 def resource(name: str) -> str:

@@ -11,9 +11,9 @@ import numpy as np
 from gmwm._core.text import brief
 from gmwm._core.typing import FloatArray
 from gmwm._core.units import shown_unit
+from gmwm.datasheet import Datasheet
 from gmwm.estimate import Fit
 from gmwm.population import AxisComparison, Spread
-from gmwm.report.datasheet import Datasheet
 
 _LEFT, _RIGHT = 46.0, 374.0
 _TOP, _MIDDLE = 15.0, 196.0  # of the deviations

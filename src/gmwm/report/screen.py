@@ -8,7 +8,7 @@ import numpy as np
 
 from gmwm._core.text import brief
 from gmwm.calibration import AxisNumbers, Calibration
-from gmwm.report.datasheet import UNITS, Datasheet
+from gmwm.datasheet import UNITS, Datasheet
 from gmwm.report.health import verdict
 from gmwm.report.numbers import SHOWN, Certified
 from gmwm.report.page import quantity_text

@@ -10,11 +10,11 @@ import numpy as np
 from gmwm._core.text import WIDTH, brief, wrapped
 from gmwm._core.units import si_parameter_unit
 from gmwm.calibration import Calibration, SensorNumbers
+from gmwm.datasheet import UNITS
 from gmwm.errors import InputError
 from gmwm.estimate import Fit, JointFit
 from gmwm.export import SENSORS, Triad
 from gmwm.issues import Notice, worst_first
-from gmwm.report.datasheet import UNITS
 from gmwm.report.health import findings, is_short, length_sentence, trust
 from gmwm.report.numbers import SHOWN, triad_of
 from gmwm.report.page import duration_text

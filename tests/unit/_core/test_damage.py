@@ -18,8 +18,8 @@ from gmwm._core import jobs
 from gmwm._core.documents import read_yaml
 from gmwm._core.files import moved_into_place, moved_together
 from gmwm._core.runs import do_runs
+from gmwm.datasheet import read_datasheet
 from gmwm.export import read_numbers
-from gmwm.report import read_datasheet
 
 SI = {"gyro": "rad/s", "accel": "m/s^2"}
 

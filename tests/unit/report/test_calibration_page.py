@@ -17,12 +17,12 @@ import gmwm
 from gmwm import Channel, InputError, Process, RandomWalk, WhiteNoise, parameter
 from gmwm.calibration import axis_numbers
 from gmwm.cli.console import in_options
+from gmwm.datasheet import read_datasheet
 from gmwm.issues import Notice
 from gmwm.plotting import COMPONENT_COLOURS
 from gmwm.report import figure as figures, write_report
 from gmwm.report.budget import navigation
 from gmwm.report.calibration import _needed as needed, page
-from gmwm.report.datasheet import read_datasheet
 from gmwm.report.figure import (
     density_figure,
     deviation_figure,

@@ -1,0 +1,134 @@
+"""Numbers for filters from a data sheet: ``gmwm sheet``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from gmwm._core.text import brief, bullets, wrapped
+from gmwm.cli.console import print_result
+from gmwm.cli.options import FILE_TO_WRITE, PATH, options
+from gmwm.errors import InputError
+
+if TYPE_CHECKING:
+    from gmwm.filter_numbers import FilterNumbers
+
+
+@click.command()
+@click.argument("source", metavar="SHEET", required=False)
+@options(
+    """
+    --horizon S
+    --form TEXT  N+K, N+GM or N+K+GM.
+    --unit-spread FACTOR  How many times as noisy as typical your unit may be.
+    --rate HZ  Sampling rate, for programs that want it beside the numbers.
+    --imu FILE  Numbers in use, to be judged: a file of Kalibr, OpenVINS, VINS or their like.
+    --report HTML  Page to write: the models in the Allan plot, and the numbers.
+    -o --output JSON  File to save the numbers in, for gmwm export.
+    --list  List the sensors whose data sheets are installed.
+    --units
+    --json
+    """,
+    form={"default": "N+K"},
+    unit_spread={"type": float, "default": 1.25},
+    rate={"type": float, "default": float("nan"), "show_default": False},
+    imu={"type": PATH},
+    report=FILE_TO_WRITE,
+    output=FILE_TO_WRITE,
+    list={"name": "listed"},
+)
+def sheet(
+    source: str | None,
+    horizon: float,
+    form: str,
+    imu: Path | None,
+    report: Path | None,
+    output: Path | None,
+    listed: bool,
+    units: str,
+    as_json: bool,
+    **how: float,
+) -> None:
+    """Find numbers for a filter from a data sheet, where there is no recording.
+
+    SHEET is a YAML file such as 'gyro: {N: 0.15 deg/sqrt(h), B: 7 deg/h}', or a sensor of --list.
+    Two numbers leave much open: N and K are found for every kind of error model that agrees with
+    them, and the last table holds what covers them all. An hour of recording tells more.
+
+    \b
+    Examples:
+      gmwm sheet --list
+      gmwm sheet bmi088 --rate 200 -o numbers.json
+      gmwm export numbers.json --to kalibr
+      gmwm sheet mine.yaml --imu imu.yaml
+    """
+    from gmwm.datasheet import datasheet, sheets
+
+    if listed:
+        lines = (wrapped(datasheet(name).document, f"{name:<10} ", 11) for name in sheets())
+        click.echo("\n".join(line for each in lines for line in each))
+        return
+    if source is None:
+        raise InputError("gmwm sheet needs a YAML file or a sensor (sensors: gmwm sheet --list)")
+    found = datasheet(source)
+    numbers = found.numbers(form, horizon, **how)
+    if output is not None:
+        numbers.save(output)
+    answer = _for_filter(numbers, how["unit_spread"])
+    if report is not None:
+        from gmwm.report import write_sheet_report
+
+        write_sheet_report(found, report, numbers, answer)
+    parts = [found.text(units, form, horizon), answer]
+    if imu is not None:
+        parts.append(
+            _judged(found.judged(_in_use(imu, how["rate"]), horizon, how["unit_spread"]), imu)
+        )
+    print_result(numbers, report, output, text="\n\n".join(parts), as_json=as_json)
+
+
+def _for_filter(numbers: FilterNumbers, unit_spread: float) -> str:
+    """N, K and the start bias of each sensor in SI by key, and how consistent they are."""
+    from gmwm._core.units import SI_UNIT
+    from gmwm.filter_numbers import shown_unit
+    from gmwm.report import filter_key
+
+    title = (
+        f"For your filter, outages up to {numbers.horizon:g} s: covers all of them, in units up to "
+        f"{unit_spread:g} times as noisy (keys of OpenVINS, Kalibr)"
+    )
+    lines = wrapped(title)
+    for quantity, each in numbers.items():
+        for letter in "NK":
+            (unit, scale), value = shown_unit(letter, quantity, "field"), getattr(each, letter)
+            si = f"{value:.2e} {shown_unit(letter, quantity, 'si')[0]}"
+            key = filter_key(quantity, letter)
+            lines.append(f"{key:<27}  {letter} {si:<25}  {brief(value * scale, 3)} {unit}")
+    starts = [f"{k} {n.initial_sd:.2e} {SI_UNIT[k]}" for k, n in numbers.items() if n.initial_sd]
+    lines += (
+        wrapped(
+            f"start bias, 1 sigma (with the turn-on bias of the sheet, if any): {', '.join(starts)}"
+        )
+        if starts
+        else []
+    )
+    worst = [f"{k} {max(n.nees.values()):.2g}" for k, n in numbers.items()]
+    lines += wrapped(f"NEES at most {', '.join(worst)} (1: consistent, below: cautious)")
+    return "\n".join([*lines, "", *wrapped("An hour of recording tells more: gmwm calibrate")])
+
+
+def _in_use(imu: Path, rate: float) -> Any:
+    from gmwm.export import read_numbers
+
+    found = read_numbers(imu, rate)
+    if not {"gyro", "accel"} & {*found}:
+        raise InputError(f"{imu}: has numbers by axis: judge one by gmwm certify, with a recording")
+    return found
+
+
+def _judged(nees: dict[str, tuple[float, float]], imu: Path) -> str:
+    """The range of NEES of a filter with numbers in use, by sensor."""
+    lines = wrapped(f"{imu}: NEES of a filter with these numbers, over the models (1: consistent)")
+    return "\n".join([*lines, *bullets(f"{k}: {a:.2g} to {b:.2g}" for k, (a, b) in nees.items())])

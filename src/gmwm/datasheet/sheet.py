@@ -1,0 +1,318 @@
+"""What a data sheet states, the error models that agree with it, and numbers for a filter."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from gmwm import plotting
+from gmwm._core import checks
+from gmwm._core.tables import plain_table
+from gmwm._core.text import brief, wrapped
+from gmwm._core.typing import FloatArray
+from gmwm._core.units import customary_unit
+from gmwm.datasheet import tuning
+from gmwm.datasheet.models import agreeing, lowest_deviation
+from gmwm.errors import InputError
+from gmwm.filter_numbers import (
+    HORIZON,
+    AxisFilterNumbers,
+    FilterNumbers,
+    InUnits,
+    Predicted,
+    bound,
+    certify,
+    shown_unit,
+)
+from gmwm.issues import notice
+from gmwm.process import BiasInstability, Model, Process, RandomWalk, WhiteNoise
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+UNITS = {"N": "u/sqrt(Hz)", "B": "u", "K": "u/s/sqrt(Hz)"}
+"""Of the numbers that most data sheets state."""
+
+KEYS = {
+    **UNITS,
+    "noise_density": "u/sqrt(Hz)",
+    "rms_noise": "u",
+    "bandwidth": "Hz",
+    "lowest_deviation": "u",
+    "correlation_time": "s",
+    "turn_on_bias": "u",
+}
+"""What an entry of a sensor may state, with units."""
+
+_FINE = 1e-3  # s, sampling interval of curves: that of the sensor does not matter
+_SHARED = ("bandwidth", "correlation_time")  # the same in noisier units
+_TERMS: dict[str, type[Process]] = {"N": WhiteNoise, "B": BiasInstability, "K": RandomWalk}
+_PER_DENSITY = np.sqrt(0.5)
+"""N over a noise density: the variance of a band per hertz is one-sided, N^2 the two-sided power
+spectral density (IEEE Std 952-1997, C.1.1)."""
+_FIRST_ORDER = np.pi / 2.0
+"""Equivalent noise bandwidth of a first-order filter over its bandwidth."""
+
+
+@dataclass(frozen=True, repr=False)
+class Datasheet(InUnits):
+    """What a data sheet states, by sensor or channel.
+
+    Attributes
+    ----------
+    name : str
+        Of the sensor, or of the file.
+    entries : dict
+        "gyro", "accel" or a channel -> key of `KEYS` -> value, SI.
+    document : str
+        Where the values are from; empty if unknown.
+    pages : dict
+        Sensor -> key -> page of the document.
+    """
+
+    name: str
+    entries: dict[str, dict[str, float]]
+    document: str = ""
+    pages: dict[str, dict[str, str]] = field(default_factory=dict)
+
+    @property
+    def letters(self) -> dict[str, dict[str, float]]:
+        """N, B and K of each sensor or channel as far as they are stated, SI."""
+        return {sensor: self.of(sensor, None) for sensor in self.entries}
+
+    def of(self, channel: str, quantity: str | None) -> dict[str, float]:
+        """N, B and K of a channel as far as they are stated, SI."""
+        values = self.entries.get(channel, self.entries.get(quantity or "", {}))
+        found = {letter: values[letter] for letter in UNITS if letter in values}
+        if "N" not in found and "noise_density" in values:
+            found["N"] = _PER_DENSITY * values["noise_density"]
+        return found
+
+    def deviation(
+        self, channel: str, quantity: str | None, tau: FloatArray, dt: float
+    ) -> FloatArray | None:
+        """The Allan deviation of N, B and K, u, or ``None``."""
+        values = self.of(channel, quantity)
+        if not values:
+            return None
+        curves = [_TERMS[key](value).haar_variance(tau, dt) for key, value in values.items()]
+        return np.asarray(np.sqrt(2.0 * np.sum(curves, axis=0)), dtype=float)
+
+    def models(self, sensor: str, unit_spread: float = 1.0) -> dict[str, Model]:
+        """Error models that agree with what is stated of a sensor, by their terms.
+
+        They go wherever models by channel do, e.g. ``gmwm.bound(sheet.models("gyro"),
+        shared=True)`` or `gmwm.certify`; docs/data-sheets.md says how they are made.
+
+        Parameters
+        ----------
+        sensor : str
+            Key of ``entries``.
+        unit_spread : float, optional
+            Standard deviations of a unit's errors over the typical ones of the sheet, 1 or more.
+
+        Raises
+        ------
+        InputError
+            If nothing is stated of the sensor, or no white or no slow noise.
+        """
+        if sensor not in self.entries:
+            raise InputError(f"{self.name} states nothing of {sensor!r}: {', '.join(self.entries)}")
+        if not checks.is_number(unit_spread) or not 1.0 <= unit_spread <= checks.LARGEST:
+            raise InputError(f"unit_spread = {unit_spread}: give a factor of 1 or more")
+        where = f"{self.name}: {sensor}"
+        values = {
+            k: v if k in _SHARED else unit_spread * v for k, v in self.entries[sensor].items()
+        }
+        return {
+            f"{sensor}_{label}{way}": model
+            for way, N in _white(where, values).items()
+            for label, model in agreeing(where, values, N).items()
+        }
+
+    def numbers(
+        self,
+        form: str = "N+K",
+        horizon: float = HORIZON,
+        *,
+        unit_spread: float = tuning.UNIT_SPREAD,
+        rate: float = float("nan"),
+    ) -> FilterNumbers:
+        """The smallest numbers that are not overconfident for any model that agrees with the sheet.
+
+        Parameters
+        ----------
+        form, horizon
+            As of `gmwm.bound`.
+        unit_spread : float, optional
+            As of `models`; docs/data-sheets.md has the reason for the default.
+        rate : float, optional
+            At which the sensor is sampled, Hz: for programs that want it beside the numbers.
+
+        Returns
+        -------
+        FilterNumbers
+            By sensor, each for all of its axes, of those that have white and slow noise. The
+            predictions are the largest NEES and the smallest tightness over the models.
+
+        Raises
+        ------
+        InputError
+            If there is no such sensor, or as `gmwm.bound` does.
+        """
+        found, reasons = {}, []
+        for sensor, values in self.entries.items():
+            try:
+                models = self.models(sensor, unit_spread)
+            except InputError as error:
+                reasons.append(error)
+                continue
+            sd = values.get("turn_on_bias", 0.0)
+            found[sensor] = _of_all(
+                [*bound(models, form, horizon, bias_sd=sd, shared=True).values()]
+            )
+        if not found:
+            raise reasons[0]
+        return FilterNumbers(
+            found, f"{self.name}, from a data sheet: record an hour", rate, shared=True
+        )
+
+    def judged(
+        self,
+        numbers: Mapping[str, Any],
+        horizon: float = HORIZON,
+        unit_spread: float = tuning.UNIT_SPREAD,
+    ) -> dict[str, tuple[float, float]]:
+        """Least and largest NEES of a filter with given numbers, by sensor.
+
+        Parameters
+        ----------
+        numbers : mapping
+            By sensor, as of `gmwm.certify`.
+        horizon : float, optional
+            Time without aiding, s.
+        unit_spread : float, optional
+            As of `models`; the least is that of a typical unit, the largest that of a noisy one.
+        """
+        found = {}
+        for sensor in (name for name in self.entries if name in numbers):
+            nees = [
+                check.nees
+                for spread in (1.0, unit_spread)
+                for check in certify(
+                    self.models(sensor, spread), {sensor: numbers[sensor]}, outages=(horizon,)
+                ).of("free")
+            ]
+            found[sensor] = (min(nees), max(nees))
+        return found
+
+    def plot(
+        self, sensor: str, numbers: FilterNumbers | None = None, ax: Axes | None = None
+    ) -> Axes:
+        """The Allan deviations of the models that agree with what is stated of a sensor.
+
+        Parameters
+        ----------
+        sensor : str
+            Key of ``entries``.
+        numbers : FilterNumbers, optional
+            Of a filter, drawn over them.
+        ax : matplotlib Axes, optional
+
+        Returns
+        -------
+        matplotlib Axes
+        """
+        quantity = sensor.partition("_")[0]
+        unit, scale = customary_unit("u", quantity, "u")
+        models = self.models(sensor)
+        first = next(iter(models.values()))
+        crossing = 2.0 * float(first.haar_variance(np.ones(1), _FINE)[0])
+        lowest = lowest_deviation(self.entries[sensor]) or np.sqrt(crossing)
+        tau = np.geomspace(0.1, 1e4, 81)
+        curves = {key: np.sqrt(2.0 * m.haar_variance(tau, _FINE)) for key, m in models.items()}
+        lines = {}
+        if numbers is not None and sensor in numbers:
+            own = numbers[sensor].model.haar_variance(tau, _FINE)
+            lines[f"filter, {numbers.form} for {numbers.horizon:g} s"] = scale * np.sqrt(2.0 * own)
+        title = f"{self.name}, {sensor}"
+        return plotting.model_set(
+            tau,
+            scale * np.stack([*curves.values()]),
+            lines,
+            scale * lowest,
+            unit=unit,
+            title=title,
+            ax=ax,
+        )
+
+    def __repr__(self) -> str:
+        return f"<Datasheet of {self.name}: {', '.join(self.entries)}>"
+
+    def text(self, units: str = "field", form: str = "N+K", horizon: float = HORIZON) -> str:
+        """Of each kind of model that agrees with the sheet, N and K that a filter needs."""
+        about = f"{self.name} ({self.document})" if self.document else self.name
+        what = "typical values of a data sheet. Models that agree with it, and N and K of a filter"
+        title = f"{about}: {what} for each, for outages up to {horizon:g} s:"
+        parts = ["\n".join(wrapped(title))]
+        for sensor in self.entries:
+            try:
+                models = self.models(sensor)
+            except InputError as error:
+                parts.append("\n".join(wrapped(str(error), indent=2)))
+                continue
+            kinds: dict[str, list[AxisFilterNumbers]] = {}
+            for label, model in models.items():
+                found = bound(model, form, horizon)
+                for kind in (_kind(label), "all"):
+                    kinds.setdefault(kind, []).append(found)
+            kinds["all"] = kinds.pop("all")
+            known = [shown_unit(key, sensor.partition("_")[0], units) for key in "NK"]
+            rows = []
+            for kind, same in kinds.items():
+                values = zip([[e.N for e in same], [e.K for e in same]], known, strict=True)
+                rows.append((kind, *(_ends(each, scale) for each, (_, scale) in values)))
+            heads = (
+                sensor,
+                *(f"{key}, {unit}" for key, (unit, _) in zip("NK", known, strict=True)),
+            )
+            parts.append(plain_table(heads, rows).rstrip())
+        return "\n\n".join(parts)
+
+
+def _of_all(axes: Sequence[AxisFilterNumbers]) -> AxisFilterNumbers:
+    """Numbers that models share, as those of one axis."""
+    worst = tuple(
+        Predicted(same[0].time, max(e.nees for e in same), min(e.tightness for e in same))
+        for same in zip(*(each.predicted for each in axes), strict=True)
+    )
+    return replace(axes[0], predicted=worst, notices=(notice("from-data-sheet"),))
+
+
+def _kind(label: str) -> str:
+    """The terms of a model without its correlation time."""
+    return re.sub(r" [\d.,e+]+ s| \(.*\)", "", label.partition("_")[2]).replace("+", " + ")
+
+
+def _ends(values: Sequence[float], scale: float) -> str:
+    return " to ".join(dict.fromkeys(brief(scale * end(values), 3) for end in (min, max)))
+
+
+def _white(where: str, values: Mapping[str, float]) -> dict[str, float]:
+    """N by the way in which the sheet may mean it, u/sqrt(Hz)."""
+    if "N" in values:
+        return {"": values["N"]}
+    if "noise_density" in values:
+        density = values["noise_density"]
+        return {"": _PER_DENSITY * density, " (density is N)": density}
+    if {"rms_noise", "bandwidth"} <= {*values}:
+        density = values["rms_noise"] / np.sqrt(values["bandwidth"])
+        least = _PER_DENSITY * density / np.sqrt(_FIRST_ORDER)
+        return {"": least, " (sharp band)": _PER_DENSITY * density}
+    raise InputError(
+        f"{where}: no white noise is stated: give N, noise_density, or rms_noise and bandwidth"
+    )
