@@ -471,8 +471,8 @@ _CALIBRATION = (
     Issue("departures-many", "{removed} departures were subtracted: a bias that changes so often "
         "is sensor noise", "fit a slow term instead, such as a Gauss-Markov process",
         severity="bad", lacks="stationary", reason="the bias keeps changing"),
-    Issue("departures-removed", "if the subtracted departures recur the deviation at "
-        "tau = {tau:.3g} s is {times} times as large", "find their cause, or add a slow term",
+    Issue("departures-removed", "departures were subtracted: {times} times the deviation at "
+        "{tau:.4g} s if they recur", "find their cause, or add a slow term",
         severity="warning", topic="departure"),
     Issue("drift-at-start", "a drift by {height} from the start that ends at {when}{also}",
         "leave it out{back}", severity="bad", topic="departure", lacks="stationary",

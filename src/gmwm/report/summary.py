@@ -14,6 +14,7 @@ from gmwm.datasheet import UNITS
 from gmwm.errors import InputError
 from gmwm.estimate import Fit, JointFit
 from gmwm.export import SENSORS, Triad
+from gmwm.filter_numbers import bound
 from gmwm.issues import Notice, worst_first
 from gmwm.report.health import findings, is_short, length_sentence, trust
 from gmwm.report.numbers import SHOWN, triad_of
@@ -60,16 +61,18 @@ def summary_text(calibration: Calibration, files: Iterable[str] = ()) -> str:
         Lines about the files that were written.
     """
     first, last, texts = wrapped(verdict_line(calibration)), list(files), actions(calibration)
-    for is_explained in (True, False):  # rather every axis than what the numbers cover
-        numbers = _filter(calibration, is_explained)
+    for notes in (2, 1, 0):  # rather every axis than what explains the numbers
+        numbers = _filter(calibration, notes)
         left = _LINES - sum(len(part) + 1 for part in (first, numbers, last) if part)
         least = len(_to_do(texts[:1], left))
         many = min(len(_to_do(texts, left)), _FEWEST + 1) if len(calibration) > _AXES else 0
         table = _sensor(calibration, left - 1 - max(least, many))
-        if all(any(line.startswith(name) for line in table) for name in calibration):
+        to_do = _to_do(texts, max(left - len(table) - 1, least))
+        is_whole = all(any(line.startswith(name) for line in table) for name in calibration)
+        if is_whole and len(table) + 1 + len(to_do) <= left:
             break
-    parts = [first, table, numbers, _to_do(texts, left - len(table) - 1), last]
-    return "\n\n".join("\n".join(part) for part in parts if part)
+    parts = [part for part in (first, table, numbers, to_do, last) if part]
+    return "\n\n".join("\n".join(part) for part in parts)
 
 
 def state(fit: Fit) -> str:
@@ -216,9 +219,12 @@ def reason(name: str, calibration: Calibration) -> str:
 # -- filter numbers --------------------------------------------------------------------------------
 
 
-def _filter(calibration: Calibration, is_explained: bool) -> list[str]:
-    """N and K of each sensor by key, the start bias, and if explained, what else they cover."""
-    lines, starts, covered = [], [], []
+def _filter(calibration: Calibration, notes: int) -> list[str]:
+    """N and K of each sensor by key, and the start bias.
+
+    notes: 1: with those of models that fit equally well; 2: with what else they cover, too.
+    """
+    lines, starts, covered, others = [], [], [], []
     for quantity in (q for q in SENSORS if q in {f.wv.quantity for f in calibration.values()}):
         fits = {name: fit for name, fit in calibration.items() if fit.wv.quantity == quantity}
         try:
@@ -231,7 +237,8 @@ def _filter(calibration: Calibration, is_explained: bool) -> list[str]:
             row = f"{filter_key(quantity, letter):<27}  filter {letter} {values[letter]}"
             lines.append(f"{row:<62}  {use(fits, letter)}".rstrip())
         starts += [f"{quantity} {values['start']}"] if values["start"][0] != "0" else []
-        if is_explained and use(fits, "K") != "do not use":
+        others += _of_rivals(triad, calibration) if notes else []
+        if notes > 1 and use(fits, "K") != "do not use":
             covered += wrapped(covers(triad, calibration.numbers), indent=2)
     if not lines:
         return []
@@ -239,7 +246,24 @@ def _filter(calibration: Calibration, is_explained: bool) -> list[str]:
         short = is_short(calibration.values(), SHOWN)
         what = "too short: do not use" if short else "add turn-on bias"
         lines += wrapped(f"start bias, 1 sigma ({what}): {', '.join(starts)}", indent=2)
+    if others:
+        lines += wrapped(f"models that fit equally well: {', '.join(others)}", indent=2)
     return [_FILTER.format(SHOWN), *lines, *covered]
+
+
+def _of_rivals(triad: Triad, calibration: Calibration) -> list[str]:
+    """N and K as large as models that fit equally well have them, where that is more."""
+    found = [
+        bound(model, horizon=SHOWN, dt=calibration[axis.name].wv.dt)
+        for axis in triad.axes
+        for model in calibration.rivals.get(axis.name, ())
+    ]
+    largest = {letter: max((getattr(n, letter) for n in found), default=0.0) for letter in KEYS}
+    return [
+        f"{triad.quantity} {letter} up to {brief(value / getattr(triad, letter), 2)} times"
+        for letter, value in largest.items()
+        if value > _NOTABLE * getattr(triad, letter)
+    ]
 
 
 def filter_key(quantity: str, letter: str) -> str:

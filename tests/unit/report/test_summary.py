@@ -206,7 +206,17 @@ def test_what_would_recur_leaves_a_reservation(two):
         with_notice(two, "departures-removed", "warning", tau=20.0, times="4.3", ratio=4.3)
     )
     assert "Usable with reservation (*): all axes" in text or "(*): gyro_z and accel_x" in text
-    assert "is 4.3 times as large" in " ".join(text.split())
+    assert re.search(r"^\d\. .*departures were subtracted", text, re.MULTILINE)
+
+
+def test_larger_numbers_of_models_that_fit_equally_well_are_said(two):
+    name, fit = next(iter(two.items()))
+    own = gmwm.bound(two, shared=True)[name]
+    rival = WhiteNoise(3.0 * own.N) + gmwm.RandomWalk(own.K)
+    text = printed(replace(two, rivals={name: (rival,)}))
+    quantity = fit.wv.quantity
+    assert f"models that fit equally well: {quantity} N up to 3 times" in text
+    assert "equally well" not in printed(replace(two, rivals={name: (fit.model,)}))
 
 
 def test_of_a_short_record_only_n_is_usable(two):
