@@ -144,13 +144,11 @@ class AllanLines:
                 "none"
             )
         keys = tuple(key for key in lines if key in runs)
-        coefficients, matrix = _coefficients(
-            wv, [(lines[key], runs[key]) for key in keys], self.regression == "irls"
-        )
+        sizes, matrix = _coefficients(wv, [(lines[k], runs[k]) for k in keys], self.regression)
         scale = np.array([1.0 / lines[key].factor for key in keys])
         if "R" in keys and ols_slope(wv).value < 0.0:
             scale[keys.index("R")] *= -1.0
-        fitted = _fitted(model, dict(zip(keys, map(float, scale * coefficients), strict=True)))
+        fitted = _fitted(model, dict(zip(keys, map(float, scale * sizes), strict=True)))
         residual = wv.variance - fitted.wavelet_variance(wv.tau, wv.dt, wv.wavelet)
         whitened = weight_root(wv.covariance) @ residual
         return Fit(
@@ -184,7 +182,7 @@ class AllanLines:
                     tau_max=float(wv.tau[runs[key].last]),
                     coefficient=float(coefficient),
                 )
-                for key, coefficient in zip(keys, coefficients, strict=True)
+                for key, coefficient in zip(keys, sizes, strict=True)
             ),
         )
 
@@ -300,7 +298,7 @@ def _allowance(combination: FloatArray, covariance: FloatArray) -> FloatArray:
 
 
 def _coefficients(
-    wv: WaveletVariance, parts: Sequence[tuple[_Line, _Run]], reweighted: bool
+    wv: WaveletVariance, parts: Sequence[tuple[_Line, _Run]], regression: str
 ) -> tuple[FloatArray, FloatArray]:
     """Coefficients of the lines by least squares in log-log, and their covariance."""
     gradient = np.zeros((len(parts), wv.tau.size))
@@ -310,7 +308,7 @@ def _coefficients(
         levels = levels[wv.variance[levels] > 0.0]
         heights = np.log(wv.allan_deviation[levels]) - line.slope * np.log(wv.tau[levels])
         weights = np.full(levels.size, 1.0 / levels.size)
-        for _ in range(_ROUNDS if reweighted else 0):
+        for _ in range(_ROUNDS if regression == "irls" else 0):
             relative = np.exp(2.0 * (heights - weights @ heights)) / wv.variance[levels]
             block = wv.covariance[np.ix_(levels, levels)] * np.outer(relative, relative)
             root = weight_root(block)
