@@ -102,8 +102,9 @@ def to_gauss_markov(arma: Fit | Process, dt: float | None = None) -> GaussMarkov
     Examples
     --------
     >>> import gmwm
-    >>> arma = gmwm.ARMA([1.4, -0.45], [-0.7], 1.0)
-    >>> print(gmwm.to_gauss_markov(arma, dt=1.0))
+    >>> form = gmwm.to_gauss_markov(gmwm.ARMA([1.4, -0.45], [-0.7], 1.0), dt=1.0)
+    >>> [round(value, 3) for value in form.params.values()]
+    [0.888, 1.443, 1.331, 9.491]
     """
     process: Process = arma.model.terms[0] if isinstance(arma, Fit) else arma
     step = arma.wv.dt if isinstance(arma, Fit) else dt

@@ -201,8 +201,9 @@ EM_4 = replace(
     TABLE_4,
     name="em4",
     title="EM, Table IV: three Gauss-Markov processes",
-    n=20_000,
-    runs=50,
+    n=100_000,
+    runs=20,
+    quantities=tuple(replace(quantity, published={}) for quantity in TABLE_4.quantities),
     methods={
         "EM": Estimation(EM()),
         "EM*": Estimation(

@@ -81,7 +81,10 @@ class Summary:
                 bound, absolute = bounds[name], bounds[name] * abs(s.true_value(quantity))
                 ratio = f"{bound / self.bounds[name]:.2f}"
                 rows.append([name, label, f"{absolute:.3g}", f"{bound:.3g}", ratio, *[""] * 4])
-        columns = ("RMSE", "relative", "/ bound", "bias", "covers", "paper", "without")
+        columns = ["RMSE", "relative", "/ bound", "bias", "covers", "paper", "without"]
+        legend = "; without: runs\nthat have no estimate"
+        if not any(row[-1] for row in rows):
+            columns, rows, legend = columns[:-1], [row[:-1] for row in rows], ""
         heads, counts = ["not valid"], [self.invalid]
         if any(self.from_grid.values()):
             heads, counts = [*heads, "from grid"], [*counts, self.from_grid]
@@ -95,8 +98,7 @@ class Summary:
             plain_table(("quantity", "method", *columns), rows),
             plain_table(("method", *heads, "median time"), times),
             "relative, bias: over the true value; bound: Cramer-Rao; moments: the same for\n"
-            "estimates by Haar wavelet variances only; covers: 95 % intervals; without: runs\n"
-            "that have no estimate",
+            f"estimates by Haar wavelet variances only; covers: 95 % intervals{legend}",
         ]
         return "\n".join(["\n\n".join(parts), *bullets(s.notes)])
 
