@@ -112,6 +112,11 @@ class GMWM:
         """Fit the open parameters of a model to wavelet variances."""
         ramp = next((term for term in model.terms if term.is_drift and term.is_open), None)
         if self.drift == "moments" and ramp is not None:
+            if not np.any(wv.drift_response):
+                raise InputError(
+                    f'{wv.wavelet!r} does not see a drift: use "haar", or leave out '
+                    'drift = "moments"'
+                )
             squared = [SquaredRamp() if term is ramp else term for term in model.terms]
             found = self.estimate(Model(tuple(squared)), wv)
             size = math.copysign(found.params["R"], ols_slope(wv).value)

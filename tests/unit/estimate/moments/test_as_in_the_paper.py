@@ -39,6 +39,12 @@ def test_without_an_open_ramp_it_changes_nothing():
         assert gmwm.fit(model, series(1), 1.0, method=GMWM(drift="moments")).params == usual.params
 
 
+def test_a_wavelet_that_sees_no_drift_is_rejected():
+    wv = gmwm.wavelet_variance(series(0), 1.0, wavelet="db2")
+    with pytest.raises(InputError, match="does not see a drift"):
+        gmwm.fit(TRUTH.opened(), wv, method=GMWM(drift="moments"))
+
+
 SUM = WhiteNoise(0.8) + GaussMarkov(0.5, 125.0)
 
 
