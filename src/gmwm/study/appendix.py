@@ -70,7 +70,7 @@ def allan_least_squares(
     for own, shape in lines:
         there, weighted = np.isin(tau, own), shape
         if covariance is not None:
-            weighted = np.linalg.solve(covariance[np.ix_(there, there)], shape)
+            weighted = np.asarray(np.linalg.solve(covariance[np.ix_(there, there)], shape))
         found.append(weighted @ allan_variance[there] / (weighted @ shape))
     return np.array(found)
 
