@@ -27,6 +27,7 @@ from .estimate import (
     CramerRao as CramerRao,
     Estimate as Estimate,
     Fit as Fit,
+    GaussMarkovForm as GaussMarkovForm,
     JointFit as JointFit,
     SimulatedMoments as SimulatedMoments,
     Whittle as Whittle,
@@ -34,6 +35,7 @@ from .estimate import (
     bootstrap_test as bootstrap_test,
     cramer_rao as cramer_rao,
     fit as fit,
+    to_gauss_markov as to_gauss_markov,
 )
 from .export import export as export
 from .filter_numbers import (

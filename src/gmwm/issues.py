@@ -552,6 +552,9 @@ _ESTIMATE = (
         reason="a correlation time beyond reach"),
     _fit("sensor-bandwidth", "the sensor's {bandwidth:.3g} Hz low-pass shapes this noise ({term}, "
         "N = {size:.3g} {unit}); a filter needs no state for it", severity="note"),
+    _fit("start-missed", "a search from the starting values ended at an objective of "
+        "{objective:.3g}, above the minimum {least:.3g} of the grid, which was taken",
+        severity="note"),
     _fit("too-few-levels", "{levels} levels cannot determine {parameters} parameters",
         "record longer or use a smaller model", lacks="enough_levels", reason="record too short"),
     _fit("undetermined", "not determined by this record (standard error {stderr:.2g})",

@@ -123,7 +123,7 @@ def show_truth(fitted: Calibration, truth: dict[str, Model]) -> None:
 
 _SIMULATED = (
     *("table2", "table3", "table4", "five-gm", "fig2", "fig3", "fig4"),
-    *("weights2", "weights3", "weights4"),
+    *("weights2", "weights3", "weights4", "em4", "starts4", "arma4", "indirect2"),
 )
 _NAVIGATED, _ROTATED = ("fig5", "fig6", "fig7", "fig8", "fig9"), ("fig8", "fig9")
 _TESTS = ("appendix-a", "selection")
@@ -168,9 +168,11 @@ def reproduce(
     bound), coverage of the 95 % intervals and the paper's own errors; fig2, fig3 and fig4 draw
     the same runs as boxplots; five-gm is white noise + five Gauss-Markov processes; appendix-a
     shows the bias of lines in the Allan plot; weights2, weights3 and weights4 compare weights and
-    wavelets of the method of moments; selection counts how often the true model is chosen. fig5
-    and fig6 show one gyro with lines and with the fitted model; fig7 and fig8 navigate a
-    helicopter, fig9 a car, with GNSS outages, by filters with different calibrations.
+    wavelets of the method of moments; em4, starts4 and arma4 do EM, starting values and ARMA(3,2)
+    for three Gauss-Markov processes; indirect2 simulates the moments; selection counts how often
+    the true model is chosen. fig5 and fig6 show one gyro with lines and with the fitted model;
+    fig7 and fig8 navigate a helicopter, fig9 a car, with GNSS outages, by filters with different
+    calibrations.
     Times are in seconds, rates in 1/s. Raw estimates are kept in Parquet.
 
     \b

@@ -1,5 +1,9 @@
 """Estimation: open parameters of a model from a series, by any method, and how good any can be."""
 
+from gmwm.estimate.arma_form import (
+    GaussMarkovForm as GaussMarkovForm,
+    to_gauss_markov as to_gauss_markov,
+)
 from gmwm.estimate.bootstrap import (
     Bootstrap as Bootstrap,
     bootstrap as bootstrap,

@@ -16,6 +16,7 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
+from gmwm._core import checks
 from gmwm._core.text import per_cent
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
@@ -63,6 +64,8 @@ _LINES: dict[type[Process], _Line] = {
     RateRamp: _Line("R", 1.0, np.sqrt(0.5)),
 }
 
+_ROUNDS = 5  # of reweighting, which settles in two
+
 
 class _Run(NamedTuple):
     """Levels from ``first`` up to ``last``, which is included."""
@@ -86,11 +89,14 @@ class AllanLines:
         Key -> first and last averaging time (s, both included) of its region. Those of other keys
         are found in the plot, on the side of the given ones where their slope belongs. Where the
         plot does not have the slope in a given region, the fit is not valid.
+    regression : {"ols", "irls"}, optional
+        Ordinary least squares, as usual, or iteratively reweighted by the covariance of the levels,
+        which the paper prefers.
 
     Raises
     ------
     InputError
-        If the regions are not pairs of rising times.
+        If the regions are not pairs of rising times, or the regression is neither.
 
     Notes
     -----
@@ -102,10 +108,12 @@ class AllanLines:
     """
 
     regions: Mapping[str, Sequence[float]] | None = None
+    regression: str = "ols"
 
     name: ClassVar[str] = "allan"
 
     def __post_init__(self) -> None:
+        checks.choice("regression", self.regression, ("ols", "irls"))
         if self.regions is None:
             return
         if not isinstance(self.regions, Mapping):
@@ -136,11 +144,11 @@ class AllanLines:
                 "none"
             )
         keys = tuple(key for key in lines if key in runs)
-        coefficients, matrix = _coefficients(wv, [(lines[key], runs[key]) for key in keys])
+        sizes, matrix = _coefficients(wv, [(lines[k], runs[k]) for k in keys], self.regression)
         scale = np.array([1.0 / lines[key].factor for key in keys])
         if "R" in keys and ols_slope(wv).value < 0.0:
             scale[keys.index("R")] *= -1.0
-        fitted = _fitted(model, dict(zip(keys, map(float, scale * coefficients), strict=True)))
+        fitted = _fitted(model, dict(zip(keys, map(float, scale * sizes), strict=True)))
         residual = wv.variance - fitted.wavelet_variance(wv.tau, wv.dt, wv.wavelet)
         whitened = weight_root(wv.covariance) @ residual
         return Fit(
@@ -174,7 +182,7 @@ class AllanLines:
                     tau_max=float(wv.tau[runs[key].last]),
                     coefficient=float(coefficient),
                 )
-                for key, coefficient in zip(keys, coefficients, strict=True)
+                for key, coefficient in zip(keys, sizes, strict=True)
             ),
         )
 
@@ -290,7 +298,7 @@ def _allowance(combination: FloatArray, covariance: FloatArray) -> FloatArray:
 
 
 def _coefficients(
-    wv: WaveletVariance, parts: Sequence[tuple[_Line, _Run]]
+    wv: WaveletVariance, parts: Sequence[tuple[_Line, _Run]], regression: str
 ) -> tuple[FloatArray, FloatArray]:
     """Coefficients of the lines by least squares in log-log, and their covariance."""
     gradient = np.zeros((len(parts), wv.tau.size))
@@ -299,8 +307,15 @@ def _coefficients(
         levels = np.arange(run.first, run.last + 1)
         levels = levels[wv.variance[levels] > 0.0]
         heights = np.log(wv.allan_deviation[levels]) - line.slope * np.log(wv.tau[levels])
-        coefficients[i] = np.exp(np.mean(heights))
-        gradient[i, levels] = coefficients[i] / (2.0 * wv.variance[levels] * levels.size)
+        weights = np.full(levels.size, 1.0 / levels.size)
+        for _ in range(_ROUNDS if regression == "irls" else 0):
+            relative = np.exp(2.0 * (heights - weights @ heights)) / wv.variance[levels]
+            block = wv.covariance[np.ix_(levels, levels)] * np.outer(relative, relative)
+            root = weight_root(block)
+            weights = np.sum(root, axis=1) @ root
+            weights /= np.sum(weights)
+        coefficients[i] = np.exp(weights @ heights)
+        gradient[i, levels] = coefficients[i] * weights / (2.0 * wv.variance[levels])
     return coefficients, gradient @ wv.covariance @ gradient.T
 
 

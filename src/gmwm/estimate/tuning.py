@@ -77,6 +77,7 @@ STARTS = 8
 """... and places on its grid from which such a term is refined, unless one fits within chance. From
 one, 59 of 80 fits of an ARMA(2, 1) to its own series ended at another minimum."""
 
+SAME_MINIMUM = 0.01  # of the objective, a chi-square: moves no estimate by 0.1 standard errors
 IMPROVEMENT = 1e-3  # share of the objective that makes an exchange worth a refinement
 REWEIGHTINGS = 3  # rounds of weights of the reference mixture
 MAX_ROUNDS = 40  # rounds of weights of a model before those of the reference mixture

@@ -27,6 +27,7 @@ LENGTHS = (1_000, 10_000, 100_000, 1_000_000)
 NAMES = ("sigma2_WN", "sigma2_RW")
 _TRUE = np.array([0.04, 4e-4])
 _SCALES = np.array([2.0**j for j in range(8)])
+_ROUNDS = 3  # of reweighting
 _FIRST = 4
 """Scales that white noise is read from; the others are the random walk's."""
 
@@ -37,6 +38,7 @@ class Convergence:
 
     allan, allan_error: (2,), of the Allan estimates of sigma2_WN and sigma2_RW: their mean over
         the runs, and its standard error.
+    irls, irls_error: (2,), the same of lines that are reweighted by the covariance of the levels.
     gmwm, gmwm_error: (2,), the same of GMWM.
     """
 
@@ -44,21 +46,33 @@ class Convergence:
     runs: int
     allan: FloatArray
     allan_error: FloatArray
+    irls: FloatArray
+    irls_error: FloatArray
     gmwm: FloatArray
     gmwm_error: FloatArray
 
 
-def allan_least_squares(tau: FloatArray, allan_variance: FloatArray, k: int = _FIRST) -> FloatArray:
+def allan_least_squares(
+    tau: FloatArray,
+    allan_variance: FloatArray,
+    k: int = _FIRST,
+    covariance: FloatArray | None = None,
+) -> FloatArray:
     """Least-squares lines through the first k scales and the others to 128 s, (2,).
 
     tau: (J,), averaging times 1, 2, 4, ... s, at least to 128 s.
     allan_variance: (J,).
     k: From 1 to 7.
+    covariance: (J, J), of the levels, up to a factor, to weight them by; by default all are equal.
     """
     lines = (_SCALES[:k], 1.0 / _SCALES[:k]), (_SCALES[k:], _SCALES[k:] / 3.0)
-    return np.array(
-        [shape @ allan_variance[np.isin(tau, own)] / (shape @ shape) for own, shape in lines]
-    )
+    found = []
+    for own, shape in lines:
+        there, weighted = np.isin(tau, own), shape
+        if covariance is not None:
+            weighted = np.asarray(np.linalg.solve(covariance[np.ix_(there, there)], shape))
+        found.append(weighted @ allan_variance[there] / (weighted @ shape))
+    return np.array(found)
 
 
 def expectation(k: int = _FIRST) -> FloatArray:
@@ -72,33 +86,44 @@ def converge(runs: int, seed: int, jobs: int = 1) -> list[Convergence]:
     for n in LENGTHS:
         found = do_runs(partial(_one_run, n, seed), runs, {}, jobs=jobs)["estimates"]
         means, errors = found.mean(axis=0), found.std(axis=0, ddof=1) / np.sqrt(runs)
-        result.append(Convergence(n, runs, means[0], errors[0], means[1], errors[1]))
+        result.append(
+            Convergence(n, runs, *(e for both in zip(means, errors, strict=True) for e in both))
+        )
     return result
 
 
 def _one_run(n: int, seed: int, run: int) -> dict[str, FloatArray]:
-    """Both estimates of both parameters, (2, 2)."""
+    """All estimates of both parameters, (3, 2)."""
     series = TRUTH.simulate(n, 1.0, np.random.default_rng([seed, n, run]))
     wv = wavelet_variance(series, 1.0)
     params = estimate(TRUTH.opened(), wv).params
-    lines = allan_least_squares(wv.tau, wv.allan_variance)
-    return {"estimates": np.array([lines, [params["N"] ** 2, params["K"] ** 2]])}
+    lines = irls = allan_least_squares(wv.tau, wv.allan_variance)
+    for _ in range(_ROUNDS):  # weights of the model that the lines give
+        white, walk = np.sqrt(np.maximum(irls, np.finfo(float).tiny))
+        model = WhiteNoise(float(white)) + RandomWalk(float(walk))
+        covariance = wv.covariance_under(model.psd)
+        irls = allan_least_squares(wv.tau, wv.allan_variance, covariance=covariance)
+    return {"estimates": np.array([lines, irls, [params["N"] ** 2, params["K"] ** 2]])}
 
 
 def convergence_table(rows: list[Convergence]) -> str:
     """The table, 80 columns wide."""
     parts = [
         "Appendix A: least squares on the Allan variance of white noise + random walk\n"
-        f"lines over 1-8 s and 16-128 s; means of {rows[0].runs} runs with standard errors",
+        "lines over 1-8 s and 16-128 s, all levels alike (OLS) or reweighted (IRLS)\n"
+        f"means of {rows[0].runs} runs with standard errors",
     ]
     for k, name in enumerate(NAMES):
         cells = []
         for row in rows:
-            both = (row.allan, row.allan_error), (row.gmwm, row.gmwm_error)
-            means = [f"{mean[k]:.5g} +- {error[k]:.2g}" for mean, error in both]
-            cells.append([f"{row.n:,}", f"{expectation()[k]:.5g}", *means])
-        table = plain_table(("n", "Allan, expected", "Allan, mean", "GMWM, mean"), cells)
-        parts.append(f"{name}, truth {_TRUE[k]:g}\n{table}")
+            all_ = zip(
+                (row.allan, row.irls, row.gmwm),
+                (row.allan_error, row.irls_error, row.gmwm_error),
+                strict=True,
+            )
+            cells.append([f"{row.n:,}", *(f"{m[k]:.5g} +- {e[k]:.2g}" for m, e in all_)])
+        table = plain_table(("n", "OLS, mean", "IRLS, mean", "GMWM, mean"), cells)
+        parts.append(f"{name}, truth {_TRUE[k]:g}, expected of OLS {expectation()[k]:.5g}\n{table}")
     ratios = [(k, *(expectation(k) / _TRUE)) for k in range(1, _SCALES.size)]
     table = plain_table(("k", *NAMES), [[f"{value:.4g}" for value in row] for row in ratios])
     parts.append(f"Expected over true value; white noise from the first k scales\n{table}")

@@ -53,6 +53,7 @@ class Summary:
     bounds: Quantity -> relative Cramer-Rao bound.
     moment_bounds: Quantity -> that of estimates by the wavelet variances only.
     invalid: Method -> runs that the method itself calls not valid.
+    from_grid: Method -> runs in which the starting values did not lead to the minimum.
     seconds: Method -> median time of an estimate, s.
     """
 
@@ -63,6 +64,7 @@ class Summary:
     bounds: Mapping[str, float]
     moment_bounds: Mapping[str, float]
     invalid: Mapping[str, int]
+    from_grid: Mapping[str, int]
     seconds: Mapping[str, float]
 
     @property
@@ -79,16 +81,24 @@ class Summary:
                 bound, absolute = bounds[name], bounds[name] * abs(s.true_value(quantity))
                 ratio = f"{bound / self.bounds[name]:.2f}"
                 rows.append([name, label, f"{absolute:.3g}", f"{bound:.3g}", ratio, *[""] * 4])
-        columns = ("RMSE", "relative", "/ bound", "bias", "covers", "paper", "without")
-        times = [[m, f"{self.invalid[m]:,}", f"{self.seconds[m]:.2g} s"] for m in self.methods]
+        columns = ["RMSE", "relative", "/ bound", "bias", "covers", "paper", "without"]
+        legend = "; without: runs\nthat have no estimate"
+        if not any(row[-1] for row in rows):
+            columns, rows, legend = columns[:-1], [row[:-1] for row in rows], ""
+        heads, counts = ["not valid"], [self.invalid]
+        if any(self.from_grid.values()):
+            heads, counts = [*heads, "from grid"], [*counts, self.from_grid]
+        times = [
+            [m, *(f"{count[m]:,}" for count in counts), f"{self.seconds[m]:.2g} s"]
+            for m in self.methods
+        ]
         parts = [
             f"{s.title}\n{self.runs:,} runs of {s.n:,} samples at {1.0 / s.dt:g} Hz, "
             f"seed {self.seed}",
             plain_table(("quantity", "method", *columns), rows),
-            plain_table(("method", "not valid", "median time"), times),
+            plain_table(("method", *heads, "median time"), times),
             "relative, bias: over the true value; bound: Cramer-Rao; moments: the same for\n"
-            "estimates by Haar wavelet variances only; covers: 95 % intervals; without: runs\n"
-            "that have no estimate",
+            f"estimates by Haar wavelet variances only; covers: 95 % intervals{legend}",
         ]
         return "\n".join(["\n\n".join(parts), *bullets(s.notes)])
 
@@ -123,9 +133,10 @@ def summarise(study: Study, table: pa.Table, seed: int) -> Summary:
             there = own & np.isfinite(estimate)
             error = estimate[there] / value - 1.0
             inside = (low[there] <= value) & (value <= high[there])
-            with np.errstate(invalid="ignore"):  # no run has an estimate
+            inside = inside[~np.isnan(low[there])]
+            with np.errstate(invalid="ignore"):  # no run has an estimate, or an interval
                 relative, bias, coverage = (
-                    float(np.sum(each) / error.size) for each in (error**2, error, inside)
+                    float(np.divide(np.sum(each), each.size)) for each in (error**2, error, inside)
                 )
             relative **= 0.5
             scores[name, method] = Score(
@@ -138,7 +149,7 @@ def summarise(study: Study, table: pa.Table, seed: int) -> Summary:
                 missing=int(np.sum(own) - np.sum(there)),
                 published=quantity.published.get(method, float("nan")),
             )
-    valid = np.array(table["valid"].to_pylist())
+    valid, from_grid = (np.array(table[name].to_pylist()) for name in ("valid", "from_grid"))
     seconds = table["seconds"].to_numpy()
     return Summary(
         study=study,
@@ -148,6 +159,7 @@ def summarise(study: Study, table: pa.Table, seed: int) -> Summary:
         bounds=bounds,
         moment_bounds=moment_bounds,
         invalid={m: int(np.sum(~valid[names == m])) for m in methods},
+        from_grid={m: int(np.sum(from_grid[names == m])) for m in methods},
         seconds={m: float(np.median(seconds[names == m])) for m in methods},
     )
 
@@ -156,7 +168,7 @@ def _cells(name: str, method: str, x: Score) -> list[str]:
     paper = "" if np.isnan(x.published) else f"{x.published:.3g}"
     bias = round(x.bias, 3) + 0.0  # no minus before a zero
     errors = [f"{x.rmse:.3g}", f"{x.relative:.3g}", f"{x.ratio:.2f}"]
-    shares = [f"{bias:.1%}", f"{x.coverage:.1%}"]
+    shares = [f"{bias:.1%}", "" if np.isnan(x.coverage) else f"{x.coverage:.1%}"]
     return [name, method, *errors, *shares, paper, str(x.missing or "")]
 
 

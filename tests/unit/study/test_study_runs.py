@@ -7,6 +7,7 @@ import pytest
 
 from gmwm import AllanLines, InputError, RandomWalk, WhiteNoise
 from gmwm.study.studies import STUDIES, Estimation, Quantity, Study, one_run, run_study
+from marks import slow
 
 SMALL = Study(
     name="small",
@@ -75,7 +76,7 @@ def test_unknown_method_and_no_runs(tmp_path):
         run_study(SMALL, tmp_path, runs=0)
 
 
-@pytest.mark.parametrize("name", STUDIES)
+@pytest.mark.parametrize("name", [slow(name) if name == "arma4" else name for name in STUDIES])
 def test_every_method_knows_its_options(name, tmp_path, monkeypatch):
     """A short series is estimated or refused with a sentence, never with an error in an option."""
     short = replace(STUDIES[name], n=300)

@@ -28,6 +28,7 @@ def rows(estimates, method, lower=0.03, upper=0.05):
             "method": method,
             "seconds": 0.5,
             "valid": np.isfinite(value),
+            "from_grid": False,
             "message": "",
             "sigma2_WN": value,
             "sigma2_WN_lower": lower,

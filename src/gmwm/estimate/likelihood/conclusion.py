@@ -86,6 +86,8 @@ def maximise(
             continue
         value, previous = there, slope
         slope = gradient(objective, moved, scale)
+        if not np.all(np.isfinite(slope)):  # at the edge of what parameters can be
+            return Maximum(moved, value, False)
         step, change, z = moved - z, previous - slope, moved
         curvature = float(step @ change)
         if curvature <= 1e-12 * float(np.linalg.norm(step) * np.linalg.norm(change)):

@@ -42,13 +42,14 @@ from gmwm.estimate.likelihood.likelihood import (
     objective_of,
     stacked,
 )
-from gmwm.estimate.problem import spectral_information
+from gmwm.estimate.problem import ols_slope, spectral_information
 from gmwm.estimate.result import Fit
 from gmwm.issues import notice
 from gmwm.process import Model, Process, StateSpace, as_model
 from gmwm.readers import Channel
+from gmwm.variance import as_wavelet_variance
 
-DRIFTS = ("ramp", "state")
+DRIFTS = ("ramp", "state", "removed")
 _TINY = 1e-12  # keeps the stopping rule defined where the log-likelihood is zero
 _FASTEST, _SLOWEST = 1.0 - 1e-12, 1e-12  # of 1 - phi
 
@@ -68,9 +69,10 @@ class EM:
     max_iterations : int, optional
     accelerate : bool, optional
         Whether steps are extrapolated.
-    drift : {"ramp", "state"}, optional
-        A ramp added to the signal, or an input to the first state as in Stebler et al. (2011),
-        which a Gauss-Markov state forgets.
+    drift : {"ramp", "state", "removed"}, optional
+        A ramp added to the signal; an input to the first state as in Stebler et al. (2011), which a
+        Gauss-Markov state forgets; or a line of ordinary least squares that is removed before, as
+        in Stebler et al. (2012), without a standard error.
 
     Raises
     ------
@@ -102,6 +104,10 @@ class EM:
                     f'method = "em" does not support {term!r}: it takes WhiteNoise, RandomWalk, '
                     'RateRamp and GaussMarkov; "mle" supports the others, "gmwm" a Sinusoid too'
                 )
+        if self.drift == "removed":
+            line = ols_slope(as_wavelet_variance(channel, None)).value
+            ramps = [t.with_values(R=line) if t.is_drift and t.is_open else t for t in model.terms]
+            model = Model(tuple(ramps))
         series = Series.of(model, channel, self.start, exact=True)
         iteration = Iteration(series, self.drift == "state")
         return _conclude(series, iteration, *iteration.run(self))

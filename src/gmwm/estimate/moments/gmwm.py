@@ -8,9 +8,10 @@ point: it is smooth where one computed from the data is noisy.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import ClassVar
+from typing import ClassVar, cast
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -29,15 +30,33 @@ from gmwm.estimate.moments.weights import (
     dictionary_fit,
     with_discrepancy,
 )
-from gmwm.estimate.problem import Moments, Scales, Simulation, is_plain
+from gmwm.estimate.problem import (
+    Coordinates,
+    Moments,
+    Scales,
+    Simulation,
+    is_plain,
+    keys_by_term,
+    ols_slope,
+)
 from gmwm.estimate.result import Fit
-from gmwm.process import Model
+from gmwm.issues import notice
+from gmwm.process import Model, Process, RateRamp, as_model, parameter
 from gmwm.variance import WaveletVariance
 
+DRIFTS = ("slope", "moments")
 _converged: WeakKeyDictionary[WaveletVariance, dict[tuple[GMWM, Model], Converged]] = (
     WeakKeyDictionary()
 )
 """A selection and the tests of its terms ask for the same model repeatedly."""
+
+
+class SquaredRamp(RateRamp):
+    """A rate ramp as a term of nu(theta) like any other, which shows its square."""
+
+    R: float = parameter("u/s", "scale", meaning="rate ramp")
+    short_name: ClassVar[str] = "_R"
+    is_drift: ClassVar[bool] = False
 
 
 @dataclass(frozen=True)
@@ -53,20 +72,32 @@ class GMWM:
         Relative error that the model is allowed at each level beyond the statistical one. By
         default it is estimated where the model fails the chi-square test, and zero elsewhere; see
         `gmwm.estimate.moments.weights`.
+    drift : {"slope", "moments"}, optional
+        A rate ramp is estimated by generalized least squares beside the wavelet variances, or is
+        part of nu(theta) to the letter of the paper's eq. (9), which knows it by its square only.
+    start : Process, Model or float, optional
+        The same model with starting values, or one value for all parameters: the paper's are all
+        1.0. A local search from there must reach the minimum of the global one, which needs no
+        start; else a notice says so. The lower one is taken.
 
     Raises
     ------
     InputError
-        For unknown weights, or a discrepancy that is not a fraction.
+        For unknown weights or drift, or a discrepancy that is not a fraction.
     """
 
     weights: str = "model"
     discrepancy: float | None = None
+    drift: str = "slope"
+    start: Process | Model | float | None = None
 
     name: ClassVar[str] = "gmwm"
 
     def __post_init__(self) -> None:
         checks.choice("weights", self.weights, WEIGHTS)
+        checks.choice("drift", self.drift, DRIFTS)
+        if self.start is not None and not checks.is_number(self.start):
+            as_model(cast("Model", self.start))
         given = self.discrepancy
         if given is not None and (not checks.is_number(given) or not 0.0 <= given < 1.0):
             raise InputError(
@@ -79,6 +110,17 @@ class GMWM:
 
     def estimate(self, model: Model, wv: WaveletVariance) -> Fit:
         """Fit the open parameters of a model to wavelet variances."""
+        ramp = next((term for term in model.terms if term.is_drift and term.is_open), None)
+        if self.drift == "moments" and ramp is not None:
+            if not np.any(wv.drift_response):
+                raise InputError(
+                    f'{wv.wavelet!r} does not see a drift: use "haar", or leave out '
+                    'drift = "moments"'
+                )
+            squared = [SquaredRamp() if term is ramp else term for term in model.terms]
+            found = self.estimate(Model(tuple(squared)), wv)
+            size = math.copysign(found.params["R"], ols_slope(wv).value)
+            return replace(found, model=model.with_params({**found.params, "R": size}))
 
         def without(i: int) -> Fit | None:
             noise = [k for k, term in enumerate(model.terms) if not term.is_drift]
@@ -91,7 +133,20 @@ class GMWM:
             weights = Weights.of(self.weights, wv)
             return conclude_moments(self._cached(model, wv), wv, weights, self.name, without)
 
-        return concluded(model, without)
+        if self.start is None:
+            return concluded(model, without)
+        least = replace(self, start=None)._cached(model, wv)
+        weights = Weights.of(self.weights, wv)
+        profile = Profile(least.design, least.moments(wv).target, weights.root(least.covariance))
+        grid = profile.refine(profile.at(least.point.shapes))
+        reached = profile.descend(_started(self.start, least.design.coordinates))
+        if reached.objective < grid.objective:
+            least = replace(least, point=reached)
+        fit = conclude_moments(least, wv, weights, self.name, without)
+        if reached.objective <= grid.objective + tuning.SAME_MINIMUM:
+            return fit
+        values = {"objective": reached.objective, "least": grid.objective}
+        return replace(fit, notices=(*fit.notices, notice("start-missed", "", values)))
 
     def _cached(self, model: Model, wv: WaveletVariance) -> Converged:
         """The minimum, searched once for each model and series."""
@@ -138,6 +193,24 @@ class GMWM:
         return found or _under_reference(problem, level)
 
 
+def _started(start: Process | Model | float, coordinates: Coordinates) -> list[Process]:
+    """The noise terms with starting values."""
+    model = coordinates.model
+    if checks.is_number(start):
+        given: dict[str, float | None] = dict.fromkeys(model.params, float(cast("float", start)))
+    else:
+        given = as_model(cast("Model", start)).params
+    if given.keys() != model.params.keys() or None in given.values():
+        raise InputError(
+            f"start = {start!r} does not give every parameter of {model!r} a value, or has others: "
+            "repeat the model with numbers, or give one number for all"
+        )
+    keys, terms = keys_by_term(model), list(coordinates.noise)
+    for i, name in coordinates.names:
+        terms[i] = terms[i].with_values(**{name: given[keys[coordinates.terms[i].place, name]]})
+    return terms
+
+
 @dataclass(frozen=True)
 class SimulatedMoments(GMWM):
     """GMWM with the model's wavelet variances found by simulation, ``method="simulated"``.
@@ -146,22 +219,25 @@ class SimulatedMoments(GMWM):
 
     Parameters
     ----------
-    weights, discrepancy
+    weights, discrepancy, drift, start
         As of `GMWM`.
     replications : int, optional
         Number of simulated series as long as the data. The covariance of the estimates grows by
         one part in so many.
     seed : int, optional
         Of these series.
+    single : bool, optional
+        Whether they are one series of their total length, R T in the paper; a walk then goes on.
 
     Raises
     ------
     InputError
-        If ``replications`` is not a positive integer, or ``seed`` is negative.
+        If ``replications`` is not a positive integer, ``seed`` negative, or ``single`` no truth.
     """
 
     replications: int = 10
     seed: int = 0
+    single: bool = False
 
     name: ClassVar[str] = "simulated"
 
@@ -169,9 +245,10 @@ class SimulatedMoments(GMWM):
         super().__post_init__()
         checks.whole("replications", self.replications, 1)
         checks.whole("seed", self.seed, 0)
+        checks.truth("single", self.single)
 
     def scales(self, wv: WaveletVariance) -> Scales:
-        simulation = Simulation(int(self.replications), int(self.seed))
+        simulation = Simulation(int(self.replications), int(self.seed), self.single)
         return replace(Scales.of(wv), simulation=simulation, simulate_all=True)
 
 

@@ -15,13 +15,15 @@ import numpy as np
 from scipy.optimize import leastsq
 
 from gmwm._core.typing import FloatArray
+from gmwm.errors import InputError
 from gmwm.estimate import tuning
 from gmwm.estimate.moments.design import MOST_SHAPES, Design
 from gmwm.estimate.moments.kernels import Weighted, linearized, profiled, projected
 from gmwm.estimate.problem import Scales, objectives_with, shape_of, solve_nonnegative
-from gmwm.process import GaussMarkov, Shape, WhiteNoise
+from gmwm.process import GaussMarkov, Process, Shape, WhiteNoise
 
 _MOST = 200  # evaluations of a search
+_LARGEST = 300.0  # logarithm of an amplitude, beyond which its square overflows
 _XTOL, _FTOL, _GTOL = 1e-7, 1e-9, 1e-9  # tolerances at which MINPACK ends it
 
 
@@ -120,6 +122,31 @@ class Profile:
         moved = design.unpack(np.clip(z, *bounds), shapes)
         point = Point(moved, x, float(residual @ residual))
         return point if point.objective <= start.objective else start
+
+    def descend(self, processes: Sequence[Process]) -> Point:
+        """Local minimum over all parameters at once, amplitudes included, from any values.
+
+        Nothing is profiled out: Levenberg-Marquardt steps in logarithms, as a user of eq. (9) of
+        Stebler et al. (2012) would take them from starting values.
+        """
+        design, coordinates = self.design, self.design.coordinates
+        z0, own = coordinates.pack(processes), [shape_of(process) for process in processes]
+        if not np.all(np.isfinite(z0)):
+            raise InputError(f"start = {list(processes)!r}: give every parameter a positive value")
+        linear = np.array([is_amplitude for _, is_amplitude in coordinates.owners])
+
+        def shapes(z: FloatArray) -> list[Shape]:
+            return design.unpack(np.clip(z[~linear], *design.bounds), own)
+
+        def residuals(z: FloatArray) -> FloatArray:
+            amplitudes = np.exp(np.minimum(z[linear], _LARGEST))
+            left = self.target - design.implied(amplitudes, shapes(z))
+            return np.asarray(self.root @ left)
+
+        if z0.size > self.target.size:
+            return self.at(own)
+        z = leastsq(residuals, z0, maxfev=_MOST * z0.size, full_output=True)[0]
+        return self.refine(self.at(shapes(z)))
 
     def _start_of_compiled(self, shapes: Sequence[Shape]) -> tuple[FloatArray, FloatArray]:
         """Shapes of the shaped terms, and the curves of the others, as `linearized` takes them."""

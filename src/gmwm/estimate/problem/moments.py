@@ -4,10 +4,10 @@ They depend on the model through the ramp (its slope is removed from the data) a
 noise (which implies the covariance).
 
 The curves of a model are in closed form, or simulated for processes that are known by simulation
-only (indirect inference): the mean over R series as long as the data, made with the same random
-numbers whatever the parameters, takes the place of the closed form, and the covariance of the
-moments grows by (1 + 1/R) (Gourieroux, Monfort & Renault 1993, *J. Applied Econometrics* 8,
-S85-S118; eq. (13) ff. of Stebler et al. 2012).
+only (indirect inference): the mean over R series as long as the data, or one series R times as
+long, made with the same random numbers whatever the parameters, takes the place of the closed
+form, and the covariance of the moments grows by (1 + 1/R) (Gourieroux, Monfort & Renault 1993, *J.
+Applied Econometrics* 8, S85-S118; eq. (13) ff. of Stebler et al. 2012).
 """
 
 from __future__ import annotations
@@ -39,11 +39,13 @@ from gmwm.variance import WaveletVariance, pilot_psd, wavelet_variance
 class Simulation:
     """How moments are simulated.
 
-    replications: Number of series.
+    replications: Number of series as long as the data.
+    single: Whether they are one series of their total length.
     """
 
     replications: int
     seed: int
+    single: bool = False
 
     def curve(
         self, process: Process, tau: FloatArray, n: int, dt: float, wavelet: str
@@ -66,14 +68,17 @@ def _simulated(
     """Averaging times and mean wavelet variances; a fit asks for the same terms repeatedly."""
     total: FloatArray | float = 0.0
     times = np.ones(1)
-    for replication in range(simulation.replications):
+    count, length = simulation.replications, n
+    if simulation.single:
+        count, length = 1, n * simulation.replications
+    for replication in range(count):
         rng = np.random.default_rng([simulation.seed, replication])
-        series = process.simulate(n, dt, rng)
+        series = process.simulate(length, dt, rng)
         if np.all(series == series[0]):
             continue  # rounded to nothing: no variance
         wv = wavelet_variance(series, dt, wavelet=wavelet)
         times, total = wv.tau, total + wv.variance
-    return times, np.asarray(total / simulation.replications)
+    return times, np.asarray(total / count)
 
 
 @dataclass(frozen=True, eq=False)
@@ -219,6 +224,13 @@ class Moments:
         if self.slope_is_free and self.slope is not None:
             means = wv.mean_covariance_under(psd)
             covariance = detrended_covariance(covariance, means, wv.drift_response, self.slope)
+        if drift := noise.drift_rate():  # beside noise, one that stays in the data
+            means = wv.mean_covariance_under(psd)
+            # Below the levels where they are known, means are those of the slope seen there.
+            levels = np.arange(wv.tau.size)
+            known = np.maximum(levels, int(np.argmax(np.diag(means) > 0.0)))
+            scale = 2.0 * drift * wv.drift_response**2 / wv.drift_response[known]
+            covariance = covariance + np.outer(scale, scale) * means[np.ix_(known, known)]
         if any(self.scales.is_simulated(term) for term in noise.terms):
             covariance = covariance * (1.0 + wv.n_all / wv.n / self.scales.simulation.replications)
         return covariance

@@ -309,3 +309,14 @@ def test_options_out_of_range_are_refused(option, value):
         InputError, match=f"{option} = .*give an? (small positive number|integer, 1 or more)"
     ):
         em(WhiteNoise(), WhiteNoise(1.0).simulate(100, 1.0, 1), **{option: value})
+
+
+def test_a_removed_drift_is_the_line_of_least_squares():
+    truth = WhiteNoise(0.8) + RandomWalk(0.02) + RateRamp(0.01)
+    x = truth.simulate(500, 1.0, 3)
+    found = gmwm.fit(truth.opened(), x, 1.0, method=gmwm.EM(drift="removed"))
+    line = np.polyval(np.polyfit(np.arange(500), x, 1), np.arange(500))
+    without = gmwm.fit(WhiteNoise() + RandomWalk(), x - line, 1.0, method="em")
+    assert found.params["R"] == pytest.approx(np.polyfit(np.arange(500), x, 1)[0], rel=1e-9)
+    assert found.params["N"] == pytest.approx(without.params["N"], rel=1e-3)
+    assert "R" not in found.stderr

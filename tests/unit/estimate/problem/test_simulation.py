@@ -50,6 +50,15 @@ def test_a_known_process_by_simulation_agrees_with_its_closed_form(series):
     assert "simulated moments" in str(simulated)
 
 
+def test_one_long_series_agrees_with_as_many_short_ones(series):
+    closed = gmwm.fit(TRUTH.opened(), series, dt=1.0)
+    method = SimulatedMoments(replications=16, single=True)
+    single = gmwm.fit(TRUTH.opened(), series, dt=1.0, method=method)
+    assert single.valid, single.message
+    for key, error in closed.stderr.items():
+        assert single.params[key] == pytest.approx(closed.params[key], abs=3.0 * error / 4.0)
+
+
 def test_the_covariance_grows_by_the_share_of_the_simulation():
     series = WhiteNoise(1.0).simulate(8192, 1.0, 4)
     closed = gmwm.fit(WhiteNoise(), series, dt=1.0)
