@@ -155,15 +155,15 @@ def test_standard_errors_are_the_spread_of_the_estimates(truth, n):
 
 def test_an_interval_of_95_percent_covers_95_percent():
     truth = WhiteNoise(0.3) + RandomWalk(0.05)
-    runs = 60
+    runs = 40
     rng = np.random.default_rng(8)
     held = {key: 0 for key in truth.params}
     for _ in range(runs):
         fit = mle(truth.opened(), truth.simulate(500, 1.0, rng), start=truth)
         for key, (low, high) in fit.interval().items():
             held[key] += low <= truth.params[key] <= high
-    # Binomial: 0.95 with a deviation of 0.028.
-    assert all(0.87 < count / runs <= 1.0 for count in held.values()), held
+    # Binomial: 0.95 with a deviation of 0.034.
+    assert all(0.84 < count / runs <= 1.0 for count in held.values()), held
 
 
 @pytest.mark.parametrize("method", ["mle", slow("whittle")])
