@@ -13,7 +13,7 @@ import gmwm
 import marks
 from gmwm import Channel, GaussMarkov, InputError, RandomWalk, Recording, WhiteNoise, bound, reduce
 from gmwm._core.text import brief
-from gmwm.export import TARGETS
+from gmwm.export import TARGETS, refusal
 from gmwm.filter_numbers import usable
 from gmwm.issues import Notice
 from imu_numbers import numbers
@@ -250,6 +250,15 @@ def test_files_have_six_lines_and_yaml_twelve(slow, stepped, name, is_valid, sou
     assert sum("not valid, do not use: gyro_y" in line for line in comments) == (not is_valid)
     if name in YAML:
         assert len(lines) <= 12
+
+
+def test_what_to_do_is_said_once_where_it_is_the_same():
+    cut, shield = (
+        Notice("step", "bad", "", "a step", {}, each) for each in ("cut it", "shield it")
+    )
+    said = "not valid: gyro_x (the bias stepped), gyro_y (the bias stepped); "
+    assert refusal({"gyro_x": cut, "gyro_y": cut}) == f"{said}cut it"
+    assert refusal({"gyro_x": cut, "gyro_y": shield}) == f"{said}gyro_x: cut it; gyro_y: shield it"
 
 
 def test_per_axis_files_have_the_bound_of_each_axis(slow):
