@@ -9,8 +9,8 @@ import pytest
 import fuzz
 from marks import slow
 
-SOME = {"npy": 75, "odd": 2, "document": 5, "study": 6, "field": 6, "fleet": 2}
-SOME |= {"gzip": 20, "datasheet": 30}
+SOME = {"npy": 150, "odd": 2, "document": 10, "study": 6, "field": 12, "fleet": 2}
+SOME |= {"gzip": 40, "datasheet": 60}
 SOME |= dict.fromkeys(("mat", "mat73", "hdf5"), 5)  # each is first tried in a process of its own
 
 
