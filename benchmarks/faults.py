@@ -3,7 +3,7 @@
 Run with ``python benchmarks/faults.py`` (ten minutes; ``--clean 20`` for a first look). Logs are
 emulated, five minutes at 20 Hz with a fix a second:
 
-- each fault of `gmwm.study.FAULTS`, some together, and wrong sensor models; printed is what the
+- each fault of `emulated_logs.FAULTS`, some together, and wrong sensor models; printed is what the
   verdict names, with values and standard errors;
 - logs without a fault: how many are blamed, out of how many. The thresholds follow from the
   probability of a false alarm; none was adjusted to these seeds.
@@ -12,9 +12,14 @@ emulated, five minutes at 20 Hz with a fix a second:
 from __future__ import annotations
 
 import argparse
+import sys
+from pathlib import Path
 
 from gmwm.ins import Navigated, SensorModels
-from gmwm.study import FAULTS, emulated_log, sensors
+from gmwm.study import sensors
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
+from emulated_logs import FAULTS, emulated_log
 
 TOGETHER = (("stamps", "lever arm"), ("one far", "coloured"), ("outliers", "stamps"))
 COARSE = {"gyro": 30.0, "accel": 100.0}

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import sys
 from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
@@ -26,7 +27,10 @@ from gmwm.ins import SensorModels, car_drive, compare, gnss, tuning
 from gmwm.ins.covariance.analysis import Course
 from gmwm.ins.filter import Outage
 from gmwm.ins.simulation import Scenario
-from gmwm.study import emulated_log, sensors
+from gmwm.study import sensors
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
+from emulated_logs import emulated_log
 
 NAMES = ("larger", "calibrated")
 

@@ -499,7 +499,7 @@ def test_who_stops_reading_does_not_lose_the_results(tmp_path):
 
 @pytest.mark.parametrize(
     ("arguments", "what"),
-    [(("--help",), "closed"), (("--help",), "full"), (("--help",), "head"),
+    [(("--help",), "closed"), (("--help",), "full"), slow(("--help",), "head"),
      (("health", "f.csv"), "head")],
 )  # fmt: skip
 def test_output_that_nobody_takes(tmp_path, arguments, what):

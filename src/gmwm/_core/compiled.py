@@ -4,22 +4,21 @@ from __future__ import annotations
 
 import hashlib
 import logging
-import re
 import signal
-from collections.abc import Callable, Iterator
+import sys
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager, suppress
 from functools import lru_cache
 from pathlib import Path
 from threading import current_thread, main_thread
-from types import FrameType
+from types import CodeType, FrameType
 from typing import Any
 
 import numba
+import numpy as np
 from numba.core.compiler_lock import global_compiler_lock
 
-_CONSTANT = re.compile(rb"\b[A-Z][A-Z0-9_]+\b")
 _LONGEST_WAIT = 60.0  # s, for a process that compiles the same loop
-_DEFINED = re.compile(rb"^[A-Z][A-Z0-9_, ]*(?=[:=])", re.MULTILINE)
 
 
 def compiled(**options: Any) -> Callable[[Callable[..., Any]], Any]:
@@ -42,18 +41,18 @@ def compiled(**options: Any) -> Callable[[Callable[..., Any]], Any]:
 
 
 def _stamped(loop: Any) -> Any:
-    """Let what is kept on disk count as long as no compiled file changes, and be made once.
+    """Let what is kept on disk count as long as nothing that it holds changes, and be made once.
 
-    Numba looks at the file of the function only. A loop holds the code and the constants of what it
-    calls, so after an upgrade that changed another file it would go on with the old ones.
+    Numba looks at the time of the function's file only. A loop holds the code and the constants of
+    what it calls, so after a change of another file it would go on with the old ones.
     """
     kept = getattr(getattr(loop, "_cache", None), "_cache_file", None)
     if kept is not None:
-        kept._source_stamp = digest_of(Path(__file__).parents[1])
         load_index = kept._load_index
 
         def load_readable_index() -> Any:
             """What is kept, or nothing if it names a record class that was renamed since."""
+            kept._source_stamp = stamp_of(loop)
             try:
                 return load_index()
             except (AttributeError, ImportError):
@@ -68,6 +67,39 @@ def _stamped(loop: Any) -> Any:
 
         loop.compile = compile_once
     return loop
+
+
+def stamp_of(loop: Any) -> bytes:
+    """Digest of the code of a loop and of those it calls, of their constants and their records."""
+    digest = hashlib.sha256()
+    seen: list[Any] = []
+
+    def add(value: Any, names: Mapping[str, Any]) -> None:
+        if isinstance(value, CodeType):
+            digest.update(value.co_code)
+            add((*value.co_consts, *value.co_names, *map(names.get, value.co_names)), names)
+        elif isinstance(value, tuple):
+            for part in value:
+                add(part, names)
+        elif isinstance(value, np.ndarray):
+            digest.update(value.tobytes())
+        elif isinstance(value, bool | int | float | complex | str | np.generic):
+            digest.update(repr(value).encode())
+        elif hasattr(value, "py_func") and value not in seen:
+            seen.append(value)
+            own = value.py_func.__globals__
+            add(value.py_func.__code__, own)
+            add_records(own)
+
+    def add_records(names: Mapping[str, Any]) -> None:
+        for each in names.values():
+            if isinstance(each, type) and hasattr(each, "_fields") and each not in seen:
+                seen.append(each)
+                add((each.__qualname__, each._fields), {})
+                add_records(vars(sys.modules[each.__module__]))  # one may hold others
+
+    add(loop, {})
+    return digest.digest()
 
 
 @contextmanager
@@ -118,20 +150,6 @@ def _interruptible() -> Iterator[None]:
         signal.signal(signal.SIGINT, before)
     if seen:
         raise KeyboardInterrupt
-
-
-@lru_cache(maxsize=1)
-def digest_of(package: Path) -> bytes:
-    """Of the version, and of each file with a compiled function or a constant that one may hold."""
-    texts = {file: file.read_bytes() for file in sorted(package.rglob("*.py"))}
-    loops = {file: text for file, text in texts.items() if b"@compiled" in text}
-    named = set(_CONSTANT.findall(b"".join(loops.values())))
-    digest = hashlib.sha256(texts[package / "_core" / "__init__.py"])
-    for file, text in texts.items():
-        defined = _CONSTANT.findall(b" ".join(_DEFINED.findall(text)))
-        if file in loops or not named.isdisjoint(defined):
-            digest.update(text)
-    return digest.digest()
 
 
 @lru_cache(maxsize=1)

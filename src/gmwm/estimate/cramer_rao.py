@@ -4,19 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import ClassVar, NamedTuple
+from typing import ClassVar
 
 import numpy as np
 
 from gmwm._core import checks
-from gmwm._core.compiled import compiled
 from gmwm._core.documents import Array, Document, Interval, Samples, Text, check_covariance
 from gmwm._core.frozen import freeze
 from gmwm._core.tables import cell, plain_table
 from gmwm._core.text import per_cent, wrapped
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
-from gmwm.estimate.likelihood import Columns, arrays_of, filtered, regular_inverse, stacked
+from gmwm.estimate.likelihood import (
+    Columns,
+    Recursion,
+    accumulated,
+    arrays_of,
+    filtered,
+    regular_inverse,
+    stacked,
+)
 from gmwm.estimate.problem import (
     Coordinates,
     Slope,
@@ -261,58 +268,17 @@ def _exact_information(
     # The unknown constant is the last state.
     constant = StateSpace.scalar("constant", 1.0, 0.0, level * _VAGUE)
 
-    def run(at: FloatArray) -> _Recursion:
+    def run(at: FloatArray) -> Recursion:
         own = stacked(coordinates.processes(at, processes), dt)
         space = StateSpace.stack([own, constant])
         nothing = np.zeros((1, space.n_states))
         found = filtered(arrays_of(space), np.zeros((n, 1)), nothing, nothing)
-        return _Recursion(space.transition, space.output, found.gains, found.variances)
+        return Recursion(space.transition, space.output, found.gains, found.variances)
 
     slopes = []
     for k in range(z.size):
         move = _STEP * np.eye(z.size)[k]
         up, down = run(z + move), run(z - move)
         slopes.append([(a - b) / (2.0 * _STEP) for a, b in zip(up, down, strict=True)])
-    derivatives = _Recursion(*(np.stack(part) for part in zip(*slopes, strict=True)))
-    return np.asarray(_accumulate(run(z), derivatives))
-
-
-class _Recursion(NamedTuple):
-    """Transition (p, p), output (p,), gains (n, p) and variances (n,) of a Kalman filter."""
-
-    F: FloatArray
-    h: FloatArray
-    G: FloatArray
-    s: FloatArray
-
-
-@compiled()
-def _accumulate(at: _Recursion, by: _Recursion) -> FloatArray:
-    """Information from a filter and its derivatives, one row a parameter.
-
-    The predicted state and its d derivatives follow one linear system driven by the innovations;
-    its covariance is propagated.
-    """
-    F, h, G, s = at
-    dF, dh, dG, ds = by
-    n, p = G.shape
-    d = dF.shape[0]
-    size = p * (1 + d)
-    information = np.zeros((d, d))
-    covariance = np.zeros((size, size))
-    A, b = np.zeros((size, size)), np.zeros(size)
-    rows = np.zeros((d, size))  # d v of each parameter as a row over the joint state
-    rows[:, :p] = -dh
-    for i in range(d):
-        rows[i, p * (1 + i) : p * (2 + i)] = -h
-    for k in range(n):
-        moved = rows @ covariance @ rows.T
-        information += moved / s[k] + 0.5 * np.outer(ds[:, k], ds[:, k]) / s[k] ** 2
-        A[:p, :p], b[:p] = F, G[k]
-        for i in range(d):
-            own = slice(p * (1 + i), p * (2 + i))
-            b[own] = dG[i, k]
-            A[own, :p] = dF[i] - np.outer(G[k], dh[i])
-            A[own, own] = F - np.outer(G[k], h)
-        covariance = A @ covariance @ A.T + s[k] * np.outer(b, b)
-    return information
+    derivatives = Recursion(*(np.stack(part) for part in zip(*slopes, strict=True)))
+    return np.asarray(accumulated(run(z), derivatives))

@@ -101,10 +101,17 @@ def bound(
         if any(axis.fit is None for axis in axes.axes):
             raise InputError("level needs a fit: leave it out, a model has no confidence region")
     if isinstance(tau, str):
-        problems = [_problem(group, horizon, level) for group in axes.sharing(shared)]
-        tau = correlation_time(problems, form)
+        tau = _shared_time(axes.sharing(shared), form, horizon, level)
     given = (form, horizon, level, tau)
     return axes.as_given(axes.numbers(lambda group: bound_of(group, *given), shared))
+
+
+@lru_cache(maxsize=64)
+def _shared_time(
+    groups: tuple[tuple[AxisModel, ...], ...], form: str, horizon: float, level: float | None
+) -> float:
+    """The correlation time that costs least over all axes, s; cached as `bound_of`."""
+    return correlation_time([_problem(group, horizon, level) for group in groups], form)
 
 
 @lru_cache(maxsize=64)

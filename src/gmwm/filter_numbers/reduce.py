@@ -108,14 +108,14 @@ def reduce(
     axes = SensorAxes.of(source, dt, bias_sd, rate)
     axes.check_interval("outages" if keyframe is None else "keyframe", times[0])
     search = _Search(form, times, keyframe is not None)
-    time = search.correlation_time(axes.sharing(shared)) if isinstance(tau, str) else tau
+    time = _shared_time(search, axes.sharing(shared)) if isinstance(tau, str) else tau
     tell, done, total = progress or (lambda *_: None), 0, len(axes.axes)
 
-    def found(group: tuple[AxisModel, ...]) -> list[AxisFilterNumbers]:
+    def found(group: tuple[AxisModel, ...]) -> tuple[AxisFilterNumbers, ...]:
         nonlocal done
         tell(done, total, group[0].name)
         done += len(group)
-        return search.numbers(group, time)
+        return _numbers(search, group, time)
 
     result = axes.as_given(axes.numbers(found, shared))
     tell(total, total, "")
@@ -127,7 +127,7 @@ class _Search:
     """For the numbers of a form that are right after some times without aiding."""
 
     form: str
-    times: Sequence[float]
+    times: tuple[float, ...]
     is_relative: bool
 
     def chain(self, axis: AxisModel) -> Chain:
@@ -220,6 +220,19 @@ class _Search:
         model = with_correlation_times(problem, self.form, taus)
         biases = [axis.bias_sd for axis in group]
         return model, start_sd(biases, targets, model, slow_share=1.0)
+
+
+@lru_cache(maxsize=64)
+def _shared_time(search: _Search, groups: tuple[tuple[AxisModel, ...], ...]) -> float:
+    """Cached as `bound_of`: an export and its explanation ask for it again."""
+    return search.correlation_time(groups)
+
+
+@lru_cache(maxsize=64)
+def _numbers(
+    search: _Search, group: tuple[AxisModel, ...], tau: float | None
+) -> tuple[AxisFilterNumbers, ...]:
+    return tuple(search.numbers(group, tau))
 
 
 def _overconfidence(found: Sequence[Predicted], longest: float) -> list[Notice]:

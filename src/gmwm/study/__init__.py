@@ -3,9 +3,7 @@
 from gmwm.study.appendix import converge as converge, convergence_table as convergence_table
 from gmwm.study.choice import choice_study as choice_study, choice_table as choice_table
 from gmwm.study.demo import (
-    FAULTS as FAULTS,
     compare as compare,
-    emulated_log as emulated_log,
     sensors as sensors,
     simulated_imu as simulated_imu,
     write_demo_files as write_demo_files,

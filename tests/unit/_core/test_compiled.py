@@ -59,47 +59,44 @@ def test_a_package_that_cannot_be_written_and_no_home(tmp_path):
 
 _CALLEE = "from gmwm._core.compiled import compiled\n@compiled()\ndef inner():\n    return {}\n"
 _CALLER = """
+from typing import NamedTuple
 from gmwm._core.compiled import compiled
-from {0}_callee import inner
+from stale_callee import inner
+from stale_tuning import HALF, OTHER
+class Pair(NamedTuple):
+    {}: float
+    {}: float
 @compiled()
-def outer():
-    return inner()
+def outer(pair):
+    return inner() + HALF + 0.001 * pair.first
+x = OTHER
 """
 
 
-def test_a_loop_is_compiled_anew_after_what_it_calls_changed(tmp_path, monkeypatch):
+def test_a_loop_is_compiled_anew_after_what_it_holds_changed_and_only_then(tmp_path, monkeypatch):
+    """The code of a loop that it calls, a constant of another file, the fields of its record."""
     monkeypatch.syspath_prepend(tmp_path)
-    (tmp_path / "stale_caller.py").write_text(_CALLER.format("stale"))
-    values = []
-    for text, stamp in (("1.5", b"old"), ("22.5", b"new"), ("22.5", b"new")):
-        (tmp_path / "stale_callee.py").write_text(_CALLEE.format(text))
-        monkeypatch.setattr(compiled, "digest_of", lambda _, stamp=stamp: stamp)
-        for name in ("stale_callee", "stale_caller"):
-            sys.modules.pop(name, None)
+    tuning, fields = "HALF, OTHER = {}, {}", ("first", "last")
+    for number, constants, names, value, is_kept in (
+        ("1.5", ("0.25", "0"), fields, 1.751, False),
+        ("1.5", ("0.25", "0"), fields, 1.751, True),
+        ("1.5", ("0.25", "77"), fields, 1.751, True),
+        ("22.5", ("0.25", "77"), fields, 22.751, False),
+        ("22.5", ("0.125", "77"), fields, 22.626, False),
+        ("22.5", ("0.125", "77"), fields[::-1], 22.627, False),
+    ):
+        (tmp_path / "stale_callee.py").write_text(_CALLEE.format(number))
+        (tmp_path / "stale_tuning.py").write_text(tuning.format(*constants))
+        (tmp_path / "stale_caller.py").write_text(_CALLER.format(*names))
+        os.utime(tmp_path / "stale_caller.py", (0, 0))  # numba looks at it
+        for name in ("callee", "tuning", "caller"):
+            sys.modules.pop(f"stale_{name}", None)
+        for bytecode in tmp_path.rglob("*.pyc"):
+            bytecode.unlink()
         importlib.invalidate_caches()
         caller = importlib.import_module("stale_caller")
-        values.append(caller.outer())
-        hits = caller.outer.stats.cache_hits
-    assert values == [1.5, 22.5, 22.5]
-    assert sum(hits.values()) == 1  # the third time from the disk
-
-
-def test_the_stamp_changes_with_each_compiled_file_and_with_the_constants_that_one_names(tmp_path):
-    texts = {
-        "_core/__init__.py": "1", "a.py": "@compiled()\ndef f():\n    return tuning.LEAST * HALF",
-        "b/tuning.py": "MOST, LEAST = 2, 1", "b/half.py": "_ALL = 4\nHALF: float = _ALL / 2",
-        "b/other.py": "OTHER = 1\ny = HALF",
-    }  # fmt: skip
-    for name, text in texts.items():
-        (tmp_path / name).parent.mkdir(exist_ok=True)
-        (tmp_path / name).write_text(text)
-    digest = compiled.digest_of.__wrapped__
-    first = digest(tmp_path)
-    for name, text in texts.items():
-        (tmp_path / name).write_text(text + " ")
-        assert (digest(tmp_path) != first) == (name != "b/other.py"), name
-        (tmp_path / name).write_text(text)
-    assert digest(tmp_path) == first
+        assert caller.outer(caller.Pair(1.0, 2.0)) == pytest.approx(value)
+        assert (sum(caller.outer.stats.cache_hits.values()) == 1) is is_kept
 
 
 _BOTH = """

@@ -94,7 +94,7 @@ STATIONARY = {
 @pytest.mark.parametrize("model", STATIONARY.values(), ids=STATIONARY)
 def test_stationary_noise_has_departures_in_one_of_a_hundred_records_at_most(model):
     """And a fit is not valid for one in one of 200 records (`python benchmarks/departures.py`)."""
-    runs = 8
+    runs = 4
     free = fitted(noise(0), WhiteNoise() + RandomWalk())
     records = [noise(100 + seed, model) for seed in range(runs)]
     found = [x for x in records if departures(free, gmwm.wavelet_variance(x, dt=DT))]
@@ -128,8 +128,8 @@ def test_a_fit_is_not_valid_from_an_evidence_of_1000_on(size, is_valid):
 )
 def test_sizes_of_the_study_are_found_in_white_noise(curve, size):
     """`python benchmarks/departures.py power` finds them in 95 % of the records."""
-    found = [departures(fitted(noise(seed, WHITE) + size * SAMPLE * curve)) for seed in range(4)]
-    assert sum(len(each) > 0 for each in found) >= 3
+    found = [departures(fitted(noise(seed, WHITE) + size * SAMPLE * curve)) for seed in range(3)]
+    assert sum(len(each) > 0 for each in found) >= 2
 
 
 def test_a_step_of_a_tenth_of_a_sample_deviation_in_an_hour_at_100_hz():
@@ -344,7 +344,7 @@ def test_what_was_taken_off_is_what_the_model_lacks():
     assert fit.valid
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", [0, slow(1), slow(2)])
 def test_how_many_times_a_step_enlarges_the_deviation_is_judged_by_the_model(seed):
     """The coarsest level of the rest has one degree of freedom: its ratios are 12 to 20."""
     x = noise(seed, WHITE) + 0.1 * SAMPLE * STEP
@@ -359,7 +359,7 @@ def test_how_many_times_a_step_enlarges_the_deviation_is_judged_by_the_model(see
 def test_the_noise_that_an_estimated_step_takes_is_given_back():
     """Without that, the coarsest levels of white noise come out too small."""
     ratios = []
-    for seed in range(8):
+    for seed in range(6):
         x = noise(500 + seed, WHITE) + SAMPLE * (TIME > 2000.0) - SAMPLE * (TIME > 5000.0)
         fit = gmwm.calibrate(recording(x), WhiteNoise(), screening=(), remove_departures=True)
         wv = fit["gyro_x"].wv

@@ -21,7 +21,7 @@ def of_kind(record, x, kind):
 
 
 def test_white_noise_does_not_drift(record):
-    runs = 50
+    runs = 25
     count = sum(bool(of_kind(record, white(10_000, seed), "drift")) for seed in range(runs))
     assert count <= binom.isf(1e-6, runs, FALSE_ALARM)
 

@@ -40,7 +40,7 @@ def test_frequency_and_damping(record, frequency, damping, sigma, background):
 
 @pytest.mark.parametrize("name", NOISES)
 def test_smooth_spectra_have_none(record, name):
-    runs = 25
+    runs = 12
     count = sum(
         bool(found(record, simulated(NOISES[name], 8000, seed)).resonances("gyro_z"))
         for seed in range(runs)

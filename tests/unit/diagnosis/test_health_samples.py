@@ -9,7 +9,7 @@ from gmwm import RandomWalk, WhiteNoise
 from gmwm.diagnosis.samples import cut_off_or_abrupt_end
 from marks import slow
 
-SEEDS = range(60)
+SEEDS = range(30)
 
 
 def white(n, seed):

@@ -35,7 +35,7 @@ def inside(fit, truth, level=0.999):
     ],
     ids=repr,
 )
-@pytest.mark.parametrize("dt", [1.0, 0.01])
+@pytest.mark.parametrize("dt", [slow(1.0), 0.01])
 def test_every_kind_of_model_is_found_again(truth, dt):
     scaled = truth
     if dt != 1.0 and not isinstance(truth, gmwm.ARIMA):
@@ -80,14 +80,14 @@ def test_standard_errors_are_right_for_every_weight(omega):
     rng = np.random.default_rng(5)
     fits = [
         gmwm.fit(truth.opened(), truth.simulate(2000, 1.0, rng), dt=1.0, omega=omega)
-        for _ in range(40)
+        for _ in range(24)
     ]
     for key in ("N", "K"):
         estimates = np.array([fit.params[key] for fit in fits])
         predicted = np.median([fit.stderr[key] for fit in fits if key in fit.stderr])
-        # sd of a standard deviation over 40 runs: 11 %, more for the skewed identity weights
-        assert np.std(estimates) == pytest.approx(predicted, rel=0.35)
-        assert np.mean(estimates) == pytest.approx(truth.params[key], abs=4 * predicted / 40**0.5)
+        # sd of a standard deviation over 24 runs: 15 %, more for the skewed identity weights
+        assert np.std(estimates) == pytest.approx(predicted, rel=0.45)
+        assert np.mean(estimates) == pytest.approx(truth.params[key], abs=4 * predicted / 24**0.5)
 
 
 def test_model_weights_are_the_most_efficient():
@@ -241,7 +241,7 @@ def test_a_right_model_that_no_mixture_follows_is_allowed_no_discrepancy(truth):
     # The mixture's own lack was granted to the model: 6 of 20 autoregressions had a discrepancy.
     model = truth + GaussMarkov(0.5, 100.0) if isinstance(truth, Resonance) else truth
     model = gmwm.process.as_model(model)
-    for seed in range(6):
+    for seed in range(4):
         fit = gmwm.fit(model.opened(), model.simulate(50_000, 1.0, seed), 1.0)
         assert fit.discrepancy == 0.0
 

@@ -13,7 +13,7 @@ import gmwm
 import marks
 from gmwm import Channel, GaussMarkov, InputError, RandomWalk, Recording, WhiteNoise, bound, reduce
 from gmwm._core.text import brief
-from gmwm.export import TARGETS
+from gmwm.export import TARGETS, refusal
 from gmwm.filter_numbers import usable
 from gmwm.issues import Notice
 from imu_numbers import numbers
@@ -180,6 +180,14 @@ def slow():
     return fitted(SLOW["gyro"], SLOW["accel"], n=60_000, seed=5)
 
 
+@pytest.fixture(scope="module")
+def stepped(slow):
+    """The same with a step in every axis y."""
+    step = (Notice("step", "bad", "", "a step", {}),)
+    fits = {n: replace(f, notices=step if n[-1] == "y" else ()) for n, f in slow.items()}
+    return replace(slow, fits=fits)
+
+
 @pytest.mark.parametrize("horizon", [None, 10.0])
 def test_slow_terms_count_as_a_random_walk(slow, horizon):
     content = yaml.safe_load(gmwm.export(slow, "kalibr", horizon=horizon))
@@ -224,13 +232,13 @@ def test_the_explanation_has_the_numbers_of_the_file_and_of_each_axis(slow):
 YAML = ("kalibr", "vins", "orbslam3", "fastlio", "liosam", "kimera", "okvis2", "maplab")
 
 
-@pytest.mark.parametrize("source", ["bench.csv", "a long name of a file " * 20])
-@pytest.mark.parametrize("is_valid", [True, False])
+@pytest.mark.parametrize(
+    ("is_valid", "source"), [(True, "a long name of a file " * 20), (False, "bench.csv")]
+)
 @pytest.mark.parametrize("name", sorted(TARGETS))
-def test_files_have_six_lines_of_comment_and_yaml_twelve_in_all(slow, name, is_valid, source):
-    step = () if is_valid else (Notice("step", "bad", "", "a step", {}),)
-    fits = {n: replace(f, notices=step if n[-1] == "y" else ()) for n, f in slow.items()}
-    text = gmwm.export(replace(slow, fits=fits, source=source), name)
+def test_files_have_six_lines_and_yaml_twelve(slow, stepped, name, is_valid, source):
+    given = slow if is_valid else stepped
+    text = gmwm.export(replace(given, source=source), name)
     marks = {"gtsam-cpp": "//", "matlab": "%"}
     lines = text.splitlines()
     comments = [line for line in lines if line.startswith(marks.get(name, "#"))]
@@ -242,6 +250,15 @@ def test_files_have_six_lines_of_comment_and_yaml_twelve_in_all(slow, name, is_v
     assert sum("not valid, do not use: gyro_y" in line for line in comments) == (not is_valid)
     if name in YAML:
         assert len(lines) <= 12
+
+
+def test_what_to_do_is_said_once_where_it_is_the_same():
+    cut, shield = (
+        Notice("step", "bad", "", "a step", {}, each) for each in ("cut it", "shield it")
+    )
+    said = "not valid: gyro_x (the bias stepped), gyro_y (the bias stepped); "
+    assert refusal({"gyro_x": cut, "gyro_y": cut}) == f"{said}cut it"
+    assert refusal({"gyro_x": cut, "gyro_y": shield}) == f"{said}gyro_x: cut it; gyro_y: shield it"
 
 
 def test_per_axis_files_have_the_bound_of_each_axis(slow):

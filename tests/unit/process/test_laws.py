@@ -74,7 +74,7 @@ def mean_square_difference(process, m, dt):
 
 @pytest.mark.parametrize("process", FIRST)
 def test_closed_form_equals_mean_over_simulation(process):
-    n, runs, dt = 2048, 40, 0.25
+    n, runs, dt = 2048, 20, 0.25
     rng = np.random.default_rng(20)
     waves = [wavelet_variance(process.simulate(n, dt, rng), dt).variance for _ in range(runs)]
     expected = process.haar_variance(2.0 ** np.arange(11) * dt, dt)

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 import gmwm
+from emulated_logs import emulated_log
 from gmwm import GaussMarkov, RandomWalk, RateRamp, WhiteNoise, ins
-from gmwm.study.demo import DRIVE, RATE, compare, emulated_log, simulated_imu, write_demo_files
+from gmwm.study.demo import DRIVE, RATE, compare, simulated_imu, write_demo_files
 from gmwm.study.navigation import TABLE_5, TABLE_6
 
 DEG_PER_HOUR = pi / 180.0 / 3600.0

@@ -129,7 +129,7 @@ def test_times_are_rounded_sorted_and_cut_for_each_kind():
     ids=lambda process: type(process).__name__,
 )
 def test_intervals_hold_the_truth(process):
-    runs, n = 40, 512
+    runs, n = 25, 512
     rng = np.random.default_rng(11)
     found = [gmwm.deviations(process.simulate(n, 1.0, rng), 1.0) for _ in range(runs)]
     least = binom.ppf(1e-4, runs, 0.93)  # of a few per cent less than stated nobody takes harm
@@ -163,7 +163,7 @@ def test_an_interval_does_not_depend_on_the_other_averaging_times():
     ids=["quantization and white", "quantization and walk", "resonance and white"],
 )
 def test_intervals_hold_the_truth_of_mixed_noise(model):
-    runs, n = 40, 4096
+    runs, n = 25, 4096
     rng = np.random.default_rng(3)
     found = [
         gmwm.deviations(model.simulate(n, 1.0, rng), 1.0, ["overlapping"]) for _ in range(runs)

@@ -309,7 +309,7 @@ def test_independent_coefficients_have_the_classical_variance_over_the_efficienc
     assert np.all(np.diag(ratio) >= 1.0)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=12, deadline=None)
 @given(
     st.integers(8, 3_000_000),
     st.sampled_from(

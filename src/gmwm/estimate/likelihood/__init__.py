@@ -2,7 +2,11 @@
 
 from gmwm.estimate.likelihood.conclusion import regular_inverse as regular_inverse
 from gmwm.estimate.likelihood.em import EM as EM
-from gmwm.estimate.likelihood.kalman import filtered as filtered
+from gmwm.estimate.likelihood.kalman import (
+    Recursion as Recursion,
+    accumulated as accumulated,
+    filtered as filtered,
+)
 from gmwm.estimate.likelihood.likelihood import (
     Columns as Columns,
     KalmanLikelihood as KalmanLikelihood,

@@ -131,7 +131,9 @@ def whiten(space: Space, Y: FloatArray) -> tuple[FloatArray, float, int]:
         if missing or not steady:
             updated[:] = P
             if not missing:
-                updated -= np.outer(gain, Ph)
+                for i in range(p):
+                    for j in range(p):
+                        updated[i, j] -= gain[i] * Ph[j]
             steady = not missing
             for i in range(p):
                 before[i] = P[i, i]
@@ -204,7 +206,10 @@ def smooth(
         if k < n - 1:  # (1 - P[k + 1] N) L P[k]
             _times(L, predicted, right)
             _times(later, N, left)
-            _times(np.eye(p) - left, right, D[k])
+            for i in range(p):
+                for j in range(p):
+                    left[i, j] = (i == j) - left[i, j]
+            _times(left, right, D[k])
         for c in range(m):
             for i in range(p):
                 back[i] = h[i] * V[k, c] / S[k]
@@ -225,3 +230,57 @@ def smooth(
         C[k] -= right
         later[:] = predicted
     return X, C, D, V, S
+
+
+class Recursion(NamedTuple):
+    """Transition (p, p), output (p,), gains (n, p) and variances (n,) of a filter; or, with a first
+    axis of length d more, their derivatives.
+    """
+
+    F: FloatArray
+    h: FloatArray
+    G: FloatArray
+    s: FloatArray
+
+
+@compiled()
+def accumulated(at: Recursion, by: Recursion) -> FloatArray:
+    """Information (d, d) of d parameters, from a filter and its derivatives.
+
+    The predicted state and its d derivatives follow one linear system driven by the innovations;
+    its covariance is propagated.
+    """
+    F, h, G, s = at
+    dF, dh, dG, ds = by
+    n, p = G.shape
+    d = dF.shape[0]
+    size = p * (1 + d)
+    information = np.zeros((d, d))
+    A, P, noise = np.zeros((size, size)), np.zeros((size, size)), np.zeros((size, size))
+    half, b = np.zeros((size, size)), np.zeros(size)
+    rows, known = np.zeros((d, size)), np.zeros((d, size))  # d v of each over the joint state
+    A[:p, :p] = F
+    for m in range(d):
+        rows[m, :p] = -dh[m]
+        rows[m, p * (1 + m) : p * (2 + m)] = -h
+    for k in range(n):
+        _times(rows, P, known)
+        for i in range(d):
+            for j in range(d):
+                moved = 0.5 * ds[i, k] * ds[j, k] / s[k]
+                for q in range(size):
+                    moved += known[i, q] * rows[j, q]
+                information[i, j] += moved / s[k]
+        b[:p] = G[k]
+        for m in range(d):
+            own = p * (1 + m)
+            for i in range(p):
+                b[own + i] = dG[m, k, i]
+                for j in range(p):
+                    A[own + i, j] = dF[m, i, j] - G[k, i] * dh[m, j]
+                    A[own + i, own + j] = F[i, j] - G[k, i] * h[j]
+        for i in range(size):
+            for j in range(size):
+                noise[i, j] = s[k] * b[i] * b[j]
+        _propagate(A, noise, P, half, P)
+    return information

@@ -133,7 +133,7 @@ def test_a_noisy_autoregression_is_that_of_statsmodels():
     ids=repr,
 )
 def test_standard_errors_are_the_spread_of_the_estimates(truth, n):
-    runs = 20
+    runs = 12
     rng = np.random.default_rng(12)
     fits = [
         mle(truth.opened(), truth.simulate(n, 1.0, rng), start=truth)  # `whittle` agrees with it
@@ -155,21 +155,21 @@ def test_standard_errors_are_the_spread_of_the_estimates(truth, n):
 
 def test_an_interval_of_95_percent_covers_95_percent():
     truth = WhiteNoise(0.3) + RandomWalk(0.05)
-    runs = 60
+    runs = 40
     rng = np.random.default_rng(8)
     held = {key: 0 for key in truth.params}
     for _ in range(runs):
         fit = mle(truth.opened(), truth.simulate(500, 1.0, rng), start=truth)
         for key, (low, high) in fit.interval().items():
             held[key] += low <= truth.params[key] <= high
-    # Binomial: 0.95 with a deviation of 0.028.
-    assert all(0.87 < count / runs <= 1.0 for count in held.values()), held
+    # Binomial: 0.95 with a deviation of 0.034.
+    assert all(0.84 < count / runs <= 1.0 for count in held.values()), held
 
 
 @pytest.mark.parametrize("method", ["mle", slow("whittle")])
 def test_an_amplitude_of_zero_has_an_upper_bound(method):
     zero = bounded = 0
-    runs = 20
+    runs = 12
     rng = np.random.default_rng(21)
     for _ in range(runs):
         x = WhiteNoise(1.0).simulate(1000, 1.0, rng)
@@ -193,8 +193,8 @@ def test_an_amplitude_of_zero_has_an_upper_bound(method):
 @pytest.mark.parametrize(
     ("K", "method", "runs"),
     [
-        (1.5e-3, "mle", 20),
-        (6e-3, "mle", 25),
+        (1.5e-3, "mle", 12),
+        (6e-3, "mle", 12),
         slow(1.5e-3, "em", 10),
     ],
 )
@@ -207,7 +207,7 @@ def test_intervals_of_a_walk_that_can_hardly_be_seen_cover_it(K, method, runs):
         fit = gmwm.fit(truth.opened(), x, dt=1.0, method=METHODS[method](start=truth))
         low, high = fit.interval()["K"]
         held += low <= K <= high
-    assert held >= 0.8 * runs  # less than 1 of 100 at a coverage of 0.93
+    assert held >= 0.75 * runs  # less than 1 of 100 at a coverage of 0.93
 
 
 def test_missing_samples_cost_only_what_they_knew():

@@ -17,6 +17,7 @@ from gmwm import (
 )
 from gmwm.estimate import METHODS
 from gmwm.process import as_model
+from marks import slow
 
 OF_SAMPLES = ("mle", "whittle", "em")
 
@@ -61,10 +62,15 @@ def test_models_without_white_noise_are_found_again(truth):
         assert abs(fit.params[key] - truth.params[key]) < norm.isf(1e-4) * error
 
 
-@pytest.mark.parametrize("method", OF_SAMPLES)
 @pytest.mark.parametrize(
-    "model",
-    [WhiteNoise() + GaussMarkov(), WhiteNoise() + 2 * GaussMarkov(), 2 * GaussMarkov()],
+    ("method", "model"),
+    [
+        *((method, WhiteNoise() + GaussMarkov()) for method in OF_SAMPLES),
+        ("mle", 2 * GaussMarkov()),
+        ("whittle", WhiteNoise() + 2 * GaussMarkov()),
+        slow("em", WhiteNoise() + 2 * GaussMarkov()),
+        slow("em", 2 * GaussMarkov()),
+    ],
     ids=repr,
 )
 def test_too_rich_a_model_of_white_noise_is_not_valid(method, model):

@@ -85,14 +85,14 @@ def test_the_same_seed_gives_the_same_estimates(series):
 def test_noise_rounded_as_coarsely_as_it_is_large():
     """White noise alone is off by the variance of rounding; the simulation is not."""
     errors, naive = [], []
-    for seed in range(8):
+    for seed in range(5):
         x = RoundedNoise(sigma=0.7, lsb=1.0).simulate(8192, 1.0, seed)
         fit = gmwm.fit(RoundedNoise(lsb=1.0), x, dt=1.0, method=SimulatedMoments(replications=4))
         assert fit.valid, fit.message
         errors.append((fit.params["sigma"] - 0.7) / fit.stderr["sigma"])
         white = gmwm.fit(WhiteNoise(), x, dt=1.0)
         naive.append((white.params["N"] - 0.7) / white.stderr["N"])
-    assert np.mean(np.square(errors)) < 3.3  # chi-square of 8 over 8, at 0.001
+    assert np.mean(np.square(errors)) < 4.1  # chi-square of 5 over 5, at 0.001
     assert np.min(naive) > 5.0
 
 
@@ -101,7 +101,7 @@ def test_a_bias_held_in_blocks():
     fits = [
         gmwm.fit(truth.opened(), truth.simulate(16_384, 1.0, seed), dt=1.0,
 method=SimulatedMoments(replications=4))
-        for seed in (1, 2, 3)
+        for seed in (1, 2)
     ]  # fmt: skip
     for fit in fits:
         for key, value in truth.params.items():

@@ -17,7 +17,7 @@ WV = gmwm.wavelet_variance(WhiteNoise(1.0).simulate(20_000, 1.0, 1), 1.0)
 @pytest.mark.parametrize("walk", [1e-3, slow(5e-4), slow(1.7e-3)])
 def test_bounds_of_a_walk_near_the_threshold_lie_above_it(walk):
     # Under the noise without the walk 30, 26 and 16 of 100 bounds lay below.
-    runs, below = 25, 0
+    runs, below = 15, 0
     truth = WhiteNoise(1.0) + RandomWalk(walk)
     for seed in range(runs):
         fit = gmwm.fit(MODEL, truth.simulate(20_000, 1.0, seed), 1.0)

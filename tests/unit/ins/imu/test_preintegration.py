@@ -104,7 +104,7 @@ def test_jacobian_is_the_derivative_of_the_increments():
 
 def test_covariance_is_that_of_simulated_errors():
     # Mean normalised error squared of r runs: chi-squared of 9 r degrees of freedom over 9 r.
-    rng, runs, imu = np.random.default_rng(1), 150, moving(60)
+    rng, runs, imu = np.random.default_rng(1), 60, moving(60)
     sensors = SensorModels.of(MODELS)
     true = preintegrate(imu, MODELS, start="stationary")
     weight = np.linalg.inv(true.covariance[:9, :9])

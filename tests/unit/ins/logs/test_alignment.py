@@ -13,7 +13,7 @@ from gmwm.ins.logs import Measured, align
 DT, N, LLA = 0.1, 300, np.array([0.8, 0.2, 300.0])
 RPY = np.array([0.02, -0.03, 1.1])
 TIMES = np.arange(1.0, 29.0)
-DRAWS = 100
+DRAWS = 50
 QUIET = WhiteNoise(1e-9)
 
 

@@ -5,9 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from emulated_logs import emulated_log
 from gmwm.errors import InputError
 from gmwm.ins import Measured, Navigated, read_fixes
-from gmwm.study.demo import LEVER_ARM, emulated_log, sensors
+from gmwm.study.demo import LEVER_ARM, sensors
 
 RATE, DURATION = 10.0, 160.0
 NED = ("north", "east", "down")

@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from emulated_logs import emulated_log
 from gmwm.errors import InputError
 from gmwm.ins import Comparison, Outage, Paired, compare, tuning
 from gmwm.ins.geometry import ned_difference
 from gmwm.ins.logs import Replay, align, paired, smooth
 from gmwm.ins.simulation import Ratio
-from gmwm.study.demo import emulated_log, sensors
+from gmwm.study.demo import sensors
 
 
 @pytest.fixture(scope="module")

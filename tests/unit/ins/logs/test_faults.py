@@ -5,11 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from emulated_logs import emulated_log
 from gmwm.ins import Measured, Navigated, Straight, emulate, gnss, perform
 from gmwm.ins.filter import InitialSd
 from gmwm.ins.logs import Fault, Faults, Replay, fault_notice
 from gmwm.ins.logs.faults import resolution_notice
-from gmwm.study.demo import LEVER_ARM, emulated_log, sensors
+from gmwm.study.demo import LEVER_ARM, sensors
 from marks import slow
 
 DURATION = 160.0
@@ -33,7 +34,7 @@ def codes(navigated):
     [
         (204, ["off-grid"], {}, []),  # fixes between samples
         *(
-            (300 + seed, [], {"vehicle": each}, [])
+            (slow if seed else pytest.param)(300 + seed, [], {"vehicle": each}, [])
             for seed in range(3)
             for each in ("car", "loiter")
         ),

@@ -1,5 +1,3 @@
-import subprocess
-import sys
 from typing import Any
 
 import numpy as np
@@ -126,10 +124,3 @@ def test_numbers_of_one_axis_are_not_enough(tmp_path):
     path = gmwm.bound(WhiteNoise(1.0) + RandomWalk(0.1)).save(tmp_path / "one.json")
     with pytest.raises(InputError, match=r"one.json: sensor models"):
         read_models("filters", path.name, tmp_path)
-
-
-def test_a_new_session_loads_what_another_saved(tmp_path):
-    path = gmwm.bound(WhiteNoise(1.0) + RandomWalk(0.1)).save(tmp_path / "one.json")
-    code = f"import gmwm; print(type(gmwm.load({str(path)!r})).__name__)"
-    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert found.stdout.split() == ["AxisFilterNumbers"]

@@ -144,7 +144,7 @@ def test_texts_and_arrays_in_other_files_are_not_read(tmp_path):
 @pytest.mark.skipif(not OF_MATLAB.exists(), reason="scipy is installed without its test data")
 def test_what_matlab_writes_ends_nothing():
     """Most hold nothing of a recording, which is what they are refused for."""
-    for path in sorted(OF_MATLAB.glob("test*_7.4_GLNX86.mat"))[::3]:
+    for path in sorted(OF_MATLAB.glob("test*_7.4_GLNX86.mat"))[::6]:
         with pytest.raises(InputError) as caught:
             tried(read_mat, path)
             raise InputError("used")
