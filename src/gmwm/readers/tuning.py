@@ -15,6 +15,10 @@ MOST_SENSORS, IN_TURNS, FEWEST_OF_BLOCK = 16, 0.1, 4096
 # raw topics at 1 Hz by default, and ArduPilot its IMU at 25 Hz at least.
 THINNED = 20.0
 
+# Times the time that a sample covers from which nearly all steps show that others were left out: of
+# every second, two.
+APART = 1.5
+
 # -- sensors at rest ------------------------------------------------------------------------------
 
 # Relative distance from standard gravity of an accelerometer at rest: scale errors of the cheapest
