@@ -92,8 +92,8 @@ def held_samples(channel: Examined) -> Held:
     if step != 0.0:
         expected, variance = np.sum([_by_chance(each) for each in _alike(sizes / step)], axis=0)
     else:
-        ends = np.array([0.0, 0.5, 1.5, 2.5]) * tuning.NEAR * scatter
-        near, one, two = np.histogram(sizes[sizes > 0.0], ends)[0]
+        edges = np.array([0.0, 0.5, 1.5, 2.5]) * tuning.NEAR * scatter
+        near, one, two = np.histogram(sizes[sizes > 0.0], edges)[0]
         # Steps that slowly change their size, by a correction, are a lattice all the same: of noise
         # without steps half as many are so near.
         if not two or not one < 4 * near < 4 * one:
