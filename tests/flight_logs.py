@@ -64,8 +64,8 @@ def write_ulog(path, *topics):
     return path
 
 
-def combined(samples=X, relative=-500):
-    columns = {"accelerometer_timestamp_relative": relative}
+def combined(samples=X, relative=-500, covered=4000):
+    columns = {"accelerometer_timestamp_relative": relative, "gyro_integral_dt": covered}
     for i in range(3):
         columns[f"gyro_rad[{i}]"] = samples[:, i]
         columns[f"accelerometer_m_s2[{i}]"] = samples[:, 3 + i]

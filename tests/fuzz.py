@@ -2,8 +2,8 @@
 """Damaged inputs: every file that gmwm reads, mutated, is used or refused in one sentence.
 
 ``python tests/fuzz.py --cases 70000`` draws as many over all kinds of files, prints how many were used
-and refused, and ends with status 1 if any was neither: a traceback, a warning, more than 20 s of the
-processor, or more than 2 GB. ``--only KIND --first CASE --cases 1`` repeats one. The suite runs some of
+and refused, and ends with status 1 if any was neither: a traceback, a warning, more than 10 s of the
+processor, or more than 1 GB. ``--only KIND --first CASE --cases 1`` repeats one. The suite runs some of
 each.
 """
 
@@ -48,7 +48,7 @@ from gmwm.ins.spec import experiment_from, read_document
 from gmwm.ins.trajectory.trajectory_file import read_log
 from gmwm.report import write_report
 
-SECONDS, BYTES = 20, 2 << 30
+SECONDS, BYTES = 10, 1 << 30
 TOO_LARGE = "too large"
 LONGEST = 2000  # characters of a message, with the path
 SI = formats.SI

@@ -9,7 +9,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
-from annotated_types import Ge
+from annotated_types import Ge, MinLen
 
 from gmwm._core import checks
 from gmwm._core.documents import Document, Rate, Samples, Text, load_document
@@ -70,7 +70,7 @@ class Calibration(ByName[Fit], Document):
     _held = "fits"
     _unknown = "the calibration has no model of channel {name!r}: it has {known}"
 
-    fits: Mapping[Text, Fit]
+    fits: Annotated[Mapping[Text, Fit], MinLen(1)]
     skipped: Mapping[Text, Notice]
     source: Text
     rate: Rate

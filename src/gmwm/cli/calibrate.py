@@ -286,6 +286,8 @@ def write_files(
                 written.insert(1, f"{kalibr.name} (Kalibr)")
             except InputError as error:  # the other files are no worse for it
                 lines = wrapped(f"no {kalibr.name}: {error}")
+        if target is not None:  # after a kill, none of another run is left
+            (folder / TARGETS[target].file_name).unlink(missing_ok=True)
     has_imu = len(written) > 2
     if not has_imu and kalibr.exists():
         lines.append(f"left {kalibr} of an earlier run: Kalibr needs gyro and accelerometer")

@@ -9,7 +9,7 @@ from typing import Any
 
 import click
 
-from gmwm._core.files import folder_to_fill, write_text
+from gmwm._core.files import folder_to_fill, moved_together, write_text
 from gmwm.cli.console import print_result, progress_bar, with_option
 from gmwm.cli.options import PATH, READING, arguments_of_read, folder_to_write, numbers, options
 from gmwm.errors import InputError
@@ -194,11 +194,10 @@ def navigate(
         text = f"{file}: {error.problem}"
         raise InputError(text, error.code, error.hint, error.values) from None
     with folder_to_fill(output) as folder:
-        if is_own:
-            found, paths = _own_data(subject, folder)
-        else:
-            found, paths = _validated(subject, folder, **work)
-    print_result(found, *paths, as_json=as_json)
+        found, write = _own_data(subject) if is_own else _validated(subject, folder, **work)
+        with moved_together(folder) as new:
+            paths = write(new)
+    print_result(found, *(folder / each.name for each in paths), as_json=as_json)
 
 
 def _subject(content: dict[str, Any], base: Path, is_own: bool) -> Any:
@@ -214,22 +213,21 @@ def _subject(content: dict[str, Any], base: Path, is_own: bool) -> Any:
 
 
 def _validated(experiment: Any, folder: Path, *, resume: bool, **work: Any) -> Any:
-    """Do the runs of a study; its result and files."""
+    """Do the runs of a study; its result, and what writes its files into a folder."""
     from gmwm.ins.simulation import Validation
 
-    table, page = (folder / name for name in _OF_STUDY)
+    table, page = _OF_STUDY
     work |= {"folder": folder / "runs", "earlier": "resume" if resume else "replace"}
     with progress_bar("navigating", "runs") as bar:
         found = Validation.of(experiment, progress=bar, **work)
-    return found, (write_text(table, str(found)), found.report(page))
+    return found, lambda new: (write_text(new / table, str(found)), found.report(new / page))
 
 
-def _own_data(given: Any, folder: Path) -> Any:
-    """Filter real data, or compare sensor models on them; the result and its files."""
+def _own_data(given: Any) -> Any:
+    """Filter real data, or compare sensor models on them; as `_validated`."""
     from gmwm.ins.logs import Comparison, Navigated
 
     if isinstance(given, Comparison):
-        return given, [given.report(folder / _OF_SENSORS)]
-    found, (solution, page) = Navigated.of(given), (folder / name for name in _OF_LOG)
-    found.write_solution(solution)
-    return found, (solution, found.report(page))
+        return given, lambda new: [given.report(new / _OF_SENSORS)]
+    found, (solution, page) = Navigated.of(given), _OF_LOG
+    return found, lambda new: (found.write_solution(new / solution), found.report(new / page))

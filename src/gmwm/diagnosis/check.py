@@ -25,10 +25,10 @@ from gmwm.diagnosis.events import event, find_events, with_single_outliers
 from gmwm.diagnosis.health import ChannelHealth, Health
 from gmwm.diagnosis.innovations import Examined, crosstalk_notices, innovations
 from gmwm.diagnosis.lines import line_notices
-from gmwm.diagnosis.motion import Motion, find_motion, moves, runs_of
+from gmwm.diagnosis.motion import Motion, find_motion, runs_of
 from gmwm.diagnosis.resolution import rounding, step_size, widest_step
 from gmwm.diagnosis.resonances import peaks, resonance_notice
-from gmwm.diagnosis.still import vibration
+from gmwm.diagnosis.still import moves, vibration
 from gmwm.diagnosis.tails import contamination, heavy_tails, outliers_or_tails
 from gmwm.issues import Notice, Severity, notice, worst_first
 from gmwm.readers import Channel, Recording, require_recording

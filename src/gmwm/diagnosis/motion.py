@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import wraps
 from itertools import pairwise
@@ -12,12 +12,10 @@ from weakref import ref
 import numpy as np
 
 from gmwm._core.distributions import norm
-from gmwm._core.text import readable
 from gmwm._core.typing import BoolArray, FloatArray
 from gmwm._core.units import SI_UNIT, factor
 from gmwm.diagnosis import tuning
 from gmwm.diagnosis.innovations import Spans
-from gmwm.issues import Notice, notice
 from gmwm.readers import AXES, Channel, Recording, block_means, steady_turn, turning_gravity
 
 T = TypeVar("T")
@@ -255,35 +253,6 @@ def _never_rests(recording: Recording, rate: FloatArray, size: int) -> bool:
         and found.change > tuning.SWAYS * _GRAVITY
         and 1.0 / tuning.AS_PREDICTED < found.factor < tuning.AS_PREDICTED
     )
-
-
-def moves(recording: Recording) -> Iterator[Notice]:
-    """Say when the recording moves or tilts, and which stretches are static."""
-    motion = find_motion(recording)
-    ends: dict[str, float] = {}
-    hint = f"no stretch of {tuning.SHORTEST_STATIC:g} s is static: record again, at rest"
-    if motion.static:
-        start, stop = max(motion.static, key=lambda each: each[1] - each[0])
-        ends = {"start": start, "stop": stop}
-        hint = f"use one static stretch: from {times_of(motion.static)}"
-    others = [move for move in motion.moves if not move.is_tilt]
-    tilts = [move for move in motion.moves if move.is_tilt]
-    if others:
-        rate, tilt = max(move.rate for move in others), max(move.tilt for move in others)
-        most = "" if motion.turns_steadily else "up to "
-        verb = f"it tilts by {np.degrees(tilt):.2g} deg" if tilt > tuning.TILTS else "it moves"
-        if rate > tuning.TURNS:
-            verb = f"it turns at {most}{readable(rate, 'rad/s')}"
-        values = {"moves": len(others), "rate": rate, "angle": tilt} | ends
-        times = f"from {times_of([(move.start, move.stop) for move in others])}"
-        yield notice("not-static", "", values, severity="bad", hint=hint, verb=verb, times=times)
-    if tilts:
-        largest = max(tilts, key=lambda move: move.tilt)
-        when = 0.5 * (largest.start + largest.stop)
-        values = {"tilts": len(tilts), "angle": largest.tilt, "time": when} | ends
-        more = f", the largest of {len(tilts)} tilts" if len(tilts) > 1 else ""
-        degrees = np.degrees(largest.tilt)
-        yield notice("tilt", "", values, severity="bad", hint=hint, degrees=degrees, others=more)
 
 
 def times_of(stretches: Sequence[tuple[float, float]]) -> str:

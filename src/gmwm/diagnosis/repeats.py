@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from gmwm._core.typing import known_of
+from gmwm._core.typing import FloatArray, IntArray, known_of
 from gmwm.diagnosis import tuning
 from gmwm.diagnosis.health import Repetition
 from gmwm.diagnosis.innovations import Examined, Held
@@ -74,9 +74,9 @@ def interpolation_notice(channel: Channel) -> Notice | None:
 def held_samples(channel: Examined) -> Held:
     """Find samples that repeat the one before, as recorders write them for a lost packet.
 
-    Measured differences of no step are by a power of the ratio more frequent than those of one step
-    by which these are than those of two: 1/3 of a Gaussian law. Nothing is held if chance, with
-    three standard errors, explains those that repeat.
+    Of a log-concave law, differences of no step are more frequent than those of one step by at most
+    the ratio by which these are than those of two. Each group of blocks of like scatter has its own
+    law. Nothing is held if chance, with three standard errors, explains those that repeat.
     """
     values, step, scatter = channel.values, channel.step, channel.scatter
     # Where steps are wide in a part of the values, neighbours are equal by chance in that part.
@@ -86,23 +86,21 @@ def held_samples(channel: Examined) -> Held:
     sizes = known_of(np.abs(sizes, out=sizes))
     same = int(np.count_nonzero(sizes == 0.0))
     fewest = max(tuning.FALSE_ALARM * sizes.size, tuning.LONG_RUN)
-    if same < fewest:
+    if same < fewest or not is_dithered(channel.present, step):
         return Held()
-    width = step or tuning.NEAR * scatter
-    near, one, two = np.histogram(sizes[sizes > 0.0], np.array([0.0, 0.5, 1.5, 2.5]) * width)[0]
-    if not is_dithered(channel.present, step) or not min(one, two):
-        return Held()
-    if step == 0.0:
+    expected, variance = 0.0, 0.0
+    if step != 0.0:
+        expected, variance = np.sum([_by_chance(each) for each in _alike(sizes / step)], axis=0)
+    else:
+        edges = np.array([0.0, 0.5, 1.5, 2.5]) * tuning.NEAR * scatter
+        near, one, two = np.histogram(sizes[sizes > 0.0], edges)[0]
         # Steps that slowly change their size, by a correction, are a lattice all the same: of noise
         # without steps half as many are so near.
-        chance, error = float(not one < 4 * near < 4 * one), 0.0
-    else:
-        power = tuning.LAST_RISE
-        chance = 0.5 * one / sizes.size * max(one / two, 1.0) ** power
-        error = float(np.hypot((1.0 + power) / np.sqrt(one), power / np.sqrt(two)))
-    if same - chance * np.exp(3.0 * error) * sizes.size < fewest:
+        if not two or not one < 4 * near < 4 * one:
+            return Held()
+    if same - expected - 3.0 * np.sqrt(variance) < fewest:
         return Held()
-    share = same / sizes.size - chance
+    share, chance = (same - expected) / sizes.size, expected / sizes.size
     runs = next(stuck(channel), None)
     if runs is not None and 2.0 * runs.values["samples"] > share * channel.present.size:
         return Held(0.0, chance)  # most of what is held is held in a few places
@@ -110,6 +108,24 @@ def held_samples(channel: Examined) -> Held:
     ends = np.flatnonzero(np.isnan(values[1:]) | (np.diff(values) == 0.0)) + 1
     longest = np.max(np.diff(ends, prepend=0, append=values.size))
     return Held(share, chance, bool(longest <= tuning.FEWEST_BETWEEN_HELD))
+
+
+def _alike(steps: FloatArray) -> list[IntArray]:
+    """Differences in whole steps, in groups of blocks whose means are alike."""
+    width = tuning.BLOCK_OF_HELD
+    blocks = np.rint(steps[: steps.size // width * width]).astype(np.int64).reshape(-1, width)
+    means = np.log(np.maximum(blocks.mean(axis=1), 1.0 / width))
+    level = np.floor(means / np.log(tuning.LIKE_SCATTER))
+    return [blocks[level == each].ravel() for each in np.unique(level)]
+
+
+def _by_chance(steps: IntArray) -> tuple[float, float]:
+    """How many differences of no step chance explains at most, and the variance of that."""
+    none, one, two = np.bincount(np.minimum(steps, 3), minlength=3)[:3].tolist()
+    if not min(one, two):  # nothing shows the law
+        return none, 0.0
+    found = 0.5 * one * max(one / two, 1.0)
+    return min(found, none), found**2 * (4.0 / one + 1.0 / two)
 
 
 def held_or_stuck(channel: Examined) -> Iterator[Notice]:

@@ -16,7 +16,7 @@ import numpy as np
 import scipy
 
 from gmwm._core.distributions import chi2
-from gmwm._core.text import brief
+from gmwm._core.text import brief, readable
 from gmwm._core.typing import BoolArray, FloatArray
 from gmwm._core.units import SI_UNIT, factor
 from gmwm.diagnosis import tuning
@@ -264,6 +264,37 @@ class Blocks:
     def loud_stretches(self) -> tuple[tuple[float, float], ...]:
         """Begin and end of each, s."""
         return tuple((self.length * a, self.length * b) for a, b in runs_of(self.loudness.loud))
+
+
+def moves(recording: Recording) -> Iterator[Notice]:
+    """Say when the recording moves or tilts, and which stretches are static."""
+    motion, still = find_motion(recording), rest_of(recording)
+    static = motion.static if still is None else still.stretches
+    ends: dict[str, float] = {}
+    vibrate = ", and those without motion vibrate" if still and still.vibrating else ""
+    hint = f"no stretch of {tuning.SHORTEST_STILL:g} s is at rest{vibrate}: record again, at rest"
+    if static:
+        start, stop = max(static, key=lambda each: each[1] - each[0])
+        ends = {"start": start, "stop": stop}
+        hint = f"use one static stretch: from {times_of(static)}"
+    others = [move for move in motion.moves if not move.is_tilt]
+    tilts = [move for move in motion.moves if move.is_tilt]
+    if others:
+        rate, tilt = max(move.rate for move in others), max(move.tilt for move in others)
+        most = "" if motion.turns_steadily else "up to "
+        verb = f"it tilts by {np.degrees(tilt):.2g} deg" if tilt > tuning.TILTS else "it moves"
+        if rate > tuning.TURNS:
+            verb = f"it turns at {most}{readable(rate, 'rad/s')}"
+        values = {"moves": len(others), "rate": rate, "angle": tilt} | ends
+        times = f"from {times_of([(move.start, move.stop) for move in others])}"
+        yield notice("not-static", "", values, severity="bad", hint=hint, verb=verb, times=times)
+    if tilts:
+        largest = max(tilts, key=lambda move: move.tilt)
+        when = 0.5 * (largest.start + largest.stop)
+        values = {"tilts": len(tilts), "angle": largest.tilt, "time": when} | ends
+        more = f", the largest of {len(tilts)} tilts" if len(tilts) > 1 else ""
+        degrees = np.degrees(largest.tilt)
+        yield notice("tilt", "", values, severity="bad", hint=hint, degrees=degrees, others=more)
 
 
 def vibration(recording: Recording) -> Iterator[Notice]:

@@ -59,7 +59,7 @@ HARMFUL_END = 0.08  # density times deviation of Gaussian noise cut at 2.1: 10 %
 
 HELD_AT_MOST = 0.05  # share of repeated samples that may stay; the noise is larger by that
 CHANCE_OF_HELD = 0.05  # share equal by chance up to which they are masked (noise 1.6 % too small)
-LAST_RISE = 0.75  # largest power of a law (Student's t, 2.5 degrees of freedom, coarse rounding)
+BLOCK_OF_HELD, LIKE_SCATTER = 64, 1.5  # samples that give a mean to 9 %, ratio of means alike
 NEAR = 0.25  # of the scatter: stands for the step where there is none
 FEWEST_BETWEEN_HELD = 16  # samples in a row that show how the noise goes on
 

@@ -324,11 +324,11 @@ class Store:
         path = self.path(item.name)
         content = read_json(path)
         try:
-            if not isinstance(content, dict) or "fleet" not in content:
+            if not isinstance(content, dict) or not isinstance(content.get("fleet"), dict):
                 raise InputError("was not written by a fleet")
             origin = _Origin.from_content(content["fleet"])
             calibration = Calibration.from_dict(content)
-        except (InputError, TypeError) as error:
+        except (TypeError, ValueError) as error:  # InputError is one
             hint = "move it away, or give another folder"
             raise InputError(f"{path}: {error}: {hint}") from None
         return origin, Unit(item.path, item.name, calibration, origin.sha256)

@@ -301,7 +301,7 @@ def _check_jumps(clock: Clock, found: _Grid, seconds: float) -> None:
             place = f"{clock.source}, {clock.column}, near {clock.where(found.change.row)}"
             text = f"{place}: the sampling rate goes from {first:.4g} to {then:.4g} Hz"
             raise InputError(text, "rate-changes", "use the part before or after")
-    if jumps.are_rounding:
+    if jumps.are_rounding or (found.uneven is None and jumps.have_rhythm):
         text = f"a step of two intervals, and {jumps.rows.size - 1:,} more such at even distances"
         raise clock.error(int(jumps.rows[0]), f"{text}, as if the stamps were rounded too coarsely")
     if off_grid > tuning.MOST_OFF_GRID * n and found.uneven is None:

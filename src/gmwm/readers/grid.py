@@ -56,6 +56,16 @@ class Jumps:
         shortest = np.min(apart[half - 1 :] - apart[: apart.size - half + 1])
         return bool(shortest <= 1.0 + 0.1 * np.median(apart))
 
+    @property
+    def have_rhythm(self) -> bool:
+        """Whether many, half of one row, have lines in their spectrum: rounding, and lost rows."""
+        if 2 * np.count_nonzero(self.missing == 1.0) <= self.rows.size:
+            return False
+        number = np.ones(self.rows[-1] + 1, dtype=np.int64)
+        number[self.rows] += self.missing.astype(np.int64)
+        fewest = max(tuning.MANY_LOST * number.size, tuning.BINS_OF_RHYTHM)
+        return self.rows.size > fewest and _has_rhythm(np.cumsum(number))
+
     def strays(self, stamps: FloatArray) -> bool:
         """Whether the differences of the steps add up, as those of rows lost unnoticed do."""
         number = np.ones(stamps.size)
@@ -132,12 +142,21 @@ def find_jumps(stamps: FloatArray) -> Jumps:
     interval = float(rest / (steps.size - candidates.size))
     if not (0.0 < interval < np.inf):
         return Jumps(candidates[:0], steps[:0], steps[:0], interval)
+    shortest = float(np.min(steps))
     del steps  # the line needs as much memory
     advance = _advance(stamps, candidates, interval)
     missing = np.maximum(np.rint(advance) - 1.0, 0.0)
     real = missing > 0.0
     found = Jumps(candidates[real], advance[real], missing[real], interval)
     number = np.ones(stamps.size, dtype=np.int64)
+    if found.are_rounding:
+        rows = np.cumsum(number)
+        line = interval_of(stamps, rows)
+        late = stamps - stamps[0] - line * rows
+        # Within half a unit of an even clock, none is lost; many at equal distances may be.
+        is_sure = np.ptp(np.diff(found.rows)) > 0 or found.rows.size < tuning.MANY_LOST * rows.size
+        if is_sure and np.ptp(late) < tuning.ROUNDED * shortest:
+            return Jumps(candidates[:0], advance[:0], missing[:0], line)
     number[found.rows] += found.missing.astype(np.int64)
     # A jump off the grid starts a part whose clock has an offset of its own.
     starts = found.rows[found.is_off_grid]

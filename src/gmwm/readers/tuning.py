@@ -15,6 +15,10 @@ MOST_SENSORS, IN_TURNS, FEWEST_OF_BLOCK = 16, 0.1, 4096
 # raw topics at 1 Hz by default, and ArduPilot its IMU at 25 Hz at least.
 THINNED = 20.0
 
+# Times the time that a sample covers from which nearly all steps show that others were left out: of
+# every second, two.
+APART = 1.5
+
 # -- sensors at rest ------------------------------------------------------------------------------
 
 # Relative distance from standard gravity of an accelerometer at rest: scale errors of the cheapest
@@ -90,6 +94,7 @@ LONGEST_OF_WRAP = 100.0  # steps within which a counter that ran over goes on
 # are alike, above which half of them: of one of a hundred rows lost at random, 0.4 % of recordings
 # have as many alike at most.
 FEWEST_IN_RHYTHM, ALL_IN_RHYTHM = 4, 6
+ROUNDED = 1.2  # shortest steps between the earliest and the latest stamp: one, and a line's error
 
 # Intervals from a whole number beyond which a step may as well have the next one: where the unit of
 # stamps is half of the interval, each slip of the rounding is such a step.

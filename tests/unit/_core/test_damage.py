@@ -163,6 +163,13 @@ def test_parts_of_a_study_that_others_wrote(tmp_path):
         do_runs(lambda run: {"a": np.zeros(4)}, 9, {"seed": 1}, folder=tmp_path)
 
 
+def test_a_calibration_without_channels_is_rejected(calibration, tmp_path):
+    path = tmp_path / "calibration.json"
+    path.write_text(json.dumps(calibration.to_dict() | {"channels": {}}))
+    with pytest.raises(InputError, match="channels"):
+        gmwm.load(path)
+
+
 # -- files that change, and what a kill leaves -----------------------------------------------------
 
 

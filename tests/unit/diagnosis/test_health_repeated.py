@@ -152,6 +152,21 @@ def test_chance_explains_equal_neighbours_of_rounded_noise(step, law):
         assert share < 0.01
 
 
+@pytest.mark.parametrize("loud", [2, 5])
+def test_chance_explains_equal_neighbours_of_noise_that_is_louder_at_times(loud):
+    for seed in range(3):
+        rng = np.random.default_rng([4, seed])
+        noise = rng.normal(size=50_000) * np.where(np.arange(50_000) < 50_000 // loud, 4.0, 1.0)
+        for step in (1.0, 2.8, 3.0):
+            values = np.rint(noise / step) * step
+            assert held_samples(examined(values, step=step)).share == 0.0
+        again = np.flatnonzero(rng.random(values.size) < 0.2)[1:]
+        values = np.rint(2.0 * noise)
+        values[again] = values[again - 1]
+        # A seventh is equal anyway, and the law gives an upper limit to what is.
+        assert 0.12 < held_samples(examined(values, step=1.0)).share < 0.2
+
+
 def test_a_sensor_that_is_held_keeps_the_samples_that_were_measured(record):
     noise = np.random.default_rng(5).normal(size=5000)
     values = noise.copy()

@@ -96,6 +96,16 @@ def test_an_engine_is_no_rest_though_it_is_the_quietest_there_is():
     assert found.stretches == ()
     assert len(found.vibrating) == 2
     assert found.timeline[0] == found.timeline[-1] == "~"
+    (moves,) = gmwm.health(recording).of(code="not-static")
+    assert "start" not in moves.values
+    assert "those without motion vibrate" in moves.hint
+
+
+def test_health_names_the_stretch_that_calibrate_uses():
+    recording, _ = log(("idle", 40.0), ("move", 30.0), ("rest", 20.0))
+    (stretch,) = find_still(recording).stretches
+    (moves,) = gmwm.health(recording).of(code="not-static")
+    assert (moves.values["start"], moves.values["stop"]) == stretch
 
 
 @pytest.mark.parametrize("seed", range(3))

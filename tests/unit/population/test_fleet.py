@@ -234,7 +234,9 @@ def test_units_of_another_version_are_not_mixed_in(lot, copied, monkeypatch):
         gmwm.fleet(lot, folder=copied, resume=True, **QUICK)
 
 
-@pytest.mark.parametrize("damage", ["empty", "cut", "foreign", "plain", "origin", "list", "null"])
+@pytest.mark.parametrize(
+    "damage", ["empty", "cut", "foreign", "plain", "origin", "odd", "list", "null"]
+)
 def test_a_damaged_or_foreign_calibration_is_refused_in_one_sentence(
     lot, outputs, copied, worked, damage
 ):
@@ -243,6 +245,8 @@ def test_a_damaged_or_foreign_calibration_is_refused_in_one_sentence(
     content = json.loads(text)
     if damage == "origin":
         content["fleet"]["sha256"] = "large"
+    if damage == "odd":
+        content["fleet"] = ["a"]
     if damage == "plain":
         del content["fleet"]
     path.write_text({

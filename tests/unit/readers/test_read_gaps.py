@@ -276,9 +276,9 @@ def test_a_wild_stamp_asks_for_no_memory(recorded):
         read(path, units=GYRO)
 
 
-@pytest.mark.parametrize("rate", [700.0, 850.0, 950.0])
+@pytest.mark.parametrize("rate", [800.0, 950.0])  # or every fifth, every twentieth row is lost
 def test_stamps_rounded_too_coarsely_are_no_gaps(recorded, rate):
-    path, _ = recorded(without(), np.round(np.arange(N) / rate * 1e3), "time_ms")
+    path, _ = recorded(without(), np.floor(np.arange(N) / rate * 1e3), "time_ms")
     with pytest.raises(InputError, match=r"line \d+: a step of two intervals.*rounded too coarse"):
         read(path, units=GYRO)
 

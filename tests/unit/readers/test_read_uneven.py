@@ -161,8 +161,27 @@ def test_coarse_stamps_with_a_loss_are_refused_as_without(recorded):
         recorded(clock)
 
 
+@pytest.mark.parametrize("rate", [700.0, 850.0, 952.0, 998.7])
+def test_rounded_stamps_of_an_even_clock_give_its_rate(recorded, rate):
+    clock = Simulated(3, rate)
+    clock.stamps = np.round(clock.stamps, 3)
+    found, truth = recorded(clock)
+    np.testing.assert_array_equal(found["gyro_x"].values, truth)
+    assert found.rate == pytest.approx(rate, rel=2e-5)
+
+
+@pytest.mark.parametrize("rate", [700.0, 850.0])
+@pytest.mark.parametrize("loss", [0.1, 0.4])
+def test_coarse_stamps_with_many_losses_are_no_faster_clock(recorded, rate, loss):
+    clock = Simulated(3, rate)
+    clock.lose(loss)
+    clock.stamps = np.round(clock.stamps, 3)
+    with pytest.raises(InputError, match=r"rounded too coarsely|is not known"):
+        recorded(clock)
+
+
 @pytest.mark.parametrize(("rate", "unit"), [(800.0, 1e-3), (952.0, 1e-3), (80.0, 1e-2)])
-@pytest.mark.parametrize("loss", [0.0, 0.01])
+@pytest.mark.parametrize("loss", [0.01, 0.05])
 def test_coarse_stamps_are_not_a_faster_clock_that_loses_rows(recorded, rate, unit, loss):
     clock = Simulated(0, rate)
     clock.lose(loss)

@@ -72,6 +72,7 @@ def _tables(path: Path, wanted: Wanted) -> tuple[ArrayTable, ...]:
     for topic in chosen:
         kind, data = by_name[topic.name].name, by_name[topic.name].data
         if kind == _COMBINED:
+            _check_every_sample(path.name, data)
             found += [(topic, columns) for columns in _combined(data)]
         elif kind in _FIFO:
             found.append((topic, _from_fifo(data, _FIFO[kind])))
@@ -166,6 +167,17 @@ def _combined(data: Mapping[str, AnyArray]) -> list[_Columns]:
     if np.all(is_new) or np.count_nonzero(is_new) < tuning.FEWEST_SAMPLES:
         return [gyro | _columns(data["timestamp"], "accel", axes)]
     return [gyro, _columns(stamps[is_new], "accel", [axis[is_new] for axis in axes])]
+
+
+def _check_every_sample(source: str, data: Mapping[str, AnyArray]) -> None:
+    """Reject rows farther apart than the time each sample covers: the logger left out others."""
+    covered = float(np.median(data.get("gyro_integral_dt", 0)))
+    steps = np.diff(data["timestamp"].astype(float))
+    if steps.size and 0.0 < covered * tuning.APART < (step := float(np.quantile(steps, 0.05))):
+        raise InputError(
+            f"{source}: each row of {_COMBINED} covers {covered / 1e3:.3g} ms, and rows are "
+            f"{step / 1e3:.3g} ms apart, so that the noise would be too large: {_HINT}"
+        )
 
 
 def _from_fifo(data: Mapping[str, AnyArray], sensor: str) -> _Columns:

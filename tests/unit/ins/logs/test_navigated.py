@@ -1,5 +1,6 @@
 """Real data: an IMU's log and GNSS fixes, made here from a known drive, so that truth is known."""
 
+import os
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -187,13 +188,23 @@ def run(run):
     return partial(run, "navigate")
 
 
-def test_the_command_writes_the_solution_and_a_report(run):
-    folder = Path("data")
+def test_the_command_writes_the_solution_and_a_report(run, monkeypatch):
+    folder, out, replace, beside = Path("data"), Path("out"), os.replace, []
     folder.mkdir()
+    out.mkdir()
+    for name in ("solution.csv", "report.html"):
+        (out / name).write_text("of an earlier run")
+
+    def watched(*paths):
+        replace(*paths)
+        beside.append(sum(each.stat().st_size < 100 for each in out.glob("[rs]*")))
+
+    monkeypatch.setattr(os, "replace", watched)
     truth = drive(folder)
     (folder / "run.yaml").write_text(yaml.safe_dump(content()))
     code, printed, told = run(folder / "run.yaml", "-o", "out")
     assert (code, told) == (0, "")
+    assert beside == [2, 2, 0, 0], "a kill would mix two runs"
     assert max(map(len, printed.splitlines())) <= 80
     for text in ("Innovations: NIS", "Predicted accuracy at the end", "agree with",
                  "Longest time without a position fix: 20 s, from 1100 s to 1120 s"):  # fmt: skip

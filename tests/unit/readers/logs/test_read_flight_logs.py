@@ -137,6 +137,12 @@ def test_instances_are_sensors(tmp_path):
     assert np.array_equal(found["gyro_x"].values, 2 * counts[:, 0] * float(np.float32(0.001)))
 
 
+def test_samples_that_cover_less_than_a_step_are_thinned(tmp_path):
+    message = refusal(write_ulog(tmp_path / "a.ulg", combined(covered=2000)))
+    assert "covers 2 ms, and rows are 4 ms apart" in message and "SDLOG_PROFILE" in message
+    assert gmwm.read(write_ulog(tmp_path / "b.ulg", combined(covered=3990))).rate == 250.0
+
+
 def test_thinned_topics_are_refused(tmp_path):
     slow = 5_000_000 + 1_000_000 * np.arange(200)
     path = write_ulog(
