@@ -613,6 +613,9 @@ _FILTER_NUMBERS = (
         "|R| times the horizon", "for longer outages add a state for it", severity="warning"),
     _filter("from-data-sheet", "a data sheet states typical values, not those of your unit",
         "record an hour at rest: gmwm calibrate"),
+    _filter("short-horizon", "{horizon:g} s is too short: within a second N and K follow the "
+        "sensor's low-pass and its vibration, not its slow errors", "give the longest outage, or "
+        "60 s if there is none: it costs an aided filter little", severity="warning"),
     _filter("turn-on-left-out", "the start bias leaves out the turn-on bias, which a recording at "
         "rest cannot show", "add its variance"),
     _filter("uncertainty-not-covered", {

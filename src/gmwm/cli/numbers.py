@@ -78,7 +78,8 @@ def bound(file: Path, **options: Any) -> None:
 @options(
     """
     --outages T,T,...  Lengths of outages in seconds.
-    --keyframe S  Interval of keyframes or scans instead of outages, for relative poses.
+    --keyframe S  Interval of keyframes or scans instead of outages, for relative poses; 1 s or
+        more.
     """,
     outages={"default": "10,30,60"},
 )
