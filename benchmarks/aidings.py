@@ -1,6 +1,6 @@
 """Certificates for poses and odometry: exact covariance analysis against simulated filters.
 
-    python benchmarks/aidings.py [--runs 60] [--seed 500]
+    python benchmarks/aidings.py [--runs 80] [--seed 500] [--aiding pose odometry wheels]
 
 Each run drives the whole nonlinear filter with simulated sensors and aiding of `gmwm.ins`, with the
 true models and with those of a data sheet, which have no slow terms. At the end of outages: NEES
@@ -60,7 +60,7 @@ def errors_since(scenario: Scenario, found: FilterErrors, outage: Outage) -> np.
 def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--runs", type=int, default=60)
+    parser.add_argument("--runs", type=int, default=80)
     parser.add_argument("--seed", type=int, default=500)
     parser.add_argument("--aiding", nargs="*", default=list(AIDINGS))
     given = parser.parse_args()

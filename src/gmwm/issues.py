@@ -598,7 +598,7 @@ _FILTER_NUMBERS = (
     _filter("more-than-white-noise", {
         "": "the model has no white noise: N covers {parts}",
         "more": "N is {times:.3g} times that of the model's white noise: it also covers {parts}"}),
-    _filter("no-navigation-filter", "the INS/GNSS filter is left out: {reason}"),
+    _filter("no-navigation-filter", "the filter of all axes is left out: {reason}"),
     _filter("not-predicted", "the consistency is not predicted: {reason}"),
     _filter("optimistic", {
         "bound": "overconfident: NEES {nees:.3g} {when}; the numbers leave out too much here",

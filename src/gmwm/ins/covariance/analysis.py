@@ -168,15 +168,12 @@ class Course:
             np.empty((kept.epoch.size, *P.shape)),
             np.empty((kept.epoch.size, *J.shape)),
         )
-        about = JointFilter(
-            ready.settings,
-            joint.table,
-            *(
-                np.where(each.settings.noise_states >= 0, each.settings.noise_states + first, -1)
-                for each, first in ((ready, n), (real, m))
-            ),
-            ready.at_keyframe(initial)[1],
+        own_noise, true_noise = (
+            np.where(each.settings.noise_states >= 0, each.settings.noise_states + first, -1)
+            for each, first in ((ready, n), (real, m))
         )
+        keyframe = ready.at_keyframe(initial)[1]
+        about = JointFilter(ready.settings, joint.table, own_noise, true_noise, keyframe)
         run_jointly(self.track, self.events, about, P, J, out)
         velocity = scenario.trajectory.velocity[kept.epoch]
         # The filter's error in a sensor is the true sum less the estimated one, and either way
@@ -191,12 +188,10 @@ class Course:
         )
         since = None
         if ready.keyframe >= 0:
-            rows = self._rows_since(ready.keyframe, n + table.m)
-            signs = np.where(np.arange(n + table.m) < n, 1.0, -1.0)
+            rows = self._rows_since(ready.keyframe, m)
+            own = rows * np.where(np.arange(m) < n, 1.0, -1.0)  # estimates are errors turned round
             predicted = rows @ out.P @ np.swapaxes(rows, 1, 2)
-            own = rows * signs
-            size = n + table.m
-            actual = own @ out.J[:, :size, :size] @ np.swapaxes(own, 1, 2)
+            actual = own @ out.J[:, :m, :m] @ np.swapaxes(own, 1, 2)
             since = CovarianceErrors(found.time, predicted, actual)
         notices = []
         for end in (outage.end for outage in scenario.outages):

@@ -27,17 +27,24 @@ from gmwm.process import GaussMarkov, Model, RandomWalk, WhiteNoise
 FORMS: dict[str, tuple[str, ...]] = {"N+K": ("N", "K"), "N+GM": ("N", "sigma", "tau")}
 """Forms of a reduced model, with their parameters."""
 
+
+def _wheels(truth: Trajectory, _: float) -> Aiding:
+    """With keyframes that measure nothing, from which the way in an outage counts."""
+    interval = max(round(_WHEELS_EVERY / truth.dt), 1) * truth.dt
+    return wheels(truth, interval) + odometry(truth, interval).unused()
+
+
 AIDINGS: dict[str, Callable[[Trajectory, float], Aiding]] = {
     "gnss": lambda truth, _: gnss(truth),
     "pose": poses,
     "odometry": odometry,
-    # Keyframes without a measurement, from which the way in an outage counts.
-    "wheels": lambda truth, _: wheels(truth) + odometry(truth, 0.1).unused(),
+    "wheels": _wheels,
 }
 """What aids the filter of `loiter_with_outages`, given the trajectory and an interval, s."""
 
 _POSITION_AND_VELOCITY = slice(0, 6)
 
+_WHEELS_EVERY = 0.1  # s, or the nearest multiple of the sampling interval
 _STEPS = 60
 _SLOPE_STEP = 1e-4  # of the logarithms of factors, for slopes by differences
 _FARTHEST = 12.0  # logarithm of a factor, beyond which numbers have no meaning any more
