@@ -598,7 +598,7 @@ _FILTER_NUMBERS = (
     _filter("more-than-white-noise", {
         "": "the model has no white noise: N covers {parts}",
         "more": "N is {times:.3g} times that of the model's white noise: it also covers {parts}"}),
-    _filter("no-navigation-filter", "the INS/GNSS filter is left out: {reason}"),
+    _filter("no-navigation-filter", "the filter of all axes is left out: {reason}"),
     _filter("not-predicted", "the consistency is not predicted: {reason}"),
     _filter("optimistic", {
         "bound": "overconfident: NEES {nees:.3g} {when}; the numbers leave out too much here",
@@ -613,6 +613,9 @@ _FILTER_NUMBERS = (
         "|R| times the horizon", "for longer outages add a state for it", severity="warning"),
     _filter("from-data-sheet", "a data sheet states typical values, not those of your unit",
         "record an hour at rest: gmwm calibrate"),
+    _filter("short-horizon", "{horizon:g} s is too short: within a second N and K follow the "
+        "sensor's low-pass and its vibration, not its slow errors", "give the longest outage, or "
+        "60 s if there is none: it costs an aided filter little", severity="warning"),
     _filter("turn-on-left-out", "the start bias leaves out the turn-on bias, which a recording at "
         "rest cannot show", "add its variance"),
     _filter("uncertainty-not-covered", {

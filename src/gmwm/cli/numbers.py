@@ -78,7 +78,8 @@ def bound(file: Path, **options: Any) -> None:
 @options(
     """
     --outages T,T,...  Lengths of outages in seconds.
-    --keyframe S  Interval of keyframes or scans instead of outages, for relative poses.
+    --keyframe S  Interval of keyframes or scans instead of outages, for relative poses; 1 s or
+        more.
     """,
     outages={"default": "10,30,60"},
 )
@@ -171,6 +172,10 @@ _IN_SI = {
     -K GYRO,ACCEL  Random walk in use, with -N, rad/s^2/sqrt(Hz) and m/s^3/sqrt(Hz).
     --outages T,T,...  Lengths of outages in seconds.
     --keyframe S  Interval of keyframes or scans in seconds.
+    --aiding NAME  What aids the whole filter: gnss, pose (absolute poses at keyframes), odometry
+        (relative poses, visual or lidar) or wheels.
+    --reference FILE  Reference trajectory on which it is judged, a CSV of time, latitude,
+        longitude, height, roll, pitch, yaw; a loiter or, with wheels, a car's drive by default.
     --motion NAME  Motion in which the errors below act: handheld, drone, car, fixed-wing, or a
         recording of your own.
     --scale-error PERCENT  Scale error of both sensors.
@@ -189,6 +194,7 @@ _IN_SI = {
     K={"name": "walk"},
     outages={"default": "10,60"},
     keyframe={"default": 1.0},
+    aiding={"default": "gnss"},
     **{name: {"default": 0.0} for name in _IN_SI},
 )
 def certify(
@@ -197,17 +203,19 @@ def certify(
     """Predict how consistent a filter is with the numbers in use.
 
     FILE is a calibration.json, taken for the truth. True errors beside those that the filter
-    predicts, for free inertial growth, an INS/GNSS filter in outages and relative poses between
+    predicts, for free inertial growth, an aided INS in outages and relative poses between
     keyframes; then what N and K have to cover, cause by cause.
 
     \b
     Examples:
       gmwm certify out/calibration.json --imu kalibr.yaml
       gmwm certify out/calibration.json -N 1e-4,2e-3 -K 1e-6,3e-5
+      gmwm certify out/calibration.json --imu kalibr.yaml --aiding wheels
       gmwm certify calibration.json --imu imu.yaml --motion car --scale-error 1
     """
     from gmwm.calibration import Calibration
     from gmwm.filter_numbers import Imperfections, certify as run
+    from gmwm.ins import Trajectory
     from gmwm.readers import read
 
     calibration = Calibration.load(file)
@@ -221,6 +229,8 @@ def certify(
         keyframe=given["keyframe"],
         imperfections=imperfections,
         motion=read(motion) if motion is not None and Path(motion).is_file() else motion,
+        aiding=given["aiding"],
+        reference=None if given["reference"] is None else Trajectory.read(given["reference"]),
     )
     if output is not None:
         found.save(output)

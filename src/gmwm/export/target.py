@@ -72,20 +72,20 @@ def notes(imu: ImuNumbers, title: str, caution: str) -> list[str]:
     upper = [f"{t.quantity} {k}" for t in imu.triads for k in ("N", "K", "sigma") if t.is_upper(k)]
     worst = [max(triad.axes, key=lambda axis: axis.N) for triad in imu.triads]
     covers = "; ".join(f"{axis.name} {axis.covers}" for axis in worst if axis.covers)
-    loose = [
-        n for t in imu.triads for axis in t.axes for n in axis.notices if n.code == "loose-form"
-    ]
+    notices = [n for triad in imu.triads for axis in triad.axes for n in axis.notices]
+    is_short = any(n.code == "short-horizon" for n in notices)
     lines = [
         f"{title}: {' and '.join(imu.sources)}",
         f"{purpose}; for details: gmwm export --explain",
         not_valid_line(imu.invalid) if imu.invalid else "",
+        "do not use: within a second N and K follow the sensor's low-pass" if is_short else "",
         caution,
         _consistency(imu),
         _start(imu),
         f"95 % upper limit, no such term was found: {', '.join(upper)}" if upper else "",
         f"N, K also cover {covers}" if covers else "",
         "for a filter with a Gauss-Markov state: gmwm bound --form N+K+GM"
-        if any(n.hint for n in loose)
+        if any(n.code == "loose-form" and n.hint for n in notices)
         else "",
     ]
     return [_fitting(line) for line in lines if line][:MOST]

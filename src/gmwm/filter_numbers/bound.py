@@ -163,7 +163,7 @@ def bound_of(
                 )
             )
         notices += covered_terms_notices(axis, target, model, problem.targets)
-        notices += fit_notices(axis, level)
+        notices += fit_notices(axis, level, horizon)
         about = (form, model, horizon, sd, "bound", found, tuple(notices), axis.quantity, stderr)
         numbers.append(AxisFilterNumbers(*about))
     return tuple(numbers)
@@ -282,9 +282,10 @@ def covered_terms_notices(
     return found
 
 
-def fit_notices(axis: AxisModel, level: float | None) -> list[Notice]:
-    """Limits of the fit and of the prediction."""
-    found = []
+def fit_notices(axis: AxisModel, level: float | None, horizon: float) -> list[Notice]:
+    """Limits of the fit, of the horizon (s) and of the prediction."""
+    is_short = horizon < tuning.SHORTEST_HORIZON
+    found = [notice("short-horizon", "", {"horizon": horizon})] * is_short
     try:
         axis.model.state_space(axis.dt)
     except InputError as error:

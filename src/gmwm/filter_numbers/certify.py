@@ -23,7 +23,7 @@ from gmwm.filter_numbers.propagation import Chain
 from gmwm.filter_numbers.reduce import usable
 from gmwm.filter_numbers.result import AxisFilterNumbers, FilterNumbers, InUnits, shown_unit
 from gmwm.filter_numbers.spectra import KINDS
-from gmwm.ins import SensorModels, covariance_analysis, loiter_with_outages
+from gmwm.ins import AIDINGS, SensorModels, Trajectory, covariance_analysis, loiter_with_outages
 from gmwm.issues import Notice, notice
 from gmwm.process import Model, Process, RandomWalk, WhiteNoise, as_model
 from gmwm.readers import Recording
@@ -44,6 +44,9 @@ _SHOWN = {
 CONSUMERS = {
     "free": f"Without aiding, after {tuning.SETTLING:g} s of fixes every {tuning.FIX_INTERVAL:g} s",
     "outage": "INS/GNSS filter, at the end of an outage",
+    "pose": "INS with absolute poses at keyframes, at the end of a time without them",
+    "odometry": "INS with visual or lidar odometry: way in a time without it",
+    "wheels": "INS with wheel odometry: way in a time without it",
     "keyframes": "Relative pose between keyframes",
 }
 """Users of the numbers."""
@@ -55,7 +58,7 @@ _OrNaN = Annotated[NotNegative, NoneIs(float("nan"))]
 class Check:
     """Predicted error beside the true one.
 
-    consumer: {"free", "outage", "keyframes"}.
+    consumer: Key of `CONSUMERS`.
     where: The channel, or "horizontal".
     quantity: Of the error.
     time: Without aiding, s.
@@ -189,6 +192,8 @@ def certify(
     keyframe: float = 1.0,
     imperfections: Imperfections | None = None,
     motion: str | Motion | Recording | None = None,
+    aiding: str = "gnss",
+    reference: Trajectory | None = None,
     bias_sd: Sd = 0.0,
     dt: float | None = None,
     rate: float | None = None,
@@ -209,6 +214,11 @@ def certify(
         Errors that static data cannot show, as far as they are known.
     motion : {"handheld", "drone", "car", "fixed-wing"}, Motion or Recording, optional
         With which they come: a usual one, or that of a recording.
+    aiding : {"gnss", "pose", "odometry", "wheels"}, optional
+        What aids the whole filter; see `gmwm.ins.loiter_with_outages`.
+    reference : Trajectory, optional
+        Reference trajectory on which it is judged, at its own sampling interval, in place of a
+        loiter or, with wheels, of a car's drive.
     bias_sd : float or mapping, optional
         Standard deviation of a constant bias, such as the turn-on bias, in u; by axis or kind.
     dt, rate : float, optional
@@ -229,7 +239,8 @@ def certify(
     Exact covariance analysis of linear filters, for the truth given: of each axis alone (fixes of
     its last integral every second, then none; of a heading, the angle gained since if that is
     worse), of each axis between keyframes (the pose starts anew at each, the bias goes on), and of
-    a whole INS/GNSS filter on a loiter, where all six axes are known. It covers neither
+    a whole aided filter on a trajectory, where all six axes are known. Odometry does not fix the
+    position: judged is the way since its last keyframe, in body axes then. It covers neither
     nonlinearity nor errors that are not in the models.
     """
     times = given_times("outages", outages)
@@ -251,7 +262,8 @@ def certify(
     in_use = {a.name: _in_use(numbers, a, horizon, starts[a.name]) for a in axes.axes}
     own = replace(safe, source="", axes=in_use)
     found = [check for axis in axes.axes for check in _of_axis(axis, own, times, keyframe)]
-    in_flight, notices = _in_flight(axes, own, times)
+    checks.choice("aiding", aiding, tuple(AIDINGS))
+    in_flight, notices = _in_flight(axes, own, times, (reference, aiding, keyframe))
     causes: list[Cause] = []
     for group in axes.groups:
         rows, advice = _causes(group, own, horizon, known, moved)
@@ -323,9 +335,15 @@ def _of_axis(
 
 
 def _in_flight(
-    axes: SensorAxes, numbers: FilterNumbers, times: Sequence[float]
+    axes: SensorAxes,
+    numbers: FilterNumbers,
+    times: Sequence[float],
+    aided: tuple[Trajectory | None, str, float],
 ) -> tuple[list[Check], list[Notice]]:
-    """Errors of an INS/GNSS filter at the end of outages, where there are six axes."""
+    """Errors of an aided INS at the end of outages, where there are six axes.
+
+    aided: Trajectory, aiding and interval of keyframes (s) of `loiter_with_outages`.
+    """
     try:
         truth = SensorModels.of(
             {axis.name: axis.model for axis in axes.axes},
@@ -335,15 +353,20 @@ def _in_flight(
             {name: each.model for name, each in numbers.items()},
             {name: each.initial_sd for name, each in numbers.items()},
         )
-        scenario = loiter_with_outages(times, axes.axes[0].dt)
+        scenario = loiter_with_outages(times, axes.axes[0].dt, *aided)
         analysis = covariance_analysis(scenario, truth, believed)
     except InputError as error:
         return [], [notice("no-navigation-filter", reason=str(error))]
-    nees, result = analysis.nees(), []
+    judged = analysis.since or analysis
+    nees, result = judged.nees(slice(0, 3)), []
+    what = "position" if analysis.since is None else "way"
+    consumer = "outage" if aided[1] == "gnss" else aided[1]
     for outage in scenario.outages:
         at, time = analysis.index(outage.end), outage.duration
-        true, own = (float(np.hypot(*sd[at, :2])) for sd in (analysis.sd, analysis.predicted_sd))
-        where = ("outage", "horizontal", "position", "m")
+        true, own = (
+            float(np.sqrt(np.trace(each[at, :2, :2]))) for each in (judged.actual, judged.predicted)
+        )
+        where = (consumer, "horizontal", what, "m")
         result.append(Check(*where, time, true, own, float(nees[at])))
     return result, []
 

@@ -147,7 +147,7 @@ class _Search:
             share = float(np.sqrt(model.white_density())) / own if own > 0.0 else 1.0
             notices += [notice("less-white-noise", "", {"share": share})] * (share <= tuning.BELOW)
             notices += covered_terms_notices(axis, target, model, targets)
-            notices += fit_notices(axis, None)
+            notices += fit_notices(axis, None, longest)
             about = (self.form, model, longest, sd, "reduce", found, tuple(notices), axis.quantity)
             numbers.append(AxisFilterNumbers(*about))
         return numbers

@@ -3,6 +3,9 @@
 # s without aiding unless another is given: safe when aiding stops, and true errors of real sensors
 # are at most 1.11 times the optimum, 1.36 times with 10 s: benchmarks/aided.py
 HORIZON = 60.0
+# s below which a horizon is warned of: behind a low-pass of 10 Hz K for 0.05, 0.5, 0.9 and 1 s is
+# 2,560, 7.8, 1.6 and 1.3 times that for 60 s (test_a_horizon_within_the_low_pass_is_warned_of):
+SHORTEST_HORIZON = 1.0
 
 # -- dominance ------------------------------------------------------------------------------------
 

@@ -1,5 +1,6 @@
 from .covariance.analysis import Analysis as Analysis, covariance_analysis as covariance_analysis
 from .covariance.reduction import (
+    AIDINGS as AIDINGS,
     Reduction as Reduction,
     loiter_with_outages as loiter_with_outages,
     reduce as reduce,
@@ -10,7 +11,10 @@ from .filter.aiding import (
     Outage as Outage,
     barometer as barometer,
     gnss as gnss,
+    odometry as odometry,
+    poses as poses,
     standstills as standstills,
+    wheels as wheels,
 )
 from .filter.filter import (
     FilterInnovations as FilterInnovations,

@@ -75,6 +75,20 @@ def test_no_direction_is_too_optimistic_with_a_gauss_markov_process(name, form, 
         assert numbers.tau == (tau,)
 
 
+def test_a_horizon_within_the_low_pass_is_warned_of():
+    sensor = LowPassNoise(1e-3, 10.0, 2.0, 0.7071) + GaussMarkov(1e-4, 60.0)
+    usual = gmwm.bound(sensor)
+    for horizon, most, warned in ((0.05, 3000.0, True), (0.9, 1.7, True), (1.0, 1.4, False)):
+        found = gmwm.bound(sensor, horizon=horizon)
+        assert most / 1.2 < found.K / usual.K < most
+        relative = gmwm.reduce(sensor, keyframe=horizon)
+        for numbers in (found, relative):
+            own = [each for each in numbers.notices if each.code == "short-horizon"]
+            assert [(n.severity, n.values) for n in own] == [
+                ("warning", {"horizon": horizon})
+            ] * warned
+
+
 def test_one_correlation_time_for_all_axes_is_the_one_that_costs_least():
     truths = {f"gyro_{i}": TRUTHS[name] for i, name in enumerate(("one", "two", "three"))}
     own = gmwm.bound(truths, "N+GM")

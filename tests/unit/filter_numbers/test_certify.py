@@ -18,7 +18,7 @@ from gmwm import (
     RandomWalk,
     WhiteNoise,
 )
-from gmwm.ins import SensorModels, covariance_analysis, loiter_with_outages
+from gmwm.ins import SensorModels, car_drive, covariance_analysis, loiter_with_outages
 
 ONE = TRUTHS["one"]
 SENSOR = {
@@ -296,3 +296,28 @@ def test_numbers_by_axis_or_kind():
 def test_numbers_that_cannot_be_used(given, message):
     with pytest.raises(InputError, match=message):
         gmwm.certify({"gyro_x": ONE}, given)
+
+
+@pytest.mark.parametrize("aiding", ["pose", "odometry", "wheels"])
+def test_the_truth_passes_with_any_aiding_and_a_data_sheet_does_not(aiding):
+    (right,) = gmwm.certify(SENSOR, SENSOR, outages=(10.0,), aiding=aiding, dt=0.1).of(aiding)
+    (wrong,) = gmwm.certify(SENSOR, SHEET, outages=(10.0,), aiding=aiding, dt=0.1).of(aiding)
+    assert right.nees == pytest.approx(1.0, abs=1e-3)
+    assert right.true == pytest.approx(right.believed, rel=1e-3)
+    assert wrong.nees > 3.0
+
+
+def test_a_reference_trajectory_takes_the_place_of_the_loiter():
+    drive = car_drive(duration=150.0, dt=0.1)
+    (own,) = gmwm.certify(SENSOR, SHEET, outages=(10.0,), reference=drive, dt=0.1).of("outage")
+    scenario = loiter_with_outages((10.0,), 0.1, drive)
+    believed = gmwm.certify(SENSOR, SHEET, outages=(10.0,), dt=0.1).numbers
+    models = SensorModels.of(
+        {name: each.model for name, each in believed.items()},
+        {name: each.initial_sd for name, each in believed.items()},
+    )
+    analysis = covariance_analysis(scenario, SensorModels.of(SENSOR), models)
+    assert own.nees == pytest.approx(analysis.nees()[analysis.index(scenario.outages[0].end)])
+    short = drive.segment(0.0, 100.0)
+    (left_out,) = gmwm.certify(SENSOR, SHEET, outages=(10.0,), reference=short, dt=0.1).notices
+    assert left_out.code == "no-navigation-filter"

@@ -7,6 +7,7 @@ from gmwm.ins.covariance.analysis import (
 )
 from gmwm.ins.covariance.joint_kernels import LinearStep as LinearStep, aid_jointly as aid_jointly
 from gmwm.ins.covariance.reduction import (
+    AIDINGS as AIDINGS,
     loiter_with_outages as loiter_with_outages,
     reduce as reduce,
     smallest_score as smallest_score,

@@ -14,12 +14,17 @@ from gmwm._core.typing import BoolArray, FloatArray, IntArray
 from gmwm.ins import tuning
 from gmwm.ins.covariance.joint_kernels import JointFilter, KeptCovariances, Track, run_jointly
 from gmwm.ins.filter import (
+    IS_RELATIVE,
+    KINDS,
     NAVIGATION,
     Events,
     Filter,
+    Keyframe,
     Kinematics,
     Outputs,
     SensorStates,
+    new_keyframe,
+    observe_since,
     unmodified,
 )
 from gmwm.ins.geometry import matrix_from_rpy
@@ -49,7 +54,7 @@ class CovarianceErrors:
         """
         part = self.USUAL_PART if part is None else part
         predicted, actual = self.predicted[:, part, part], self.actual[:, part, part]
-        size = np.sqrt(np.diagonal(predicted, axis1=1, axis2=2))
+        size = np.sqrt(np.maximum(np.diagonal(predicted, axis1=1, axis2=2), 0.0))
         scale = np.where(size > 0.0, size, 1.0)
         outer = scale[:, :, None] * scale[:, None, :]
         ratio = np.linalg.pinv(predicted / outer, hermitian=True) @ (actual / outer)
@@ -86,6 +91,9 @@ class Analysis(CovarianceErrors):
         Of the estimated errors of the sensors, rad/s and m/s^2.
     notices : tuple of Notice
         Outages that end with errors larger than can be predicted without runs.
+    since : CovarianceErrors or None
+        With relative poses: of the way since the last keyframe, in its body axes, m, and of the
+        turn, rad.
     """
 
     USUAL_PART = slice(0, 3)  # the position
@@ -94,6 +102,7 @@ class Analysis(CovarianceErrors):
     sensor_predicted: FloatArray
     sensor_actual: FloatArray
     notices: tuple[Notice, ...] = ()
+    since: CovarianceErrors | None = None
 
     @property
     def sd(self) -> FloatArray:
@@ -151,20 +160,20 @@ class Course:
         joint, n, m = _joint(table, real.states), NAVIGATION, NAVIGATION + table.m
         P = ready.covariance(initial, scenario.initial_sd)
         J = block_diag(P[:n, :n], joint.covariance + np.outer(joint.mean, joint.mean))
+        if ready.keyframe >= 0:
+            new_keyframe(J, *ready.at_keyframe(initial), -1.0)
         out = KeptCovariances(
             kept.epoch,
             kept.before,
             np.empty((kept.epoch.size, *P.shape)),
             np.empty((kept.epoch.size, *J.shape)),
         )
-        about = JointFilter(
-            ready.settings,
-            joint.table,
-            *(
-                np.where(each.settings.noise_states >= 0, each.settings.noise_states + first, -1)
-                for each, first in ((ready, n), (real, m))
-            ),
+        own_noise, true_noise = (
+            np.where(each.settings.noise_states >= 0, each.settings.noise_states + first, -1)
+            for each, first in ((ready, n), (real, m))
         )
+        keyframe = ready.at_keyframe(initial)[1]
+        about = JointFilter(ready.settings, joint.table, own_noise, true_noise, keyframe)
         run_jointly(self.track, self.events, about, P, J, out)
         velocity = scenario.trajectory.velocity[kept.epoch]
         # The filter's error in a sensor is the true sum less the estimated one, and either way
@@ -177,6 +186,13 @@ class Course:
             sensor_predicted=table.sums @ out.P[:, n:, n:] @ table.sums.T,
             sensor_actual=joint.sums @ out.J[:, n:, n:] @ joint.sums.T,
         )
+        since = None
+        if ready.keyframe >= 0:
+            rows = self._rows_since(ready.keyframe, m)
+            own = rows * np.where(np.arange(m) < n, 1.0, -1.0)  # estimates are errors turned round
+            predicted = rows @ out.P @ np.swapaxes(rows, 1, 2)
+            actual = own @ out.J[:, :m, :m] @ np.swapaxes(own, 1, 2)
+            since = CovarianceErrors(found.time, predicted, actual)
         notices = []
         for end in (outage.end for outage in scenario.outages):
             *tilts, heading = map(float, found.sd[found.index(end), 6:])
@@ -185,7 +201,24 @@ class Course:
                 values = {"time": end, "tilt": tilt, "heading": heading}
                 t, h = math.degrees(tilt), math.degrees(heading)
                 notices.append(notice("outside-linearity", "", values, tilt_deg=t, heading_deg=h))
-        return replace(found, notices=tuple(notices))
+        return replace(found, notices=tuple(notices), since=since)
+
+    def _rows_since(self, first: int, size: int) -> FloatArray:
+        """Rows of the way and the turn since the last keyframe at each kept epoch, (K, 6, size)."""
+        kept, truth = self.outputs, self.scenario.trajectory
+        taken = np.append(0, self.events.epoch[IS_RELATIVE[self.events.kind]])
+        rows = np.zeros((kept.epoch.size, 6, size))
+        for k, (epoch, is_before) in enumerate(zip(kept.epoch, kept.before, strict=True)):
+            last = int(np.max(taken[taken < epoch + 1 - is_before], initial=0))
+            here, there = (
+                Kinematics(matrix_from_rpy(truth.rpy[i]), truth.velocity[i], truth.lla[i])
+                for i in (epoch, last)
+            )
+            for i in range(6):
+                kind = KINDS["displacement" if i < 3 else "rotation"]
+                about = (np.zeros(3), here, Keyframe(there, first))
+                observe_since(kind, i % 3, *about, rows[k, i])
+        return rows
 
 
 def covariance_analysis(

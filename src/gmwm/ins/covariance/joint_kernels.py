@@ -19,14 +19,18 @@ from gmwm._core.compiled import compiled
 from gmwm._core.typing import FloatArray, IntArray
 from gmwm.ins.filter import (
     IS_GNSS,
+    IS_RELATIVE,
     Events,
+    Keyframe,
     Kinematics,
     SensorTable,
     Settings,
     excess,
     measurement_update,
+    new_keyframe,
     new_transition,
     observe,
+    observe_since,
     propagate,
     tilt_squared,
     transition,
@@ -67,12 +71,14 @@ class JointFilter(NamedTuple):
     joint: Sensor states of the joint vector.
     estimate, truth: (kinds, 3), places in the joint vector of the estimated and the true slow noise
         of each measurement; -1 for none.
+    since: The last keyframe, overwritten.
     """
 
     settings: Settings
     joint: SensorTable
     estimate: IntArray
     truth: IntArray
+    since: Keyframe
 
 
 class KeptCovariances(NamedTuple):
@@ -89,27 +95,29 @@ class KeptCovariances(NamedTuple):
 
 @compiled()
 def update_jointly(
-    J: FloatArray, h: FloatArray, estimate: int, truth: int, variance: float, gain: FloatArray,
+    J: FloatArray, h: FloatArray, n: int, estimate: int, truth: int, variance: float,
+    gain: FloatArray,
 ) -> None:  # fmt: skip
     """Update the joint second moments by a scalar measurement with a given gain, in place.
 
-    h: (n,), row of the integrals.
+    h: Row of the n integrals, and of states whose estimates are their errors with the sign turned.
     estimate, truth: Places of the estimated and the true slow noise of the measurement, or -1.
     variance: Of the measurement's white noise.
     gain: (n + q,), the filter's.
     """
-    n, size = h.size, J.shape[0]
+    size = J.shape[0]
     a, k = np.zeros(size), np.zeros(size)
-    for i in range(n):
+    for i in range(h.size):
         if h[i] != 0.0:
+            factor = h[i] if i < n else -h[i]
             for j in range(size):
-                a[j] += h[i] * J[i, j]
+                a[j] += factor * J[i, j]
     # Feedback: the integrals are corrected, and the estimates take what their errors lose.
     k[:n], k[n : gain.size] = gain[:n], -gain[n:]
     if estimate >= 0:
         for j in range(size):
             a[j] += J[estimate, j] - J[truth, j]
-    s = variance + np.sum(h * a[:n])
+    s = variance + np.sum(h[:n] * a[:n]) - np.sum(h[n:] * a[n : h.size])
     if estimate >= 0:
         s += a[estimate] - a[truth]
     for i in range(size):
@@ -163,7 +171,7 @@ def aid_jointly(
             for j in range(i, gain.size):
                 P[i, j] -= gain[i] * gain[j] * total
                 P[j, i] = P[i, j]
-        update_jointly(J, h, -1, -1, variance, gain)
+        update_jointly(J, h, n, -1, -1, variance, gain)
         if is_relative:
             P[last] = P[:, last] = 0.0
             J[last] = J[:, last] = 0.0
@@ -178,7 +186,8 @@ def run_jointly(
     kept: KeptCovariances,
 ) -> None:  # fmt: skip
     """Propagate P and J of a navigation filter along a trajectory."""
-    change, h, settings = new_transition(), np.zeros(9), about.settings
+    change, h, settings, since = new_transition(), np.zeros(9), about.settings, about.since
+    row = np.zeros(P.shape[0])
     gain, x = np.zeros(P.shape[0]), np.zeros(P.shape[0])
     event = out = 0
     gathered = j_gathered = 0.0
@@ -199,21 +208,30 @@ def run_jointly(
             out += 1
         attitude = P[6, 6] + P[7, 7] + P[8, 8] if settings.second_order else 0.0
         j_attitude = J[6, 6] + J[7, 7] + J[8, 8] if settings.second_order else 0.0
-        end = Kinematics(track.end.C[s], track.end.v[s], track.end.lla[s])
+        end, is_keyframe = Kinematics(track.end.C[s], track.end.v[s], track.end.lla[s]), False
         while event < events.epoch.size and events.epoch[event] == epoch:
             kind, value = events.kind[event], events.value[event]
             for component in range(3):
                 sd = events.sd[event, component]
                 if not sd > 0.0:
                     continue
+                if IS_RELATIVE[kind]:
+                    observe_since(kind, component, value, end, since, row)
+                    measurement_update(P, row, -1, sd * sd, 0.0, x, gain)
+                    update_jointly(J, row, 9, -1, -1, sd * sd, gain)
+                    continue
                 observe(kind, component, value, end, track.rate[s], settings.lever, h)
                 estimate, truth = about.estimate[kind, component], about.truth[kind, component]
                 expected = sd * sd + excess(P, h, attitude)
                 measurement_update(P, h, estimate, expected, 0.0, x, gain)
-                update_jointly(J, h, estimate, truth, sd * sd + excess(J, h, j_attitude), gain)
+                update_jointly(J, h, 9, estimate, truth, sd * sd + excess(J, h, j_attitude), gain)
             if IS_GNSS[kind]:
                 gathered = j_gathered = 0.0
+            is_keyframe |= IS_RELATIVE[kind]
             event += 1
+        if is_keyframe:
+            new_keyframe(P, end, since, 1.0)
+            new_keyframe(J, end, since, -1.0)
         while out < kept.epoch.size and kept.epoch[out] == epoch:
             kept.P[out], kept.J[out] = P, J
             out += 1

@@ -17,18 +17,34 @@ from gmwm.calibration import Calibration
 from gmwm.errors import InputError
 from gmwm.ins import tuning
 from gmwm.ins.covariance.analysis import Course
-from gmwm.ins.filter import Outage, gnss
+from gmwm.ins.filter import Aiding, Outage, gnss, odometry, poses, wheels
 from gmwm.ins.imu import AXES, SensorModels
 from gmwm.ins.simulation import Scenario
-from gmwm.ins.trajectory import Trajectory, fixed_wing_loiter
+from gmwm.ins.trajectory import Trajectory, car_drive, fixed_wing_loiter
 from gmwm.issues import Notice, notice
 from gmwm.process import GaussMarkov, Model, RandomWalk, WhiteNoise
 
 FORMS: dict[str, tuple[str, ...]] = {"N+K": ("N", "K"), "N+GM": ("N", "sigma", "tau")}
 """Forms of a reduced model, with their parameters."""
 
+
+def _wheels(truth: Trajectory, _: float) -> Aiding:
+    """With keyframes that measure nothing, from which the way in an outage counts."""
+    interval = max(round(_WHEELS_EVERY / truth.dt), 1) * truth.dt
+    return wheels(truth, interval) + odometry(truth, interval).unused()
+
+
+AIDINGS: dict[str, Callable[[Trajectory, float], Aiding]] = {
+    "gnss": lambda truth, _: gnss(truth),
+    "pose": poses,
+    "odometry": odometry,
+    "wheels": _wheels,
+}
+"""What aids the filter of `loiter_with_outages`, given the trajectory and an interval, s."""
+
 _POSITION_AND_VELOCITY = slice(0, 6)
 
+_WHEELS_EVERY = 0.1  # s, or the nearest multiple of the sampling interval
 _STEPS = 60
 _SLOPE_STEP = 1e-4  # of the logarithms of factors, for slopes by differences
 _FARTHEST = 12.0  # logarithm of a factor, beyond which numbers have no meaning any more
@@ -227,7 +243,11 @@ def read_off(models: SensorModels, form: str, longest: float, dt: float) -> Sens
 
 
 def loiter_with_outages(
-    lengths: Sequence[float], dt: float = 0.01, trajectory: Trajectory | None = None
+    lengths: Sequence[float],
+    dt: float = 0.01,
+    trajectory: Trajectory | None = None,
+    aiding: str = "gnss",
+    keyframe: float = 1.0,
 ) -> Scenario:
     """A loiter with one GNSS position a second of 1 m (vertical 1.5 m), and outages.
 
@@ -241,8 +261,14 @@ def loiter_with_outages(
     dt : float, optional
         Sampling interval of the IMU of the loiter, s.
     trajectory : Trajectory, optional
-        Another motion than a loiter of a fixed-wing aircraft.
+        Another motion than a loiter of a fixed-wing aircraft, or a car's drive with wheels.
+    aiding : {"gnss", "pose", "odometry", "wheels"}, optional
+        Absolute poses (5 cm, 0.2 deg) or relative ones (1 cm, 1 mrad) at keyframes, or wheel
+        odometry (5 cm/s; 10 cm/s aside and down) ten times a second, in place of GNSS.
+    keyframe : float, optional
+        Interval of the keyframes, s.
     """
+    aids = AIDINGS[checks.choice("aiding", aiding, tuple(AIDINGS))]
     outages, start = list[Outage](), tuning.SETTLING
     for length in lengths:
         outages.append(Outage(start, checks.positive("outage length", length)))
@@ -250,10 +276,12 @@ def loiter_with_outages(
         start = float(np.ceil(start + length + tuning.SETTLING))
     end = outages[-1].end if outages else 0.0
     if trajectory is None:
-        trajectory = fixed_wing_loiter(duration=max(start, 2.0 * tuning.SETTLING), dt=dt)
+        make = car_drive if aiding == "wheels" else fixed_wing_loiter
+        trajectory = make(duration=max(start, 2.0 * tuning.SETTLING), dt=dt)
     elif trajectory.duration < end:
         raise InputError(
             f"trajectory: it has {trajectory.duration:g} s, and outages of these lengths two "
             f"minutes apart need {end:g} s: give a longer one, or fewer outages"
         )
-    return Scenario(trajectory, gnss(trajectory), tuple(outages), interval=tuning.SETTLING)
+    aided = aids(trajectory, keyframe)
+    return Scenario(trajectory, aided, tuple(outages), interval=tuning.SETTLING)

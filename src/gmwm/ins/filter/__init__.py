@@ -1,6 +1,14 @@
 """The INS/GNSS filter: mechanization, error states, measurement updates."""
 
-from gmwm.ins.filter.aiding import Aiding as Aiding, Fixes as Fixes, Outage as Outage, gnss as gnss
+from gmwm.ins.filter.aiding import (
+    Aiding as Aiding,
+    Fixes as Fixes,
+    Outage as Outage,
+    gnss as gnss,
+    odometry as odometry,
+    poses as poses,
+    wheels as wheels,
+)
 from gmwm.ins.filter.covariance_kernels import (
     NAVIGATION as NAVIGATION,
     excess as excess,
@@ -18,9 +26,17 @@ from gmwm.ins.filter.filter import (
     navigate as navigate,
     unmodified as unmodified,
 )
-from gmwm.ins.filter.measurements import IS_GNSS as IS_GNSS, KINDS as KINDS, observe as observe
+from gmwm.ins.filter.measurements import (
+    IS_GNSS as IS_GNSS,
+    IS_RELATIVE as IS_RELATIVE,
+    KINDS as KINDS,
+    new_keyframe as new_keyframe,
+    observe as observe,
+    observe_since as observe_since,
+)
 from gmwm.ins.filter.records import (
     Events as Events,
+    Keyframe as Keyframe,
     Kinematics as Kinematics,
     SensorTable as SensorTable,
     Settings as Settings,

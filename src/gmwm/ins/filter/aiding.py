@@ -52,14 +52,19 @@ class Fixes:
 
     Attributes
     ----------
-    kind : {"position", "velocity", "height", "standstill"}
+    kind : str
+        "position", "velocity", "height", "standstill", "attitude", "odometer", "displacement" or
+        "rotation".
     time : (E,) ndarray
         s since the first epoch, rising.
     value : (E, 3) ndarray
         Latitude, longitude, height (rad, m); velocity to the north, east, down (m/s); height (m)
-        in the first column; zero for a standstill, or how much a simulated one shakes.
+        in the first column; zero for a standstill, or how much a simulated one shakes; roll, pitch,
+        yaw (rad); velocity forward, right, down (m/s); way and turn (roll, pitch, yaw) since the
+        last such fix, in body axes then (m, rad).
     sd : (E, 3) ndarray
-        Standard deviations to the north, east and down, m or m/s; a component of zero is not used.
+        Standard deviations along the axes of the value, about them for angles, m, m/s or rad; a
+        component of zero is not used.
     """
 
     kind: str
@@ -170,8 +175,16 @@ class Aiding:
             kept = np.ones(fixes.time.size, dtype=bool)
             for start, end in spans if fixes.measurement.is_gnss else ():
                 kept &= (fixes.time <= start) | (fixes.time >= end)
-            result.append(fixes.part(kept))
+            sd = fixes.sd.copy()
+            for _, end in spans if fixes.measurement.is_relative else ():
+                # The first after an outage has no keyframe to relate to, and is the next one.
+                sd[np.searchsorted(fixes.time, end) :][:1] = 0.0
+            result.append(replace(fixes, sd=sd).part(kept))
         return replace(self, fixes=tuple(result))
+
+    def unused(self) -> Aiding:
+        """The same fixes without a component that is used: times alone."""
+        return replace(self, fixes=tuple(replace(f, sd=np.zeros_like(f.sd)) for f in self.fixes))
 
     def noisy(self, rng: np.random.Generator) -> Aiding:
         """The same with noise added to error-free fixes, the coloured one included."""
@@ -273,6 +286,39 @@ def standstills(trajectory: Trajectory, interval: float = 1.0, sd: float = 0.01)
     index = np.rint(fixes.time / trajectory.dt).astype(int)
     speed = np.linalg.norm(trajectory.velocity[index], axis=1)
     return Aiding((fixes.part(speed < _STANDSTILL),))
+
+
+def poses(
+    trajectory: Trajectory,
+    interval: float = 1.0,
+    *,
+    position_sd: float | Sequence[float] = tuning.POSE_SD[0],
+    attitude_sd: float | Sequence[float] = tuning.POSE_SD[1],
+) -> Aiding:
+    """Error-free absolute poses, as of a lidar in a map; m and rad; see `gnss`."""
+    given = {"position": position_sd, "attitude": attitude_sd}
+    return Aiding(tuple(_along(kind, trajectory, interval, sd) for kind, sd in given.items()))
+
+
+def odometry(
+    trajectory: Trajectory,
+    interval: float = 1.0,
+    *,
+    way_sd: float | Sequence[float] = tuning.ODOMETRY_SD[0],
+    turn_sd: float | Sequence[float] = tuning.ODOMETRY_SD[1],
+) -> Aiding:
+    """Error-free relative poses between keyframes, of cameras or a lidar; m, rad; see `gnss`."""
+    given = {"displacement": way_sd, "rotation": turn_sd}
+    return Aiding(tuple(_along(kind, trajectory, interval, sd) for kind, sd in given.items()))
+
+
+def wheels(
+    trajectory: Trajectory,
+    interval: float = 0.1,
+    sd: float | Sequence[float] = tuning.WHEEL_SD,
+) -> Aiding:
+    """Error-free velocities forward, right and down of a car that does not slip; see `gnss`."""
+    return Aiding((_along("odometer", trajectory, interval, sd),))
 
 
 def _along(

@@ -251,10 +251,10 @@ def measurement_update(
     x: FloatArray,
     K: FloatArray,
 ) -> tuple[float, float]:
-    """Update by one scalar measurement ``z = h x[:9] - x[state] + noise``, in place.
+    """Update by one scalar measurement ``z = h x - x[state] + noise``, in place.
 
     P: (n, n).
-    h: (9,), of the navigation errors.
+    h: (9,) of the navigation errors, or (n,).
     state: Index in ``x`` of a state of coloured measurement noise; -1 for none.
     variance: Of the white noise of the measurement.
     z: Estimate less measurement.
@@ -264,7 +264,7 @@ def measurement_update(
     """
     n = P.shape[0]
     K[:] = 0.0
-    for i in range(9):
+    for i in range(h.size):
         factor = h[i]
         if factor != 0.0:
             for j in range(n):
@@ -274,7 +274,7 @@ def measurement_update(
             K[j] -= P[state, j]
     total = variance
     innovation = z
-    for i in range(9):
+    for i in range(h.size):
         total += h[i] * K[i]
         innovation -= h[i] * x[i]
     if state >= 0:

@@ -18,12 +18,13 @@ from gmwm.ins import tuning
 from gmwm.ins.filter.aiding import Aiding
 from gmwm.ins.filter.covariance_kernels import ATTITUDE, NAVIGATION, VELOCITY
 from gmwm.ins.filter.filter_kernels import PAUSED, run
-from gmwm.ins.filter.measurements import KINDS, MEASUREMENTS
+from gmwm.ins.filter.measurements import KINDS, MEASUREMENTS, new_keyframe
 from gmwm.ins.filter.records import (
     Events,
     FilterState,
     Innovated,
     Kept,
+    Keyframe,
     Kinematics,
     RunPlace,
     Samples,
@@ -33,6 +34,8 @@ from gmwm.ins.filter.states import SensorStates
 from gmwm.ins.geometry import matrix_from_rpy, ned_difference, rpy_from_matrix, skew
 from gmwm.ins.imu import Imu, SensorModels
 from gmwm.ins.trajectory import NavState, Trajectory, check_latitudes
+
+_POSE = ("north", "east", "down", "roll", "pitch", "yaw")  # states of a keyframe
 
 
 @dataclass(frozen=True, eq=False)
@@ -188,11 +191,13 @@ class Filter:
     at every epoch that has a measurement or a result.
 
     dt: Sampling interval of the IMU, s.
+    keyframe: First place in the covariance of the states of the last keyframe; -1 for none.
     """
 
     states: SensorStates
     dt: float
     settings: Settings
+    keyframe: int
 
     @classmethod
     def of(
@@ -212,35 +217,46 @@ class Filter:
             for component in np.flatnonzero(sd > 0.0):
                 places.append((code, component))
                 slow.append((kind.slow_names[component], float(sd[component]), tau))
+        relative = any(each.measurement.is_relative for each in aiding.fixes)
+        slow += [(f"keyframe {name}", 0.0, 0.0) for name in _POSE] * relative
         states = SensorStates.of(sensors, dt, stride, drift_known, tuple(slow))
         noise_states = np.full((len(MEASUREMENTS), 3), -1, dtype=np.int64)
-        for state, place in enumerate(places, states.m - len(places)):
+        for state, place in enumerate(places, states.m - len(slow)):
             noise_states[place] = state
         arm = np.asarray(aiding.lever_arm)
-        return cls(states, dt, Settings(states.table, noise_states, arm, second_order, stride))
+        settings = Settings(states.table, noise_states, arm, second_order, stride)
+        return cls(states, dt, settings, NAVIGATION + states.m - len(_POSE) if relative else -1)
 
     def covariance(self, initial: NavState, sd: InitialSd) -> FloatArray:
         """Covariance at the first epoch, (9 + m, 9 + m), with the modified velocity error."""
         P = np.zeros((NAVIGATION + self.states.m, NAVIGATION + self.states.m))
         P[:NAVIGATION, :NAVIGATION] = unmodified(np.diag(sd.deviations**2), -initial.velocity)
         P[NAVIGATION:, NAVIGATION:] = self.states.covariance
+        if self.keyframe >= 0:
+            new_keyframe(P, *self.at_keyframe(initial), 1.0)
         return P
+
+    def at_keyframe(self, initial: NavState) -> tuple[Kinematics, Keyframe]:
+        """The initial state, and the keyframe that it is."""
+        C, v, lla = matrix_from_rpy(initial.rpy), initial.velocity.copy(), initial.lla.copy()
+        pose = Kinematics(C.copy(), v.copy(), lla.copy())
+        return Kinematics(C, v, lla), Keyframe(pose, self.keyframe)
 
     def run(
         self, imu: Imu, initial: NavState, initial_sd: InitialSd, events: Events, outputs: Outputs
     ) -> Solution:
         """Filter a record of the filter's sampling interval; ``outputs`` are kept."""
         check_latitudes(initial.lla[None, :], "initial")
-        C, v, lla = matrix_from_rpy(initial.rpy), initial.velocity.copy(), initial.lla.copy()
+        at, since = self.at_keyframe(initial)
         P, x = self.covariance(initial, initial_sd), self.states.mean.copy()
-        estimate = FilterState(Kinematics(C, v, lla), P, x)
+        estimate = FilterState(at, P, x)
         nothing, count = np.full(events.value.shape, np.nan), outputs.epoch.size
         found = Innovated(nothing, nothing.copy(), np.ones(events.epoch.size, dtype=np.bool_))
         sizes = ((6,), (3, 3), (9, 9), (6,), (6, 6))
         kept = Kept(outputs.epoch, outputs.before, *(np.zeros((count, *each)) for each in sizes))
         samples = Samples(imu.rotation, imu.velocity, imu.dt)
         place, rejected = np.zeros(4, dtype=np.int64), np.zeros(len(KINDS), dtype=np.int64)
-        where, stopped = RunPlace(place, rejected, np.zeros(7)), PAUSED
+        where, stopped = RunPlace(place, rejected, np.zeros(7), since), PAUSED
         settings = self.settings
         for part in (*windows(imu.n), slice(imu.n, imu.n)):
             if stopped == PAUSED:

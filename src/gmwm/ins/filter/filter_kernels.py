@@ -16,7 +16,14 @@ from gmwm.ins.filter.covariance_kernels import (
     tilt_squared,
     transition,
 )
-from gmwm.ins.filter.measurements import IS_GNSS, IS_INFERRED, observe
+from gmwm.ins.filter.measurements import (
+    IS_GNSS,
+    IS_INFERRED,
+    IS_RELATIVE,
+    new_keyframe,
+    observe,
+    observe_since,
+)
 from gmwm.ins.filter.mechanization import step
 from gmwm.ins.filter.records import (
     Events,
@@ -140,7 +147,8 @@ def _aid(
     epoch, n, rejected = events.epoch[event], samples.rotation.shape[0], where.rejected
     attitude = P[6, 6] + P[7, 7] + P[8, 8] if settings.second_order else 0.0
     errors, gain = np.zeros(P.shape[0]), np.zeros(P.shape[0])
-    h, rate, change = np.zeros(9), np.empty(3), new_transition()
+    h, rate, change, since = np.zeros(9), np.empty(3), new_transition(), where.since
+    row, is_keyframe = np.zeros(P.shape[0]), False
     for i in range(3):
         turned = where.carry[i] if epoch > 0 or n == 0 else samples.rotation[0, i]
         rate[i] = turned / samples.dt
@@ -156,16 +164,21 @@ def _aid(
             sd = events.sd[event, component]
             if not sd > 0.0:
                 continue
-            value = events.value[event]
-            z = observe(kind, component, value, seen, seen_rate, settings.lever, h)
-            if moved:
-                h[:] = np.sum(change.A * h[:, None], axis=0)
-            own = settings.noise_states[kind, component]
-            if own >= 0:
-                z += x[own]
-                own += 9
-            variance = sd * sd + excess(P, h, attitude)
-            found, variance = measurement_update(P, h, own, variance, z, errors, gain)
+            value, own = events.value[event], settings.noise_states[kind, component]
+            if IS_RELATIVE[kind]:
+                z = observe_since(kind, component, value, at, since, row)
+                # What is known of the errors at the keyframe since it was taken.
+                z -= np.sum(row[9:] * x)
+                found, variance = measurement_update(P, row, -1, sd * sd, z, errors, gain)
+            else:
+                z = observe(kind, component, value, seen, seen_rate, settings.lever, h)
+                if moved:
+                    h[:] = np.sum(change.A * h[:, None], axis=0)
+                if own >= 0:
+                    z += x[own]
+                    own += 9
+                variance = sd * sd + excess(P, h, attitude)
+                found, variance = measurement_update(P, h, own, variance, z, errors, gain)
             innovated.value[event, component] = found
             innovated.sd[event, component] = math.sqrt(variance)
             squares += found * found / variance
@@ -174,9 +187,13 @@ def _aid(
             P[:], errors[:] = P_before, errors_before
         elif IS_GNSS[kind]:
             where.carry[6] = 0.0
+        is_keyframe |= IS_RELATIVE[kind]
         event += 1
     x += errors[9:]
     correct(at, errors)
+    if is_keyframe:
+        new_keyframe(P, at, since, 1.0)
+        x[since.first - 9 : since.first - 3] = 0.0
     return event
 
 

@@ -14,8 +14,15 @@ import numpy as np
 from gmwm._core.compiled import compiled
 from gmwm._core.typing import FloatArray, IntArray
 from gmwm.errors import InputError
-from gmwm.ins.filter.records import Kinematics
-from gmwm.ins.geometry import matrix_from_rpy, offset, radii_at
+from gmwm.ins.filter.records import Keyframe, Kinematics
+from gmwm.ins.geometry import (
+    matrix_from_rotation_vector,
+    matrix_from_rpy,
+    ned_difference,
+    offset,
+    radii_at,
+    rpy_from_matrix,
+)
 from gmwm.ins.imu import Imu
 from gmwm.ins.trajectory import Trajectory
 
@@ -34,6 +41,11 @@ class Instrument(NamedTuple):
     arm: FloatArray
     imu: Imu | None
 
+    @property
+    def before(self) -> IntArray:
+        """Epoch of the keyframe before each."""
+        return np.append(0, self.epochs[:-1])
+
 
 class Measurement:
     """A kind of measurement of up to three components.
@@ -41,7 +53,8 @@ class Measurement:
     Its kernel fills the row h (9,) of the navigation errors and returns estimate less measurement.
 
     name: Of the kind, in `Fixes` and in files.
-    is_gnss: Whether an outage removes it.
+    is_gnss: Whether an outage removes it: GNSS, poses and odometry.
+    is_relative: Whether it relates the pose to that at the one before, the keyframe.
     is_inferred: Whether it is inferred rather than measured: it is always gated, and never used
         against the filter.
     components: How many of the three columns of values it has.
@@ -51,6 +64,7 @@ class Measurement:
     name: ClassVar[str]
     is_gnss: ClassVar[bool] = False
     is_inferred: ClassVar[bool] = False
+    is_relative: ClassVar[bool] = False
     components: ClassVar[int] = 3
     slow_names: ClassVar[tuple[str, ...]] = ()
 
@@ -61,7 +75,7 @@ class Measurement:
 
     @staticmethod
     def moved(value: FloatArray, by: FloatArray) -> FloatArray:
-        """Values moved by errors ``by``, (E, 3), in m or m/s to the north, east and down."""
+        """Values moved by errors ``by``, (E, 3), in their unit: m, m/s or rad along three axes."""
         return value + by
 
     @staticmethod
@@ -176,6 +190,124 @@ class Standstill(Measurement):
 
 
 @compiled()
+def _turned(component: int, C: FloatArray, rpy: FloatArray) -> float:
+    """Component of the small rotation by which C (3, 3) is off measured roll, pitch and yaw."""
+    sr, sp, sy = math.sin(rpy[0]), math.sin(rpy[1]), math.sin(rpy[2])
+    cr, cp, cy = math.cos(rpy[0]), math.cos(rpy[1]), math.cos(rpy[2])
+    rows = (
+        (cp * cy, sr * sp * cy - cr * sy, cr * sp * cy + sr * sy),
+        (cp * sy, sr * sp * sy + cr * cy, cr * sp * sy - sr * cy),
+        (-sp, sr * cp, cr * cp),
+    )
+    i, j = (component + 1) % 3, (component + 2) % 3
+    total = 0.0
+    for k in range(3):
+        total += C[i, k] * rows[j][k] - C[j, k] * rows[i][k]
+    return 0.5 * total
+
+
+class Attitude(Measurement):
+    """Roll, pitch and yaw of an absolute pose, rad; errors are turns about north, east, down."""
+
+    name = "attitude"
+    is_gnss = True
+
+    @staticmethod
+    def moved(value: FloatArray, by: FloatArray) -> FloatArray:
+        return rpy_from_matrix(matrix_from_rotation_vector(-by) @ matrix_from_rpy(value))
+
+    @staticmethod
+    def along(where: Instrument) -> FloatArray:
+        return where.trajectory.rpy[where.epochs]
+
+
+class Odometer(Measurement):
+    """Velocity of the IMU forward, right and down, m/s: wheels that roll and do not slip."""
+
+    name = "odometer"
+    is_gnss = True
+
+    @staticmethod
+    def along(where: Instrument) -> FloatArray:
+        matrix = matrix_from_rpy(where.trajectory.rpy[where.epochs])
+        return np.einsum("kji,kj->ki", matrix, where.trajectory.velocity[where.epochs])
+
+
+class Displacement(Measurement):
+    """Way since the keyframe, in its body axes, m; short against the Earth."""
+
+    name = "displacement"
+    is_gnss = is_relative = True
+
+    @staticmethod
+    def along(where: Instrument) -> FloatArray:
+        truth = where.trajectory
+        matrix = matrix_from_rpy(truth.rpy[where.before])
+        way = ned_difference(truth.lla[where.epochs], truth.lla[where.before])
+        return np.einsum("kji,kj->ki", matrix, way)
+
+
+class Rotation(Measurement):
+    """Turn since the keyframe, as roll, pitch and yaw, rad; errors are about its body axes."""
+
+    name = "rotation"
+    is_gnss = is_relative = True
+    moved = Attitude.moved
+
+    @staticmethod
+    def along(where: Instrument) -> FloatArray:
+        before, now = (
+            matrix_from_rpy(where.trajectory.rpy[k]) for k in (where.before, where.epochs)
+        )
+        return rpy_from_matrix(np.swapaxes(before, 1, 2) @ now)
+
+
+@compiled()
+def observe_since(
+    kind: int, component: int, value: FloatArray, at: Kinematics, since: Keyframe, h: FloatArray
+) -> float:
+    """Fill the row h (n,) of a relative measurement; returns estimate less measurement.
+
+    The pose at the keyframe has states of its own, a stochastic clone (Roumeliotis & Burdick 2002,
+    "Stochastic cloning", *IEEE ICRA*): position and attitude errors from ``since.first`` on.
+    """
+    C, first = since.pose.C, since.first
+    x, y, z = C[0, component], C[1, component], C[2, component]
+    h[:] = 0.0
+    if kind == _ROTATION:
+        turn = np.zeros((3, 3))
+        for i in range(3):
+            for j in range(3):
+                for k in range(3):
+                    turn[i, j] += C[k, i] * at.C[k, j]
+        h[6], h[7], h[8] = x, y, z
+        h[first + 3], h[first + 4], h[first + 5] = -x, -y, -z
+        return _turned(component, turn, value)
+    lla = since.pose.lla
+    meridian, transverse = radii_at(math.sin(lla[0]))
+    north = (meridian + lla[2]) * (at.lla[0] - lla[0])
+    east = (transverse + lla[2]) * math.cos(lla[0]) * (at.lla[1] - lla[1])
+    down = lla[2] - at.lla[2]
+    h[0], h[1], h[2] = x, y, z
+    h[first], h[first + 1], h[first + 2] = -x, -y, -z
+    h[first + 3], h[first + 4] = z * east - y * down, x * down - z * north
+    h[first + 5] = y * north - x * east
+    return x * north + y * east + z * down - value[component]
+
+
+@compiled()
+def new_keyframe(P: FloatArray, at: Kinematics, since: Keyframe, sign: float) -> None:
+    """Make a pose the keyframe: its states are copies of the navigation errors, times a sign."""
+    since.pose.C[:], since.pose.lla[:] = at.C, at.lla
+    for i in range(6):
+        own = i if i < 3 else i + 3
+        P[since.first + i] = sign * P[own]
+    for i in range(6):
+        own = i if i < 3 else i + 3
+        P[:, since.first + i] = sign * P[:, own]
+
+
+@compiled()
 def _to_navigation(C: FloatArray, x: float, y: float, z: float) -> tuple[float, float, float]:
     """Components of a vector of the body to the north, east and down."""
     a = C[0, 0] * x + C[0, 1] * y + C[0, 2] * z
@@ -196,7 +328,9 @@ def _add_turned(component: int, a: float, b: float, c: float, h: FloatArray) -> 
 
 # -- table of all kinds ----------------------------------------------------------------------------
 
-MEASUREMENTS: tuple[type[Measurement], ...] = (Position, Velocity, Height, Standstill)
+MEASUREMENTS: tuple[type[Measurement], ...] = (
+    *(Position, Velocity, Height, Standstill, Attitude, Odometer, Displacement, Rotation),
+)
 """All kinds; a kind's place is its code in the kernels."""
 
 KINDS = {each.name: code for code, each in enumerate(MEASUREMENTS)}
@@ -204,6 +338,8 @@ KINDS = {each.name: code for code, each in enumerate(MEASUREMENTS)}
 
 IS_GNSS = np.array([each.is_gnss for each in MEASUREMENTS])  # by code
 IS_INFERRED = np.array([each.is_inferred for each in MEASUREMENTS])
+IS_RELATIVE = np.array([each.is_relative for each in MEASUREMENTS])
+_ROTATION = KINDS["rotation"]
 
 
 @compiled()
@@ -216,9 +352,9 @@ def observe(
     lever: FloatArray,
     h: FloatArray,
 ) -> float:
-    """Fill the row h (9,) of one component of a measurement; returns estimate less measurement.
+    """Fill the row h (n,) of one component of a measurement; returns estimate less measurement.
 
-    kind: Code of `KINDS`.
+    kind: Code of `KINDS`; relative ones: `observe_since`.
     rate, lever: (3,), angular rate, rad/s, and antenna from the IMU, m, body axes.
     """
     h[:] = 0.0
@@ -229,4 +365,11 @@ def observe(
     if kind == 2:
         h[2] = -1.0  # errors are counted downwards
         return at.lla[2] - value[0]
+    if kind == 4:
+        h[6 + component] = 1.0
+        return _turned(component, at.C, value)
+    if kind == 5:
+        # The attitude error turns the velocity along: the modified velocity error alone shows.
+        h[3], h[4], h[5] = at.C[0, component], at.C[1, component], at.C[2, component]
+        return h[3] * at.v[0] + h[4] * at.v[1] + h[5] * at.v[2] - value[component]
     return observe_velocity(component, value, at, np.zeros(3), lever, h)

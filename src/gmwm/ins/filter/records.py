@@ -18,6 +18,16 @@ class Kinematics(NamedTuple):
     lla: FloatArray
 
 
+class Keyframe(NamedTuple):
+    """Pose that relative measurements begin at, and the first of its six states in a covariance.
+
+    first: -1 if there are none.
+    """
+
+    pose: Kinematics
+    first: int
+
+
 class Increments(NamedTuple):
     """Integrals of angular rate (rad) and specific force (m/s) over an interval, body axes."""
 
@@ -165,8 +175,10 @@ class RunPlace(NamedTuple):
     place: (4,), epoch, event, kept epoch, steps of the covariance.
     rejected: (kinds,), measurements of each kind that were rejected in a row.
     carry: (7,), increments of the sample before, and root mean square of `tilt_squared`.
+    since: The last keyframe, overwritten.
     """
 
     place: IntArray
     rejected: IntArray
     carry: FloatArray
+    since: Keyframe

@@ -63,7 +63,7 @@ class SensorStates:
         drift_known: Whether drifts start at zero and have their slopes exactly, as simulated ones
             do.
         slow: First-order Gauss-Markov states that add to no inertial sensor, after the others:
-            name, standard deviation and correlation time (s).
+            name, standard deviation and correlation time (s); constants where the first is zero.
         Raises InputError if a term has no state-space form, or one of more than two states.
         """
         given = tuple((sensors.models[axis], sensors.bias_sd[axis]) for axis in AXES)
@@ -84,7 +84,9 @@ def _states(
     for i, (model, bias_sd) in enumerate(given):
         forms, white[i] = _blocks(AXES[i], model, bias_sd**2, dt, drift_known)
         blocks += [(i, form) for form in forms]
-    blocks += [(_NO_AXIS, GaussMarkov(sigma, tau).state_space(dt)) for _, sigma, tau in slow]
+    for name, sigma, tau in slow:
+        constant = StateSpace.scalar(name, 1.0, 0.0, 0.0)
+        blocks.append((_NO_AXIS, GaussMarkov(sigma, tau).state_space(dt) if sigma else constant))
     m = sum(form.n_states for _, form in blocks)
     phi, phi_off, gain, noise, noise_off, cross = (np.zeros((k_max + 1, m)) for _ in range(6))
     axis, partner = np.zeros(m, dtype=np.int64), np.arange(m)

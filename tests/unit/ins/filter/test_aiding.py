@@ -128,7 +128,7 @@ def test_events_come_in_order_of_time():
         (lambda: fixes([1.0], value=np.array([[np.inf, 0.0, 0.0]])), "number 0 is not finite"),
         (lambda: fixes([1.0], value=np.zeros((1, 2))), "give E times and E x 3 values"),
         (
-            lambda: fixes([1.0], kind="odometer"),
+            lambda: fixes([1.0], kind="speedometer"),
             "choose from position, velocity, height, standstill",
         ),
         (lambda: Outage(-1.0, 5.0), "outage start -1.0"),

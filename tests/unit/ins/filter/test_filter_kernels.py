@@ -5,17 +5,24 @@ import pytest
 
 from gmwm import AR, GaussMarkov, RandomWalk, RateRamp, Resonance, WhiteNoise
 from gmwm.ins import SensorModels
-from gmwm.ins.filter import KINDS, Kinematics, SensorStates, observe
+from gmwm.ins.filter import KINDS, Keyframe, Kinematics, SensorStates, observe, observe_since
 from gmwm.ins.filter.filter_kernels import _advance, correct
 from gmwm.ins.filter.measurements import MEASUREMENTS
 from gmwm.ins.filter.records import Samples
-from gmwm.ins.geometry import matrix_from_rotation_vector, matrix_from_rpy, ned_difference, offset
+from gmwm.ins.geometry import (
+    matrix_from_rotation_vector,
+    matrix_from_rpy,
+    ned_difference,
+    offset,
+    rpy_from_matrix,
+)
 
 DT = 0.01
 ATTITUDE = np.array([0.3, -0.4, 2.1])
 VELOCITY = np.array([40.0, -25.0, 3.0])
 RATE = np.array([0.2, -0.5, 0.7])
 LEVER = np.array([1.5, -0.4, -2.0])
+BEFORE, WAY = matrix_from_rpy(np.array([-0.2, 0.1, 1.7])), np.array([12.0, -30.0, 4.0])
 PLACES = [(0.8, 0.1, 300.0), (-0.6, np.pi - 1e-8, 20.0), (1.38, -np.pi, 5000.0)]
 
 
@@ -26,6 +33,10 @@ def measured(kind, C, v, lla):
         "velocity": lambda: v + C @ np.cross(RATE, LEVER),
         "standstill": lambda: v,
         "height": lambda: np.array([lla[2], 0.0, 0.0]),
+        "attitude": lambda: rpy_from_matrix(C),
+        "odometer": lambda: C.T @ v,
+        "displacement": lambda: BEFORE.T @ WAY,
+        "rotation": lambda: rpy_from_matrix(BEFORE.T @ C),
     }[kind]()
 
 
@@ -40,8 +51,35 @@ def difference(kind, component, value, C, v, lla, h=None):
     return observe(KINDS[kind], component, value, Kinematics(C, v, lla), RATE, LEVER, h)
 
 
+@pytest.mark.parametrize("lla", PLACES[:2])
+@pytest.mark.parametrize("kind", ["displacement", "rotation"])
+def test_rows_since_a_keyframe_are_derivatives_by_both_poses(kind, lla):
+    lla = np.array(lla)
+    there = offset(lla, WAY)
+    value, C = measured(kind, matrix_from_rpy(ATTITUDE), VELOCITY, lla), matrix_from_rpy(ATTITUDE)
+
+    def residual(component, x, h):
+        now = Kinematics(*estimated(C, VELOCITY, there, x[:9]))
+        keyframe = np.concatenate([x[9:12], np.zeros(3), x[12:]])
+        before = Kinematics(*estimated(BEFORE, VELOCITY, lla, keyframe))
+        return observe_since(KINDS[kind], component, value, now, Keyframe(before, 9), h)
+
+    for component in range(3):
+        h, found, unused = np.full(15, np.nan), np.zeros(15), np.zeros(15)
+        assert residual(component, np.zeros(15), h) == pytest.approx(0.0, abs=2e-3)
+        for i in range(15):
+            x = np.zeros(15)
+            x[i] = 1e-2 if i < 3 or 9 <= i < 12 else 1e-4
+            ends = [residual(component, s * x, unused) for s in (1.0, -1.0)]
+            found[i] = (ends[0] - ends[1]) / (2.0 * x[i])
+        # The way is counted on the ellipsoid at the keyframe: 1e-7 per metre, times a tangent.
+        np.testing.assert_allclose(found, h, atol=2e-3)
+
+
 @pytest.mark.parametrize("lla", PLACES)
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize(
+    "kind", [kind for kind in KINDS if not MEASUREMENTS[KINDS[kind]].is_relative]
+)
 def test_rows_are_the_derivatives_of_the_residuals(kind, lla):
     C, v, lla = matrix_from_rpy(ATTITUDE), VELOCITY, np.array(lla)
     value = measured(kind, C, v, lla)
