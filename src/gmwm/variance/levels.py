@@ -28,6 +28,7 @@ from gmwm.variance.gaps import (
     window_count,
 )
 from gmwm.variance.modwt import coefficients
+from gmwm.variance.periodogram import Periodogram
 
 
 def pilot_psd(variance: FloatArray, averaging: FloatArray, dt: float) -> PSD:
@@ -363,6 +364,14 @@ class Levels:
         deviation = np.sqrt(growth) * (1.0 + change)
         inflation = np.outer(deviation, deviation) * common_share(centres, widths, n)
         return GapEffects(n - self.runs.present, self.counts, change, inflation)
+
+    def spectrum(self) -> Periodogram | None:
+        """That of the longest run, if it holds most of the samples."""
+        longest = np.argmax(self.runs.edges[:, 1] - self.runs.edges[:, 0])
+        start, stop = self.runs.edges[longest].tolist()
+        if stop - start < tuning.SHARE_OF_RUN * self.runs.present:
+            return None
+        return Periodogram.of(self.values[start:stop], self._integral[start : stop + 1])
 
     def block_means(self) -> tuple[FloatArray, int]:
         """Means of blocks of what exists, and their size.

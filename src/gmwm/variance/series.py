@@ -119,6 +119,7 @@ def wavelet_variance(
         gaps=levels.effects(change),
         fourth_cumulant=0.0 if robust else fourth_cumulant(values),
         data_covariance=found,
+        spectrum=None if robust else levels.spectrum(),
     )
 
 

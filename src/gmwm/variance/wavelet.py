@@ -27,11 +27,12 @@ from gmwm._core.typing import FloatArray
 from gmwm._core.units import shown_unit
 from gmwm.errors import InputError
 from gmwm.issues import Notice, notice
-from gmwm.process import PSD, wavelet as known_wavelet
+from gmwm.process import PSD, wavelet as known_wavelet, wavelet_variance as variance_under
 from gmwm.variance import tuning
 from gmwm.variance.covariance.haar import haar_covariance, line_covariance, mean_covariance
 from gmwm.variance.gaps import GapEffects
 from gmwm.variance.levels import pilot_psd
+from gmwm.variance.periodogram import Periodogram
 
 if TYPE_CHECKING:
     import pandas
@@ -84,7 +85,12 @@ class WaveletVariance(Printed, Document):
     data_covariance : (J, J) ndarray or None
         Covariance of ``variance`` estimated from the coefficients themselves, u^4, where it was
         asked for.
+    spectrum : Periodogram or None
+        Of the samples, for ``covariance``; ``None`` where no run holds most of them, for robust
+        estimates, streams and several recordings.
     """
+
+    LATER = frozenset({"spectrum"})
 
     tau: Array
     variance: Array
@@ -103,6 +109,7 @@ class WaveletVariance(Printed, Document):
     gaps: GapEffects | None = None
     fourth_cumulant: Annotated[NotNegative, Le(tuning.LARGEST_VARIANCE**2)] = 0.0
     data_covariance: Array | None = None
+    spectrum: Periodogram | None = None
 
     @property
     def n_all(self) -> int:
@@ -163,11 +170,14 @@ class WaveletVariance(Printed, Document):
     def covariance(self) -> FloatArray:
         """Covariance of ``variance``, u^4, (J, J).
 
-        For a Gaussian series with the smooth spectrum that the wavelet variances themselves imply;
-        no model is assumed.
+        For a Gaussian series with the smooth spectrum of its samples, or that the wavelet variances
+        themselves imply; no model is assumed.
         """
-        psd = pilot_psd(self._positive, self.averaging, self.dt)
-        return self.covariance_under(psd)
+        if self.spectrum is None:
+            return self.covariance_under(pilot_psd(self._positive, self.averaging, self.dt))
+        implied = variance_under(self.spectrum.psd, (), self.tau, self.dt, self.wavelet)
+        scale = self._positive / implied
+        return self.covariance_under(self.spectrum.root_square) * np.outer(scale, scale)
 
     def covariance_under(self, psd: PSD, lines: Sequence[tuple[float, float]] = ()) -> FloatArray:
         """Covariance of ``variance`` for noise of a given spectrum, u^4, (J, J).
@@ -305,6 +315,8 @@ class WaveletVariance(Printed, Document):
             raise ValueError("blocks hold more samples than there are, or none")
         if self.gaps is not None:
             self.gaps.check(self.n, size)
+        if self.spectrum is not None:
+            self.spectrum.check()
         if self.data_covariance is not None:
             check_covariance(self.data_covariance.tolist(), size, "data_covariance")
 
@@ -385,7 +397,9 @@ class PooledVariance(WaveletVariance):
         pooled["data_covariance"] = (
             _combined(covariances, shares) if len(covariances) == len(parts) else None
         )
-        return cls(**{**own, **pooled, "fourth_cumulant": 0.0}, parts=tuple(parts))
+        return cls(
+            **{**own, **pooled, "fourth_cumulant": 0.0, "spectrum": None}, parts=tuple(parts)
+        )
 
     @cached_property
     def shares(self) -> FloatArray:
