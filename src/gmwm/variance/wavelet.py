@@ -129,6 +129,8 @@ class WaveletVariance(Printed, Document):
     @property
     def width(self) -> FloatArray:
         """Number of samples in a coefficient, (J,)."""
+        if self.wavelet == "haar":
+            return 2.0 * self.averaging
         kind = known_wavelet(self.wavelet)
         return np.array([kind.width(j + 1) for j in range(self.tau.size)], dtype=float)
 
