@@ -17,6 +17,7 @@ LARGEST_MISFIT = 3.0  # factor from which a bin no longer pulls at the power law
 MOST_OF_SPECTRUM = (1 << 16) - 1  # samples whose periodogram is taken whole
 PIECE_OF_SPECTRUM = (1 << 13) - 1  # samples, or means of blocks, of a piece of a longer series
 COARSER_BLOCKS = 256  # times the block before, of the spectrum at lower frequencies
+PLAIN_DRIFT = 4.0  # standard errors of the mean of the coarsest coefficients under the spectrum
 MOST_BINS = 1000  # of a stored spectrum; a series of 2^40 samples has 300
 SHARE_OF_RUN = 0.5  # of the samples, in a run that stands for a series with gaps
 LEAST_ORDINATE = 8  # of a piece; lower frequencies are those of longer blocks

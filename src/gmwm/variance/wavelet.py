@@ -172,14 +172,22 @@ class WaveletVariance(Printed, Document):
     def covariance(self) -> FloatArray:
         """Covariance of ``variance``, u^4, (J, J).
 
-        For a Gaussian series with the smooth spectrum of its samples, or that the wavelet variances
-        themselves imply; no model is assumed.
+        For a Gaussian series with the smooth spectrum of its samples, about a drift where it has a
+        plain one, or with the spectrum that the wavelet variances themselves imply; no model is
+        assumed.
         """
         if self.spectrum is None:
             return self.covariance_under(pilot_psd(self._positive, self.averaging, self.dt))
+        found = self.covariance_under(self.spectrum.root_square)
+        means, response = self.mean_covariance_under(self.spectrum.psd), self.drift_response
+        if response[-1] > 0.0 and self.mean[-1] ** 2 > tuning.PLAIN_DRIFT**2 * means[-1, -1]:
+            # Means of fine levels are those of a coarser one, but for the response.
+            at = np.maximum(np.arange(self.tau.size), int(np.argmax(np.diag(means) > 0.0)))
+            drift = response**2 / response[at] * (self.mean[-1] / response[-1])
+            return found + 4.0 * np.outer(drift, drift) * means[np.ix_(at, at)]
         implied = variance_under(self.spectrum.psd, (), self.tau, self.dt, self.wavelet)
         scale = self._positive / implied
-        return self.covariance_under(self.spectrum.root_square) * np.outer(scale, scale)
+        return found * np.outer(scale, scale)
 
     def covariance_under(self, psd: PSD, lines: Sequence[tuple[float, float]] = ()) -> FloatArray:
         """Covariance of ``variance`` for noise of a given spectrum, u^4, (J, J).
