@@ -131,6 +131,11 @@ class AllanLines:
                 f'method = "allan" reads the Allan deviation, which {wv.wavelet!r} does not give: '
                 'make the wavelet variance with wavelet="haar"'
             )
+        if not np.allclose(np.diff(np.log2(wv.averaging)), 1.0):
+            raise InputError(
+                'method = "allan" reads octaves: give a curve at 1, 2, 4, ... times the shortest '
+                'averaging time, or use method="gmwm"'
+            )
         lines = _wanted(model)
         given = _given_runs(model, wv, lines, self.regions or {})
         runs = dict(given)

@@ -30,6 +30,12 @@ PILOT_STEP = 0.8  # share of a step in logarithms: levels share frequencies, who
 PILOT_STEEPEST = 2.5  # power of the frequency from level to level; that of a random walk is 2
 HAAR_PEAK = 0.37  # the Haar gain of averaging time tau peaks at f = 0.37/tau
 
+# -- curves without samples -----------------------------------------------------------------------
+
+LEAST_RATIO = 1.4  # of averaging times that are kept
+LEAST_TIMES = 4
+TIME_ROUNDING = 0.005  # relative, of averaging times that are whole numbers of samples as printed
+
 # -- gaps -----------------------------------------------------------------------------------------
 
 LONGEST_GAP = 0.25

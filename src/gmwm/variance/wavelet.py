@@ -117,6 +117,11 @@ class WaveletVariance(Printed, Document):
         return self.n
 
     @property
+    def extent(self) -> str:
+        """Length and rate in words."""
+        return f"{self.n:,} samples at {1.0 / self.dt:g} Hz"
+
+    @property
     def averaging(self) -> FloatArray:
         """Averaging times in samples, (J,)."""
         return np.rint(self.tau / self.dt)
@@ -276,10 +281,8 @@ class WaveletVariance(Printed, Document):
     # -- printed, stored, drawn --------------------------------------------------------------------
 
     def __repr__(self) -> str:
-        size = f"{self.n:,} samples at {1.0 / self.dt:g} Hz"
-        return (
-            f"<{type(self).__name__} of {self.name or 'a series'}: {size}, {self.tau.size} levels>"
-        )
+        name = f"<{type(self).__name__} of {self.name or 'a series'}"
+        return f"{name}: {self.extent}, {self.tau.size} levels>"
 
     def __str__(self) -> str:
         return self.text()
@@ -289,7 +292,7 @@ class WaveletVariance(Printed, Document):
 
     def text(self, units: str = "field") -> str:
         """The text of `print`: Allan deviations in data-sheet units or, with "si", in SI."""
-        head = f"{self.name or 'series'}: {self.n:,} samples at {1.0 / self.dt:g} Hz"
+        head = f"{self.name or 'series'}: {self.extent}"
         if self.gaps is not None:
             head += f", {self.gaps.missing:,} of them missing"
         if self.wavelet != "haar":
@@ -381,6 +384,8 @@ class PooledVariance(WaveletVariance):
             raise InputError("no recordings given: give at least one wavelet variance")
         longest = max(parts, key=lambda part: part.tau.size)
         for part in parts:
+            if not np.array_equal(part.tau, longest.tau[: part.tau.size]):
+                raise InputError("recordings have other averaging times: fit curves one by one")
             for name in ("dt", "unit", "wavelet", "efficiency"):
                 if getattr(part, name) != getattr(longest, name):
                     raise InputError(

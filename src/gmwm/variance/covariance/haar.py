@@ -338,17 +338,24 @@ def haar_covariance(
 
 
 def line_covariance(
-    lines: Sequence[tuple[float, float]], psd: PSD, dt: float, name: str, counts: FloatArray
+    lines: Sequence[tuple[float, float]],
+    psd: PSD,
+    dt: float,
+    kind: str | FloatArray,
+    counts: FloatArray,
 ) -> FloatArray:
     """Contribution of spectral lines to the covariance: their product with the noise around them.
 
     A line of amplitude a at frequency f adds 2 a^2 |H_j|^2 |H_k|^2 S(f) / max(M_j, M_k), with the
-    gains H of the wavelet of a name.
+    gains H of the wavelet of a name, or of Haar filters of averaging times in samples.
     """
     total = np.zeros((counts.size, counts.size))
     for frequency, amplitude in lines:
         f = np.abs(frequency * dt - np.rint(frequency * dt))
-        gain = wavelet(name).gains(counts.size, f)
+        if isinstance(kind, str):
+            gain = wavelet(kind).gains(counts.size, f)
+        else:
+            gain = (np.sin(np.pi * kind * f) ** 2 / (kind * np.sin(np.pi * f))) ** 2
         density = float(evaluated(psd, np.array([f]) / dt, dt)[0]) / dt
         total += 2.0 * amplitude**2 * density * np.outer(gain, gain)
     return np.asarray(total / np.maximum.outer(counts, counts))
