@@ -79,6 +79,7 @@ from .variance import (
     haar_covariance as haar_covariance,
     imodwt as imodwt,
     modwt as modwt,
+    read_curves as read_curves,
     wavelet_variance as wavelet_variance,
 )
 

@@ -233,6 +233,8 @@ def as_channel(
     """
     if isinstance(data, Channel):
         return data
+    if isinstance(data, WaveletVariance):
+        raise InputError(f"{data!r} has no samples, which this needs: give the series")
     if isinstance(data, str | Mapping):
         source = f"gmwm.read({data!r})" if isinstance(data, str) else "recording"
         raise InputError(
