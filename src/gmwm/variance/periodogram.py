@@ -168,7 +168,7 @@ def _places(
     least: Ordinate that the first bin begins with; no bin has one from ``end`` or ``high`` on.
     spacing: Of the ordinates, cycles per sample.
     """
-    ordinate = np.arange(least, end)
+    ordinate = np.arange(float(least), end)
     ordinate = ordinate[ordinate * spacing < high]
     start = np.flatnonzero(np.diff(_panel(ordinate * spacing), prepend=-np.inf))
     width = np.diff(start, append=ordinate.size).astype(float)
