@@ -300,7 +300,8 @@ def _straight_runs(wv: WaveletVariance, slope: float, usable: np.ndarray) -> Ite
 
 def _allowance(combination: FloatArray, covariance: FloatArray) -> FloatArray:
     """How far combinations (rows) of logarithms of this covariance may be off."""
-    error = np.sqrt(np.einsum("ij,jk,ik->i", combination, covariance, combination))
+    square = np.einsum("ij,jk,ik->i", combination, covariance, combination)
+    error = np.sqrt(np.maximum(square, 0.0))  # a drift without noise leaves rounding errors
     return np.asarray(
         tuning.SLOPE_TOLERANCE + np.minimum(tuning.SLOPE_SIGMA * error, tuning.SLOPE_TOLERANCE)
     )
