@@ -69,14 +69,17 @@ from .process.kinds import *  # noqa: F403
 from .readers import Channel as Channel, Recording as Recording, read as read
 from .selection import Selection as Selection, select as select
 from .variance import (
+    Curve as Curve,
     Deviations as Deviations,
     Modwt as Modwt,
     StreamingVariance as StreamingVariance,
     WaveletVariance as WaveletVariance,
+    curve as curve,
     deviations as deviations,
     haar_covariance as haar_covariance,
     imodwt as imodwt,
     modwt as modwt,
+    read_curves as read_curves,
     wavelet_variance as wavelet_variance,
 )
 

@@ -105,7 +105,7 @@ def calibrate(
         has no stretch of ten seconds at rest.
     """
     alone = isinstance(recording, Recording | str | os.PathLike) or is_frame(recording)
-    parts: list[Any] = [recording] if alone else list(recording)
+    parts: list[Any] = list(recording) if not alone and np.iterable(recording) else [recording]
     given: list[Recording] = [read(each) if is_frame(each) else each for each in parts]
     _check_together(given)
     size = sum(each.n * len(each.inertial) for each in given)

@@ -30,7 +30,7 @@ from gmwm.diagnosis.motion import (
 )
 from gmwm.diagnosis.resolution import step_size
 from gmwm.issues import Notice, notice
-from gmwm.readers import Channel, Recording
+from gmwm.readers import Channel, Recording, require_recording
 
 _GRAVITY = factor("g", SI_UNIT["accel"])
 _WIDTH = 60  # characters of the timeline
@@ -88,6 +88,7 @@ def find_still(recording: Recording) -> Still:
     Blocks of a quarter of a second whose scatter is that of the noise, and whose mean rate is that
     of the quietest ones; without stretches that scatter more than the quietest, or in a band.
     """
+    require_recording(recording)
     blocks = blocks_of(recording)
     if blocks is None:
         return Still((), 0.0, (), recording.duration)

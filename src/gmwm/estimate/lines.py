@@ -126,11 +126,7 @@ class AllanLines:
 
     def estimate(self, model: Model, wv: WaveletVariance) -> Fit:
         """Read the open parameters of a model from straight regions of the Allan plot."""
-        if wv.wavelet != "haar":
-            raise InputError(
-                f'method = "allan" reads the Allan deviation, which {wv.wavelet!r} does not give: '
-                'make the wavelet variance with wavelet="haar"'
-            )
+        _check_octaves(wv)
         lines = _wanted(model)
         given = _given_runs(model, wv, lines, self.regions or {})
         runs = dict(given)
@@ -198,6 +194,19 @@ def _wanted(model: Model) -> dict[str, _Line]:
             )
     wanted = [_LINES[type(term)] for term in model.terms if term.is_open]
     return {line.key: line for line in wanted}
+
+
+def _check_octaves(wv: WaveletVariance) -> None:
+    if wv.wavelet != "haar":
+        raise InputError(
+            f'method = "allan" reads the Allan deviation, which {wv.wavelet!r} does not give: '
+            'make the wavelet variance with wavelet="haar"'
+        )
+    if not np.allclose(np.diff(np.log2(wv.averaging)), 1.0):
+        raise InputError(
+            'method = "allan" reads octaves: give a curve at 1, 2, 4, ... times the shortest '
+            'averaging time, or use method="gmwm"'
+        )
 
 
 def _given_runs(
@@ -291,7 +300,8 @@ def _straight_runs(wv: WaveletVariance, slope: float, usable: np.ndarray) -> Ite
 
 def _allowance(combination: FloatArray, covariance: FloatArray) -> FloatArray:
     """How far combinations (rows) of logarithms of this covariance may be off."""
-    error = np.sqrt(np.einsum("ij,jk,ik->i", combination, covariance, combination))
+    square = np.einsum("ij,jk,ik->i", combination, covariance, combination)
+    error = np.sqrt(np.maximum(square, 0.0))  # a drift without noise leaves rounding errors
     return np.asarray(
         tuning.SLOPE_TOLERANCE + np.minimum(tuning.SLOPE_SIGMA * error, tuning.SLOPE_TOLERANCE)
     )

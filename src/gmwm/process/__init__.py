@@ -17,6 +17,7 @@ from gmwm.process.model import (
 )
 from gmwm.process.parameter import Parameter as Parameter, parameter as parameter
 from gmwm.process.spectral import (
+    PANEL as PANEL,
     PSD as PSD,
     Panels as Panels,
     evaluated as evaluated,
@@ -25,6 +26,7 @@ from gmwm.process.spectral import (
     node_weights as node_weights,
     quadrature as quadrature,
     resolved_share as resolved_share,
+    wavelet_variance as wavelet_variance,
 )
 from gmwm.process.state_space import StateSpace as StateSpace, block_diagonal as block_diagonal
 from gmwm.process.wavelets import (

@@ -190,12 +190,12 @@ def quadrature(averaging: tuple[float, ...]) -> Quadrature:
     return Quadrature(frequency, weight, gain)
 
 
-_PANEL, _POINTS = 0.125, 12
+PANEL, _POINTS = 0.125, 12
 """Width of a panel in the logarithm of tan(pi f dt), and Chebyshev points on it. A polynomial
 through them is as near as rho^-12, rho that of the Bernstein ellipse through the next pole of the
 spectrum (Trefethen 2013, *Approximation Theory and Approximation Practice*, ch. 8)."""
 
-PANEL_POLE, HALF_PANEL = 2.21, 0.5 * _PANEL
+PANEL_POLE, HALF_PANEL = 2.21, 0.5 * PANEL
 """Distance of that pole in half panels from which the polynomial is good to 1e-8."""
 
 WIDER = 4
@@ -223,7 +223,7 @@ class Panels:
     share: FloatArray
 
     @classmethod
-    def of(cls, nodes: FloatArray, width: float = _PANEL) -> Panels:
+    def of(cls, nodes: FloatArray, width: float = PANEL) -> Panels:
         """Those of nodes (K,), panel by panel: log tan(pi f) of each, f in cycles per sample."""
         panel = np.floor(nodes / width)
         starts = np.flatnonzero(np.diff(panel, prepend=-np.inf))
@@ -261,7 +261,7 @@ def panel_weights(averaging: tuple[float, ...], times: int = 1) -> tuple[FloatAr
     """
     if times > 1:
         log_tangent, weight = panel_weights(averaging)
-        panels = Panels.of(log_tangent, times * _PANEL)
+        panels = Panels.of(log_tangent, times * PANEL)
         gathered = panels.gathered(weight)
     else:
         frequency, weight = _nodes(max(averaging))

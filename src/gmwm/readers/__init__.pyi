@@ -16,8 +16,10 @@ from .recording import (
 from .registry import (
     CLOCKS as CLOCKS,
     NAMES as NAMES,
+    Wanted as Wanted,
     is_frame as is_frame,
     is_text as is_text,
+    open_tables as open_tables,
 )
 from .table import label as label, load_columns as load_columns
 from .text.cells import DATE as DATE, seconds_of as seconds_of

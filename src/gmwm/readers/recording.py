@@ -335,4 +335,4 @@ def require_recording(given: Any) -> None:
         raise InputError(f"{path} is a path: read it first, gmwm.read({path}, rate=..., units=...)")
     if not isinstance(given, Recording):
         hint = "give what gmwm.read returns, or make one with Recording.from_arrays"
-        raise InputError(f"{checks.shown(given)} is not a recording: {hint}")
+        raise InputError(f"{checks.shown(given)} is not a recording of samples: {hint}")

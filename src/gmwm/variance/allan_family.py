@@ -23,6 +23,7 @@ from gmwm.errors import InputError
 from gmwm.readers import Channel
 from gmwm.variance import tuning
 from gmwm.variance.covariance.allan import AllanFilter, allan_dof
+from gmwm.variance.kernels import cumulative
 from gmwm.variance.periodogram import Periodogram
 from gmwm.variance.series import as_channel, checked_samples, where_of
 
@@ -187,7 +188,7 @@ def deviations(
     confidence = checks.share("confidence", confidence, 0.95)
     averaging = _averaging(tau, channel)
     centred = values - mean
-    spectrum = Periodogram.of(centred)
+    spectrum = Periodogram.of(centred, cumulative(centred, 0.0))
     found: dict[str, list[FloatArray]] = {}
     for name in _chosen_kinds(kinds):
         label, kind = _KINDS[name]

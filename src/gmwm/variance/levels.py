@@ -28,13 +28,14 @@ from gmwm.variance.gaps import (
     window_count,
 )
 from gmwm.variance.modwt import coefficients
+from gmwm.variance.periodogram import Periodogram
 
 
 def pilot_psd(variance: FloatArray, averaging: FloatArray, dt: float) -> PSD:
     """Power-law pieces between the pass bands of the levels, fitted to the wavelet variances.
 
     variance: (J,), Haar wavelet variances, u^2, positive.
-    averaging: (J,), averaging times in samples, dyadic.
+    averaging: (J,), averaging times in samples, rising.
     dt: Sampling interval, s.
     Returns: ``psd(f, dt)``.
     """
@@ -42,13 +43,13 @@ def pilot_psd(variance: FloatArray, averaging: FloatArray, dt: float) -> PSD:
     knots = np.log(tuning.HAAR_PEAK / averaging)[::-1]  # rising frequency
     places = _Places(x, knots)
     level = np.log(2.0 * variance * averaging)
-    largest = tuning.PILOT_STEEPEST * float(np.log(2.0))
+    largest = (tuning.PILOT_STEEPEST * np.diff(np.log(averaging))).tolist()
     for _ in range(tuning.PILOT_ITERATIONS):
         implied = weight @ np.exp(places.interpolated(level[::-1]))
         level = level + np.clip(tuning.PILOT_STEP * np.log(variance / implied), -1.0, 1.0)
-        limited = level.tolist()  # within f^-2.5 .. f^2.5 from one level (an octave) to the next
-        for j in range(1, level.size):
-            limited[j] = min(max(limited[j], limited[j - 1] - largest), limited[j - 1] + largest)
+        limited = level.tolist()  # within f^-2.5 .. f^2.5 from one level to the next
+        for j, step in enumerate(largest, 1):
+            limited[j] = min(max(limited[j], limited[j - 1] - step), limited[j - 1] + step)
         level = np.array(limited)
 
     def psd(f: FloatArray, sampling: float) -> FloatArray:
@@ -363,6 +364,14 @@ class Levels:
         deviation = np.sqrt(growth) * (1.0 + change)
         inflation = np.outer(deviation, deviation) * common_share(centres, widths, n)
         return GapEffects(n - self.runs.present, self.counts, change, inflation)
+
+    def spectrum(self) -> Periodogram | None:
+        """That of the longest run, if it holds most of the samples."""
+        longest = np.argmax(self.runs.edges[:, 1] - self.runs.edges[:, 0])
+        start, stop = self.runs.edges[longest].tolist()
+        if stop - start < tuning.SHARE_OF_RUN * self.runs.present:
+            return None
+        return Periodogram.of(self.values[start:stop], self._integral[start : stop + 1])
 
     def block_means(self) -> tuple[FloatArray, int]:
         """Means of blocks of what exists, and their size.

@@ -119,6 +119,7 @@ def wavelet_variance(
         gaps=levels.effects(change),
         fourth_cumulant=0.0 if robust else fourth_cumulant(values),
         data_covariance=found,
+        spectrum=None if robust else levels.spectrum(),
     )
 
 
@@ -232,6 +233,8 @@ def as_channel(
     """
     if isinstance(data, Channel):
         return data
+    if isinstance(data, WaveletVariance):
+        raise InputError(f"{data!r} has no samples, which this needs: give the series")
     if isinstance(data, str | Mapping):
         source = f"gmwm.read({data!r})" if isinstance(data, str) else "recording"
         raise InputError(

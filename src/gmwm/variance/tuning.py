@@ -14,7 +14,13 @@ TAPERS = 3
 LAWS = (2.0, 1.0, 0.0, -1.0, -2.0)  # powers of the frequency: quantization noise to random walk
 LAW_ITERATIONS = 150
 LARGEST_MISFIT = 3.0  # factor from which a bin no longer pulls at the power laws
-SPECTRUM_BINS_PER_OCTAVE = 8
+MOST_OF_SPECTRUM = (1 << 16) - 1  # samples whose periodogram is taken whole
+PIECE_OF_SPECTRUM = (1 << 13) - 1  # samples, or means of blocks, of a piece of a longer series
+COARSER_BLOCKS = 256  # times the block before, of the spectrum at lower frequencies
+PLAIN_DRIFT = 4.0  # standard errors of the mean of the coarsest coefficients under the spectrum
+MOST_BINS = 1000  # of a stored spectrum; a series of 2^40 samples has 300
+SHARE_OF_RUN = 0.5  # of the samples, in a run that stands for a series with gaps
+LEAST_ORDINATE = 8  # of a piece; lower frequencies are those of longer blocks
 ORDINATES_OF_BIN = 12.0  # ordinates as certain as that a sum of power laws is right
 
 # -- the spectrum implied by wavelet variances ----------------------------------------------------
@@ -23,6 +29,12 @@ PILOT_ITERATIONS = 12  # rounds of scaling; the last changes no level by as much
 PILOT_STEP = 0.8  # share of a step in logarithms: levels share frequencies, whole steps oscillate
 PILOT_STEEPEST = 2.5  # power of the frequency from level to level; that of a random walk is 2
 HAAR_PEAK = 0.37  # the Haar gain of averaging time tau peaks at f = 0.37/tau
+
+# -- curves without samples -----------------------------------------------------------------------
+
+LEAST_RATIO = 1.4  # of averaging times that are kept
+LEAST_TIMES = 4
+TIME_ROUNDING = 0.005  # relative, of averaging times that are whole numbers of samples as printed
 
 # -- gaps -----------------------------------------------------------------------------------------
 

@@ -27,11 +27,12 @@ from gmwm._core.typing import FloatArray
 from gmwm._core.units import shown_unit
 from gmwm.errors import InputError
 from gmwm.issues import Notice, notice
-from gmwm.process import PSD, wavelet as known_wavelet
+from gmwm.process import PSD, wavelet as known_wavelet, wavelet_variance as variance_under
 from gmwm.variance import tuning
 from gmwm.variance.covariance.haar import haar_covariance, line_covariance, mean_covariance
 from gmwm.variance.gaps import GapEffects
 from gmwm.variance.levels import pilot_psd
+from gmwm.variance.periodogram import Periodogram
 
 if TYPE_CHECKING:
     import pandas
@@ -84,7 +85,12 @@ class WaveletVariance(Printed, Document):
     data_covariance : (J, J) ndarray or None
         Covariance of ``variance`` estimated from the coefficients themselves, u^4, where it was
         asked for.
+    spectrum : Periodogram or None
+        Of the samples, for ``covariance``; ``None`` where no run holds most of them, for robust
+        estimates, streams and several recordings.
     """
+
+    LATER = frozenset({"spectrum"})
 
     tau: Array
     variance: Array
@@ -103,11 +109,17 @@ class WaveletVariance(Printed, Document):
     gaps: GapEffects | None = None
     fourth_cumulant: Annotated[NotNegative, Le(tuning.LARGEST_VARIANCE**2)] = 0.0
     data_covariance: Array | None = None
+    spectrum: Periodogram | None = None
 
     @property
     def n_all(self) -> int:
         """Number of samples of all recordings."""
         return self.n
+
+    @property
+    def extent(self) -> str:
+        """Length and rate in words."""
+        return f"{self.n:,} samples at {1.0 / self.dt:g} Hz"
 
     @property
     def averaging(self) -> FloatArray:
@@ -122,6 +134,8 @@ class WaveletVariance(Printed, Document):
     @property
     def width(self) -> FloatArray:
         """Number of samples in a coefficient, (J,)."""
+        if self.wavelet == "haar":
+            return 2.0 * self.averaging
         kind = known_wavelet(self.wavelet)
         return np.array([kind.width(j + 1) for j in range(self.tau.size)], dtype=float)
 
@@ -163,11 +177,22 @@ class WaveletVariance(Printed, Document):
     def covariance(self) -> FloatArray:
         """Covariance of ``variance``, u^4, (J, J).
 
-        For a Gaussian series with the smooth spectrum that the wavelet variances themselves imply;
-        no model is assumed.
+        For a Gaussian series with the smooth spectrum of its samples, about a drift where it has a
+        plain one, or with the spectrum that the wavelet variances themselves imply; no model is
+        assumed.
         """
-        psd = pilot_psd(self._positive, self.averaging, self.dt)
-        return self.covariance_under(psd)
+        if self.spectrum is None:
+            return self.covariance_under(pilot_psd(self._positive, self.averaging, self.dt))
+        found = self.covariance_under(self.spectrum.root_square)
+        means, response = self.mean_covariance_under(self.spectrum.psd), self.drift_response
+        if response[-1] > 0.0 and self.mean[-1] ** 2 > tuning.PLAIN_DRIFT**2 * means[-1, -1]:
+            # Means of fine levels are those of a coarser one, but for the response.
+            at = np.maximum(np.arange(self.tau.size), int(np.argmax(np.diag(means) > 0.0)))
+            drift = response**2 / response[at] * (self.mean[-1] / response[-1])
+            return found + 4.0 * np.outer(drift, drift) * means[np.ix_(at, at)]
+        implied = variance_under(self.spectrum.psd, (), self.tau, self.dt, self.wavelet)
+        scale = self._positive / implied
+        return found * np.outer(scale, scale)
 
     def covariance_under(self, psd: PSD, lines: Sequence[tuple[float, float]] = ()) -> FloatArray:
         """Covariance of ``variance`` for noise of a given spectrum, u^4, (J, J).
@@ -256,10 +281,8 @@ class WaveletVariance(Printed, Document):
     # -- printed, stored, drawn --------------------------------------------------------------------
 
     def __repr__(self) -> str:
-        size = f"{self.n:,} samples at {1.0 / self.dt:g} Hz"
-        return (
-            f"<{type(self).__name__} of {self.name or 'a series'}: {size}, {self.tau.size} levels>"
-        )
+        name = f"<{type(self).__name__} of {self.name or 'a series'}"
+        return f"{name}: {self.extent}, {self.tau.size} levels>"
 
     def __str__(self) -> str:
         return self.text()
@@ -269,7 +292,7 @@ class WaveletVariance(Printed, Document):
 
     def text(self, units: str = "field") -> str:
         """The text of `print`: Allan deviations in data-sheet units or, with "si", in SI."""
-        head = f"{self.name or 'series'}: {self.n:,} samples at {1.0 / self.dt:g} Hz"
+        head = f"{self.name or 'series'}: {self.extent}"
         if self.gaps is not None:
             head += f", {self.gaps.missing:,} of them missing"
         if self.wavelet != "haar":
@@ -305,6 +328,8 @@ class WaveletVariance(Printed, Document):
             raise ValueError("blocks hold more samples than there are, or none")
         if self.gaps is not None:
             self.gaps.check(self.n, size)
+        if self.spectrum is not None:
+            self.spectrum.check()
         if self.data_covariance is not None:
             check_covariance(self.data_covariance.tolist(), size, "data_covariance")
 
@@ -359,6 +384,8 @@ class PooledVariance(WaveletVariance):
             raise InputError("no recordings given: give at least one wavelet variance")
         longest = max(parts, key=lambda part: part.tau.size)
         for part in parts:
+            if not np.array_equal(part.tau, longest.tau[: part.tau.size]):
+                raise InputError("recordings have other averaging times: fit curves one by one")
             for name in ("dt", "unit", "wavelet", "efficiency"):
                 if getattr(part, name) != getattr(longest, name):
                     raise InputError(
@@ -385,7 +412,9 @@ class PooledVariance(WaveletVariance):
         pooled["data_covariance"] = (
             _combined(covariances, shares) if len(covariances) == len(parts) else None
         )
-        return cls(**{**own, **pooled, "fourth_cumulant": 0.0}, parts=tuple(parts))
+        return cls(
+            **{**own, **pooled, "fourth_cumulant": 0.0, "spectrum": None}, parts=tuple(parts)
+        )
 
     @cached_property
     def shares(self) -> FloatArray:

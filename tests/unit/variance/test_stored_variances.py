@@ -72,11 +72,13 @@ def at(index, value):
         (("gaps", "inflation"), shorter), (("gaps", "inflation", 0), shorter),
         (("gaps", "inflation", 0), at(1, 0.0)), (("data_covariance",), shorter),
         (("data_covariance", 0), at(1, 1e9)), (("driftless",), lambda d: [1.0]),
-        (("wavelet",), lambda w: "none"),
+        (("wavelet",), lambda w: "none"), (("spectrum", "mean"), shorter),
+        (("spectrum", "mean"), at(0, 0.0)), (("spectrum", "block"), at(0, 1.5)),
+        (("spectrum", "centre"), at(0, 0.6)), (("spectrum", "count"), at(0, None)),
     ],
 )  # fmt: skip
 def test_what_does_not_go_together_is_refused(path, change):
-    content = stored(data_covariance="none")
+    content = stored(path[0] != "spectrum", data_covariance="none")
     read(content)
     with pytest.raises(gmwm.InputError):
         read(changed(content, path, change))

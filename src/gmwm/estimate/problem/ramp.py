@@ -172,8 +172,8 @@ def _existing(wv: WaveletVariance) -> NDArray[np.intp]:
     index = np.flatnonzero(there[1:-1] & (there[:-2] | there[2:]))
     if index.size < tuning.FEWEST_BLOCKS:
         raise InputError(
-            f"{wv.name or 'the series'} has missing samples everywhere, so no ramp can be "
-            "estimated: fit a model without RateRamp"
+            f"{wv.name or 'the series'} has no samples in a row, so no ramp can be estimated: fit "
+            "a model without RateRamp"
         )
     return index
 

@@ -403,7 +403,7 @@ class Fit(Document, Printed):
         return "\n".join(lines)
 
     def _size(self) -> str:
-        return f"{self.wv.n:,} samples at {1.0 / self.wv.dt:g} Hz"
+        return self.wv.extent
 
     def plot(self, ax: Axes | None = None, *, units: str = "field") -> Axes:
         """Allan deviation with error bars, fitted curve, its 95 % band and components.

@@ -73,7 +73,7 @@ def allan_dof(kind: AllanFilter, spectrum: Periodogram, n: int, m: int) -> tuple
     """
     f, weight = _nodes(m)
     mean = weight @ (kind.gain(m, f) * spectrum.psd(f, 1.0))
-    square = weight @ (kind.gain(m, f, 2) * spectrum.square(f))
+    square = weight @ (kind.gain(m, f, 2) * spectrum.root_square(f, 1.0) ** 2)
     part = min(n, tuning.FEW_AVERAGES * m)
     bias, share, added = _of_blocks(kind, spectrum, part, m)
     bias, share = (1.0 + (each - 1.0) * part / n for each in (bias, share))  # ends are 1/n of it

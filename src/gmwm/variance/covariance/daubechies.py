@@ -47,7 +47,8 @@ class _LagSums:
 @lru_cache(maxsize=4)
 def _lag_sums(name: str, n: int, levels: int) -> _LagSums:
     filters = wavelet(name)
-    block, first = block_of(n)
+    block, shortest = block_of(n)
+    first = int(np.log2(shortest))
     coarse = range(min(first, levels) + 1, levels + 1)
     grid = LagGrid.holding(max(3 * n / block, tuning.LEAST_LAGS), block)
     folds = np.arange(max(-tuning.FOLDS, -(block // 2)), min(tuning.FOLDS, (block - 1) // 2) + 1)

@@ -78,8 +78,8 @@ def lag_sums(
     return mean, square, whole
 
 
-# Mean of sin^4(x) sin^4(2^s x) over x, less the square of the mean of sin^4(x), for s = 0 and 1.
-_MEAN_PRODUCT_EXCESS = {0: 35.0 / 128.0 - 9.0 / 64.0, 1: 7.0 / 64.0 - 9.0 / 64.0}
+# Mean of sin^4(x) sin^4(s x) over x, less the square of the mean of sin^4(x), for s = 1 and 2.
+_MEAN_PRODUCT_EXCESS = {1: 35.0 / 128.0 - 9.0 / 64.0, 2: 7.0 / 64.0 - 9.0 / 64.0}
 
 
 def haar_counts(n: int, m: FloatArray) -> FloatArray:
@@ -146,10 +146,11 @@ class _LagSums:
 
 
 @lru_cache(maxsize=16)  # recordings that are fitted jointly; 3 MB each
-def _lag_sums(n: int) -> _LagSums:
-    """Set-up of the sums over lags, on means of blocks of samples."""
-    m = dyadic_levels(n)
-    block, first = block_of(n)
+def _lag_sums(n: int, averaging: tuple[float, ...] = ()) -> _LagSums:
+    """Set-up of the sums over lags, on means of blocks of samples; averaging times are rounded."""
+    m = np.array(averaging) if averaging else dyadic_levels(n)
+    block, shortest = block_of(n)
+    first = int(np.searchsorted(m, shortest))
     grid = LagGrid.holding(3 * n / block, block)
     available = haar_counts(n, m[first:])
     lag = (block * np.arange(grid.size // 2 + 1)).astype(float)
@@ -160,13 +161,12 @@ def _lag_sums(n: int) -> _LagSums:
         for k, other in enumerate(available[: j + 1]):
             pairs = centred_pairs(own, other, lag, block) / (block * min(own, other))
             counts[j, k] = counts[k, j] = pairs
-    averaging = m[first:] / block
-    sine, scaled = np.sin(np.pi * grid.frequency), averaging[:, None]
+    steps = (m[first:] // block).astype(np.intp)
+    sine, scaled = np.sin(np.pi * grid.frequency), steps[:, None]
     amplitude = np.sin(np.pi * scaled * grid.frequency) ** 2 / (scaled * sine)
     slopes = amplitude / sine
     slopes[:, 0] = 0.0
-    steps, at_zero = averaging.astype(np.intp), amplitude[:, 0].copy()
-    return _LagSums(first, grid, steps, slopes, at_zero, weights, weights * counts)
+    return _LagSums(first, grid, steps, slopes, amplitude[:, 0].copy(), weights, weights * counts)
 
 
 def _end_effects(psd: PSD, dt: float, sums: _LagSums) -> FloatArray:
@@ -191,13 +191,13 @@ def _excess(
     m = np.array(averaging)
     rows, columns, weights = [], [], []
     resolved = [resolved_share(each, frequency) for each in averaging]
-    for step, excess in _MEAN_PRODUCT_EXCESS.items():
-        for j in range(m.size - step):
-            averaged = 1.0 - resolved[j] * resolved[j + step]
+    for ratio, excess in _MEAN_PRODUCT_EXCESS.items():
+        for j, k in np.argwhere(m == ratio * m[:, None]).tolist():
+            averaged = 1.0 - resolved[j] * resolved[k]
             if np.any(averaged > 0.0):
                 rows.append(j)
-                columns.append(j + step)
-                scale = excess / (m[j] * m[j + step]) ** 2
+                columns.append(k)
+                scale = excess / (m[j] * m[k]) ** 2
                 weights.append(scale * averaged / np.sin(np.pi * frequency) ** 4)
     found = np.array(weights).reshape(-1, frequency.size)
     return np.array(rows, dtype=int), np.array(columns, dtype=int), found
@@ -301,7 +301,12 @@ def mean_covariance(psd: PSD, n: int, dt: float) -> FloatArray:
 
 
 def haar_covariance(
-    psd: PSD | Any, n: int, dt: float | None = None, *, rate: float | None = None
+    psd: PSD | Any,
+    n: int,
+    dt: float | None = None,
+    *,
+    rate: float | None = None,
+    averaging: Sequence[float] | FloatArray = (),
 ) -> FloatArray:
     """Covariance of the Haar wavelet variance estimates of a Gaussian series.
 
@@ -313,34 +318,44 @@ def haar_covariance(
         Number of samples.
     dt, rate : float
         Sampling interval, s, or rate, Hz.
+    averaging : (J,) array_like, optional
+        Averaging times, whole numbers of samples, rising, the last at most ``n`` / 2; by default
+        1, 2, 4, ...
 
     Returns
     -------
     (J, J) ndarray
-        In u^4, for the levels of `dyadic_levels`.
+        In u^4.
     """
     dt = checks.sampling_interval(dt, rate)
     psd = getattr(psd, "psd", psd)
-    m = dyadic_levels(n)
+    m = np.asarray(averaging, dtype=float) if len(averaging) else dyadic_levels(n)
     counts = haar_counts(n, m)
     covariance = integrals(psd, dt, m) / np.maximum.outer(counts, counts)
-    sums = _lag_sums(n)
+    sums = _lag_sums(n, tuple(m.tolist()) if len(averaging) else ())
     covariance[sums.first :, sums.first :] *= _end_effects(psd, dt, sums)
     return covariance
 
 
 def line_covariance(
-    lines: Sequence[tuple[float, float]], psd: PSD, dt: float, name: str, counts: FloatArray
+    lines: Sequence[tuple[float, float]],
+    psd: PSD,
+    dt: float,
+    kind: str | FloatArray,
+    counts: FloatArray,
 ) -> FloatArray:
     """Contribution of spectral lines to the covariance: their product with the noise around them.
 
     A line of amplitude a at frequency f adds 2 a^2 |H_j|^2 |H_k|^2 S(f) / max(M_j, M_k), with the
-    gains H of the wavelet of a name.
+    gains H of the wavelet of a name, or of Haar filters of averaging times in samples.
     """
     total = np.zeros((counts.size, counts.size))
     for frequency, amplitude in lines:
         f = np.abs(frequency * dt - np.rint(frequency * dt))
-        gain = wavelet(name).gains(counts.size, f)
+        if isinstance(kind, str):
+            gain = wavelet(kind).gains(counts.size, f)
+        else:
+            gain = (np.sin(np.pi * kind * f) ** 2 / (kind * np.sin(np.pi * f))) ** 2
         density = float(evaluated(psd, np.array([f]) / dt, dt)[0]) / dt
         total += 2.0 * amplitude**2 * density * np.outer(gain, gain)
     return np.asarray(total / np.maximum.outer(counts, counts))

@@ -62,11 +62,11 @@ class LagGrid:
 
 
 def block_of(n: int) -> tuple[int, int]:
-    """Samples per block in a record of ``n``, and the first level that lags are summed for."""
+    """Samples per block in a record of ``n``, and in the shortest mean that lags are summed for."""
     if n <= tuning.EXACT_SAMPLES:
-        return 1, 0
+        return 1, 1
     block = 2 ** int(np.floor(np.log2(n / tuning.BLOCKS)))
-    return block, int(np.log2(block * tuning.BLOCKS_PER_AVERAGE))
+    return block, block * tuning.BLOCKS_PER_AVERAGE
 
 
 def block_density(psd: PSD, dt: float, frequency: FloatArray, block: int) -> FloatArray:

@@ -8,19 +8,13 @@ import pytest
 
 import gmwm
 from gmwm import GaussMarkov, WhiteNoise
-from gmwm.variance import WaveletVariance
 from places import SHARED
 
 CURVES = SHARED / "reference" / "smac_curves.json"
 
 
-def series_of(variance, dt):
-    """Wavelet variances by level, as of a record of that many octaves."""
-    levels, n = len(variance), 2 ** (len(variance) + 1) - 1
-    return WaveletVariance(
-        tau=dt * 2.0 ** np.arange(levels), variance=np.array(variance), mean=np.zeros(levels),
-        blocks=np.zeros(64), block=n // 64, n=n, dt=dt,
-    )  # fmt: skip
+def octaves(variance, rate):
+    return gmwm.curve(2.0 ** np.arange(len(variance)) / rate, variance, kind="wavelet", rate=rate)
 
 
 def made(seed):
@@ -29,14 +23,14 @@ def made(seed):
     truth = WhiteNoise(7e-5) + GaussMarkov(8e-5, 4.0) + GaussMarkov(1.7e-4, 2000.0)
     variance = truth.wavelet_variance(0.004 * 2.0 ** np.arange(20), 0.004)
     bend = np.concatenate([2.0 * np.sort(rng.uniform(size=5))[::-1], rng.normal(0.0, 0.15, 15)])
-    return series_of(variance * np.exp(bend), 0.004)
+    return octaves(variance * np.exp(bend), 250.0)
 
 
 def stored(axis):
     if not CURVES.exists():
         pytest.skip("needs the stored curves")
     record = json.loads(CURVES.read_text())["navchip"]
-    return series_of(record["axes"][axis]["wavelet_variance"], 1.0 / record["rate"])
+    return octaves(record["axes"][axis]["wavelet_variance"], record["rate"])
 
 
 @pytest.mark.parametrize("source", ["Gyro. X", "Gyro. Y", *range(4)])

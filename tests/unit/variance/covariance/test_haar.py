@@ -33,10 +33,10 @@ def series_covariance(process, n):
     return toeplitz(process.autocovariance(np.arange(n), 1.0))
 
 
-def filters(n):
+def filters(n, averaging):
     """All Haar coefficients free of end effects as matrices, one a level."""
     result = []
-    for m in dyadic_levels(n).astype(int):
+    for m in averaging.astype(int):
         count = n - 2 * m + 1
         matrix = np.zeros((count, n))
         for t in range(count):
@@ -46,9 +46,9 @@ def filters(n):
     return result
 
 
-def brute_force(process, n):
+def brute_force(process, n, averaging=None):
     series = series_covariance(process, n)
-    levels = filters(n)
+    levels = filters(n, dyadic_levels(n) if averaging is None else averaging)
     squares = np.empty((len(levels), len(levels)))
     means = np.empty_like(squares)
     for j, first in enumerate(levels):
@@ -72,6 +72,19 @@ def test_covariance_equals_the_sum_over_all_pairs_of_coefficients(process, n):
     spread = np.sqrt(np.outer(np.diag(means), np.diag(means)))[coarse, coarse]
     difference = mean_covariance(process.psd, n, 1.0)[coarse, coarse] - means[coarse, coarse]
     assert np.max(np.abs(difference) / spread) < 0.02
+
+
+@pytest.mark.parametrize("process", PROCESSES, ids=repr)
+def test_any_averaging_times_are_those_between_the_octaves(process):
+    m = np.array([1, 3, 4, 6, 10, 12, 20, 31, 40, 79])
+    expected = brute_force(process, 160, m)[0]
+    found = haar_covariance(process.psd, 160, 1.0, averaging=m)
+    scale = np.sqrt(np.outer(np.diag(expected), np.diag(expected)))
+    assert np.max(np.abs(found - expected) / scale) < 0.04
+    octaves = haar_covariance(process.psd, 30_000, 1.0)
+    places = [0, 3, 7, 10, 13]
+    some = haar_covariance(process.psd, 30_000, 1.0, averaging=2.0 ** np.array(places))
+    np.testing.assert_allclose(some, octaves[np.ix_(places, places)], rtol=1e-5)
 
 
 @pytest.mark.parametrize("process", PROCESSES, ids=repr)

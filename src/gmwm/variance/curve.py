@@ -1,0 +1,181 @@
+"""An Allan curve that others made, without its samples."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from gmwm._core import checks
+from gmwm._core.documents import NotNegative
+from gmwm._core.typing import FloatArray
+from gmwm._core.units import SI_UNIT, factor, quantity_of
+from gmwm.errors import InputError
+from gmwm.process import PSD
+from gmwm.variance import tuning
+from gmwm.variance.covariance.haar import haar_covariance, line_covariance
+from gmwm.variance.wavelet import WaveletVariance
+
+_PER_WAVELET = {"deviation": 0.5, "variance": 0.5, "wavelet": 1.0}
+"""Kind of values -> wavelet variance per square of a deviation, or per variance."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Curve(WaveletVariance):
+    """Wavelet variances at any averaging times, without samples; made by `curve`.
+
+    error: Standard error of reading a deviation, relative; it adds to that of the estimate. All
+        other attributes are as in `WaveletVariance`.
+    """
+
+    SCHEMA: ClassVar[str] = "gmwm.curve"
+
+    error: NotNegative = 0.0
+
+    @property
+    def extent(self) -> str:
+        """Length and rate in words."""
+        ends = f"{self.tau[0]:.4g} to {self.tau[-1]:.4g} s"
+        return f"curve from {ends} of {super().extent}"
+
+    def covariance_under(self, psd: PSD, lines: Sequence[tuple[float, float]] = ()) -> FloatArray:
+        """As that of a series, at any averaging times, with the error of reading."""
+        covariance = haar_covariance(psd, self.n, self.dt, averaging=self.averaging)
+        covariance[np.diag_indices_from(covariance)] += (2.0 * self.error * self.variance) ** 2
+        if lines:
+            covariance += line_covariance(lines, psd, self.dt, self.averaging, self.counts)
+        return covariance
+
+    def detrended(self, slope: float) -> FloatArray:
+        """Raise InputError: a curve does not show the sign of a drift."""
+        raise InputError(
+            "a curve does not show a drift apart from noise: fit a model without RateRamp, or the "
+            "samples"
+        )
+
+    def check_content(self) -> None:
+        m = self.averaging
+        if not (m.ndim == 1 and m.size == self.variance.size and np.all(np.isfinite(m))):
+            raise ValueError("not one variance an averaging time")
+        if not (m[0] >= 1.0 and np.all(np.diff(m) > 0.0) and 2.0 * m[-1] <= self.n):
+            raise ValueError("averaging times do not rise from one sample to half the record")
+        if not np.all((self.variance > 0.0) & (self.variance <= tuning.LARGEST_VARIANCE)):
+            raise ValueError("a variance is not positive, or too large")
+
+
+def curve(
+    tau: Sequence[float] | FloatArray,
+    values: Sequence[float] | FloatArray,
+    *,
+    kind: str = "deviation",
+    duration: float | None = None,
+    rate: float | None = None,
+    error: float = 0.0,
+    unit: str = "u",
+    name: str = "",
+) -> Curve:
+    """An Allan curve of another tool, a data sheet or a paper, to fit models to.
+
+    `fit`, `select` and `plot` take it like a wavelet variance, and `bound` and `export` their
+    results. Health, drifts and likelihoods need the samples.
+
+    Parameters
+    ----------
+    tau : (J,) array_like
+        Averaging times, s, in any order and at any distances. At most two an octave are kept:
+        others say hardly more.
+    values : (J,) array_like
+        The curve, in ``unit`` or its square.
+    kind : {"deviation", "variance", "wavelet"}, optional
+        Overlapping Allan deviation, Allan variance, or Haar wavelet variance.
+    duration : float, optional
+        Length of the recording, s, which decides how certain the values are; by default the
+        shortest that has such a curve, twice the longest averaging time.
+    rate : float, optional
+        Sampling rate, Hz; by default one sample in the shortest averaging time.
+    error : float, optional
+        Standard error of reading a deviation, in per cent: 3 or so for a digitised plot.
+    unit : str, optional
+        Such as "deg/h", "deg/s", "ug", "m/s^2".
+    name : str, optional
+        Of the axis, such as "gyro_x".
+
+    Returns
+    -------
+    Curve
+
+    Raises
+    ------
+    InputError
+        If these are not such values, fewer than four remain, or the recording is shorter than twice
+        the longest averaging time.
+
+    Examples
+    --------
+    >>> import gmwm
+    >>> tau = [0.01, 0.1, 1.0, 10.0, 100.0, 1000.0]
+    >>> found = gmwm.curve(tau, [36.0, 11.4, 3.6, 1.14, 0.37, 0.25], unit="deg/h", error=3.0)
+    >>> gmwm.fit("N + K", found).valid
+    True
+    """
+    scale = _PER_WAVELET[checks.choice("kind", kind, tuple(_PER_WAVELET))]
+    times, given = (checks.real_numbers(each, "the curve") for each in (tau, values))
+    if times.ndim != 1 or times.shape != given.shape:
+        raise InputError(
+            f"a curve of {given.shape} values at {times.shape} averaging times: give one list of "
+            "each, of equal lengths"
+        )
+    if not np.all((times > 0.0) & np.isfinite(times) & (given > 0.0) & np.isfinite(given)):
+        raise InputError("a curve has an averaging time or value that is not positive: remove it")
+    order = np.argsort(times)
+    times, given = times[order], given[order]
+    dt = checks.sampling_interval(float(times[0]) if rate is None else None, rate)
+    kept = _apart(times / dt)
+    times, given = times[kept], given[kept]
+    if times.size < tuning.LEAST_TIMES:
+        raise InputError(
+            f"a curve of {times.size} averaging times between one sample, {dt:g} s, and the "
+            f"longest: give at least {tuning.LEAST_TIMES}, half an octave apart"
+        )
+    m = np.rint(times / dt)
+    shortest = 2.0 * m[-1] * dt
+    length = shortest if duration is None else checks.positive("duration", duration)
+    if length < shortest * (1.0 - tuning.TIME_ROUNDING):
+        raise InputError(
+            f"duration = {length:g} s is less than twice the longest averaging time, "
+            f"{times[-1]:g} s: give that of the recording"
+        )
+    quantity, own = None, unit
+    if unit != "u":
+        quantity = quantity_of(unit)
+        own = SI_UNIT[quantity]
+        given = given * factor(unit, own) ** (1 if kind == "deviation" else 2)
+    variance = scale * (given**2 if kind == "deviation" else given)
+    whole = np.abs(times - m * dt) < tuning.TIME_ROUNDING * times
+    return Curve(
+        tau=np.where(whole, m * dt, times),
+        variance=variance,
+        mean=np.zeros(times.size),
+        blocks=np.array([np.nan]),
+        block=1,
+        n=checks.samples(max(round(length / dt), int(2.0 * m[-1]))),
+        dt=dt,
+        name=name,
+        quantity=quantity,
+        unit=own,
+        error=checks.plausible("error", error) / 100.0,
+    )
+
+
+def _apart(m: FloatArray) -> list[int]:
+    """Places of the averaging times that are kept.
+
+    m: Averaging times in samples, rising.
+    """
+    kept: list[int] = []
+    for place, each in enumerate(np.rint(m).tolist()):
+        if each >= (np.rint(m[kept[-1]]) * tuning.LEAST_RATIO if kept else 1.0):
+            kept.append(place)
+    return kept
