@@ -129,14 +129,13 @@ class Discrepancy:
     """The level of discrepancy while a fit is iterated.
 
     given: Fixed value; ``None`` to estimate it.
-    dof: Degrees of freedom of the fit.
+    is_overdetermined: Whether there are more levels than parameters, without which it is zero.
     """
 
-    def __init__(self, given: float | None, dof: int) -> None:
+    def __init__(self, given: float | None, is_overdetermined: bool) -> None:
         self.value = given or 0.0
         self.given = given
-        self._estimated = given is None and dof > 0
-        self._dof = dof
+        self._estimated = given is None and is_overdetermined
 
     def start_at(self, value: float) -> None:
         """Begin with the reference mixture's value, if it is to be estimated and not small.
@@ -147,7 +146,12 @@ class Discrepancy:
             self.value = value
 
     def update(
-        self, residual: FloatArray, covariance: FloatArray, target: FloatArray, basis: FloatArray
+        self,
+        residual: FloatArray,
+        covariance: FloatArray,
+        target: FloatArray,
+        basis: FloatArray,
+        dof: int,
     ) -> bool:
         """Estimate anew from residuals (J,) and their covariance; returns whether it changed.
 
@@ -155,10 +159,10 @@ class Discrepancy:
         """
         if not self._estimated:
             return False
-        if self.value == 0.0 and suffices(0.0, residual, covariance, target, basis, self._dof):
+        if self.value == 0.0 and suffices(0.0, residual, covariance, target, basis, dof):
             return False
         before = self.value
-        self.value = moment_estimate(residual, covariance, target, self._dof)
+        self.value = moment_estimate(residual, covariance, target, dof)
         return abs(self.value - before) > _SETTLED * max(self.value, before, 1e-6)
 
 
