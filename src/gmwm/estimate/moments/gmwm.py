@@ -272,7 +272,9 @@ class _Problem:
         A term without one fits nothing, and counted it would only raise the discrepancy.
         """
         present = self.design.amplitudes(point.x) > 0.0
-        return int(self.moments.wv.tau.size - sum(present[i] for i, _ in self.design.coordinates.owners))
+        return int(
+            self.moments.wv.tau.size - sum(present[i] for i, _ in self.design.coordinates.owners)
+        )
 
 
 def _iterate(problem: _Problem, relaxed: FloatArray, level: Discrepancy) -> Converged | None:
@@ -342,9 +344,7 @@ def _under_reference(problem: _Problem, level: Discrepancy) -> Converged:
         covariance = with_discrepancy(statistical, target, level.value)
         point = problem.search(target, covariance)
         residual = target - design.implied(point.x, point.shapes)
-        if not level.update(
-            residual, statistical, target, reference.curve, problem.dof(point)
-        ):
+        if not level.update(residual, statistical, target, reference.curve, problem.dof(point)):
             break
     return Converged(
         design, moments.slope, covariance, statistical, point, reference.curve, level.value

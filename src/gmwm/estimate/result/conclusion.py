@@ -191,14 +191,19 @@ def estimate_notices(
         if is_positive_shape and error > tuning.UNDETERMINED * (item.value or 0.0):
             bad.append(notice("undetermined", item.key, {"stderr": error}))
     bad += _indistinct_notices(model, keys, matrix)
+    terms = {item.key: item.term for item in model.parameters}
+    worst: dict[tuple[int, int], tuple[float, Notice]] = {}  # one for any two terms
     for (i, first), (j, second) in combinations(enumerate(keys), 2):
         if errors[first] == 0.0 or errors[second] == 0.0:
             continue
         correlation = float(matrix[i, j] / (errors[first] * errors[second]))
         is_loose = errors[second] > tuning.LOOSE * abs(model.params[second] or 0.0)
-        if abs(correlation) > tuning.CONFOUNDED and is_loose:
+        pair = terms[first], terms[second]
+        before = worst[pair][0] if pair in worst else tuning.CONFOUNDED
+        if abs(correlation) > before and is_loose:
             values = {"other": first, "correlation": correlation}
-            bad.append(notice("confounded", second, values))
+            worst[pair] = abs(correlation), notice("confounded", second, values)
+    bad += [found for _, found in worst.values()]
     return bad, _bandwidth_notices(model, wv)
 
 
