@@ -314,7 +314,7 @@ def _iterate(problem: _Problem, relaxed: FloatArray, level: Discrepancy) -> Conv
         # A discrepancy does not enter before the weights settle, where any model looks wrong.
         if converged or (level.value > 0.0 and rounds % tuning.DISCREPANCY_EVERY == 0):
             changed = level.update(
-                target - curve, statistical, target, previous, problem.dof(point)
+                target - curve, statistical, target, previous, problem.dof(point), moments.taken
             )
             if converged and not changed:
                 return Converged(
@@ -344,7 +344,9 @@ def _under_reference(problem: _Problem, level: Discrepancy) -> Converged:
         covariance = with_discrepancy(statistical, target, level.value)
         point = problem.search(target, covariance)
         residual = target - design.implied(point.x, point.shapes)
-        if not level.update(residual, statistical, target, reference.curve, problem.dof(point)):
+        if not level.update(
+            residual, statistical, target, reference.curve, problem.dof(point), moments.taken
+        ):
             break
     return Converged(
         design, moments.slope, covariance, statistical, point, reference.curve, level.value

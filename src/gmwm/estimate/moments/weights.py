@@ -80,6 +80,7 @@ def suffices(
     target: FloatArray,
     basis: FloatArray,
     dof: int,
+    taken: FloatArray | float = 0.0,
 ) -> bool:
     """Whether residuals (J,) agree with their covariance under a discrepancy of ``value``.
 
@@ -93,7 +94,9 @@ def suffices(
         implied = target - residual
         if np.any(implied <= 0.0) or np.any(basis <= 0.0):
             return False
-        objective = chi_square(target, implied, covariance, basis)[1]
+        if isinstance(taken, np.ndarray):
+            taken = taken[known]
+        objective = chi_square(target, implied, covariance, basis, taken)[1]
         return bool(chi2.sf(objective, dof) > tuning.MISFIT_P)
     return _objective(value, residual, covariance, target) <= dof
 
@@ -152,6 +155,7 @@ class Discrepancy:
         target: FloatArray,
         basis: FloatArray,
         dof: int,
+        taken: FloatArray | float = 0.0,
     ) -> bool:
         """Estimate anew from residuals (J,) and their covariance; returns whether it changed.
 
@@ -159,7 +163,7 @@ class Discrepancy:
         """
         if not self._estimated:
             return False
-        if self.value == 0.0 and suffices(0.0, residual, covariance, target, basis, dof):
+        if self.value == 0.0 and suffices(0.0, residual, covariance, target, basis, dof, taken):
             return False
         before = self.value
         self.value = moment_estimate(residual, covariance, target, dof)

@@ -86,18 +86,20 @@ class Comparison:
         basis: FloatArray,
         n_free: int,
         statistical: FloatArray | None = None,
+        taken: FloatArray | float = 0.0,
     ) -> Comparison:
         """Compare under a covariance that belongs to the wavelet variances ``basis``.
 
-        ``statistical`` is the covariance less the discrepancy, where there is one.
+        ``statistical`` is the covariance less the discrepancy, where there is one; ``taken`` as of
+        `chi_square`.
         """
         whitened = weight_root(covariance) @ (target - implied)
         dof = target.size - n_free
         plain = allowed = float("nan")
         if dof > 0 and np.all(basis > 0.0):
-            plain = allowed = chi_square(target, implied, covariance, basis)[1]
+            plain = allowed = chi_square(target, implied, covariance, basis, taken)[1]
             if statistical is not None:
-                plain = chi_square(target, implied, statistical, basis)[1]
+                plain = chi_square(target, implied, statistical, basis, taken)[1]
         return cls(float(whitened @ whitened), plain, allowed, dof)
 
 
