@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from itertools import product
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
@@ -386,6 +386,15 @@ class Process:
         """
         axes = [parameter.grid(dt, n).tolist() for parameter in self.shape_parameters]
         return list(product(*axes))
+
+    @property
+    def nested(self) -> tuple[Process, ...]:
+        """Open processes whose sum is a case of this kind: the search starts from their fit."""
+        return ()
+
+    def shape_of_sum(self, processes: Sequence[Process], dt: float) -> Shape:
+        """The shape at which this process is a sum of `nested` ones with values."""
+        raise NotImplementedError
 
     def shape_to_free(self, shape: Shape) -> FloatArray:
         """Map shape parameters to the whole real line."""

@@ -208,13 +208,17 @@ def conclude_likelihood(
     noise = Model(top.processes)
     covariance, target = moments.covariance(noise), moments.target
     implied = noise.wavelet_variance(wv.tau, wv.dt, wv.wavelet)
-    comparison = Comparison.of(target, implied, covariance, implied, len(found.present))
+    taken = moments.taken
+    comparison = Comparison.of(
+        target, implied, covariance, implied, len(found.present), taken=taken
+    )
     if series.is_bridged:
         untested = float("nan")
         comparison = replace(comparison, chi_square=untested, chi_square_allowed=untested)
         found = replace(found, notices=(*found.notices, notice("no-test")))
         return conclude(found, comparison, wv, misfits=False)
-    agrees = suffices(0.0, target - implied, covariance, target, implied, max(comparison.dof, 1))
+    dof = max(comparison.dof, 1)
+    agrees = suffices(0.0, target - implied, covariance, target, implied, dof, taken)
     return conclude(found, comparison, wv, misfits=not agrees)
 
 

@@ -94,7 +94,13 @@ def conclude_moments(
         notices=notices,
     )
     comparison = Comparison.of(
-        target, implied, end.covariance, end.basis, jacobian.shape[1], end.statistical
+        target,
+        implied,
+        end.covariance,
+        end.basis,
+        jacobian.shape[1],
+        end.statistical,
+        moments.taken,
     )
     fit = conclude(found, comparison, wv, misfits=end.discrepancy > 0.0)
     redundant = _redundant_terms(design, point, comparison.objective, target, end.covariance)

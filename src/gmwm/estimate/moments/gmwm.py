@@ -50,6 +50,8 @@ _converged: WeakKeyDictionary[WaveletVariance, dict[tuple[GMWM, Model], Converge
 )
 """A selection and the tests of its terms ask for the same model repeatedly."""
 
+_LEAST_ERROR = 1e-12  # of a wavelet variance, relative: that of 1e24 samples
+
 
 class SquaredRamp(RateRamp):
     """A rate ramp as a term of nu(theta) like any other, which shows its square."""
@@ -167,7 +169,7 @@ class GMWM:
         moments = moments.under(dictionary_fit(wv, wv.variance, noise).mixture)
         problem = _Problem(design, moments, Weights.of(self.weights, wv))
         reference = dictionary_fit(wv, moments.target, noise)
-        level = Discrepancy(self.discrepancy, wv.tau.size - design.n_free)
+        level = Discrepancy(self.discrepancy, wv.tau.size > design.n_free)
         first = [level.value]
         if not any(process.is_line for process in noise):
             # The misfit of a sum of all kinds is discrepancy from the start. But processes that are
@@ -264,6 +266,16 @@ class _Problem:
         """The global minimum under the weights of a covariance of the moments."""
         return search(Profile(self.design, target, self.weights.root(covariance)))
 
+    def dof(self, point: Point) -> int:
+        """Levels less the parameters of terms that have an amplitude.
+
+        A term without one fits nothing, and counted it would only raise the discrepancy.
+        """
+        present = self.design.amplitudes(point.x) > 0.0
+        return int(
+            self.moments.wv.tau.size - sum(present[i] for i, _ in self.design.coordinates.owners)
+        )
+
 
 def _iterate(problem: _Problem, relaxed: FloatArray, level: Discrepancy) -> Converged | None:
     """Iterate theta -> minimum under the weights that theta implies; ``None`` if it wanders.
@@ -282,7 +294,8 @@ def _iterate(problem: _Problem, relaxed: FloatArray, level: Discrepancy) -> Conv
         target, statistical = moments.target, moments.covariance(noise)
         covariance = with_discrepancy(statistical, target, level.value)
         relaxed = covariance if rounds == 1 else (1.0 - part) * relaxed + part * covariance
-        if np.min(np.diag(relaxed)) < np.finfo(float).tiny:
+        deviation = np.sqrt(np.diag(covariance))
+        if not np.all(deviation > _LEAST_ERROR * np.abs(target)):
             return None  # a level without any noise of the model would outweigh all others
         if rounds == 1:  # weights from a first fit may point elsewhere: search anew, then follow
             point = problem.search(target, relaxed)
@@ -292,7 +305,7 @@ def _iterate(problem: _Problem, relaxed: FloatArray, level: Discrepancy) -> Conv
             profile = Profile(design, given, problem.weights.root(relaxed), lost=lost)
             point = profile.refine(profile.at(point.shapes))
         previous, curve = curve, design.implied(point.x, point.shapes)
-        before, step = step, (curve - previous) / np.sqrt(np.diag(covariance))
+        before, step = step, (curve - previous) / deviation
         largest = float(np.max(np.abs(step)))
         least = min(least, largest)
         if rounds == tuning.WANDERING_ROUNDS and least > tuning.WANDERING_STEP:
@@ -300,7 +313,9 @@ def _iterate(problem: _Problem, relaxed: FloatArray, level: Discrepancy) -> Conv
         converged = largest < tuning.SETTLED
         # A discrepancy does not enter before the weights settle, where any model looks wrong.
         if converged or (level.value > 0.0 and rounds % tuning.DISCREPANCY_EVERY == 0):
-            changed = level.update(target - curve, statistical, target, previous)
+            changed = level.update(
+                target - curve, statistical, target, previous, problem.dof(point), moments.taken
+            )
             if converged and not changed:
                 return Converged(
                     design, moments.slope, covariance, statistical, point, curve, level.value
@@ -329,7 +344,9 @@ def _under_reference(problem: _Problem, level: Discrepancy) -> Converged:
         covariance = with_discrepancy(statistical, target, level.value)
         point = problem.search(target, covariance)
         residual = target - design.implied(point.x, point.shapes)
-        if not level.update(residual, statistical, target, reference.curve):
+        if not level.update(
+            residual, statistical, target, reference.curve, problem.dof(point), moments.taken
+        ):
             break
     return Converged(
         design, moments.slope, covariance, statistical, point, reference.curve, level.value

@@ -7,7 +7,7 @@ Kaufman's form (Golub & Pereyra 2003, *Inverse Problems* 19, R1-R26).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, cast
 
@@ -20,7 +20,7 @@ from gmwm.estimate import tuning
 from gmwm.estimate.moments.design import MOST_SHAPES, Design
 from gmwm.estimate.moments.kernels import Weighted, linearized, profiled, projected
 from gmwm.estimate.problem import Scales, objectives_with, shape_of, solve_nonnegative
-from gmwm.process import GaussMarkov, Process, Shape, WhiteNoise
+from gmwm.process import GaussMarkov, Model, Process, Shape, WhiteNoise
 
 _MOST = 200  # evaluations of a search
 _LARGEST = 300.0  # logarithm of an amplitude, beyond which its square overflows
@@ -178,9 +178,9 @@ def search(profile: Profile, known: Sequence[Shape | None] | None = None) -> Poi
     """Global minimum for fixed weights, by adding terms one at a time and exchanging them.
 
     Each term with free shapes is first placed where on its grid it lowers the objective most, then
-    all shapes are refined together. A term with many shapes is refined from several such places. At
-    the end each term in turn is taken out and placed anew. A model that extends another one is
-    never worse if started from that one's shapes.
+    all shapes are refined together. A term with many shapes is refined from several such places,
+    and from the fit of the processes that it nests. At the end each term in turn is taken out and
+    placed anew. A model that extends another one is never worse if started from that one's shapes.
 
     known: Shapes to start with, ``None`` for the terms still to be placed.
     """
@@ -193,13 +193,13 @@ def search(profile: Profile, known: Sequence[Shape | None] | None = None) -> Poi
     missing = [i for i in design.shaped if shapes[i] is None]
     point = _present(profile, shapes)
     for i in missing:
-        many = design.terms[i].n_shapes >= tuning.MANY_SHAPES
-        starts = _places(profile, point.shapes, i, tuning.STARTS if many else 1)
-        point = _refine_present(profile, starts[0])
-        for start in starts[1:]:
-            if point.objective < profile.target.size:
+        found = None
+        for start in _starts(profile, point.shapes, i):
+            refined = _refine_present(profile, start)
+            found = min(found or refined, refined, key=lambda p: p.objective)
+            if found.objective < profile.target.size:
                 break  # within chance
-            point = min(point, _refine_present(profile, start), key=lambda p: p.objective)
+        point = found or point
     if len(design.shaped) < 2:
         return point
     for _ in range(tuning.EXCHANGES):
@@ -214,6 +214,29 @@ def search(profile: Profile, known: Sequence[Shape | None] | None = None) -> Poi
         if point.objective > before * (1.0 - tuning.IMPROVEMENT):
             break
     return point
+
+
+def _starts(profile: Profile, shapes: Sequence[Shape | None], i: int) -> Iterator[Point]:
+    """Points from which term ``i`` is refined beside the terms placed."""
+    term = profile.design.terms[i]
+    if term.process.nested and np.all(term.free_shape):
+        yield _at_nested(profile, shapes, i)
+    many = term.n_shapes >= tuning.MANY_SHAPES
+    yield from _places(profile, shapes, i, tuning.STARTS if many else 1)
+
+
+def _at_nested(profile: Profile, shapes: Sequence[Shape | None], i: int) -> Point:
+    """Term ``i`` at the sum of the processes that it nests, fitted beside the terms placed."""
+    terms, scales = profile.design.terms, profile.design.scales
+    nested = terms[i].process.nested
+    others = (term.process for term, shape in zip(terms, shapes, strict=True) if shape is not None)
+    design = Design(Model((*others, *nested)), scales)
+    found = search(Profile(design, profile.target, profile.root))
+    fitted = zip(design.terms, design.fitted_processes(found.x, found.shapes), strict=True)
+    parts = [at for term, at in fitted if any(term.process is each for each in nested)]
+    filled = list(shapes)
+    filled[i] = terms[i].process.shape_of_sum(parts, scales.dt)
+    return _present(profile, filled)
 
 
 def _columns(profile: Profile, shapes: Sequence[Shape | None]) -> tuple[FloatArray, FloatArray]:

@@ -80,6 +80,7 @@ def suffices(
     target: FloatArray,
     basis: FloatArray,
     dof: int,
+    taken: FloatArray | float = 0.0,
 ) -> bool:
     """Whether residuals (J,) agree with their covariance under a discrepancy of ``value``.
 
@@ -93,7 +94,9 @@ def suffices(
         implied = target - residual
         if np.any(implied <= 0.0) or np.any(basis <= 0.0):
             return False
-        objective = chi_square(target, implied, covariance, basis)[1]
+        if isinstance(taken, np.ndarray):
+            taken = taken[known]
+        objective = chi_square(target, implied, covariance, basis, taken)[1]
         return bool(chi2.sf(objective, dof) > tuning.MISFIT_P)
     return _objective(value, residual, covariance, target) <= dof
 
@@ -129,14 +132,13 @@ class Discrepancy:
     """The level of discrepancy while a fit is iterated.
 
     given: Fixed value; ``None`` to estimate it.
-    dof: Degrees of freedom of the fit.
+    is_overdetermined: Whether there are more levels than parameters, without which it is zero.
     """
 
-    def __init__(self, given: float | None, dof: int) -> None:
+    def __init__(self, given: float | None, is_overdetermined: bool) -> None:
         self.value = given or 0.0
         self.given = given
-        self._estimated = given is None and dof > 0
-        self._dof = dof
+        self._estimated = given is None and is_overdetermined
 
     def start_at(self, value: float) -> None:
         """Begin with the reference mixture's value, if it is to be estimated and not small.
@@ -147,7 +149,13 @@ class Discrepancy:
             self.value = value
 
     def update(
-        self, residual: FloatArray, covariance: FloatArray, target: FloatArray, basis: FloatArray
+        self,
+        residual: FloatArray,
+        covariance: FloatArray,
+        target: FloatArray,
+        basis: FloatArray,
+        dof: int,
+        taken: FloatArray | float = 0.0,
     ) -> bool:
         """Estimate anew from residuals (J,) and their covariance; returns whether it changed.
 
@@ -155,10 +163,10 @@ class Discrepancy:
         """
         if not self._estimated:
             return False
-        if self.value == 0.0 and suffices(0.0, residual, covariance, target, basis, self._dof):
+        if self.value == 0.0 and suffices(0.0, residual, covariance, target, basis, dof, taken):
             return False
         before = self.value
-        self.value = moment_estimate(residual, covariance, target, self._dof)
+        self.value = moment_estimate(residual, covariance, target, dof)
         return abs(self.value - before) > _SETTLED * max(self.value, before, 1e-6)
 
 

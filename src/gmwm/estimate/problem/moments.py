@@ -22,6 +22,7 @@ import numpy as np
 from gmwm._core.frozen import frozen
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
+from gmwm.estimate import tuning
 from gmwm.estimate.problem.parameters import drift_key
 from gmwm.estimate.problem.ramp import (
     Slope,
@@ -184,11 +185,16 @@ class Moments:
         return self.wv.variance if self.slope is None else self.wv.detrended(self.slope.value)
 
     @property
+    def taken(self) -> FloatArray:
+        """What the estimated slope takes of the variances of the noise, u^2, (J,)."""
+        if self.slope is None:
+            return np.zeros_like(self.wv.variance)
+        return bias_of_detrending(self.wv, self.slope)
+
+    @property
     def target(self) -> FloatArray:
         """Wavelet variances of the noise alone, u^2, (J,): what the slope takes is added."""
-        if self.slope is None:
-            return self.detrended
-        return self.detrended + bias_of_detrending(self.wv, self.slope)
+        return self.detrended + self.taken
 
     def slope_variances(self, terms: Sequence[Process]) -> FloatArray | None:
         """What each term adds to the variance of the estimated slope; None where none is."""
@@ -244,6 +250,7 @@ class FittedMoments:
     implied: (J,), those of the model's noise, u^2.
     statistical: (J, J), covariance of ``target`` if the model is right, u^4.
     discrepancy: Relative error allowed for at each level.
+    taken: (J,), what was added to ``target`` because an estimated slope took it, u^2.
     """
 
     scales: Scales
@@ -251,6 +258,7 @@ class FittedMoments:
     implied: FloatArray
     statistical: FloatArray
     discrepancy: float
+    taken: FloatArray
 
     @classmethod
     def of(
@@ -275,9 +283,9 @@ class FittedMoments:
             moments = Moments(wv, slope, drift in keys, scales)
         if not noise:  # straight lines of the Allan plot may leave a ramp alone
             nothing = np.zeros_like(wv.tau)
-            return cls(scales, moments.target, nothing, wv.covariance, discrepancy)
+            return cls(scales, moments.target, nothing, wv.covariance, discrepancy, nothing)
         implied, statistical = scales.curve(Model(noise)), moments.covariance(Model(noise))
-        return cls(scales, moments.target, implied, statistical, discrepancy)
+        return cls(scales, moments.target, implied, statistical, discrepancy, moments.taken)
 
     @cached_property
     def covariance(self) -> FloatArray:
@@ -302,14 +310,21 @@ def weight_root(covariance: FloatArray) -> FloatArray:
 
 
 def chi_square(
-    target: FloatArray, implied: FloatArray, covariance: FloatArray, basis: FloatArray
+    target: FloatArray,
+    implied: FloatArray,
+    covariance: FloatArray,
+    basis: FloatArray,
+    taken: FloatArray | float = 0.0,
 ) -> tuple[FloatArray, float]:
     """Standardised residuals per level and their chi-square, on the cube-root scale.
 
     ``basis`` (J,) are the wavelet variances to which ``covariance`` belongs. A wavelet variance of
     few degrees of freedom is far from normal, its cube root is not (Wilson & Hilferty 1931, *PNAS*
-    17, 684-688).
+    17, 684-688). That holds for the variance of the detrended data, to which ``target`` adds what
+    the slope took (J,): a constant, which no cube root may hide.
     """
+    taken = np.minimum(taken, tuning.LARGEST_TAKEN * np.minimum(implied, basis))
+    target, implied, basis = target - taken, implied - taken, basis - taken
     scale = np.sqrt(np.diag(covariance))
     share = (scale / basis) ** 2 / 9.0  # 2/(9 dof)
     root, expected = np.cbrt(target / basis), np.cbrt(implied / basis) * (1.0 - share)

@@ -86,18 +86,20 @@ class Comparison:
         basis: FloatArray,
         n_free: int,
         statistical: FloatArray | None = None,
+        taken: FloatArray | float = 0.0,
     ) -> Comparison:
         """Compare under a covariance that belongs to the wavelet variances ``basis``.
 
-        ``statistical`` is the covariance less the discrepancy, where there is one.
+        ``statistical`` is the covariance less the discrepancy, where there is one; ``taken`` as of
+        `chi_square`.
         """
         whitened = weight_root(covariance) @ (target - implied)
         dof = target.size - n_free
         plain = allowed = float("nan")
         if dof > 0 and np.all(basis > 0.0):
-            plain = allowed = chi_square(target, implied, covariance, basis)[1]
+            plain = allowed = chi_square(target, implied, covariance, basis, taken)[1]
             if statistical is not None:
-                plain = chi_square(target, implied, statistical, basis)[1]
+                plain = chi_square(target, implied, statistical, basis, taken)[1]
         return cls(float(whitened @ whitened), plain, allowed, dof)
 
 
@@ -191,14 +193,19 @@ def estimate_notices(
         if is_positive_shape and error > tuning.UNDETERMINED * (item.value or 0.0):
             bad.append(notice("undetermined", item.key, {"stderr": error}))
     bad += _indistinct_notices(model, keys, matrix)
+    terms = {item.key: item.term for item in model.parameters}
+    worst: dict[tuple[int, int], tuple[float, Notice]] = {}  # one for any two terms
     for (i, first), (j, second) in combinations(enumerate(keys), 2):
         if errors[first] == 0.0 or errors[second] == 0.0:
             continue
         correlation = float(matrix[i, j] / (errors[first] * errors[second]))
         is_loose = errors[second] > tuning.LOOSE * abs(model.params[second] or 0.0)
-        if abs(correlation) > tuning.CONFOUNDED and is_loose:
+        pair = terms[first], terms[second]
+        before = worst[pair][0] if pair in worst else tuning.CONFOUNDED
+        if abs(correlation) > before and is_loose:
             values = {"other": first, "correlation": correlation}
-            bad.append(notice("confounded", second, values))
+            worst[pair] = abs(correlation), notice("confounded", second, values)
+    bad += [found for _, found in worst.values()]
     return bad, _bandwidth_notices(model, wv)
 
 

@@ -60,11 +60,11 @@ class Goodness:
         has = (at.implied > 0.0) & (variance > 0.0)
         if np.any(has):
             block = np.ix_(has, has)
-            implied = at.implied[has]
+            implied, taken = at.implied[has], at.taken[has]
             misfit[has] = np.sqrt(target[has] / implied) - 1.0
             dof[has] = 2.0 * implied**2 / variance[has]
-            residual[has] = chi_square(target[has], implied, at.statistical[block], implied)[0]
-            allowed[has] = chi_square(target[has], implied, at.covariance[block], implied)[0]
+            for each, covariance in ((residual, at.statistical), (allowed, at.covariance)):
+                each[has] = chi_square(target[has], implied, covariance[block], implied, taken)[0]
         return cls(
             tau=wv.tau,
             data=np.sqrt(2.0 * target),

@@ -10,12 +10,14 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 import scipy
+from numpy.polynomial.polynomial import polyfromroots
 from scipy.linalg import solve_discrete_lyapunov
 
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.process import spectral
 from gmwm.process.base import Process, Shape
+from gmwm.process.kinds.gauss_markov import GaussMarkov
 from gmwm.process.parameter import Parameter, parameter
 from gmwm.process.spectral import squared_sine
 from gmwm.process.state_space import StateSpace, from_state_space
@@ -209,6 +211,30 @@ class ARIMA(Process):
             else np.random.default_rng(0).normal(0.3, 1.2, (700, size))
         )
         return [self.shape_from_free(point) for point in points]
+
+    @property
+    def nested(self) -> tuple[Process, ...]:
+        """As many Gauss-Markov processes as the order, where the moving average holds their sum.
+
+        AR(1) processes sum to an ARMA(p, p - 1) (Granger & Morris 1976, *JRSS A* 139, 246-257).
+        """
+        p, q = self.orders
+        return (GaussMarkov(),) * p if self.d == 0 and 2 <= p <= q + 1 else ()
+
+    def shape_of_sum(self, processes: Sequence[Process], dt: float) -> Shape:
+        values = [(each.values["sigma"] or 0.0, each.values["tau"] or 0.0) for each in processes]
+        power, phi = np.array([(s * s, np.exp(-dt / t)) for s, t in values if s]).reshape(-1, 2).T
+        # The moving average has the roots within 1 of the spectrum times the autoregression's.
+        spectrum = np.zeros(max(2 * phi.size - 1, 1))
+        for k, variance in enumerate(power * (1.0 - phi**2)):
+            others = polyfromroots(np.delete(phi, k))
+            spectrum += variance * np.convolve(others, others[::-1])
+        roots = np.roots(spectrum)
+        inner = roots[np.argsort(np.abs(roots))][: roots.size // 2]
+        ar, ma = np.zeros(self.orders[0]), np.zeros(self.orders[1])
+        ar[: phi.size] = -polyfromroots(phi)[-2::-1]
+        ma[: inner.size] = np.real(polyfromroots(inner)[-2::-1])
+        return (*map(float, _inside(ar)), *map(float, -_inside(-ma)))
 
 
 class ARMA(ARIMA):

@@ -30,11 +30,11 @@ def test_none_where_chance_explains_the_residuals():
 
 def update(each, size):
     residual = size * TARGET * np.where(np.arange(LEVELS) % 2, 1.0, -1.0)
-    return each.update(residual, COVARIANCE, TARGET, TARGET)
+    return each.update(residual, COVARIANCE, TARGET, TARGET, 9)
 
 
 def test_it_starts_where_the_residuals_are_no_chance_and_settles():
-    each = Discrepancy(None, 9)
+    each = Discrepancy(None, True)
     assert not update(each, 0.01) and each.value == 0.0
     assert update(each, 0.1)
     first = each.value
@@ -42,9 +42,9 @@ def test_it_starts_where_the_residuals_are_no_chance_and_settles():
     assert not update(each, 0.1) and each.value == pytest.approx(first)
 
 
-@pytest.mark.parametrize(("given", "dof"), [(0.05, 9), (0.0, 9), (None, 0)])
-def test_one_that_is_given_or_not_known_stays(given, dof):
-    each = Discrepancy(given, dof)
+@pytest.mark.parametrize(("given", "over"), [(0.05, True), (0.0, True), (None, False)])
+def test_one_that_is_given_or_not_known_stays(given, over):
+    each = Discrepancy(given, over)
     assert not update(each, 0.3)
     each.start_at(0.5)
     assert each.value == (given or 0.0)
@@ -53,6 +53,6 @@ def test_one_that_is_given_or_not_known_stays(given, dof):
 def test_it_starts_at_what_was_found_elsewhere_if_that_is_notable():
     least = tuning.DISCREPANCY_NOTABLE
     for value, taken in ((0.99 * least, 0.0), (1.01 * least, 1.01 * least)):
-        each = Discrepancy(None, 1)
+        each = Discrepancy(None, True)
         each.start_at(value)
         assert each.value == taken

@@ -41,3 +41,14 @@ def test_a_further_term_does_not_spoil_the_fit(source):
     misfits = [float(np.std(np.log(fit.implied / wv.variance))) for fit in fits]
     assert all(b < 1.1 * a for a, b in pairwise(misfits)), misfits
     assert max(fit.discrepancy for fit in fits) < 0.6
+
+
+@pytest.mark.filterwarnings("ignore::gmwm.errors.FitWarning")
+def test_a_term_of_zero_amplitude_does_not_change_the_discrepancy():
+    """Each took two degrees of freedom, so that the allowed discrepancy grew with it."""
+    bent = np.concatenate([[0.0, -1.7, -3.4], -4.4 - np.arange(4), -7.4 + 1.4 * np.arange(4)])
+    wv = series_of(np.exp2(bent), 0.01)
+    one, *larger = (gmwm.fit(WhiteNoise() + k * GaussMarkov(), wv) for k in (1, 2, 3))
+    for fit in larger:
+        assert fit.params["sigma_1"] == 0.0
+        assert fit.discrepancy == pytest.approx(one.discrepancy, rel=1e-6)

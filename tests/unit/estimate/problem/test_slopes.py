@@ -110,12 +110,14 @@ def test_a_root_of_the_weights_is_one():
 
 
 @pytest.mark.parametrize("dof", [2.0, 10.0, 1000.0])
-def test_cube_roots_of_a_chi_square_are_standard(dof):
-    implied = np.array([3.0])
+@pytest.mark.parametrize("taken", [0.0, 3.0])
+def test_cube_roots_of_a_chi_square_are_standard(dof, taken):
+    """Also where a slope took a part, which is added as a constant: 0.65 off at the 5 % point."""
+    own, added = np.array([3.0]), np.array([taken])
     covariance = np.array([[2.0 * 9.0 / dof]])
     for p in (0.05, 0.5, 0.95):
-        target = implied * stats.chi2.ppf(p, dof) / dof
-        standard, square = chi_square(target, implied, covariance, implied)
+        target, implied = own * stats.chi2.ppf(p, dof) / dof + added, own + added
+        standard, square = chi_square(target, implied, covariance, implied, added)
         assert standard[0] == pytest.approx(stats.norm.ppf(p), abs=0.1)
         assert square == pytest.approx(standard[0] ** 2)
 

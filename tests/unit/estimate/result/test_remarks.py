@@ -5,6 +5,7 @@ import pytest
 from scipy import stats
 
 from gmwm import (
+    ARMA,
     AveragedNoise,
     GaussMarkov,
     LowPassNoise,
@@ -81,6 +82,15 @@ def test_parameters_of_which_one_combination_is_known(correlation, loose, found)
         assert notice.values == {"other": "N", "correlation": pytest.approx(correlation)}
     assert reported("confounded", model, ("N", "K"), matrix(0.0, 1.0)) == []
     assert reported("confounded", model, ("N", "K"), matrix(1.0, 0.0)) == []
+
+
+def test_the_most_correlated_parameters_stand_for_their_term():
+    """An ARMA(3, 2) had fifteen notices of its pairs."""
+    model, keys = as_model(ARMA([0.5, 0.2], [0.3], 1.0)), ("ar_1", "ar_2", "ma_1", "sigma2")
+    share = np.array([1.0, -1.0, 1.0, 1.0])
+    covariance = np.outer(share, share) + np.diag([1e-5, 2e-5, 3e-5, 4e-5])
+    (notice,) = reported("confounded", model, keys, covariance)
+    assert (notice.where, notice.values["other"]) == ("ar_2", "ar_1")
 
 
 @pytest.mark.parametrize(("error", "found"), [(9.9, []), (10.1, ["tau_1"]), (21.0, [*TAUS])])
