@@ -115,7 +115,7 @@ def test_outsiders_import_faces_only():
 
 LINES = {
     "": 880, "_core": 2_320, "process": 3_180, "readers": 5_580, "plotting": 690,
-    "variance": 4_170, "diagnosis": 3_330, "estimate": 7_420, "selection": 1_140,
+    "variance": 4_170, "diagnosis": 3_330, "estimate": 7_440, "selection": 1_140,
     "calibration": 2_180, "datasheet": 610, "filter_numbers": 3_550, "ins": 9_520,
     "population": 2_200, "export": 1_740, "report": 2_380, "study": 1_820, "cli": 2_100,
 }  # fmt: skip

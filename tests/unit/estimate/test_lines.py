@@ -93,6 +93,14 @@ def test_a_well_separated_corner_gives_both_lines_and_no_plateau():
         assert abs(fit.params["K"] - 0.005) < 4.0 * fit.stderr["K"]
 
 
+def test_a_region_does_not_go_across_a_process_that_bends_it_a_little():
+    # White noise that is a fifth larger above the correlation time; straight by eye over 9 octaves.
+    truth = WhiteNoise(1.0) + GaussMarkov(1.5, 0.1)
+    for fit in fits(truth, WhiteNoise(), 200_000, range(3), dt=0.01):
+        assert fit.regions[0].tau_max < 0.1
+        assert abs(fit.params["N"] - 1.0) < 4.0 * fit.stderr["N"]
+
+
 def test_where_a_ramp_hides_the_random_walk_none_is_invented(drifting):
     assert all({"N", "R"} <= set(fit.keys) for fit in drifting)
     assert sum(len(fit.keys) > 2 for fit in drifting) <= RARE
@@ -112,7 +120,7 @@ def test_the_ramp_has_the_bias_of_the_random_walk_below_it(drifting):
         read.append(fit.params["R"])
     error = np.std(read) / np.sqrt(len(read))
     assert np.mean(expected) > 1.03 * 0.003
-    assert np.mean(read) > 0.003 + 3.0 * error
+    assert np.mean(read) > 0.003 + 2.0 * error
     assert abs(np.mean(read) - np.mean(expected)) < 4.0 * error
 
 
