@@ -83,9 +83,10 @@ class AllanLines:
     """Straight lines in the Allan plot, ``method="allan"``.
 
     A region is part of a run of at least three levels whose local slopes agree with the nominal one
-    and with each other by eye: the part where they agree to within their errors. Over its levels the mean of log(sigma) - slope log(tau) gives the line, hence
-    the parameter: sqrt(3) Q/tau, N/sqrt(tau), B sqrt(2 ln 2/pi), K sqrt(tau/3) or abs(R)
-    tau/sqrt(2). The ramp takes the sign of the mean slope of the series.
+    and with each other by eye: the part where they agree to within their errors. Over its levels
+    the mean of log(sigma) - slope log(tau) gives the line, hence the parameter: sqrt(3) Q/tau,
+    N/sqrt(tau), B sqrt(2 ln 2/pi), K sqrt(tau/3) or abs(R) tau/sqrt(2). The ramp takes the sign of
+    the mean slope of the series.
 
     Parameters
     ----------
