@@ -48,7 +48,8 @@ from gmwm.variance import WaveletVariance
 #
 # The tolerance adds up: eight octaves that are straight by eye may rise by a third, as those of a
 # gyro whose white noise has a Gauss-Markov process of 0.1 s beside it. So a region keeps only the
-# levels between any two of which the slope is the nominal one to within its standard error.
+# levels between any two of which the slope is the nominal one to within its standard error and a
+# hundredth of the height, half of which counts in the standard error of the parameter.
 
 
 @dataclass(frozen=True)
@@ -107,7 +108,7 @@ class AllanLines:
     -----
     The top of a Gauss-Markov process looks like bias instability, and its flank like a random walk:
     where the sum of the lines misses the data, the fit is not valid. Nothing is subtracted for
-    given terms, and standard errors do not include what other processes add in the region.
+    given terms, and standard errors include 0.5 % for what other processes add in the region.
 
     IEEE Std 952-2020, annex C; Stebler et al. (2012), *Proc. IEEE/ION PLANS*, figure 5.
     """
@@ -301,7 +302,9 @@ def _within_errors(
     """The best known part of a run whose heights are equal to within their errors, two by two."""
     variance = np.diag(covariance)
     apart = variance[:, None] + variance - 2.0 * covariance
-    off = np.abs(height[:, None] - height) > tuning.REGION_SIGMA * np.sqrt(np.maximum(apart, 0.0))
+    error = np.sqrt(np.maximum(apart, 0.0))
+    allowed = np.log2(1.0 + tuning.HEIGHT_TOLERANCE) + tuning.REGION_SIGMA * error
+    off = np.abs(height[:, None] - height) > allowed
     parts = [
         _Run(i, j)
         for i, j in combinations(range(first, last + 1), 2)
@@ -338,7 +341,8 @@ def _coefficients(
             weights /= np.sum(weights)
         coefficients[i] = np.exp(weights @ heights)
         gradient[i, levels] = coefficients[i] * weights / (2.0 * wv.variance[levels])
-    return coefficients, gradient @ wv.covariance @ gradient.T
+    read = np.diag((0.5 * tuning.HEIGHT_TOLERANCE * coefficients) ** 2)
+    return coefficients, gradient @ wv.covariance @ gradient.T + read
 
 
 def _fitted(model: Model, values: Mapping[str, float]) -> Model:
