@@ -117,7 +117,7 @@ LINES = {
     "": 880, "_core": 2_320, "process": 3_190, "readers": 5_580, "plotting": 710,
     "variance": 4_170, "diagnosis": 3_330, "estimate": 7_450, "selection": 1_140,
     "calibration": 2_180, "datasheet": 610, "filter_numbers": 3_550, "ins": 9_520,
-    "population": 2_200, "export": 1_740, "report": 2_380, "study": 2_020, "cli": 2_130,
+    "population": 2_200, "export": 1_740, "report": 2_380, "study": 2_020, "cli": 2_120,
 }  # fmt: skip
 """Most lines of Python of each room; they may only fall until they are those of the design."""
 
