@@ -288,7 +288,7 @@ def outages_compared(
         ax.set_ylabel(title)
         _plain(ax)
     handles = axes[0].get_legend_handles_labels()
-    _legend_above(figure, *handles, "points: errors; lines: RMS as predicted")
+    _legend_above(figure, *handles, title="points: errors; lines: RMS as predicted")
     axes[count - 1].set_xlabel("end of the outage [min]")
     ax = axes[count]
     for row, (ratio, lower, upper) in enumerate(ratios.values()):
