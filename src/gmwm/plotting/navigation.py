@@ -287,8 +287,8 @@ def outages_compared(
         ax.set_ylim(bottom=0.0)
         ax.set_ylabel(title)
         _plain(ax)
-    handles = axes[0].get_legend_handles_labels()
-    _legend_above(figure, *handles, title="points: errors; lines: RMS as predicted")
+    handles, names = axes[0].get_legend_handles_labels()
+    _legend_above(figure, handles, names, "points: errors; lines: RMS as predicted")
     axes[count - 1].set_xlabel("end of the outage [min]")
     ax = axes[count]
     for row, (ratio, lower, upper) in enumerate(ratios.values()):
