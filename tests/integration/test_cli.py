@@ -1010,7 +1010,7 @@ def test_appendix_has_no_options_of_a_table(run, tmp_path, option):
     [
         (("table2", "--rotate"), "--rotate"),
         (("fig7", "--rotate"), "--rotate"),
-        (("fig9", "--resume"), "--resume"),
+        (("fig5", "--resume"), "--resume"),
         (("fig9", "--rotate", "--method", "AV"), "--method"),
     ],
 )

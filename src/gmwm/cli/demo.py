@@ -17,6 +17,7 @@ from gmwm.errors import InputError
 if TYPE_CHECKING:
     from gmwm.calibration import Calibration
     from gmwm.process import Model
+    from gmwm.readers import Recording
 
 
 @click.command()
@@ -125,7 +126,8 @@ _SIMULATED = (
     *("table2", "table3", "table4", "five-gm", "fig2", "fig3", "fig4"),
     *("weights2", "weights3", "weights4", "em4", "starts4", "arma4", "indirect2"),
 )
-_NAVIGATED, _ROTATED = ("fig5", "fig6", "fig7", "fig8", "fig9"), ("fig8", "fig9")
+_SENSORS = ("fig1", "fig5", "fig6", "table5", "table6")
+_NAVIGATED, _ROTATED = ("fig7", "fig8", "fig9"), ("fig8", "fig9")
 _TESTS = ("appendix-a", "selection")
 
 Found = tuple[str, Sequence[Path]]
@@ -134,7 +136,9 @@ Found = tuple[str, Sequence[Path]]
 
 @click.command()
 @click.argument(
-    "experiment", type=click.Choice([*_SIMULATED, *_NAVIGATED, *_TESTS]), metavar="EXPERIMENT"
+    "experiment",
+    type=click.Choice([*_SIMULATED, *_SENSORS, *_NAVIGATED, *_TESTS]),
+    metavar="EXPERIMENT",
 )
 @options(
     """
@@ -145,8 +149,9 @@ Found = tuple[str, Sequence[Path]]
     --method NAME  Only this method, e.g. GMWM; repeat. By default all of the table.
     --resume
     --cluster
-    --recording FILE  fig5 to fig9: a real static recording instead of a simulated one; the first
-        is calibrated, the others are navigated with; repeat.
+    --recording FILE  fig1, fig5 to fig9: a real static recording instead of a simulated one;
+        fig7 to fig9 calibrate the first and navigate with the others. table5, table6: beside the
+        simulated one. Repeat.
     --rotate  fig8, fig9: calibrate every recording in turn and navigate with the others; further
         filters, intervals over recordings.
     --reading
@@ -170,9 +175,10 @@ def reproduce(
     shows the bias of lines in the Allan plot; weights2, weights3 and weights4 compare weights and
     wavelets of the method of moments; em4, starts4 and arma4 do EM, starting values and ARMA(3,2)
     for three Gauss-Markov processes; indirect2 simulates the moments; selection counts how often
-    the true model is chosen. fig5 and fig6 show one gyro with lines and with the fitted model;
-    fig7 and fig8 navigate a helicopter, fig9 a car, with GNSS outages, by filters with different
-    calibrations.
+    the true model is chosen. fig1, fig5 and fig6 show the way from a signal to its model, the lines
+    and the model of a gyro and an accelerometer; table5 and table6 have the paper's parameters
+    beside ours; fig7 and fig8 navigate a helicopter, fig9 a car, with GNSS outages, by filters with
+    different calibrations.
     Times are in seconds, rates in 1/s. Raw estimates are kept in Parquet.
 
     \b
@@ -184,9 +190,10 @@ def reproduce(
     """
     alone = {name: options.pop(name) for name in ("method", "cluster", "resume")}
     known = set(alone) if experiment in _SIMULATED else set()
+    if experiment in _SENSORS:
+        known = {"recording"}
     if experiment in _NAVIGATED:
-        known = {"recording"} | ({"rotate"} if experiment in _ROTATED else set())
-        known |= {"resume"} if rotate else set()
+        known = {"recording", "resume"} | ({"rotate"} if experiment in _ROTATED else set())
     for name, each in {**alone, "recording": recording, "rotate": rotate}.items():
         if each and name not in known:
             raise InputError(f"{experiment} has no option --{name}: leave it out")
@@ -196,8 +203,10 @@ def reproduce(
         try:
             if experiment in _SIMULATED:
                 text, paths = _simulated(experiment, folder, **work, **alone)
+            elif experiment in _SENSORS:
+                text, paths = _of_sensor(experiment, folder, work["seed"], recordings)
             elif experiment in _NAVIGATED:
-                work |= {"recordings": recordings} | ({"resume": alone["resume"]} if rotate else {})
+                work |= {"recordings": recordings, "resume": alone["resume"]}
                 text, paths = _navigated(experiment, folder, rotate, **work)
             else:
                 text = _tested(experiment, **work)
@@ -231,8 +240,15 @@ def _simulated(
     return texts["txt"], [raw, *pages]
 
 
+def _of_sensor(experiment: str, folder: Path, seed: int, recordings: Sequence[Recording]) -> Found:
+    from gmwm.study import reproduce_sensor
+
+    with progress_bar(experiment, "recordings") as bar:
+        return reproduce_sensor(experiment, folder, seed=seed, recordings=recordings, progress=bar)
+
+
 def _navigated(experiment: str, folder: Path, rotate: bool, **work: Any) -> Found:
-    """Figures 5 to 9; 8 and 9 with every recording calibrated in turn if ``rotate``."""
+    """Figures 7 to 9; 8 and 9 with every recording calibrated in turn if ``rotate``."""
     from gmwm.study import reproduce_figure, reproduce_rotation
 
     run = reproduce_rotation if rotate else reproduce_figure

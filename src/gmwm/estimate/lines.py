@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import pairwise, product
+from itertools import combinations, pairwise, product
 from numbers import Real
 from typing import ClassVar, NamedTuple
 
@@ -45,6 +45,11 @@ from gmwm.variance import WaveletVariance
 # So of 300 records of one process, none shows a second region; at a corner of white noise and
 # random walk one or two in a hundred show a plateau, one in ten where its levels have but a hundred
 # degrees of freedom. The broad top of a Gauss-Markov process does pass for a plateau.
+#
+# The tolerance adds up: eight octaves that are straight by eye may rise by a third, as those of a
+# gyro whose white noise has a Gauss-Markov process of 0.1 s beside it. So a region keeps only the
+# levels between any two of which the slope is the nominal one to within its standard error and a
+# hundredth of the height, half of which counts in the standard error of the parameter.
 
 
 @dataclass(frozen=True)
@@ -78,10 +83,11 @@ class _Run(NamedTuple):
 class AllanLines:
     """Straight lines in the Allan plot, ``method="allan"``.
 
-    A region is a run of at least three levels whose local slopes agree with the nominal one and
-    with each other. Over its levels the mean of log(sigma) - slope log(tau) gives the line, hence
-    the parameter: sqrt(3) Q/tau, N/sqrt(tau), B sqrt(2 ln 2/pi), K sqrt(tau/3) or abs(R)
-    tau/sqrt(2). The ramp takes the sign of the mean slope of the series.
+    A region is part of a run of at least three levels whose local slopes agree with the nominal one
+    and with each other by eye: the part where they agree to within their errors. Over its levels
+    the mean of log(sigma) - slope log(tau) gives the line, hence the parameter: sqrt(3) Q/tau,
+    N/sqrt(tau), B sqrt(2 ln 2/pi), K sqrt(tau/3) or abs(R) tau/sqrt(2). The ramp takes the sign of
+    the mean slope of the series.
 
     Parameters
     ----------
@@ -102,7 +108,7 @@ class AllanLines:
     -----
     The top of a Gauss-Markov process looks like bias instability, and its flank like a random walk:
     where the sum of the lines misses the data, the fit is not valid. Nothing is subtracted for
-    given terms, and standard errors do not include what other processes add in the region.
+    given terms, and standard errors include 0.5 % for what other processes add in the region.
 
     IEEE Std 952-2020, annex C; Stebler et al. (2012), *Proc. IEEE/ION PLANS*, figure 5.
     """
@@ -292,10 +298,29 @@ def _straight_runs(wv: WaveletVariance, slope: float, usable: np.ndarray) -> Ite
         fits = i < off.size and usable[i] and usable[i + 1] and not off[i]
         if first is not None and (not fits or bent[i - 1]):
             if i - first >= tuning.LEAST_OCTAVES:
-                yield _Run(first, i)
+                best = _within_errors(log_deviation - slope * np.log2(wv.tau), covariance, first, i)
+                yield from [best] if best else []
             first = None
         if fits and first is None:
             first = i
+
+
+def _within_errors(
+    height: FloatArray, covariance: FloatArray, first: int, last: int
+) -> _Run | None:
+    """The best known part of a run whose heights are equal to within their errors, two by two."""
+    variance = np.diag(covariance)
+    apart = variance[:, None] + variance - 2.0 * covariance
+    error = np.sqrt(np.maximum(apart, 0.0))
+    allowed = np.log2(1.0 + tuning.HEIGHT_TOLERANCE) + tuning.REGION_SIGMA * error
+    off = np.abs(height[:, None] - height) > allowed
+    parts = [
+        _Run(i, j)
+        for i, j in combinations(range(first, last + 1), 2)
+        if not np.any(off[i : j + 1, i : j + 1])
+    ]
+    known = 1.0 / np.diag(apart, 1)  # of the slope of each octave
+    return max(parts, key=lambda part: np.sum(known[part.first : part.last]), default=None)
 
 
 def _allowance(combination: FloatArray, covariance: FloatArray) -> FloatArray:
@@ -326,7 +351,8 @@ def _coefficients(
             weights /= np.sum(weights)
         coefficients[i] = np.exp(weights @ heights)
         gradient[i, levels] = coefficients[i] * weights / (2.0 * wv.variance[levels])
-    return coefficients, gradient @ wv.covariance @ gradient.T
+    read = np.diag((0.5 * tuning.HEIGHT_TOLERANCE * coefficients) ** 2)
+    return coefficients, gradient @ wv.covariance @ gradient.T + read
 
 
 def _fitted(model: Model, values: Mapping[str, float]) -> Model:

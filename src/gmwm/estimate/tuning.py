@@ -130,5 +130,7 @@ FARTHEST_EXTRAPOLATION = 3.0  # of EM, in logarithms of amplitudes and times
 LEAST_OCTAVES = 2  # octaves of a straight region: three levels, which can show a bend
 SLOPE_TOLERANCE = 0.10  # difference of slopes that reading a plot by eye accepts; see `lines`
 SLOPE_SIGMA = 2.0  # standard errors of a local slope that are allowed, up to the tolerance
+REGION_SIGMA = 3.5  # standard errors between two levels of a region: 100 of white noise keep all
+HEIGHT_TOLERANCE = 0.01  # ... and of their heights, as far as a curve is drawn and read
 WRONG_SLOPE = 0.25  # difference of slopes half way from one kind of noise to the next
 LINES_SIGMA = 3.0  # standard errors below which a misfit of the lines is chance

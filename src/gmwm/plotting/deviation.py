@@ -327,8 +327,11 @@ def _panel(ax: Axes, samples: Mapping[str, FloatArray], truth: float) -> None:
         for count, y, align in ((outside[0], 1.0, "top"), (outside[1], 0.0, "bottom")):
             if count:
                 arrow = "\u2191" if align == "top" else "\u2193"
+                side = "above" if align == "top" else "below"
                 text = ax.annotate(
-                    f"{count}{arrow}", (place, y), xycoords=("data", "axes fraction")
+                    f"{count} of {values[place - 1].size}\n{side} {arrow}",
+                    (place, y),
+                    xycoords=("data", "axes fraction"),
                 )
                 text.set(ha="center", va=align, fontsize="small", color=COMPONENT_COLOURS[1])
     ax.ticklabel_format(axis="y", style="sci", scilimits=(-2, 3), useMathText=True)

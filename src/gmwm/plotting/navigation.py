@@ -18,48 +18,57 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _DASHES: tuple[Any, ...] = ("-", (0, (5, 1.5)), (0, (3, 1, 1, 1)), (0, (1, 1)))
+_MARKERS = "osD^vX"
+_MARKS = 6  # along a line
+_PREDICTED = (0, (4, 2))
 _PANEL = (3.4, 2.1)  # inches, of one panel among several
-_BESIDE = 3  # panels in a row
+_BESIDE = 4  # panels in a row
 _COMPONENTS = ("north", "east", "down")
 _BAND = "#9ecae1"
 _TRUE = "true track"
-_WIDEST_TITLE = 30  # characters over a panel
 _IN_LEGEND = 24
+_LEGEND_HANDLE, _LEGEND_LETTER = 0.45, 0.065  # inches, of an entry and of a character
 _DENSE = 3000  # points, beyond which an image of them is smaller than they are
 _PREDICTED_SHOWN = 2.0  # of the largest true error: a prediction far above it leaves the view
 _T = TypeVar("_T")
 
 
 def track(
-    truth: FloatArray, outages: Sequence[FloatArray], solutions: Mapping[str, Sequence[FloatArray]]
+    truth: FloatArray,
+    outages: Mapping[str, FloatArray],
+    solutions: Mapping[str, Sequence[FloatArray]],
 ) -> Figure:
     """A track with its outages, and what filters made of it.
 
     truth: (n, 2), east and north, m.
-    outages: The parts of the track without GNSS.
+    outages: Title -> part of the track without GNSS.
     solutions: Name -> estimated positions during each outage.
     """
-    columns = 1 + min(len(outages), 2)
-    figure, axes = _panels(1, columns, (4.2 * columns, 4.2))
-    whole = axes[0, 0]
-    whole.plot(*truth.T, color=DATA_COLOUR, linewidth=0.9, label=_TRUE)
-    for i, part in enumerate(outages):
-        label = "without GNSS" if i == 0 else None
-        whole.plot(*part.T, color=COMPONENT_COLOURS[1], linewidth=2.5, label=label)
+    count = 1 + len(outages)
+    columns = min(count, _BESIDE)
+    rows = -(-count // columns)
+    figure, axes = _panels(rows, columns, (4.2 * columns, 4.0 * rows + 0.4))
+    whole, *parts = axes.flat
+    (line,) = whole.plot(*truth.T, color=DATA_COLOUR, linewidth=0.9)
+    for part in outages.values():
+        whole.plot(*part.T, color=COMPONENT_COLOURS[1], linewidth=2.5, label="without GNSS")
     whole.set_title("whole track", fontsize="medium")
-    for i, ax in enumerate(axes[0, 1:]):
-        part = outages[i]
-        ax.plot(*part.T, color=_BAND, linewidth=5.0, label=_TRUE)
-        for colour, dash, (name, paths) in _styles(solutions):
-            path = paths[i]
-            label = literal(name, _IN_LEGEND)
-            ax.plot(*path.T, color=colour, linestyle=dash, linewidth=1.4, label=label)
-            ax.plot(*path[-1:].T, marker="o", color=colour, markersize=4)
-        ax.set_title(f"outage {i + 1}" if len(outages) > 1 else "outage", fontsize="medium")
-    for ax in axes[0]:
+    shown = [line, *whole.get_lines()[1:2]]
+    names = [_TRUE, "without GNSS"][: len(shown)]
+    for i, (ax, (title, part)) in enumerate(zip(parts, outages.items(), strict=False)):
+        (band,) = ax.plot(*part.T, color=_BAND, linewidth=5.0)
+        lines = []
+        for style, (_, paths) in _styles(solutions):
+            lines += ax.plot(*paths[i].T, **style, linewidth=1.4, markevery=slice(-1, None))
+        ax.set_title(title, fontsize="medium")
+        if i == 0:
+            shown += [band, *lines]
+            names += [f"{_TRUE} of an outage", *(literal(name, _IN_LEGEND) for name in solutions)]
+    for ax in (whole, *parts[: len(outages)]):
         _map(ax)
-        # Below: solutions run from corner to corner.
-        ax.legend(fontsize="x-small", loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=3)
+    for ax in parts[len(outages) :]:
+        ax.set_axis_off()
+    _legend_above(figure, shown, names)
     return figure
 
 
@@ -67,39 +76,36 @@ def errors(
     panels: Mapping[str, tuple[FloatArray, FloatArray, FloatArray]],
     spans: Sequence[tuple[float, float]] = (),
     *,
-    labels: Sequence[str] = ("east [m]", "north [m]", "vertical [m]"),
+    title: str = "",
+    labels: Sequence[str] = ("east error [m]", "north error [m]", "vertical error [m]"),
 ) -> Figure:
-    """True errors of one run with the bands of 1 and 3 sigma that each filter predicted.
+    """True errors of one run beside what each filter predicted, a panel a component.
 
     panels: Name -> times (K,), s; errors and predicted standard deviations (K, d).
     spans: Outages, s.
     labels: Of the d components.
     """
-    d = len(labels)
-    blocks = -(-len(panels) // _BESIDE)
-    columns = -(-len(panels) // blocks)
-    size = _PANEL[0] * columns + 0.6, _PANEL[1] * blocks * d
-    figure, axes = _panels(blocks * d, columns, size, sharex=True)
-    top = _largest(panels)
-    for place, (name, (time, error, sd)) in enumerate(panels.items()):
-        first, column = d * (place // columns), place % columns
-        for row, label in enumerate(labels):
-            ax = axes[first + row, column]
-            _draw_bands(ax, time, sd[:, row], "predicted")
-            ax.plot(time, error[:, row], color=COMPONENT_COLOURS[1], linewidth=1.4, label="error")
-            for end in (end for span in spans for end in span):
-                ax.axvline(end, color=DATA_COLOUR, linewidth=0.8, linestyle=":")
-            _plain(ax)
-            if np.isfinite(top[row]) and top[row] > 0.0:
-                ax.set_ylim(-top[row], top[row])
-            if column == 0:
-                ax.set_ylabel(label)
-        axes[first, column].set_title(literal(name, _WIDEST_TITLE), fontsize="medium")
-        axes[first + d - 1, column].set_xlabel("time [s]")
-        axes[first + d - 1, column].tick_params(labelbottom=True)
-    for ax in axes[-d:, (len(panels) - 1) % columns + 1 :].flat:
-        ax.set_axis_off()
-    _legend_above(figure, axes[0, 0])
+    figure, axes = _panels(len(labels), 1, (7.6, 2.6 * len(labels) + 0.5), sharex=True)
+    for row, (ax, label) in enumerate(zip(axes[:, 0], labels, strict=True)):
+        for style, (name, (time, error, sd)) in _styles(panels):
+            every = _marked(time.size)
+            shown = literal(name, _IN_LEGEND)
+            ax.plot(time, error[:, row], **style, linewidth=1.7, markevery=every, label=shown)
+            for sign in (-1.0, 1.0):
+                predicted = ax.plot(time, sign * sd[:, row], **style, linewidth=0.9)[0]
+                predicted.set(markerfacecolor="w", markevery=every, linestyle=_PREDICTED)
+        for end in (end for span in spans for end in span):
+            ax.axvline(end, color=DATA_COLOUR, linewidth=0.8, linestyle=":")
+        _plain(ax)
+        peaks = [float(np.max(np.abs(e[:, row]), initial=0.0)) for _, e, _ in panels.values()]
+        sds = [float(np.max(sd[:, row], initial=0.0)) for _, _, sd in panels.values()]
+        top = 1.1 * max(*peaks, min(sds), _PREDICTED_SHOWN * min(peaks))
+        if 0.0 < top < np.inf:
+            ax.set_ylim(-top, top)
+        ax.set_ylabel(label)
+    axes[0, 0].set_title(title, fontsize="medium")
+    axes[-1, 0].set_xlabel("time [s]")
+    _legend_of_errors(figure, axes[0, 0], "1 sigma predicted")
     return figure
 
 
@@ -113,27 +119,28 @@ def _draw_bands(
 
 def growth(
     panels: Mapping[str, Mapping[str, tuple[FloatArray, FloatArray, FloatArray]]],
-    labels: Sequence[str] = ("horizontal [m]", "vertical [m]"),
+    runs: int,
+    labels: Sequence[str] = ("horizontal", "vertical"),
 ) -> Figure:
     """Growth of errors in outages: root mean square over the runs, and what filters predicted.
 
     panels: Outage -> filter -> times since the outage began (K,), s; root mean squares of the true
         errors and of the predicted ones, (K, d).
+    runs: Over which the root mean square is.
     labels: Of the d components.
     """
     rows, columns = len(labels), len(panels)
-    size = max(4.6 * columns, 5.6), 2.9 * rows
+    size = max(4.6 * columns, 7.0), 2.9 * rows + 0.3
     figure, axes = _panels(rows, columns, size, sharex="col")
+    what = f"RMS of {runs} runs" if runs > 1 else "error of one run"
     for column, (title, filters) in enumerate(panels.items()):
         for row, quantity in enumerate(labels):
             ax = axes[row, column]
-            for behind, (colour, _, (name, (time, rms, predicted))) in zip(
-                reversed(range(len(filters))), _styles(filters), strict=True
-            ):
-                # Wider the farther behind: filters that err alike are all seen.
-                width, label = 1.4 + 0.9 * behind, literal(name, _IN_LEGEND)
-                ax.plot(time, rms[:, row], color=colour, linewidth=width, label=label)
-                ax.plot(time, predicted[:, row], color=colour, linewidth=1.2, linestyle=":")
+            for style, (name, (time, rms, predicted)) in _styles(filters):
+                every, label = _marked(time.size), literal(name, _IN_LEGEND)
+                ax.plot(time, rms[:, row], **style, linewidth=1.7, markevery=every, label=label)
+                dashed = ax.plot(time, predicted[:, row], **style, linewidth=0.9)[0]
+                dashed.set(markerfacecolor="w", markevery=every, linestyle=_PREDICTED)
             _plain(ax)
             true = [each[1][:, row] for each in filters.values()]
             most = max((float(np.nanmax(each, initial=0.0)) for each in true), default=0.0)
@@ -141,12 +148,16 @@ def growth(
             if most > 0.0:
                 ax.set_ylim(top=min(ax.get_ylim()[1], 1.1 * _PREDICTED_SHOWN * most))
             if column == 0:
-                ax.set_ylabel(quantity)
+                ax.set_ylabel(f"{quantity} [m], {what}")
         axes[0, column].set_title(title, fontsize="medium")
         axes[-1, column].set_xlabel("time since the outage began [s]")
-    axes[0, 0].plot([], [], color=DATA_COLOUR, linestyle=":", label="predicted")
-    _legend_above(figure, axes[0, 0])
+    _legend_of_errors(figure, axes[0, 0], "predicted")
     return figure
+
+
+def _marked(size: int) -> slice:
+    """A few markers along a line, the last one at its end."""
+    return slice(None, None, -max(size // _MARKS, 1))
 
 
 def _panels(rows: int, columns: int, size: tuple[float, float], **options: Any) -> Any:
@@ -163,22 +174,19 @@ def literal(text: str, longest: int = 200) -> str:
     return (" " if shown.startswith("_") else "") + shown.replace("$", r"\$")
 
 
-def _largest(panels: Mapping[str, tuple[FloatArray, FloatArray, FloatArray]]) -> FloatArray:
-    """Ends of the axes of errors: all errors, and the narrowest of the bands, are in view."""
-    peaks = [np.max(np.abs(e), axis=0, initial=0.0) for _, e, _ in panels.values()]
-    bands = [np.max(3.0 * sd, axis=0, initial=0.0) for _, _, sd in panels.values()]
-    top = np.maximum(np.max(peaks, axis=0), np.min(bands, axis=0))
-    return np.asarray(1.1 * top, dtype=float)
-
-
-def _styles(
-    named: Mapping[str, _T],
-) -> list[tuple[str, str | tuple[int, tuple[float, ...]], tuple[str, _T]]]:
+def _styles(named: Mapping[str, _T]) -> list[tuple[dict[str, Any], tuple[str, _T]]]:
+    """Colour, marker and marker size of each, told apart in grey too: the later the smaller."""
     colours = [SUM_COLOUR if name == "truth" else "" for name in named]
     palette = iter(COMPONENT_COLOURS * (1 + len(named) // len(COMPONENT_COLOURS)))
-    colours = [colour or next(palette) for colour in colours]
-    dashes = [_DASHES[i % len(_DASHES)] for i in range(len(named))]
-    return list(zip(colours, dashes, named.items(), strict=True))
+    styles = [
+        {
+            "color": colour or next(palette),
+            "marker": _MARKERS[i % len(_MARKERS)],
+            "markersize": max(7.0 - 1.2 * i, 3.0),
+        }
+        for i, colour in enumerate(colours)
+    ]
+    return list(zip(styles, named.items(), strict=True))
 
 
 def _map(ax: Axes) -> None:
@@ -188,11 +196,22 @@ def _map(ax: Axes) -> None:
     _plain(ax)
 
 
-def _legend_above(figure: Figure, ax: Axes, title: str | None = None) -> None:
-    """Of one panel, where it hides none."""
-    handles, labels = ax.get_legend_handles_labels()
-    style: dict[str, Any] = {"fontsize": "x-small", "title_fontsize": "x-small", "ncols": 4}
+def _legend_above(
+    figure: Figure, handles: Sequence[Any], labels: Sequence[str], title: str | None = None
+) -> None:
+    """In one row where it hides no panel; in more where it is wider than the figure."""
+    width = sum(_LEGEND_HANDLE + _LEGEND_LETTER * len(label) for label in labels)
+    rows = -(-width // figure.get_figwidth())
+    style: dict[str, Any] = {"fontsize": "x-small", "title_fontsize": "x-small"}
+    style["ncols"] = max(-(-len(labels) // int(rows or 1)), 1)
     figure.legend(handles, labels, title=title, loc="outside upper center", **style)
+
+
+def _legend_of_errors(figure: Figure, ax: Axes, predicted: str) -> None:
+    """Of lines of errors, and of the dashed ones with what was predicted."""
+    style: dict[str, Any] = {"color": DATA_COLOUR, "marker": "o", "markerfacecolor": "w"}
+    ax.plot([], [], linestyle=_PREDICTED, linewidth=0.9, label=predicted, **style)
+    _legend_above(figure, *ax.get_legend_handles_labels())
 
 
 def _plain(ax: Axes) -> None:
@@ -217,7 +236,7 @@ def measured_track(track: FloatArray, fixes: FloatArray, without: FloatArray) ->
     points.set_rasterized(len(fixes) > _DENSE)
     line.set_rasterized(len(track) > _DENSE)
     _map(ax)
-    _legend_above(figure, ax)
+    _legend_above(figure, *ax.get_legend_handles_labels())
     return figure
 
 
@@ -240,7 +259,7 @@ def innovations(panels: Mapping[str, tuple[FloatArray, FloatArray, FloatArray]])
                 ax.set_ylabel(label)
         axes[0, column].set_title(title, fontsize="medium")
         axes[2, column].set_xlabel("time [s]")
-    _legend_above(figure, axes[0, 0])
+    _legend_above(figure, *axes[0, 0].get_legend_handles_labels())
     return figure
 
 
@@ -268,7 +287,8 @@ def outages_compared(
         ax.set_ylim(bottom=0.0)
         ax.set_ylabel(title)
         _plain(ax)
-    _legend_above(figure, axes[0], "points: errors; lines: RMS as predicted")
+    handles, names = axes[0].get_legend_handles_labels()
+    _legend_above(figure, handles, names, "points: errors; lines: RMS as predicted")
     axes[count - 1].set_xlabel("end of the outage [min]")
     ax = axes[count]
     for row, (ratio, lower, upper) in enumerate(ratios.values()):

@@ -192,6 +192,10 @@ class Process:
         """
         return type(self)(**{**self.values, **values})
 
+    def opened(self) -> Self:
+        """A copy with every parameter open."""
+        return self.with_values(**dict.fromkeys(self.values))
+
     def with_amplitude(self, amplitude: float) -> Self:
         """A copy whose wavelet variance is ``amplitude`` times that at unit amplitude.
 

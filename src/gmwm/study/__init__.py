@@ -10,6 +10,7 @@ from gmwm.study.demo import (
 )
 from gmwm.study.navigation import reproduce_figure as reproduce_figure
 from gmwm.study.rotation import reproduce_rotation as reproduce_rotation
+from gmwm.study.sensor import reproduce_sensor as reproduce_sensor
 from gmwm.study.studies import (
     FIGURES as FIGURES,
     STUDIES as STUDIES,

@@ -39,7 +39,6 @@ from gmwm.study.navigation import (
     check_channels,
     scenario_of,
     times,
-    vehicle_of,
 )
 from gmwm.study.summary import markdown_table, saved
 
@@ -354,7 +353,8 @@ def reproduce_rotation(
     """
     check_channels(figure, recordings, AXES)
     earlier: Earlier = "resume" if resume else "refuse"
-    rotation = rotate(vehicle_of(figure), recordings, folder, earlier=earlier, **options)
+    vehicle = "car" if figure == "fig9" else "helicopter"
+    rotation = rotate(vehicle, recordings, folder, earlier=earlier, **options)
     text, stem = str(rotation), folder / f"{figure}-rotated"
     contents = {".txt": text, ".md": rotation.markdown()}
     paths = [write_text(stem.with_suffix(end), each) for end, each in contents.items()]

@@ -93,6 +93,14 @@ def test_a_well_separated_corner_gives_both_lines_and_no_plateau():
         assert abs(fit.params["K"] - 0.005) < 4.0 * fit.stderr["K"]
 
 
+def test_a_region_does_not_go_across_a_process_that_bends_it_a_little():
+    # White noise that is a fifth larger above the correlation time; straight by eye over 9 octaves.
+    truth = WhiteNoise(1.0) + GaussMarkov(1.5, 0.1)
+    for fit in fits(truth, WhiteNoise(), 200_000, range(3), dt=0.01):
+        assert fit.regions[0].tau_max < 0.1
+        assert abs(fit.params["N"] - 1.0) < 4.0 * fit.stderr["N"]
+
+
 def test_where_a_ramp_hides_the_random_walk_none_is_invented(drifting):
     assert all({"N", "R"} <= set(fit.keys) for fit in drifting)
     assert sum(len(fit.keys) > 2 for fit in drifting) <= RARE
@@ -112,7 +120,7 @@ def test_the_ramp_has_the_bias_of_the_random_walk_below_it(drifting):
         read.append(fit.params["R"])
     error = np.std(read) / np.sqrt(len(read))
     assert np.mean(expected) > 1.03 * 0.003
-    assert np.mean(read) > 0.003 + 3.0 * error
+    assert np.mean(read) > 0.003 + 2.0 * error
     assert abs(np.mean(read) - np.mean(expected)) < 4.0 * error
 
 
@@ -188,7 +196,9 @@ def test_standard_errors_follow_from_the_covariance_by_differences(corner):
             for step, value in zip(steps, corner.variance, strict=True)
         ]
     )
-    np.testing.assert_allclose(fit.covariance, gradient.T @ corner.covariance @ gradient, rtol=1e-6)
+    expected = gradient.T @ corner.covariance @ gradient
+    expected += np.diag([(0.005 * fit.params[key]) ** 2 for key in "NK"])  # of the reading
+    np.testing.assert_allclose(fit.covariance, expected, rtol=1e-6)
     assert fit.keys == ("N", "K")
     assert fit.dof == corner.tau.size - 2
     assert np.isnan(fit.p_value)

@@ -36,6 +36,11 @@ def test_every_built_in_process_has_examples():
     assert [kind.__name__ for kind in CATALOGUE if not kind.examples()] == []
 
 
+def test_one_process_is_opened_as_a_model_is():
+    assert gmwm.WhiteNoise(0.2).opened() == gmwm.WhiteNoise()
+    assert gmwm.GaussMarkov(1.0, 2.0).opened() == gmwm.GaussMarkov()
+
+
 @pytest.mark.parametrize("process", EXAMPLES, ids=name)
 def test_closed_form_equals_spectral_integral(process):
     if isinstance(process, gmwm.RateRamp):

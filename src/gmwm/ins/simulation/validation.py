@@ -189,13 +189,13 @@ class Validation:
 
         truth, start = self.study.truth, self.study.truth.lla[0]
         whole = ned_difference(truth.lla[:: max(round(1.0 / truth.dt), 1)], start)
-        parts: list[FloatArray] = []
+        parts: dict[str, FloatArray] = {}
         solutions: dict[str, list[FloatArray]] = {name: [] for name in self.names}
         for outage in self.study.outages:
             first, last = round(outage.start / truth.dt), round(outage.end / truth.dt)
             every = max(round(0.1 / truth.dt), 1)
             part = truth.lla[np.append(np.arange(first, last, every), last)]
-            parts.append(ned_difference(part, start)[:, 1::-1])
+            parts[f"run 1, {_span(outage)}"] = ned_difference(part, start)[:, 1::-1]
             for name in self.names:
                 solution = self.study.example[name]
                 inside = (solution.time >= outage.start) & (solution.time <= outage.end)
@@ -223,7 +223,7 @@ class Validation:
             error = solution.errors(self.study.truth)[shown][:, order]
             error[:, 2] *= -1.0
             panels[name] = (solution.time[shown], error, solution.sd[shown][:, order])
-        return plotting.errors(panels, [(span.start, span.end)])
+        return plotting.errors(panels, [(span.start, span.end)], title=f"run 1, {_span(span)}")
 
     def plot_growth(self) -> Figure:
         """Planimetric and altimetric errors during the outages over all runs (Figure 9)."""
@@ -231,11 +231,16 @@ class Validation:
 
         panels: dict[str, Any] = {}
         for outage in self.study.outages:
-            label = f"outage of {outage.duration:g} s at {outage.start:g} s"
-            panels[label] = {name: _growth(self.study[name], outage) for name in self.reached}
+            panels[_span(outage)] = {
+                name: _growth(self.study[name], outage) for name in self.reached
+            }
         if not panels:
             raise InputError("the experiment has no outage to draw: add one")
-        return plotting.growth(panels)
+        return plotting.growth(panels, self.study[self.names[0]].runs)
+
+
+def _span(outage: Outage) -> str:
+    return f"outage of {outage.duration:g} s from {outage.start:g} s"
 
 
 def _growth(runs: FilterErrors, outage: Outage) -> tuple[FloatArray, FloatArray, FloatArray]:
