@@ -115,7 +115,7 @@ def test_outsiders_import_faces_only():
 
 LINES = {
     "": 890, "_core": 2_340, "process": 3_180, "readers": 5_610, "plotting": 690,
-    "variance": 4_700, "diagnosis": 3_340, "estimate": 7_460, "selection": 1_140,
+    "variance": 4_700, "diagnosis": 3_340, "estimate": 7_540, "selection": 1_180,
     "calibration": 2_180, "datasheet": 610, "filter_numbers": 3_600, "ins": 9_850,
     "population": 2_200, "export": 1_740, "report": 2_380, "study": 1_700, "cli": 2_110,
 }  # fmt: skip

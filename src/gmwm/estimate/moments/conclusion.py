@@ -132,18 +132,18 @@ def reweighted(fit: Fit, end: Converged, weights: Weights) -> Fit:
         names.append(drift)
         covariance = np.pad(covariance, (0, 1))
         covariance[-1, -1] = fit.stderr[drift] ** 2
-    names, covariance = in_model_order(model, names, covariance)
+    ordered, covariance = in_model_order(model, names, covariance)
     vanished = {keys[k] for k, (_, is_amplitude) in enumerate(coordinates.owners) if is_amplitude}
     vanished -= {*names, *fit.upper_bounds}
     limits = fit.interval()
     upper = {**fit.upper_bounds, **{key: limits[key][1] for key in vanished}}
-    bad, others = estimate_notices(model, names, covariance, upper, fit.wv)
+    bad, others = estimate_notices(model, ordered, covariance, upper, fit.wv)
     found = [*bad, *others, *limit_notices(design, point)]
     kept = [each for each in fit.notices if each.code not in _OF_VALUES]
     return replace(
         fit,
         model=model,
-        keys=names,
+        keys=ordered,
         covariance=covariance,
         upper_bounds=upper,
         weights=weights.name,
@@ -151,14 +151,8 @@ def reweighted(fit: Fit, end: Converged, weights: Weights) -> Fit:
     )
 
 
-_OF_VALUES = (
-    "amplitude-bound",
-    "confounded",
-    "indistinct-terms",
-    "search-limit",
-    "sensor-bandwidth",
-    "undetermined",
-)
+_OF_VALUES = {"amplitude-bound", "confounded", "indistinct-terms", "search-limit"}
+_OF_VALUES |= {"sensor-bandwidth", "undetermined"}
 """Codes of notices about estimates, which belong to one Omega; the others are about the model."""
 
 
