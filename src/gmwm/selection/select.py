@@ -402,7 +402,8 @@ def _with_slowest_held(others: Sequence[Process], wv: WaveletVariance) -> Fit | 
         return None
     best, tau = min(right, key=lambda each: each[0].chi_square)
     most = best.chi_square + float(chi2.isf(2.0 * (1.0 - tuning.HELD_LEVEL), 1))
-    shortest = min(time for fit, time in right if fit.chi_square <= most)
+    # The limit lies between the shortest time that is allowed and the next one, which is not.
+    shortest = 0.5 * min(time for fit, time in right if fit.chi_square <= most)
     key = next(i.key for i in best.model.parameters if i.value == tau)
     held = notice("time-held", key, {"tau": tau, "shortest": shortest})
     return replace(best, notices=(*best.notices, held))

@@ -37,7 +37,7 @@ none is beside the low-pass while its shape is sought."""
 
 HELD_TIMES = 7
 """Correlation times at which the slowest term of ``rule="merge"`` is held, from the length of the
-record downwards by halves: at a sixty-fourth, four of five records determine it
-(benchmarks/paper_sensor.py)."""
+record downwards by halves: those held for 27 gyros of the paper's Table VI were a sixteenth of it
+or longer (``python benchmarks/paper_sensor.py``)."""
 
 HELD_LEVEL = 0.95  # probability of the shortest time that the record allows
