@@ -567,6 +567,8 @@ _ESTIMATE = (
 _SELECTION = (
     Issue("ramp-or-walk", "this record cannot distinguish a rate ramp of {ramp} from slow noise "
         "({slow}); the model leaves out the ramp", topic="selection"),
+    Issue("time-held", "held at {tau:.3g} s: this record only shows that it is longer than "
+        "{shortest:.3g} s (95 %)", topic="selection"),
     Issue("tie", {
         "": "{text}",
         "wrong": "Use none of {names}: errors are equal within the resolution of this log{but}.",

@@ -168,7 +168,8 @@ def _opened(fit: Fit) -> Model:
 
 def _root(fit: Fit) -> FloatArray:
     """L with L'L the weight matrix at a fit."""
-    return Weights.of(fit.weights, fit.wv).root(fit.moments.covariance)
+    at = fit.moments
+    return Weights.of(fit.weights, fit.wv).root(at.covariance, at.implied - at.target)
 
 
 def _targets(at: FittedMoments, runs: int, rng: np.random.Generator) -> FloatArray:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self, cast
 import numpy as np
 
 from gmwm._core import checks
+from gmwm._core.distributions import chi2
 from gmwm._core.documents import Document
 from gmwm._core.jobs import one_blas_thread
 from gmwm._core.tables import frame, html_table, plain_table
@@ -18,6 +19,7 @@ from gmwm._core.units import shown_unit
 from gmwm.errors import InputError
 from gmwm.estimate import Data, Fit, are_several, estimate
 from gmwm.estimate.result import dense_curves, fit_joint
+from gmwm.issues import notice
 from gmwm.process import GaussMarkov, Model, Process, WhiteNoise, as_model
 from gmwm.selection import tuning
 from gmwm.selection.ranking import (
@@ -341,9 +343,9 @@ def _doubtful_term(fitted: Fit) -> Process | None:
     model = fitted.model
     owners = {item.key: model.terms[item.term] for item in model.parameters}
     kinds = {type(term).__name__: term for term in model.terms}
-    for notice in fitted.notices:
-        if notice.code in _REDUNDANT:
-            return owners[notice.where] if notice.where else kinds[notice.values["process"]]
+    for each in fitted.notices:
+        if each.code in _REDUNDANT:
+            return owners[each.where] if each.where else kinds[each.values["process"]]
     return None
 
 
@@ -359,17 +361,52 @@ def _is_supported(fitted: Fit) -> bool:
 
 
 def _by_merging(wv: WaveletVariance, choices: Choices) -> Selection:
-    """All Gauss-Markov processes allowed, one fewer while two are alike or one is redundant."""
+    """All Gauss-Markov processes allowed, one fewer while two are alike or one is redundant.
+
+    A term whose removal makes the model miss an averaging time stays. If it is too slow for the
+    record to determine its correlation time, that is held.
+    """
     base = (WhiteNoise(), *choices.extra)
+    sums = [
+        (*base, *(GaussMarkov() for _ in range(g))) for g in range(choices.max_gauss_markov + 1)
+    ]
+    sums = [each for each in sums if each == base or 2 * len(each) - len(base) < wv.tau.size]
     fits: list[Fit] = []
-    for g in range(choices.max_gauss_markov, -1, -1):
-        if g and len(base) + 2 * g >= wv.tau.size:
-            continue
-        fits.append(estimate(Model((*base, *(GaussMarkov() for _ in range(g)))), wv))
+    for terms in reversed(sums):
+        fits.append(estimate(Model(terms), wv))
         if not _gauss_markov_is_redundant(fits[-1]):
             break
-    ranking = tuple(candidate_of(fitted) for fitted in reversed(fits))
-    return Selection(ranking, ranking[0], _of_each(ranking[0], fits[-1], wv))
+    ranking = [candidate_of(fitted) for fitted in reversed(fits)]
+    if not fits[-1].valid:
+        last = len(sums) - len(fits)
+        for terms in sums[max(last, 1) : last + 2]:
+            held = _with_slowest_held(terms[:-1], wv)
+            if held is not None:
+                fits.append(held)
+                opened = held.model.with_params(dict.fromkeys(held.keys))
+                ranking.insert(0, replace(candidate_of(held), model=opened))
+                break
+    return Selection(tuple(ranking), ranking[0], _of_each(ranking[0], fits[-1], wv))
+
+
+def _with_slowest_held(others: Sequence[Process], wv: WaveletVariance) -> Fit | None:
+    """The best valid fit of a Gauss-Markov term of held time beside others; None if there is none.
+
+    From the length of the record on, a Gauss-Markov process is a random walk in it.
+    """
+    times = wv.n * wv.dt / 2.0 ** np.arange(tuning.HELD_TIMES)
+    models = (Model((*others, GaussMarkov(tau=float(tau)))) for tau in times)
+    tried = [(estimate(model, wv), float(tau)) for model, tau in zip(models, times, strict=True)]
+    right = [each for each in tried if each[0].valid]
+    if not right:
+        return None
+    best, tau = min(right, key=lambda each: each[0].chi_square)
+    most = best.chi_square + float(chi2.isf(2.0 * (1.0 - tuning.HELD_LEVEL), 1))
+    # The limit lies between the shortest time that is allowed and the next one, which is not.
+    shortest = 0.5 * min(time for fit, time in right if fit.chi_square <= most)
+    key = next(i.key for i in best.model.parameters if i.value == tau)
+    held = notice("time-held", key, {"tau": tau, "shortest": shortest})
+    return replace(best, notices=(*best.notices, held))
 
 
 def _of_each(chosen: Candidate, fitted: Fit, wv: WaveletVariance) -> Fit:

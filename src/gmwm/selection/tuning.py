@@ -34,3 +34,10 @@ to be in the model. No sum of such processes is better than their mixture."""
 FILTER_LIKE = 10.0
 """Correlation time in samples below which a Gauss-Markov process would take over part of a filter:
 none is beside the low-pass while its shape is sought."""
+
+HELD_TIMES = 7
+"""Correlation times at which the slowest term of ``rule="merge"`` is held, from the length of the
+record downwards by halves: those held for 27 gyros of the paper's Table VI were a sixteenth of it
+or longer (``python benchmarks/paper_sensor.py``)."""
+
+HELD_LEVEL = 0.95  # probability of the shortest time that the record allows

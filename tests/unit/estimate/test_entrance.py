@@ -90,6 +90,21 @@ def test_standard_errors_are_right_for_every_weight(omega):
         assert np.mean(estimates) == pytest.approx(truth.params[key], abs=4 * predicted / 24**0.5)
 
 
+@pytest.mark.parametrize("weights", ["data", "diagonal", "identity"])
+def test_a_right_model_is_valid_under_all_weights(weights):
+    truth = WhiteNoise(0.2) + RandomWalk(0.02)
+    rng = np.random.default_rng(11)
+    series = [truth.simulate(6000, 1.0, rng) for _ in range(20)]
+    fits = [gmwm.fit(truth.opened(), x, dt=1.0, weights=weights) for x in series]
+    # One in a hundred fails by chance: more than two of twenty in one of a thousand cases.
+    assert sum(fit.valid for fit in fits) >= 18
+    assert all(fit.discrepancy == 0.0 for fit in fits)
+    assert np.median([fit.stderr["N"] for fit in fits]) < 0.005
+    for key in ("N", "K"):
+        held = [inside(fit, truth, 0.95)[key] for fit in fits]
+        assert sum(held) >= 16  # of 95 % intervals: fewer in three of a thousand cases
+
+
 def test_model_weights_are_the_most_efficient():
     truth = WhiteNoise(0.3) + RandomWalk(0.02)
     x = gmwm.simulate(truth, 20_000, 1.0, 6)

@@ -161,6 +161,19 @@ def test_merging_stops_where_it_must():
         gmwm.select(x, dt=1.0, rule="magic")
 
 
+def test_merging_holds_a_time_that_the_record_does_not_determine():
+    # Five correlation times: the record shows the process, but no upper limit of its time.
+    x = gmwm.simulate(WhiteNoise(1.0) + GaussMarkov(1.0, 4000.0), 20_000, 1.0, 2)
+    selection = gmwm.select(x, dt=1.0, rule="merge", max_gauss_markov=2)
+    fit = selection.fit
+    assert fit.valid
+    assert set(fit.keys) == {"N", "sigma"}
+    assert selection.chosen is selection[0]
+    (held,) = (each for each in fit.notices if each.code == "time-held")
+    assert held.where == "tau"
+    assert held.values["shortest"] <= min(4000.0, held.values["tau"])
+
+
 def test_bias_instability_as_a_candidate():
     truth = WhiteNoise(1.0) + gmwm.BiasInstability(0.5)
     selection = gmwm.select(truth.simulate(100_000, 1.0, 2), dt=1.0, extra=[gmwm.BiasInstability()])

@@ -13,10 +13,17 @@ from gmwm._core.distributions import chi2
 from gmwm._core.typing import FloatArray
 from gmwm.estimate import tuning
 from gmwm.estimate.moments.design import Design
-from gmwm.estimate.moments.profile import Point, Profile
+from gmwm.estimate.moments.profile import Point, Profile, search
 from gmwm.estimate.moments.weights import Weights
-from gmwm.estimate.problem import Moments, Slope, weight_root
-from gmwm.estimate.result import Comparison, Estimates, Fit, conclude, upper_amplitude
+from gmwm.estimate.problem import Moments, Slope, drift_key, in_model_order, weight_root
+from gmwm.estimate.result import (
+    Comparison,
+    Estimates,
+    Fit,
+    conclude,
+    estimate_notices,
+    upper_amplitude,
+)
 from gmwm.issues import Notice, notice
 from gmwm.process import Model, Process
 from gmwm.variance import WaveletVariance
@@ -50,24 +57,19 @@ class Converged:
 def conclude_moments(
     end: Converged,
     wv: WaveletVariance,
-    weights: Weights,
     method: str,
     without: Callable[[int], Fit | None],
 ) -> Fit:
-    """Make the `Fit` of a minimum.
+    """Make the `Fit` of a minimum under model weights.
 
     without: The fit without a noise term, which shows whether a doubtful term is needed; None if
         nothing is left to fit.
     """
     design, point, moments = end.design, end.point, end.moments(wv)
     target, implied = moments.target, design.implied(point.x, point.shapes)
-    curves, amplitudes = design.curves(point.shapes), design.amplitudes(point.x)
-    terms, slope = design.unit_terms(point.shapes), moments.slope
-    variances = moments.slope_variances(terms)
-    if variances is not None:
-        curves = curves - np.outer(wv.drift_response**2, variances)
-    absent = [i for i in design.linear if amplitudes[i] == 0.0]
-    jacobian = _jacobian(design, point, curves, absent)
+    slope, variances = moments.slope, moments.slope_variances(design.unit_terms(point.shapes))
+    absent = [i for i in design.linear if design.amplitudes(point.x)[i] == 0.0]
+    jacobian, curves = _jacobian(end, moments)
     processes = design.fitted_processes(point.x, point.shapes)
     limits = {}
     for i in absent:
@@ -85,11 +87,11 @@ def conclude_moments(
     found = Estimates(
         coordinates=design.coordinates,
         processes=processes,
-        covariance=_sandwich(jacobian, end.covariance, weights),
+        covariance=_sandwich(jacobian, end.covariance, weight_root(end.covariance)),
         absent=limits,
         slope=None if variances is None else slope,
         method=method,
-        weights=weights.name,
+        weights="model",
         discrepancy=end.discrepancy,
         notices=notices,
     )
@@ -107,23 +109,90 @@ def conclude_moments(
     return _with_doubtful_terms(fit, redundant, design, processes, without)
 
 
-def _jacobian(design: Design, point: Point, curves: FloatArray, absent: list[int]) -> FloatArray:
-    """Derivative of the moments by the coordinates of the terms that have an amplitude, (J, d)."""
+def reweighted(fit: Fit, end: Converged, weights: Weights) -> Fit:
+    """The fit with another Omega: the minimum of eq. (9), errors by eq. (10) of Stebler et al.
+
+    Whether the model is right and which terms the data need does not depend on Omega, so that all
+    tests are those of the fit by model weights. B and the covariance of the wavelet variances are
+    taken there too: at a poor estimate, errors would be as poor as that.
+
+    fit, end: By model weights.
+    """
+    design, moments, coordinates = end.design, end.moments(fit.wv), end.design.coordinates
+    best, target = end.point, moments.target
+    root = weights.root(end.covariance, design.implied(best.x, best.shapes) - target)
+    point = search(Profile(design, target, root))
+    jacobian, _ = _jacobian(end, moments)
+    matrix = _sandwich(jacobian, end.covariance, root)
+    before = coordinates.fitted(design.fitted_processes(best.x, best.shapes))[1]
+    rows = {before[k]: row for row, k in enumerate(_present(design, best))}
+    drift = next((key for key in fit.keys if key == drift_key(fit.model)), None)
+    processes = design.fitted_processes(point.x, point.shapes)
+    model, keys = coordinates.fitted(processes, None if drift is None else fit.params[drift])
+    places = [k for k in _present(design, point) if keys[k] in rows]
+    names = [keys[k] for k in places]
+    order = [rows[name] for name in names]
+    own = coordinates.jacobian(processes)[np.ix_(places, places)]
+    covariance = own @ matrix[np.ix_(order, order)] @ own.T
+    if drift is not None:
+        names.append(drift)
+        covariance = np.pad(covariance, (0, 1))
+        covariance[-1, -1] = fit.stderr[drift] ** 2
+    ordered, covariance = in_model_order(model, names, covariance)
+    vanished = {keys[k] for k, (_, is_amplitude) in enumerate(coordinates.owners) if is_amplitude}
+    vanished -= {*names, *fit.upper_bounds}
+    limits = fit.interval()
+    upper = {**fit.upper_bounds, **{key: limits[key][1] for key in vanished}}
+    bad, others = estimate_notices(model, ordered, covariance, upper, fit.wv)
+    found = [*bad, *others, *limit_notices(design, point)]
+    kept = [each for each in fit.notices if each.code not in _OF_VALUES]
+    return replace(
+        fit,
+        model=model,
+        keys=ordered,
+        covariance=covariance,
+        upper_bounds=upper,
+        weights=weights.name,
+        notices=(*found, *kept),
+    )
+
+
+_OF_VALUES = {"amplitude-bound", "confounded", "indistinct-terms", "search-limit"}
+_OF_VALUES |= {"sensor-bandwidth", "undetermined"}
+"""Codes of notices about estimates, which belong to one Omega; the others are about the model."""
+
+
+def _present(design: Design, point: Point) -> list[int]:
+    """Coordinates of the terms that have an amplitude."""
     amplitudes = design.amplitudes(point.x)
+    return [k for k, (i, _) in enumerate(design.coordinates.owners) if amplitudes[i] > 0.0]
+
+
+def _jacobian(end: Converged, moments: Moments) -> tuple[FloatArray, FloatArray]:
+    """Derivative of the moments by the coordinates of the terms that have an amplitude, (J, d).
+
+    Returns: derivative; curves of all terms at unit amplitude, less what the slope takes.
+    """
+    design, point = end.design, end.point
+    amplitudes, curves = design.amplitudes(point.x), design.curves(point.shapes)
+    lost = moments.lost(design.unit_terms(point.shapes))
+    if lost is not None:
+        curves -= lost
     slopes = iter((design.shape_derivatives(point.shapes) * amplitudes[design.owners]).T)
-    columns = [np.zeros((0, curves.shape[0]))]
-    for i, is_amplitude in design.coordinates.owners:
-        column = curves[:, i] * amplitudes[i] if is_amplitude else next(slopes)
-        if i not in absent:
-            columns.append(column[None, :])
-    return np.concatenate(columns).T
+    columns = [
+        curves[:, i] * amplitudes[i] if is_amplitude else next(slopes)
+        for i, is_amplitude in design.coordinates.owners
+    ]
+    return np.array(columns)[_present(design, point)].T, curves
 
 
-def _sandwich(jacobian: FloatArray, covariance: FloatArray, weights: Weights) -> FloatArray:
-    """B V B' with B = (D' Omega D)^-1 D' Omega, on parameters scaled to be of like size."""
+def _sandwich(jacobian: FloatArray, covariance: FloatArray, root: FloatArray) -> FloatArray:
+    """B V B' with B = (D' Omega D)^-1 D' Omega, on parameters scaled to be of like size.
+
+    root: (J, J), L with L'L = Omega.
+    """
     if jacobian.shape[1] == 0:
         return np.zeros((0, 0))
-    root = weights.root(covariance)
     weighted = root @ jacobian
     length = np.sqrt(np.sum(weighted**2, axis=0))
     length[length == 0.0] = 1.0

@@ -9,7 +9,6 @@ point: it is smooth where one computed from the data is noisy.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import ClassVar, cast
 from weakref import WeakKeyDictionary
@@ -20,7 +19,7 @@ from gmwm._core import checks
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.estimate import tuning
-from gmwm.estimate.moments.conclusion import Converged, conclude_moments
+from gmwm.estimate.moments.conclusion import Converged, conclude_moments, reweighted
 from gmwm.estimate.moments.design import Design
 from gmwm.estimate.moments.profile import Point, Profile, search
 from gmwm.estimate.moments.weights import (
@@ -38,6 +37,7 @@ from gmwm.estimate.problem import (
     is_plain,
     keys_by_term,
     ols_slope,
+    weight_root,
 )
 from gmwm.estimate.result import Fit
 from gmwm.issues import notice
@@ -129,26 +129,28 @@ class GMWM:
             left = tuple(term for k, term in enumerate(model.terms) if k != noise[i])
             if not any(term.is_open for term in left) or all(t.is_drift or t.is_line for t in left):
                 return None
-            return concluded(Model(left), lambda _: None)
+            return conclude_moments(
+                efficient._cached(Model(left), wv), wv, self.name, lambda _: None
+            )
 
-        def concluded(model: Model, without: Callable[[int], Fit | None]) -> Fit:
-            weights = Weights.of(self.weights, wv)
-            return conclude_moments(self._cached(model, wv), wv, weights, self.name, without)
-
-        if self.start is None:
-            return concluded(model, without)
-        least = replace(self, start=None)._cached(model, wv)
         weights = Weights.of(self.weights, wv)
-        profile = Profile(least.design, least.moments(wv).target, weights.root(least.covariance))
-        grid = profile.refine(profile.at(least.point.shapes))
-        reached = profile.descend(_started(self.start, least.design.coordinates))
-        if reached.objective < grid.objective:
-            least = replace(least, point=reached)
-        fit = conclude_moments(least, wv, weights, self.name, without)
-        if reached.objective <= grid.objective + tuning.SAME_MINIMUM:
-            return fit
-        values = {"objective": reached.objective, "least": grid.objective}
-        return replace(fit, notices=(*fit.notices, notice("start-missed", "", values)))
+        efficient = replace(self, weights="model", start=None)
+        least, missed = efficient._cached(model, wv), []
+        if self.start is not None:
+            target = least.moments(wv).target
+            excess = least.design.implied(least.point.x, least.point.shapes) - target
+            profile = Profile(least.design, target, weights.root(least.covariance, excess))
+            grid = profile.refine(profile.at(least.point.shapes))
+            reached = profile.descend(_started(self.start, least.design.coordinates))
+            if self.weights == "model" and reached.objective < grid.objective:
+                least = replace(least, point=reached)
+            if reached.objective > grid.objective + tuning.SAME_MINIMUM:
+                values = {"objective": reached.objective, "least": grid.objective}
+                missed.append(notice("start-missed", "", values))
+        fit = conclude_moments(least, wv, self.name, without)
+        if self.weights != "model":
+            fit = reweighted(fit, least, weights)
+        return replace(fit, notices=(*fit.notices, *missed)) if missed else fit
 
     def _cached(self, model: Model, wv: WaveletVariance) -> Converged:
         """The minimum, searched once for each model and series."""
@@ -167,7 +169,7 @@ class GMWM:
         # A slope is least certain under noise fitted with the drift in it. Started as if it were
         # known, a walk can stay at zero, which makes it known.
         moments = moments.under(dictionary_fit(wv, wv.variance, noise).mixture)
-        problem = _Problem(design, moments, Weights.of(self.weights, wv))
+        problem = _Problem(design, moments)
         reference = dictionary_fit(wv, moments.target, noise)
         level = Discrepancy(self.discrepancy, wv.tau.size > design.n_free)
         first = [level.value]
@@ -256,15 +258,14 @@ class SimulatedMoments(GMWM):
 
 @dataclass(frozen=True, eq=False)
 class _Problem:
-    """A model, the moments of a series before a first fit, and the choice of Omega."""
+    """A model, and the moments of a series before a first fit."""
 
     design: Design
     moments: Moments
-    weights: Weights
 
     def search(self, target: FloatArray, covariance: FloatArray) -> Point:
         """The global minimum under the weights of a covariance of the moments."""
-        return search(Profile(self.design, target, self.weights.root(covariance)))
+        return search(Profile(self.design, target, weight_root(covariance)))
 
     def dof(self, point: Point) -> int:
         """Levels less the parameters of terms that have an amplitude.
@@ -302,7 +303,7 @@ def _iterate(problem: _Problem, relaxed: FloatArray, level: Discrepancy) -> Conv
         else:
             lost = moments.lost(design.unit_terms(point.shapes))
             given = target if lost is None else moments.detrended
-            profile = Profile(design, given, problem.weights.root(relaxed), lost=lost)
+            profile = Profile(design, given, weight_root(relaxed), lost=lost)
             point = profile.refine(profile.at(point.shapes))
         previous, curve = curve, design.implied(point.x, point.shapes)
         before, step = step, (curve - previous) / deviation

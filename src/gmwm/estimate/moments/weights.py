@@ -35,10 +35,12 @@ class Weights:
     """A choice of Omega.
 
     name: One of `WEIGHTS`.
+    variance: (J,), wavelet variances of the data, u^2.
     of_data: (J, J) or None, covariance estimated from the coefficients, for "data".
     """
 
     name: str
+    variance: FloatArray
     of_data: FloatArray | None = None
 
     @classmethod
@@ -53,15 +55,20 @@ class Weights:
                 'weights = "data" needs the covariance estimated from the coefficients: make the '
                 'wavelet variance with data_covariance="octave"'
             )
-        return cls(name, wv.data_covariance if name == "data" else None)
+        return cls(name, wv.variance, wv.data_covariance if name == "data" else None)
 
-    def root(self, covariance: FloatArray) -> FloatArray:
+    def root(self, covariance: FloatArray, excess: FloatArray) -> FloatArray:
         """L with L'L the weight matrix, (J, J).
 
-        covariance: (J, J), of the moments under the fitted model, u^4.
+        A level that is low by chance has a small estimated variance too, and would have too much
+        weight: the one estimated from the data is brought to the wavelet variances of the model.
+
+        covariance: (J, J), of the moments under the model, u^4.
+        excess: (J,), wavelet variances of the model less those of the data, u^2.
         """
         if self.of_data is not None:
-            return weight_root(self.of_data)
+            ratio = 1.0 + excess / self.variance
+            return weight_root(self.of_data * np.outer(ratio, ratio))
         if self.name == "model":
             return weight_root(covariance)
         variances = np.diag(covariance)
