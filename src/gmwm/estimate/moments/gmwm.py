@@ -76,7 +76,8 @@ class GMWM:
         `gmwm.estimate.moments.weights`.
     drift : {"slope", "moments"}, optional
         A rate ramp is estimated by generalized least squares beside the wavelet variances, or is
-        part of nu(theta) to the letter of the paper's eq. (9), which knows it by its square only.
+        part of nu(theta) to the letter of the paper's eq. (9), which knows it by its square only;
+        weights from the data are then those of its eq. (5).
     start : Process, Model or float, optional
         The same model with starting values, or one value for all parameters: the paper's are all
         1.0. A local search from there must reach the minimum of the global one, which needs no
@@ -133,7 +134,7 @@ class GMWM:
                 efficient._cached(Model(left), wv), wv, self.name, lambda _: None
             )
 
-        weights = Weights.of(self.weights, wv)
+        weights = Weights.of(self.weights, wv, self.drift == "moments")
         efficient = replace(self, weights="model", start=None)
         least, missed = efficient._cached(model, wv), []
         if self.start is not None:

@@ -37,14 +37,16 @@ class Weights:
     name: One of `WEIGHTS`.
     variance: (J,), wavelet variances of the data, u^2.
     of_data: (J, J) or None, covariance estimated from the coefficients, for "data".
+    is_literal: Whether that is taken as it is, eq. (5) of the paper to the letter.
     """
 
     name: str
     variance: FloatArray
     of_data: FloatArray | None = None
+    is_literal: bool = False
 
     @classmethod
-    def of(cls, name: str, wv: WaveletVariance) -> Weights:
+    def of(cls, name: str, wv: WaveletVariance, is_literal: bool = False) -> Weights:
         """Weights for these wavelet variances.
 
         Raises InputError if they are "data" and the variances come without a covariance of their
@@ -55,7 +57,8 @@ class Weights:
                 'weights = "data" needs the covariance estimated from the coefficients: make the '
                 'wavelet variance with data_covariance="octave"'
             )
-        return cls(name, wv.variance, wv.data_covariance if name == "data" else None)
+        of_data = wv.data_covariance if name == "data" else None
+        return cls(name, wv.variance, of_data, is_literal)
 
     def root(self, covariance: FloatArray, excess: FloatArray) -> FloatArray:
         """L with L'L the weight matrix, (J, J).
@@ -67,7 +70,7 @@ class Weights:
         excess: (J,), wavelet variances of the model less those of the data, u^2.
         """
         if self.of_data is not None:
-            ratio = 1.0 + excess / self.variance
+            ratio = 1.0 + (0.0 if self.is_literal else 1.0) * excess / self.variance
             return weight_root(self.of_data * np.outer(ratio, ratio))
         if self.name == "model":
             return weight_root(covariance)
