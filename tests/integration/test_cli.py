@@ -983,7 +983,10 @@ def test_reproduce_draws_the_figure_from_the_same_runs(run, tmp_path):
     [
         (("table9",), "table9"),
         (("table2", "--runs", 1), "--runs"),
-        (("table2", "--method", "AV2", "--runs", 2), "it has EM, EM*, AV, MLE, GMWM"),
+        (
+            ("table2", "--method", "AV2", "--runs", 2),
+            "it has EM, EM*, AV, AV IRLS, MLE, eq. (9), GMWM",
+        ),
         (("table2", "--seed", -1), "--seed"),
         (("table2", "--cluster", "nonsense://x", "--runs", 2), "no Dask scheduler"),
     ],

@@ -319,7 +319,8 @@ def _within_errors(
         for i, j in combinations(range(first, last + 1), 2)
         if not np.any(off[i : j + 1, i : j + 1])
     ]
-    known = 1.0 / np.diag(apart, 1)  # of the slope of each octave
+    # Of the slope of each octave; a drift without noise leaves rounding errors.
+    known = 1.0 / np.maximum(np.diag(apart, 1), 1e-30)
     return max(parts, key=lambda part: np.sum(known[part.first : part.last]), default=None)
 
 
@@ -395,7 +396,7 @@ def _misfit_notices(model: Model, wv: WaveletVariance) -> list[Notice]:
     implied = model.wavelet_variance(wv.tau, wv.dt, wv.wavelet)
     # In logarithms, as the standard error of a variance is proportional to its estimate: one that
     # happens to be small claims to be exact.
-    ratio = np.maximum(wv.variance, np.finfo(float).tiny) / implied
+    ratio = np.maximum(wv.variance, 1e-30) / implied
     is_off = np.abs(np.log(ratio)) > tuning.LINES_SIGMA * np.sqrt(2.0 / wv.dof)
     known = 2.0 * wv.variance**2 / np.maximum(variance, 1e-300) > tuning.WELL_KNOWN_DOF
     misfit = np.where(is_off & known, np.abs(np.sqrt(wv.variance / implied) - 1.0), 0.0)

@@ -384,14 +384,14 @@ class PooledVariance(WaveletVariance):
             raise InputError("no recordings given: give at least one wavelet variance")
         longest = max(parts, key=lambda part: part.tau.size)
         for part in parts:
-            if not np.array_equal(part.tau, longest.tau[: part.tau.size]):
-                raise InputError("recordings have other averaging times: fit curves one by one")
             for name in ("dt", "unit", "wavelet", "efficiency"):
                 if getattr(part, name) != getattr(longest, name):
                     raise InputError(
                         f"recordings do not belong together: {name} is {getattr(part, name)!r} "
                         f"and {getattr(longest, name)!r}"
                     )
+            if not np.array_equal(part.tau, longest.tau[: part.tau.size]):
+                raise InputError("recordings have other averaging times: fit curves one by one")
         shares = _shares(parts, longest.tau.size)
 
         def mean_of(values: Sequence[FloatArray | None]) -> FloatArray | None:

@@ -183,7 +183,8 @@ def _jacobian(end: Converged, moments: Moments) -> tuple[FloatArray, FloatArray]
         curves[:, i] * amplitudes[i] if is_amplitude else next(slopes)
         for i, is_amplitude in design.coordinates.owners
     ]
-    return np.array(columns)[_present(design, point)].T, curves
+    derivative = np.reshape(columns, (len(columns), len(curves)))
+    return derivative[_present(design, point)].T, curves
 
 
 def _sandwich(jacobian: FloatArray, covariance: FloatArray, root: FloatArray) -> FloatArray:

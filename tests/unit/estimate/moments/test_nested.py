@@ -47,7 +47,7 @@ def test_a_further_term_does_not_spoil_the_fit(source):
 def test_a_term_of_zero_amplitude_does_not_change_the_discrepancy():
     """Each took two degrees of freedom, so that the allowed discrepancy grew with it."""
     bent = np.concatenate([[0.0, -1.7, -3.4], -4.4 - np.arange(4), -7.4 + 1.4 * np.arange(4)])
-    wv = series_of(np.exp2(bent), 0.01)
+    wv = octaves(np.exp2(bent), 100.0)
     one, *larger = (gmwm.fit(WhiteNoise() + k * GaussMarkov(), wv) for k in (1, 2, 3))
     for fit in larger:
         assert fit.params["sigma_1"] == 0.0

@@ -24,8 +24,8 @@ def recordings(lengths, seed, truth=TRUTH):
 def test_one_recording_is_no_different():
     (wv,) = recordings([5000], 1)
     alone, joint = gmwm.fit(TRUTH.opened(), wv), gmwm.fit(TRUTH.opened(), [wv])
-    assert joint.params == pytest.approx(alone.params, rel=1e-9)
-    assert joint.stderr == pytest.approx(alone.stderr, rel=1e-9)
+    assert joint.params == pytest.approx(alone.params, rel=1e-6)
+    assert joint.stderr == pytest.approx(alone.stderr, rel=1e-6)
     assert np.isnan(joint.equality_p)
     assert joint.valid
 
