@@ -24,7 +24,7 @@ _LINES = 30  # of the page, with those about files
 _ACTIONS = 3  # notices that matter most
 _AXES, _FEWEST = 6, 4  # lines of them beside the numbers of more axes
 _NAME, _SOURCE, _TEXT = 18, 40, 60  # characters; longer ones are shortened
-_NOTABLE = 1.1  # times the table's N or K
+_NOTABLE, _APART = 1.1, 1.15  # times the table's N or K, times the filter's
 _LEAST = 0.1  # smallest number without an exponent
 _LEGEND = "+-, (a to b): 95 % interval. <=: 95 % upper limit. B: lowest deviation / 0.664"
 _FILTER = "For your filter, outages up to {:g} s (keys of OpenVINS, Kalibr; GTSAM: N^2, K^2)"
@@ -262,7 +262,7 @@ def _of_rivals(triad: Triad, calibration: Calibration) -> list[str]:
     return [
         f"{triad.quantity} {letter} up to {brief(value / getattr(triad, letter), 2)} times"
         for letter, value in largest.items()
-        if value > _NOTABLE * getattr(triad, letter)
+        if value > _APART * getattr(triad, letter)
     ]
 
 
