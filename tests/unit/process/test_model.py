@@ -174,18 +174,18 @@ def test_a_text_is_a_model(text, model):
 
 def test_the_latest_process_of_a_name_of_ones_own_is_meant():
     def defined(power):
-        class Coloured(gmwm.Process):
+        class Tinted(gmwm.Process):
             level: float = gmwm.parameter("u", role="scale")
 
             def psd(self, f, dt):
                 return self.level**2 * f**power
 
-        return Coloured
+        return Tinted
 
     first, second = defined(-0.5), defined(-1.0)
-    model = as_model("N + 1 Coloured")
+    model = as_model("N + 1 Tinted")
     assert type(model.terms[1]) is second is not first
-    with pytest.raises(gmwm.InputError, match=r"write .*, Coloured, "):
+    with pytest.raises(gmwm.InputError, match=r"write .*, Tinted, "):
         as_model("N + Colored")
 
 
