@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from gmwm.cli.main import cli
 from marks import slow
 from places import REPOSITORY
 
@@ -110,3 +111,11 @@ def test_files_of_the_source_are_called_so(name):
 def test_every_page_is_on_the_site():
     listed = set(re.findall(r"^[\w-]+$", (DOCS / "index.md").read_text(), re.MULTILINE))
     assert {page.stem for page in DOCS.glob("*.md")} - {"index"} <= listed
+
+
+def test_experiments_on_the_page_of_the_paper_exist():
+    known = next(p for p in cli.commands["reproduce"].params if p.name == "experiment").type.choices
+    text = (DOCS / "the-paper.md").read_text(encoding="utf-8")
+    spans = re.findall(r"`((?:table|fig|em|starts|arma|indirect|appendix)[\w-]*)(?: [^`]*)?`", text)
+    assert set(spans) <= set(known)
+    assert len(set(spans)) > 10
