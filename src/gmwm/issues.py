@@ -472,8 +472,8 @@ _CALIBRATION = (
         "is sensor noise", "fit a slow term instead, such as a Gauss-Markov process",
         severity="bad", lacks="stationary", reason="the bias keeps changing"),
     Issue("departures-removed", "departures were subtracted: {times} times the deviation at "
-        "{tau:.4g} s if they recur", "find their cause, or add a slow term",
-        severity="warning", topic="departure"),
+        "{tau:.4g} s if they recur", "find their cause, or fit a slow term (--model)",
+        severity="warning", topic="departure", reason="what was subtracted may recur"),
     Issue("drift-at-start", "a drift by {height} from the start that ends at {when}{also}",
         "leave it out{back}", severity="bad", topic="departure", lacks="stationary",
         reason="drift after switching on"),

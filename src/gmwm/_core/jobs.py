@@ -188,17 +188,21 @@ def _on_this_machine(
         return
     left = dict.fromkeys(items)
     # A broken pool does not tell at which item a process ended. What is left is tried once more,
-    # then one by one.
-    groups: list[Sequence[T]] = [items, items, *([item] for item in items)]
-    for group in groups:
-        try:
-            for item, result in _in_processes(work, [item for item in group if item in left], jobs):
-                del left[item]
-                yield item, result
-        except BrokenProcessPool:
-            if len(group) == 1:
-                del left[group[0]]
-                yield group[0], lost(group[0])
+    # then one by one, so that none is lost for what another did.
+    for group in (items, items, *([item] for item in items)):
+        for _ in range(ENDED if len(group) == 1 else 1):
+            waiting = [item for item in group if item in left]
+            if not waiting:
+                break
+            try:
+                for item, result in _in_processes(work, waiting, jobs):
+                    del left[item]
+                    yield item, result
+            except BrokenProcessPool:
+                continue
+        if len(group) == 1 and group[0] in left:
+            del left[group[0]]
+            yield group[0], lost(group[0])
 
 
 def _in_processes(work: Work[T, R], items: Sequence[T], jobs: int) -> Done[T, R]:

@@ -12,6 +12,8 @@ from gmwm.cli.console import print_result
 from gmwm.cli.options import FILE_TO_WRITE, PATH, options
 from gmwm.errors import InputError
 
+_CAUTIOUS = 0.5  # NEES below which predicted errors are 1.4 times the true ones
+
 if TYPE_CHECKING:
     from gmwm.filter_numbers import FilterNumbers
 
@@ -54,13 +56,15 @@ def sheet(
     """Find numbers for a filter from a data sheet, where there is no recording.
 
     SHEET is a YAML file such as 'gyro: {N: 0.15 deg/sqrt(h), B: 7 deg/h}', or a sensor of --list.
+    Write lowest_deviation in place of B where the sheet calls the lowest point of the Allan plot
+    bias instability: many do. All keys: docs/data-sheets.md.
     Two numbers leave much open: N and K are found for every kind of error model that agrees with
     them, and the last table holds what covers them all. An hour of recording tells more.
 
     \b
     Examples:
       gmwm sheet --list
-      gmwm sheet bmi088 --rate 200 -o numbers.json
+      gmwm sheet stim300 --rate 200 -o numbers.json
       gmwm export numbers.json --to kalibr
       gmwm sheet mine.yaml --imu imu.yaml
     """
@@ -131,4 +135,12 @@ def _in_use(imu: Path, rate: float) -> Any:
 def _judged(nees: dict[str, tuple[float, float]], imu: Path) -> str:
     """The range of NEES of a filter with numbers in use, by sensor."""
     lines = wrapped(f"{imu}: NEES of a filter with these numbers, over the models (1: consistent)")
-    return "\n".join([*lines, *bullets(f"{k}: {a:.2g} to {b:.2g}" for k, (a, b) in nees.items())])
+    rows = (f"{k}: {a:.2g} to {b:.2g}, {_verdict(a, b)}" for k, (a, b) in nees.items())
+    return "\n".join([*lines, *bullets(rows)])
+
+
+def _verdict(least: float, largest: float) -> str:
+    """Of the NEES in typical and in noisy units."""
+    if largest > 1.0:
+        return "overconfident" if least > 1.0 else "overconfident where the sensor is noisier"
+    return "cautious" if largest < _CAUTIOUS else "consistent"

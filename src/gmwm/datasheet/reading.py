@@ -9,8 +9,6 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from gmwm._core import checks
 from gmwm._core.checks import shown
 from gmwm._core.documents import read_yaml
@@ -112,11 +110,10 @@ def _read(place: str, content: Any, channels: dict[str, str] | None) -> Datashee
     for name, values in content.items():
         if not isinstance(name, str) or name not in known:
             raise InputError(
-                f"{place}: {shown(name)} is not a sensor of the recording; there are "
-                f"{', '.join(known)}"
+                f"{place}: {shown(name)} is not a sensor here: write one of {', '.join(known)}"
             )
         if not isinstance(values, dict):
-            raise InputError(f"{place}: {name} has no numbers: {_HINT}")
+            raise InputError(f"{place}: {name} has no numbers with names: {_HINT}")
         found = [
             _value(f"{place}: {name}", key, value, known[name]) for key, value in values.items()
         ]
@@ -141,7 +138,10 @@ def _value(where: str, key: Any, value: Any, quantity: str) -> tuple[str, float,
         raise InputError(
             f"{where}: {key} = {shown(value)} is not a number with a unit: {_HINT}"
         ) from None
-    si = number * factor(found[2], si_parameter_unit(KEYS[letter], quantity))
-    if not (np.isfinite(si) and si > 0.0):
-        raise InputError(f"{where}: {key} = {value[:40]} is not positive: give a positive number")
-    return letter, checks.plausible(key, si), found[3] or ""
+    try:
+        si = number * factor(found[2], si_parameter_unit(KEYS[letter], quantity))
+    except InputError as error:
+        raise InputError(f"{where}: {key}: {error}") from None
+    if not 0.0 < si <= checks.LARGEST:
+        raise InputError(f"{where}: {key} = {value[:40]}: give a positive number of usual size")
+    return letter, si, found[3] or ""

@@ -164,6 +164,8 @@ class Datasheet(InUnits):
         InputError
             If there is no such sensor, or as `gmwm.bound` does.
         """
+        if not np.isnan(rate):
+            rate = checks.positive("rate", rate, "give a rate in Hz")
         found, reasons = {}, []
         for sensor, values in self.entries.items():
             try:

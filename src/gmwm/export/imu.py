@@ -141,6 +141,7 @@ class ImuNumbers:
     method: {"bound", "reduce", "given"}.
     sources: One line about each recording.
     invalid: Axes that are not valid -> why.
+    reserved: Axes from which departures were subtracted.
     topic: On which the samples were sent, where a bag was calibrated; else empty.
     """
 
@@ -152,6 +153,7 @@ class ImuNumbers:
     sources: tuple[str, ...] = ()
     invalid: Mapping[str, str] = field(default_factory=dict)
     topic: str = ""
+    reserved: tuple[str, ...] = ()
 
     def by_axis(self) -> ImuNumbers:
         """The same for a file that has the numbers of each axis."""
@@ -214,6 +216,11 @@ def not_valid(given: Iterable[Any]) -> dict[str, Notice]:
             if notices and is_sensor:
                 found[name] = cause(notices) or notices[0]
     return found
+
+
+def is_reserved(fit: Fit) -> bool:
+    """Whether departures were found that may recur, so that it is used with reservation."""
+    return any(n.issue.topic == "departure" and n.severity != "note" for n in fit.notices)
 
 
 def reason(notice: Notice) -> str:
@@ -305,6 +312,7 @@ def imu_of(
         tuple(f"{s.source or 'recording'}{n}" for s, n in zip(sources, lengths, strict=True)),
         {name: reason(each) for name, each in not_valid(given).items()},
         _topic(calibrations),
+        tuple(name for name, fit in fits.items() if fit.valid and is_reserved(fit)),
     )
 
 

@@ -78,6 +78,9 @@ def notes(imu: ImuNumbers, title: str, caution: str) -> list[str]:
         f"{title}: {' and '.join(imu.sources)}",
         f"{purpose}; for details: gmwm export --explain",
         not_valid_line(imu.invalid) if imu.invalid else "",
+        f"with reservation, steps or drifts may recur: {', '.join(imu.reserved)}"
+        if imu.reserved
+        else "",
         "do not use: within a second N and K follow the sensor's low-pass" if is_short else "",
         caution,
         _consistency(imu),

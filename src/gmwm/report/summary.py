@@ -13,7 +13,7 @@ from gmwm.calibration import Calibration, SensorNumbers
 from gmwm.datasheet import UNITS
 from gmwm.errors import InputError
 from gmwm.estimate import Fit, JointFit
-from gmwm.export import SENSORS, Triad
+from gmwm.export import SENSORS, Triad, is_reserved
 from gmwm.filter_numbers import bound
 from gmwm.issues import Notice, worst_first
 from gmwm.report.health import findings, is_short, length_sentence, trust
@@ -79,8 +79,7 @@ def state(fit: Fit) -> str:
     """Whether its numbers are "usable", "reserved" because of departures, or "not valid"."""
     if not fit.valid:
         return "not valid"
-    departed = any(n.issue.topic == "departure" and n.severity != "note" for n in fit.notices)
-    return "reserved" if departed else "usable"
+    return "reserved" if is_reserved(fit) else "usable"
 
 
 def verdict_line(calibration: Calibration) -> str:
@@ -247,7 +246,9 @@ def _filter(calibration: Calibration, notes: int) -> list[str]:
         what = "too short: do not use" if short else "add turn-on bias"
         lines += wrapped(f"start bias, 1 sigma ({what}): {', '.join(starts)}", indent=2)
     if others:
-        lines += wrapped(f"models that fit equally well: {', '.join(others)}", indent=2)
+        lines += wrapped(
+            f"models that fit equally well have {', '.join(others)} as large", indent=2
+        )
     return [_FILTER.format(SHOWN), *lines, *covered]
 
 

@@ -215,7 +215,7 @@ def test_larger_numbers_of_models_that_fit_equally_well_are_said(two):
     rival = WhiteNoise(3.0 * own.N) + gmwm.RandomWalk(own.K)
     text = printed(replace(two, rivals={name: (rival,)}))
     quantity = fit.wv.quantity
-    assert f"models that fit equally well: {quantity} N up to 3 times" in text
+    assert f"models that fit equally well have {quantity} N up to 3 times as large" in text
     assert "equally well" not in printed(replace(two, rivals={name: (fit.model,)}))
 
 
