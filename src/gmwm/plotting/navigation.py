@@ -175,7 +175,7 @@ def literal(text: str, longest: int = 200) -> str:
 
 
 def _styles(named: Mapping[str, _T]) -> list[tuple[dict[str, Any], tuple[str, _T]]]:
-    """Colour, marker and marker size of each, told apart in grey too: the later the smaller."""
+    """Colour, marker and marker size of each, distinct in grey too: the later the smaller."""
     colours = [SUM_COLOUR if name == "truth" else "" for name in named]
     palette = iter(COMPONENT_COLOURS * (1 + len(named) // len(COMPONENT_COLOURS)))
     styles = [
