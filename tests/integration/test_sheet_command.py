@@ -46,6 +46,13 @@ def test_page_and_json(run, sheet, tmp_path):
     assert "gyroscope_random_walk" in page
 
 
+def test_the_default_spread_is_that_of_the_interface(run, sheet):
+    code, printed, _ = run("sheet", "sheet.yaml", "--json")
+    assert code == 0
+    found = json.loads(printed)["channels"]["gyro"]["model"]
+    assert found == gmwm.datasheet(sheet).numbers().to_dict()["channels"]["gyro"]["model"]
+
+
 def test_list_and_what_is_missing(run):
     code, printed, _ = run("sheet", "--list")
     assert (code, bool(printed)) == (0, True)

@@ -199,7 +199,7 @@ def _on_this_machine(
                     del left[item]
                     yield item, result
             except BrokenProcessPool:
-                continue
+                pass
         if len(group) == 1 and group[0] in left:
             del left[group[0]]
             yield group[0], lost(group[0])

@@ -70,7 +70,7 @@ class Weights:
         excess: (J,), wavelet variances of the model less those of the data, u^2.
         """
         if self.of_data is not None:
-            ratio = 1.0 + (0.0 if self.is_literal else 1.0) * excess / self.variance
+            ratio = np.ones_like(excess) if self.is_literal else 1.0 + excess / self.variance
             return weight_root(self.of_data * np.outer(ratio, ratio))
         if self.name == "model":
             return weight_root(covariance)
