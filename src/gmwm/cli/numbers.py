@@ -186,6 +186,7 @@ _IN_SI = {
         vibration.
     --vibration G  Vibration, root mean square.
     -o --output JSON  File to save the certificate in.
+    -v --verbose  Print every check, all notices and the recommended numbers by axis too.
     --units
     --json
     """,
@@ -198,7 +199,13 @@ _IN_SI = {
     **{name: {"default": 0.0} for name in _IN_SI},
 )
 def certify(
-    file: Path, output: Path | None, units: str, as_json: bool, motion: str | None, **given: Any
+    file: Path,
+    output: Path | None,
+    units: str,
+    as_json: bool,
+    verbose: bool,
+    motion: str | None,
+    **given: Any,
 ) -> None:
     """Predict how consistent a filter is with the numbers in use.
 
@@ -234,7 +241,7 @@ def certify(
     )
     if output is not None:
         found.save(output)
-    print_result(found, output, text=found.text(units), as_json=as_json)
+    print_result(found, output, text=found.text(units, verbose=verbose), as_json=as_json)
 
 
 def _numbers(

@@ -51,6 +51,14 @@ CONSUMERS = {
 }
 """Users of the numbers."""
 
+_MODEL, _ALL = "error model with slow terms", "all together"
+"""Causes that numbers in use are judged by."""
+
+_LOOSE = 0.5  # N and K that are needed over those in use, below which this is said
+
+_MOST_NOTICES = 3
+"""Of the text of a certificate that is not verbose."""
+
 _OrNaN = Annotated[NotNegative, NoneIs(float("nan"))]
 
 
@@ -83,8 +91,8 @@ class Cause:
 
     quantity: {"gyro", "accel", ""}.
     N, K: That dominate with it, for all axes, u/sqrt(Hz) and u/s/sqrt(Hz).
-    N_factor, K_factor: Of "error model" and "all together", over the numbers in use; of the others,
-        over those of the error model.
+    N_factor, K_factor: Of the error model and of all together, over the numbers in use; of the
+        others, over those of the error model.
     """
 
     quantity: Text
@@ -139,45 +147,87 @@ class Certificate(Document, InUnits):
             f"{worst.where} after {worst.time:g} s>"
         )
 
-    def text(self, units: str = "field") -> str:
-        lines = [f"Numbers in use: {self.numbers.source or 'given'}"]
+    def text(self, units: str = "field", *, verbose: bool = False) -> str:
+        """The verdict, one table of errors, one of numbers, and what to do.
+
+        verbose: Every check, all notices and the recommended numbers by axis too.
+        """
+        longest = max(check.time for check in self.checks)
+        lines = [*wrapped(self._verdict()), "", self._errors(longest)]
+        lines += wrapped(
+            f"true, predicted: 1 sigma after {longest:g} s. NEES per degree of freedom; 1: "
+            f"consistent, above {tuning.INCONSISTENT:g}: overconfident"
+        )
+        for quantity in dict.fromkeys(cause.quantity for cause in self.causes):
+            lines += ["", self._covered(quantity, units)]
+        notices = self.notices if verbose else self.notices[:_MOST_NOTICES]
+        lines += ["", "What to do", *self._advice(), *bullets(notices)]
+        if not verbose:
+            return "\n".join(lines)
         for consumer, title in CONSUMERS.items():
             rows = []
             for c in self.of(consumer):
                 about = [c.where, f"{c.quantity} [{c.unit}]", f"{c.time:g}"]
                 rows.append([*about, cell(c.true), cell(c.believed), cell(c.nees, 3)])
             if rows:
-                heads = ["", "", "time [s]", "true", "believed", "NEES/dof"]
+                heads = ["", "", "time [s]", "true", "predicted", "NEES"]
                 lines += ["", title, plain_table(heads, rows)]
-        for quantity in dict.fromkeys(cause.quantity for cause in self.causes):
-            lines += ["", *self._covered(quantity, units)]
-        if self.causes:
-            time = self.recommended.horizon
-            note = (
-                f"Each row below the first has N and K for {time:g} s without aiding that are "
-                "never overconfident for the error model together with the row's cause. The "
-                "factors are over those in use, and over those of the error model alone. Use N "
-                "and K as a pair: a factor can be below 1."
-            )
-            lines += ["", *wrapped(note)]
-        lines += bullets(self.notices)
         return "\n".join([*lines, "", "Recommended: " + self.recommended.text(units)])
 
-    def _covered(self, quantity: str, units: str) -> list[str]:
-        """The table of causes of a kind of sensor: the first is in use, the second the model."""
-        causes = [cause for cause in self.causes if cause.quantity == quantity]
-        (N, n_scale), (K, k_scale) = (shown_unit(letter, quantity, units) for letter in "NK")
+    def _overconfident(self) -> list[str]:
+        """Axes, or "horizontal", of which a NEES is too large."""
+        found = (each.where for each in self.checks if each.nees > tuning.INCONSISTENT)
+        return list(dict.fromkeys(found))
+
+    def _verdict(self) -> str:
+        source = self.recommended.source.partition(":")[0] or "these error models"
+        wrong = [name for name in self._overconfident() if name in self.numbers]
+        where = "on all axes" if len(wrong) == len(self.numbers) else f"on {', '.join(wrong)}"
+        if not wrong:
+            where = "in the whole filter" if self._overconfident() else ""
+        verdict = f"too small {where}: overconfident" if where else "safe on all axes"
+        return f"The numbers in use are {verdict}, if the errors are those of {source}."
+
+    def _errors(self, longest: float) -> str:
+        """A row for each axis and for the whole filter: errors, and NEES by time."""
+        free = {check.time: None for check in self.checks if check.consumer != "keyframes"}
         rows = []
-        for cause in causes:
-            row = [cause.name, cell(cause.N, scale=n_scale), cell(cause.K, scale=k_scale)]
-            over = [(cause.N, each.N, cause.K, each.K) for each in causes[:2]]
-            row += [cell(_ratio(*pair), 3) for N, n, K, k in over for pair in ((N, n), (K, k))]
-            rows.append(row)
-        heads = [f"{letter} over\n{what}" for what in ("in use", "model") for letter in "NK"]
-        return [
-            f"{quantity or 'axis'}, all axes: N [{N}] and K [{K}] have to cover",
-            plain_table(["", "N", "K", *heads], rows),
+        for where in dict.fromkeys(check.where for check in self.checks):
+            own = [check for check in self.checks if check.where == where]
+            last = next(c for c in own if c.time == longest and c.consumer != "keyframes")
+            nees = {c.time: cell(c.nees, 3) for c in own if c.consumer != "keyframes"}
+            pose = [cell(c.nees, 3) for c in own if c.consumer == "keyframes"]
+            name = where if where in self.numbers else "whole filter"
+            about = [name, f"{last.quantity} [{last.unit}]", cell(last.true), cell(last.believed)]
+            rows.append([*about, *(nees[time] for time in free), *(pose or ["-"])])
+        keyframe = next(check.time for check in self.of("keyframes"))
+        times = [f"NEES\n{time:g} s" for time in free]
+        heads = ["", "", "true", "predicted", *times, f"keyframes\n{keyframe:g} s"]
+        return plain_table(heads, rows)
+
+    def _covered(self, quantity: str, units: str) -> str:
+        """N and K in use, and those that cover the model and each cause with it."""
+        (N, n_scale), (K, k_scale) = (shown_unit(letter, quantity, units) for letter in "NK")
+        rows = [
+            [each.name, cell(each.N, scale=n_scale), cell(each.K, scale=k_scale)]
+            for each in self.causes
+            if each.quantity == quantity
         ]
+        return plain_table([f"{quantity or 'axis'}, N and K", f"N\n{N}", f"K\n{K}"], rows)
+
+    def _advice(self) -> list[str]:
+        """What to do with the numbers in use: take others, or keep them."""
+        needed = {each.quantity: each for each in self.causes if each.name in (_MODEL, _ALL)}
+        row = f"N and K of the row '{_ALL if _ALL in {c.name for c in self.causes} else _MODEL}'"
+        loose = [each for each in needed.values() if max(each.N_factor, each.K_factor) < _LOOSE]
+        if self._overconfident():
+            text = f"take {row}, for outages of {self.recommended.horizon:g} s"
+        elif loose:
+            kinds = " and ".join(each.quantity or "axis" for each in loose)
+            text = f"{kinds}: {row} are less than half of those in use, and as safe"
+        else:
+            text = "keep the numbers"
+        return wrapped(text, first="- ", indent=2)
 
     def to_frame(self) -> pandas.DataFrame:
         """A table of the checks; needs pandas."""
@@ -394,7 +444,7 @@ def _causes(
     alone = (first.N, first.K)
     causes = [
         Cause(kind, "in use", N, K, 1.0, 1.0),
-        row("error model with slow terms", first, (N, K)),
+        row(_MODEL, first, (N, K)),
     ]
     notices = []
     if N > tuning.OTHER_UNITS * first.N:
@@ -422,7 +472,7 @@ def _causes(
             notices.append(notice("estimate-it", kind, values, cause=cause))
     if terms:
         every = least(_with(group, list(terms.values())))
-        causes.append(row("all together", every, (N, K)))
+        causes.append(row(_ALL, every, (N, K)))
     return causes, notices
 
 

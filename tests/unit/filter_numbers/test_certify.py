@@ -184,23 +184,29 @@ def test_what_the_navigation_filter_cannot_hold_is_left_out_with_a_notice():
 
 
 def test_text_and_files(sheet, tmp_path):
-    text = str(sheet)
+    text, verbose = str(sheet), sheet.text(verbose=True)
+    assert text.startswith("The numbers in use are too small on ")
+    assert len(text.splitlines()) <= 30
+    for part in (
+        "position by tilt [m]",
+        "angle [deg]",
+        "whole filter",
+        "- take N and K of the row",
+    ):
+        assert part in text
     for part in (
         "Without aiding", "INS/GNSS filter", "Relative pose between keyframes",
-        "gyro, all axes: N [deg/sqrt(h)]", "after 120 s of fixes every 1 s",
-        "Recommended: N+K for 60 s", "position by tilt [m]", "angle [deg]",
+        "after 120 s of fixes every 1 s", "Recommended: N+K for 60 s",
     ):  # fmt: skip
-        assert part in text
+        assert part in verbose
     in_use, model = (
-        next(line for line in text.splitlines() if line.startswith(name)).split()[-6:]
+        next(line for line in text.splitlines() if line.startswith(name)).split()[-2:]
         for name in ("in use", "error model")
     )
-    cause = sheet.causes[1]
-    assert float(in_use[0]) == pytest.approx(3437.75 * sheet.causes[0].N, rel=1e-3)
-    assert float(model[3]) == pytest.approx(cause.K_factor, rel=1e-2)
-    assert model[4:] == in_use[2:4] == ["1", "1"]
-    assert "gyro, all axes: N [rad/s/sqrt(Hz)]" in sheet.text("si")
-    assert max(map(len, (text + sheet.text("si")).splitlines())) <= 80
+    for each, cause in zip((in_use, model), sheet.causes, strict=False):
+        assert float(each[0]) == pytest.approx(3437.75 * cause.N, rel=1e-3)
+    assert "rad/s/sqrt(Hz)" in sheet.text("si")
+    assert max(map(len, f"{verbose}\n{sheet.text('si')}".splitlines())) <= 80
     again = gmwm.load(sheet.save(tmp_path / "certificate.json"))
     assert isinstance(again, Certificate)
     assert again.to_dict() == sheet.to_dict()
@@ -208,6 +214,18 @@ def test_text_and_files(sheet, tmp_path):
     assert "NEES up to" in repr(sheet)
     pandas = pytest.importorskip("pandas")
     assert isinstance(sheet.to_frame(), pandas.DataFrame)
+
+
+def test_the_verdict_follows_the_numbers():
+    models = {name: model for name, model in SENSOR.items()}
+    safe = gmwm.bound(models, "N+K", horizon=60.0, shared=True, dt=0.1)
+    large = {kind: (10.0 * one.N, 10.0 * one.K) for kind, one in
+             (("gyro", safe["gyro_x"]), ("accel", safe["accel_x"]))}  # fmt: skip
+    kept, loose = (
+        " ".join(str(gmwm.certify(models, given, dt=0.1)).split()) for given in (safe, large)
+    )
+    assert "safe on all axes" in kept and "- keep the numbers" in kept
+    assert "safe on all axes" in loose and "less than half of those in use, and as safe" in loose
 
 
 # ---- Motion ----
