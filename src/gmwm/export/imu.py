@@ -95,6 +95,11 @@ class Triad:
         """For all axes, u."""
         return self._for_all("initial_sd")
 
+    @property
+    def slowest(self) -> Axis:
+        """The axis with the largest K: its slow terms are the first to be named."""
+        return max(self.axes, key=lambda axis: (axis.K, axis.N))
+
     def is_upper(self, letter: str) -> bool:
         """Whether no axis has the term."""
         return all(letter in axis.upper for axis in self.axes)
@@ -302,7 +307,7 @@ def imu_of(
     )
     if shared:
         gyro, accel = (_with_shared(each, fits, form, first.horizon) for each in (gyro, accel))
-    lengths = [f", {each.duration:.0f} s static" * (each.duration > 0.0) for each in sources]
+    lengths = [f", {each.duration:.0f} s recorded" * (each.duration > 0.0) for each in sources]
     return ImuNumbers(
         gyro,
         accel,

@@ -70,8 +70,8 @@ def notes(imu: ImuNumbers, title: str, caution: str) -> list[str]:
     how = " (reduce)" if imu.method == "reduce" else ""
     purpose = f"{imu.form} for outages up to {imu.horizon:g} s{how}"
     upper = [f"{t.quantity} {k}" for t in imu.triads for k in ("N", "K", "sigma") if t.is_upper(k)]
-    worst = [max(triad.axes, key=lambda axis: axis.N) for triad in imu.triads]
-    covers = "; ".join(f"{axis.name} {axis.covers}" for axis in worst if axis.covers)
+    slow = [triad.slowest for triad in imu.triads]
+    covers = "; ".join(f"{axis.name} {axis.covers}" for axis in slow if axis.covers)
     notices = [n for triad in imu.triads for axis in triad.axes for n in axis.notices]
     is_short = any(n.code == "short-horizon" for n in notices)
     lines = [

@@ -300,11 +300,10 @@ def unusable(fits: Mapping[str, Fit]) -> str:
 
 def covers(triad: Triad, numbers: SensorNumbers) -> str:
     """The largest term that makes N or K exceed the table's, in a line; empty if none does."""
-    excess = []
+    excess, axis = [], triad.slowest
     for letter in KEYS:
         own = max(getattr(numbers[axis.name], letter).value for axis in triad.axes)
         ratio = getattr(triad, letter) / own if own else np.inf
-        axis = max(triad.axes, key=lambda each: float(getattr(each, letter)))
         times = f", {brief(ratio)} times the table's," if own else ""
         text = f"{triad.quantity} {letter}{times} also carries {axis.covers}"
         excess.append((ratio, f"{text} ({_shortened(axis.name, _NAME)})" if axis.covers else ""))

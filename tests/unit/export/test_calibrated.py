@@ -132,7 +132,7 @@ def test_the_file(calibration, text, tmp_path):
     path = tmp_path / "imu.yaml"
     assert gmwm.export(calibration, "kalibr", path=path) == text
     assert path.read_text() == text
-    assert text.startswith("# Kalibr: bench.csv, 100 s static\n# N+K for outages up to 60 s")
+    assert text.startswith("# Kalibr: bench.csv, 100 s recorded\n# N+K for outages up to 60 s")
 
 
 @pytest.mark.parametrize("source", ["", "two\nlines: of name", "a # b: {c", "x\u2028y\x00\x1b[3m"])
