@@ -15,6 +15,8 @@ from gmwm.cli.options import folder_to_write, options, read_recording
 from gmwm.errors import InputError
 
 if TYPE_CHECKING:
+    import pyarrow
+
     from gmwm.calibration import Calibration
     from gmwm.process import Model
     from gmwm.readers import Recording
@@ -209,8 +211,7 @@ def reproduce(
                 work |= {"recordings": recordings, "resume": alone["resume"]}
                 text, paths = _navigated(experiment, folder, rotate, **work)
             else:
-                text = _tested(experiment, **work)
-                paths = [write_text(folder / f"{experiment}.txt", text)]
+                text, paths = _tested(experiment, folder, **work)
         except KeyboardInterrupt:
             if "resume" in known:
                 click.echo(f"finished runs are in {folder}: add --resume to continue", err=True)
@@ -221,23 +222,28 @@ def reproduce(
 def _simulated(
     experiment: str, folder: Path, *, runs: int | None, seed: int, method: Any, **work: Any
 ) -> Found:
-    import pyarrow.parquet as pq
-
     from gmwm.study import FIGURES, STUDIES, boxplots, run_study, summarise
 
     study = FIGURES.get(experiment) or STUDIES[experiment]
     with progress_bar(study.name, "runs") as bar:
         work |= {"methods": method or None, "progress": bar}
         table = run_study(study, folder, runs=runs or study.runs, seed=seed, **work)
-    raw = folder / f"{experiment}.parquet"
-    with moved_into_place(raw) as temporary:
-        pq.write_table(table, temporary)
+    raw = _raw(table, folder / f"{experiment}.parquet")
     if experiment in FIGURES:
         return "", [raw, *boxplots(study, table, folder / experiment)]
     summary = summarise(study, table, seed)
     texts = {"txt": str(summary), "md": summary.markdown()}
     pages = [write_text(folder / f"{study.name}.{end}", text) for end, text in texts.items()]
     return texts["txt"], [raw, *pages]
+
+
+def _raw(table: pyarrow.Table, path: Path) -> Path:
+    """Keep raw estimates."""
+    import pyarrow.parquet as pq
+
+    with moved_into_place(path) as temporary:
+        pq.write_table(table, temporary)
+    return path
 
 
 def _of_sensor(experiment: str, folder: Path, seed: int, recordings: Sequence[Recording]) -> Found:
@@ -256,9 +262,15 @@ def _navigated(experiment: str, folder: Path, rotate: bool, **work: Any) -> Foun
         return run(experiment, folder, progress=bar, **work)
 
 
-def _tested(experiment: str, *, runs: int | None, seed: int, jobs: int) -> str:
-    from gmwm.study import choice_study, choice_table, converge, convergence_table
+def _tested(experiment: str, folder: Path, *, runs: int | None, seed: int, jobs: int) -> Found:
+    from gmwm import study
 
+    stem, paths = folder / experiment, []
     if experiment == "selection":
-        return choice_table(choice_study(runs or 100, seed, jobs))
-    return convergence_table(converge(runs or 200, seed, jobs))
+        text = study.choice_table(study.choice_study(runs or 100, seed, jobs))
+    else:
+        rows = study.converge(runs or 200, seed, jobs)
+        text = study.convergence_table(rows)
+        paths = [_raw(study.raw_estimates(rows), stem.with_suffix(".parquet"))]
+        paths += study.saved(study.convergence_boxes(rows), stem)
+    return text, [write_text(stem.with_suffix(".txt"), text), *paths]

@@ -1,6 +1,11 @@
 """The simulation study of Stebler et al. (2012), and a harder case, over the public API."""
 
-from gmwm.study.appendix import converge as converge, convergence_table as convergence_table
+from gmwm.study.appendix import (
+    converge as converge,
+    convergence_boxes as convergence_boxes,
+    convergence_table as convergence_table,
+    raw_estimates as raw_estimates,
+)
 from gmwm.study.choice import choice_study as choice_study, choice_table as choice_table
 from gmwm.study.demo import (
     compare as compare,
@@ -17,4 +22,4 @@ from gmwm.study.studies import (
     Study as Study,
     run_study as run_study,
 )
-from gmwm.study.summary import boxplots as boxplots, summarise as summarise
+from gmwm.study.summary import boxplots as boxplots, saved as saved, summarise as summarise

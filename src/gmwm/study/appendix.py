@@ -12,9 +12,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
+import pyarrow as pa
 
+from gmwm import plotting
 from gmwm._core.runs import do_runs
 from gmwm._core.tables import plain_table
 from gmwm._core.typing import FloatArray
@@ -22,9 +25,14 @@ from gmwm.estimate import estimate
 from gmwm.process import RandomWalk, WhiteNoise
 from gmwm.variance import wavelet_variance
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 TRUTH = WhiteNoise(0.2) + RandomWalk(0.02)
 LENGTHS = (1_000, 10_000, 100_000, 1_000_000)
 NAMES = ("sigma2_WN", "sigma2_RW")
+METHODS = ("OLS", "IRLS", "GMWM")
+"""Lines by least squares, the same reweighted by the covariance of the levels, and GMWM."""
 _TRUE = np.array([0.04, 4e-4])
 _SCALES = np.array([2.0**j for j in range(8)])
 _ROUNDS = 3  # of reweighting
@@ -34,22 +42,23 @@ _FIRST = 4
 
 @dataclass(frozen=True)
 class Convergence:
-    """Means over the runs at one length.
+    """What the runs at one length gave.
 
-    allan, allan_error: (2,), of the Allan estimates of sigma2_WN and sigma2_RW: their mean over
-        the runs, and its standard error.
-    irls, irls_error: (2,), the same of lines that are reweighted by the covariance of the levels.
-    gmwm, gmwm_error: (2,), the same of GMWM.
+    estimates: (runs, 3, 2), by `METHODS`, of sigma2_WN and sigma2_RW.
     """
 
     n: int
-    runs: int
-    allan: FloatArray
-    allan_error: FloatArray
-    irls: FloatArray
-    irls_error: FloatArray
-    gmwm: FloatArray
-    gmwm_error: FloatArray
+    estimates: FloatArray
+
+    @property
+    def means(self) -> FloatArray:
+        """Over the runs, (3, 2)."""
+        return self.estimates.mean(axis=0)
+
+    @property
+    def errors(self) -> FloatArray:
+        """Standard errors of the means, (3, 2)."""
+        return self.estimates.std(axis=0, ddof=1) / np.sqrt(len(self.estimates))
 
 
 def allan_least_squares(
@@ -82,14 +91,34 @@ def expectation(k: int = _FIRST) -> FloatArray:
 
 def converge(runs: int, seed: int, jobs: int = 1) -> list[Convergence]:
     """Monte Carlo for growing length, Allan lines and GMWM on the same series."""
-    result = []
-    for n in LENGTHS:
-        found = do_runs(partial(_one_run, n, seed), runs, {}, jobs=jobs)["estimates"]
-        means, errors = found.mean(axis=0), found.std(axis=0, ddof=1) / np.sqrt(runs)
-        result.append(
-            Convergence(n, runs, *(e for both in zip(means, errors, strict=True) for e in both))
-        )
-    return result
+    return [
+        Convergence(n, do_runs(partial(_one_run, n, seed), runs, {}, jobs=jobs)["estimates"])
+        for n in LENGTHS
+    ]
+
+
+def raw_estimates(rows: list[Convergence]) -> pa.Table:
+    """A row for each length, run and method."""
+    index = [
+        (row.n, run, method, *row.estimates[run, k].tolist())
+        for row in rows
+        for run in range(len(row.estimates))
+        for k, method in enumerate(METHODS)
+    ]
+    columns = zip(*index, strict=True)
+    return pa.table(dict(zip(("n", "run", "method", *NAMES), map(list, columns), strict=True)))
+
+
+def convergence_boxes(rows: list[Convergence]) -> Figure:
+    """The estimates of growing length, a box each; the truth is dashed."""
+    panels = {
+        f"{name}: {method}": {f"{row.n:,}": row.estimates[:, m, k] for row in rows}
+        for k, name in enumerate(NAMES)
+        for m, method in enumerate(METHODS)
+    }
+    truths = {title: _TRUE[NAMES.index(title.partition(":")[0])] for title in panels}
+    title = "Appendix A: white noise + random walk, by length (dashed: truth)"
+    return plotting.boxes(panels, truths, title=title)
 
 
 def _one_run(n: int, seed: int, run: int) -> dict[str, FloatArray]:
@@ -111,18 +140,20 @@ def convergence_table(rows: list[Convergence]) -> str:
     parts = [
         "Appendix A: least squares on the Allan variance of white noise + random walk\n"
         "lines over 1-8 s and 16-128 s, all levels alike (OLS) or reweighted (IRLS)\n"
-        f"means of {rows[0].runs} runs with standard errors",
+        f"means of {len(rows[0].estimates)} runs with standard errors",
     ]
     for k, name in enumerate(NAMES):
-        cells = []
-        for row in rows:
-            all_ = zip(
-                (row.allan, row.irls, row.gmwm),
-                (row.allan_error, row.irls_error, row.gmwm_error),
-                strict=True,
-            )
-            cells.append([f"{row.n:,}", *(f"{m[k]:.5g} +- {e[k]:.2g}" for m, e in all_)])
-        table = plain_table(("n", "OLS, mean", "IRLS, mean", "GMWM, mean"), cells)
+        cells = [
+            [
+                f"{row.n:,}",
+                *(
+                    f"{m:.5g} +- {e:.2g}"
+                    for m, e in zip(row.means[:, k], row.errors[:, k], strict=True)
+                ),
+            ]
+            for row in rows
+        ]
+        table = plain_table(("n", *(f"{method}, mean" for method in METHODS)), cells)
         parts.append(f"{name}, truth {_TRUE[k]:g}, expected of OLS {expectation()[k]:.5g}\n{table}")
     ratios = [(k, *(expectation(k) / _TRUE)) for k in range(1, _SCALES.size)]
     table = plain_table(("k", *NAMES), [[f"{value:.4g}" for value in row] for row in ratios])

@@ -4,7 +4,13 @@ import numpy as np
 import pytest
 
 from gmwm.study import appendix
-from gmwm.study.appendix import allan_least_squares, converge, convergence_table, expectation
+from gmwm.study.appendix import (
+    allan_least_squares,
+    converge,
+    convergence_table,
+    expectation,
+    raw_estimates,
+)
 
 
 def test_lines_are_exact_where_each_process_is_alone():
@@ -30,10 +36,13 @@ def test_means_fall_on_the_expectation_and_not_on_the_truth(monkeypatch):
     truth = np.array([0.04, 4e-4])
     for row in rows:
         # Four standard errors of the means.
-        assert np.all(np.abs(row.allan - expectation()) < 4.0 * row.allan_error)
+        assert np.all(np.abs(row.means[0] - expectation()) < 4.0 * row.errors[0])
     last = rows[-1]
-    assert np.all(np.abs(last.gmwm - truth) < 4.0 * last.gmwm_error)
-    assert np.all(last.allan - truth > 4.0 * last.allan_error)
+    assert np.all(np.abs(last.means[2] - truth) < 4.0 * last.errors[2])
+    assert np.all(last.means[0] - truth > 4.0 * last.errors[0])
+    raw = raw_estimates(rows)
+    assert raw.num_rows == 2 * 40 * 3
+    assert raw["sigma2_RW"][-1].as_py() == last.estimates[-1, 2, 1]
     report = convergence_table(rows)
     assert max(map(len, report.splitlines())) <= 80
     assert "sigma2_RW, truth 0.0004" in report
