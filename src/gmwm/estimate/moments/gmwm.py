@@ -195,7 +195,28 @@ class GMWM:
         if found is not None and is_large:
             other = end(tuning.DISCREPANCY_NOTABLE) or found
             found = min(found, other, key=lambda each: each.discrepancy)
-        return found or _under_reference(problem, level)
+        found = found or _under_reference(problem, level)
+        if self.discrepancy is None and found.discrepancy > tuning.DISCREPANCY_NESTED:
+            found = self._as_good_as_nested(found, problem)
+        return found
+
+    def _as_good_as_nested(self, found: Converged, problem: _Problem) -> Converged:
+        """The minimum under the weights of a model without one of its terms of some shape.
+
+        It is taken if that needs less discrepancy.
+
+        The iteration of a model that does not describe the data may have several fixed points, and
+        a large discrepancy hides the misfit of the worse ones.
+        """
+        terms, wv = problem.design.model.terms, problem.moments.wv
+        shaped = {term: i for i, term in enumerate(terms) if term.is_open and len(term.values) > 1}
+        for i in shaped.values() if len(terms) > 1 else ():
+            nested = self._cached(Model((*terms[:i], *terms[i + 1 :])), wv)
+            if nested.discrepancy < found.discrepancy:
+                target = replace(problem.moments, slope=nested.slope).target
+                point = problem.search(target, nested.covariance)
+                found = replace(nested, design=problem.design, point=point)
+        return found
 
 
 def _started(start: Process | Model | float, coordinates: Coordinates) -> list[Process]:

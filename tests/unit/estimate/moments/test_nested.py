@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import gmwm
-from gmwm import GaussMarkov, WhiteNoise
+from gmwm import GaussMarkov, RandomWalk, WhiteNoise
 from places import SHARED
 
 CURVES = SHARED / "reference" / "smac_curves.json"
@@ -52,3 +52,22 @@ def test_a_term_of_zero_amplitude_does_not_change_the_discrepancy():
     for fit in larger:
         assert fit.params["sigma_1"] == 0.0
         assert fit.discrepancy == pytest.approx(one.discrepancy, rel=1e-6)
+
+
+def bent(seed):
+    """A curve of a few straight pieces, which no sum of processes need follow."""
+    rng = np.random.default_rng(seed)
+    levels = int(rng.integers(10, 20))
+    ends = [0, *np.sort(rng.choice(np.arange(1, levels), 3, replace=False)), levels]
+    slopes = np.repeat(rng.uniform(-2.0, 1.5, 4), np.diff(ends))
+    return octaves(np.exp2(np.cumsum(slopes)), 100.0)
+
+
+@pytest.mark.parametrize("seed", [6005, 6023, 7059])
+@pytest.mark.filterwarnings("ignore::gmwm.errors.FitWarning")
+def test_a_further_term_needs_no_larger_discrepancy(seed):
+    nested, larger = (
+        gmwm.fit(WhiteNoise() + RandomWalk() + k * GaussMarkov(), bent(seed)) for k in (1, 2)
+    )
+    smallest = gmwm.fit(WhiteNoise() + RandomWalk(), bent(seed))
+    assert larger.discrepancy <= 1.3 * nested.discrepancy <= 1.7 * smallest.discrepancy
