@@ -106,6 +106,8 @@ def _sensors(flag: str, texts: Sequence[str]) -> str | dict[str, str]:
     --imu-start S  Time of the first IMU sample, without time stamps, on the clock of the fixes.
     --barometer FILE  Barometric heights: time, height.
     --zero-velocity VALUE  Use standstills that the IMU shows, to this accuracy, e.g. '0.02 m/s'.
+    --reference FILE  Compare the solution with a trajectory of the IMU that is known better: a CSV
+        of time, latitude, longitude, height, roll, pitch, yaw, on the IMU's clock.
     --gate NUMBER  Reject fixes whose innovation is less probable, e.g. 1e-5.
     --position-sd N[,E,D]  Standard deviations of fixes that have none, metres: north, east, down.
         [default: 1,1,1.5]
@@ -128,6 +130,7 @@ def _sensors(flag: str, texts: Sequence[str]) -> str | dict[str, str]:
     heading=_key(lambda _, angle: f"{angle!r} deg"),
     attitude=_key(_attitude),
     barometer=_key(_absolute),
+    reference=_key(_absolute),
     position_sd=_key(_sd),
     velocity_sd=_key(_sd),
 )

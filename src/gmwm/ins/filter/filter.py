@@ -144,12 +144,22 @@ class Solution:
                 f"the trajectory ends at {truth.duration:g} s, before the solution at "
                 f"{self.time[-1]:g} s: give all of it"
             )
+        return self.less(truth.lla[index], truth.velocity[index], truth.rpy[index])
+
+    def less(
+        self,
+        lla: FloatArray,
+        velocity: FloatArray,
+        rpy: FloatArray,
+        at: BoolArray | slice = slice(None),
+    ) -> FloatArray:
+        """Estimates at some epochs less the truth there, each (K, 3); (K, 9) as ``covariance``."""
         # The estimate is (I - phi x) times the truth.
-        product = self.matrix @ np.swapaxes(matrix_from_rpy(truth.rpy[index]), 1, 2)
+        product = self.matrix[at] @ np.swapaxes(matrix_from_rpy(rpy), 1, 2)
         twice = np.swapaxes(product, 1, 2) - product
         attitude = 0.5 * np.stack([twice[:, 2, 1], twice[:, 0, 2], twice[:, 1, 0]], axis=1)
-        position = ned_difference(self.lla, truth.lla[index])
-        return np.hstack([position, self.velocity - truth.velocity[index], attitude])
+        position = ned_difference(self.lla[at], lla)
+        return np.hstack([position, self.velocity[at] - velocity, attitude])
 
 
 @dataclass(frozen=True)

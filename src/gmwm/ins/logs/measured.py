@@ -18,6 +18,7 @@ from gmwm.ins.imu import AXES, Imu, SensorModels
 from gmwm.ins.logs.attitude import standstills
 from gmwm.ins.logs.fix_log import read_fix_log, read_heights, step_notices
 from gmwm.ins.logs.imu_log import ImuLog, read_imu_log
+from gmwm.ins.logs.reference import Reference
 from gmwm.ins.spec import (
     FileName,
     Meters,
@@ -99,6 +100,7 @@ class LogSpec(Spec):
     barometer: Annotated[BarometerSpec, BeforeValidator(_of_file)] | None = None
     zero_velocity: PositiveSpeed | None = None
     bias: BiasSpec = BiasSpec()
+    reference: FileName | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,6 +123,8 @@ class Measured:
         Roll, pitch and yaw at the first fix, rad; ``None`` to find them in the data.
     attitude_sd : float
         rad.
+    reference : Reference or None
+        What the solution is compared with.
     title : str
     notices : tuple of Notice
     """
@@ -133,6 +137,7 @@ class Measured:
     heading_sd: float = tuning.HEADING_SD
     attitude: tuple[float, float, float] | None = None
     attitude_sd: float = tuning.ATTITUDE_SD
+    reference: Reference | None = None
     title: str = ""
     notices: tuple[Notice, ...] = ()
 
@@ -189,6 +194,8 @@ class Measured:
                 values = dict(zip(("north", "east", "down"), usual, strict=True))
                 notices.append(notice("sd-assumed", kind, values, sd=sd))
         start = {name: getattr(spec, name) for name in _START}
+        if spec.reference is not None:
+            start["reference"] = Reference.read(folder / spec.reference)
         return cls(
             log.imu, aiding, sensors, log.start, **start, title=log.source, notices=tuple(notices)
         )

@@ -23,6 +23,7 @@ from gmwm.ins.geometry import ned_difference
 from gmwm.ins.logs.alignment import Alignment, align
 from gmwm.ins.logs.faults import LEVEL, Faults, fault_notice, resolution_notice
 from gmwm.ins.logs.measured import Measured
+from gmwm.ins.logs.reference import ReferenceErrors
 from gmwm.ins.logs.replay import Replay, innovation_sizes
 from gmwm.ins.simulation import InnovationTest
 from gmwm.issues import Notice, notice, worst_first
@@ -63,6 +64,7 @@ class Navigated:
     alignment: Alignment
     solution: Solution
     longest_outage: LongestOutage
+    against: ReferenceErrors | None = None
 
     @classmethod
     def of(cls, measured: Measured, interval: float = 1.0) -> Navigated:
@@ -88,7 +90,11 @@ class Navigated:
         is_known = len(value) and np.all(np.isfinite(value[0]))
         distance = float(np.hypot(*value[0])) if is_known else None
         outage = LongestOutage(start, end, (sd[0], sd[1], sd[2]), distance)
-        return cls(measured, alignment, solution, outage)
+        found = cls(measured, alignment, solution, outage)
+        if measured.reference is None:
+            return found
+        clock = found.clock(solution.time)
+        return replace(found, against=measured.reference.compared(solution, clock))
 
     def test(self, kind: str | None = None) -> InnovationTest:
         """Size and whiteness of the innovations of one of `kinds`, by default of all."""
@@ -289,7 +295,8 @@ class Navigated:
             )
         if outage.distance is not None:
             text += f"; the next fix was {outage.distance:.3g} m away (horizontal)"
-        return [*sentences, text]
+        found = [] if self.against is None else [self.against.sentence()]
+        return [*sentences, text, *found]
 
     def to_dict(self) -> dict[str, Any]:
         """What was found, in JSON types: the verdict, faults, tests of the innovations."""
@@ -307,6 +314,7 @@ class Navigated:
                 }
                 for kind, test in ((kind, self.test(kind)) for kind in self.kinds)
             },
+            "reference": None if self.against is None else self.against.to_dict(),
         }
 
     def write_solution(self, path: Path) -> Path:

@@ -12,6 +12,7 @@ from gmwm.ins.simulation.filter_errors import (
     QUANTITIES as QUANTITIES,
     FilterErrors as FilterErrors,
     lag_one as lag_one,
+    normalised as normalised,
     place_of as place_of,
 )
 from gmwm.ins.simulation.trials import (

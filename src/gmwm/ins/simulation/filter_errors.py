@@ -101,7 +101,7 @@ def errors_of_run(
     """Figures of a run, by the names of `PER_RUN`; NaN where the solution does not reach."""
     done = solution.time.size
     error = solution.errors(truth)
-    groups = [_normalised(error[:, p], solution.covariance[:, p, p]) for p in GROUPS.values()]
+    groups = [normalised(error[:, p], solution.covariance[:, p, p]) for p in GROUPS.values()]
     nees, log_det = np.moveaxis(np.reshape(groups, (len(GROUPS), 2, done)), 0, -1)
     sensor_error, sensor_nees = np.full((done, 6), np.nan), np.full(done, np.nan)
     if errors.slow is not None:
@@ -109,7 +109,7 @@ def errors_of_run(
         at = outputs.epoch[:done]
         known = at < len(errors.slow)
         sensor_error[known] = solution.sensor_errors[known] - errors.slow[at[known]]
-        sensor_nees = _normalised(sensor_error, solution.sensor_covariance)[0]
+        sensor_nees = normalised(sensor_error, solution.sensor_covariance)[0]
     sensor_sd = np.sqrt(np.diagonal(solution.sensor_covariance, axis1=1, axis2=2))
     reached = (error, solution.sd, nees, log_det, sensor_error, sensor_sd, sensor_nees)
     result = {}
@@ -123,7 +123,7 @@ def errors_of_run(
     return result
 
 
-def _normalised(error: FloatArray, covariance: FloatArray) -> tuple[FloatArray, FloatArray]:
+def normalised(error: FloatArray, covariance: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Squares of errors (K, d) in units of their covariance (K, d, d), and its log determinant.
 
     Only what has a variance at some epoch counts: a sensor without states has no error that is

@@ -20,5 +20,6 @@ from gmwm.ins.trajectory.trajectory_file import (
     POSITION_WORDS as POSITION_WORDS,
     LogColumns as LogColumns,
     is_time as is_time,
+    read_log as read_log,
     words_of as words_of,
 )

@@ -187,7 +187,7 @@ class Trajectory:
             differentiated only once, five times this. It has no effect from a quarter of the
             sampling rate on. ``None``: leave all as it is.
         """
-        dt, lla, rpy = read_log(Path(path))
+        _, dt, lla, rpy = read_log(Path(path))
         rpy = unwrapped_angles(rpy)
         if smooth is not None:
             cutoff = positive("smooth", smooth, "give a cutoff in Hz, or None to leave all as is")

@@ -182,8 +182,8 @@ _LIMITS = {"latitude": _QUARTER, "pitch": _QUARTER}
 _LIMITS |= dict.fromkeys(("longitude", "roll", "yaw"), _MANY_TURNS)
 
 
-def read_log(path: Path) -> tuple[float, FloatArray, FloatArray]:
-    """Sampling interval, s, positions and attitudes, (n + 1, 3) each, of a logged trajectory.
+def read_log(path: Path) -> tuple[float, float, FloatArray, FloatArray]:
+    """First time stamp, sampling interval, s, positions and attitudes, (n + 1, 3), of a log.
 
     Raises InputError if a column is missing, a value is missing or impossible, or the time stamps
         are not even.
@@ -200,6 +200,7 @@ def read_log(path: Path) -> tuple[float, FloatArray, FloatArray]:
     dt = _interval(log, values[TIME])
     found = log.radians(values, _LIMITS) | {"height": log.metres("height", values["height"])}
     return (
+        float(values[TIME][0]) * log.seconds_per_stamp(),
         dt,
         np.stack([found[name] for name in ("latitude", "longitude", "height")], axis=-1),
         np.stack([found[name] for name in ("roll", "pitch", "yaw")], axis=-1),

@@ -99,6 +99,38 @@ def test_a_drive_comes_back_within_its_own_standard_deviations(tmp_path, velocit
     assert fits == 4
 
 
+def reference(folder, truth, start=START, step=5):
+    """Write reference.csv, the truth of a drive at a fifth of the rate."""
+    time = start + truth.dt * np.arange(0, truth.n + 1, step)
+    angles = [np.degrees(each[::step]) for each in (truth.lla[:, :2], truth.rpy)]
+    table(
+        folder / "reference.csv",
+        "time_s,latitude_deg,longitude_deg,height_m,roll_deg,pitch_deg,yaw_deg",
+        [time, angles[0], truth.lla[::step, 2], angles[1]],
+    )
+
+
+def test_a_reference_shows_the_errors_of_the_solution(tmp_path):
+    truth = drive(tmp_path)
+    reference(tmp_path, truth)
+    found = filtered(tmp_path, reference="reference.csv")
+    part = truth.segment(found.alignment.epoch * truth.dt, truth.duration)
+    expected = found.solution.errors(part)[~found.solution.before]
+    against = found.against
+    assert len(against.error) == len(expected)
+    # A spline through 2 Hz of a car's track; straight roads end in turns within half a second.
+    np.testing.assert_allclose(against.error[:, :3], expected[:, :3], atol=0.02)
+    np.testing.assert_allclose(against.error[:, 8], expected[:, 8], atol=2e-3)
+    assert against.nees("position") < 2.5
+    assert found.to_dict()["reference"]["epochs"] == len(expected)
+    assert "Against reference.csv, " in " ".join(str(found).split())
+    reference(tmp_path, truth, start=START + 0.3)  # late stamps are errors of metres
+    assert filtered(tmp_path, reference="reference.csv").against.nees("position") > 10.0
+    reference(tmp_path, truth, start=0.0)
+    with pytest.raises(InputError, match="bring both to one clock"):
+        filtered(tmp_path, reference="reference.csv")
+
+
 def test_a_record_that_begins_in_flight_takes_heading_and_speed_from_gnss(tmp_path):
     truth = drive(tmp_path, 3, fixed_wing_loiter(duration=120.0, dt=1.0 / RATE), hole=(80.0, 90.0))
     found = filtered(tmp_path)
