@@ -20,6 +20,7 @@ MADE = {
     "estimate": "-> Fit",
     "selection": "-> Selection",
     "calibration": "-> Calibration",
+    "motion": "-> InMotion",
     "ins": "-> Solution",
     "filter_numbers": "-> AxisFilterNumbers",
     "export": "-> file of a program",

@@ -51,6 +51,7 @@ from .filter_numbers import (
     error_budget as error_budget,
     reduce as reduce,
 )
+from .motion import InMotion as InMotion, motion as motion
 from .population import (
     Fleet as Fleet,
     SensorComparison as SensorComparison,

@@ -502,6 +502,17 @@ _CALIBRATION = (
         "times the deviation of the whole record, {loud_part} {more} times; the model is an "
         "average", "calibrate the part that matches how the sensor is used", severity="bad",
         lacks="noise_steady", reason="slow noise not constant"),
+    # Of the noise in motion.
+    Issue("motion-at-rest", "the rates do not correlate: taken as at rest, nothing is mapped"),
+    Issue("motion-common", "errors that all {imus} IMUs have in common are not seen"),
+    Issue("motion-filled", "{samples} missing sample{samples:s?} interpolated"),
+    Issue("motion-pairs-differ", "pairs of the other IMUs disagree in {curves} of {all} curves, up "
+        "to {tau:.2g} s: IMUs share errors, or the body flexes", "the least pair is without what "
+        "neighbours share", severity="warning"),
+    Issue("motion-two-imus", "two IMUs: the numbers are sums of the errors of both, not of one",
+        "add a third IMU", severity="warning"),
+    Issue("motion-unseen", "{curves} of {all} curves are not positive somewhere, from {tau:.2g} s "
+        "on: too little noise to be seen"),
 )  # fmt: skip
 
 _ESTIMATE = (

@@ -20,6 +20,7 @@ from gmwm.cli.calibrate import calibrate, health
 from gmwm.cli.compare import compare, fleet
 from gmwm.cli.console import with_hint
 from gmwm.cli.demo import demo, reproduce
+from gmwm.cli.motion import motion
 from gmwm.cli.navigate import navigate
 from gmwm.cli.numbers import bound, budget, certify, export, reduce
 from gmwm.cli.sheet import sheet
@@ -61,7 +62,7 @@ def cli(context: click.Context) -> None:
 
 
 _COMMANDS = (calibrate, fleet, compare, demo, budget, health)
-for _command in (*_COMMANDS, bound, reduce, certify, export, sheet, navigate, reproduce):
+for _command in (*_COMMANDS, bound, reduce, certify, export, sheet, navigate, motion, reproduce):
     cli.add_command(_command)
 
 

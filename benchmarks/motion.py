@@ -1,0 +1,169 @@
+"""Noise in motion of simulated errors on real flights, and of these flights themselves.
+
+    python benchmarks/motion.py simulate FOLDER [--runs 100 --imus 3 --seed 1 --offset 0.01]
+    python benchmarks/motion.py sessions FOLDER --static calibration.json
+    python benchmarks/motion.py predict FOLDER --static calibration.json
+
+FOLDER holds ``flight_NN_imu_K.csv.gz`` of four IMUs on one quadrotor, 120 Hz (Hurwitz and Klein
+2023, CC BY 4.0). `simulate` takes the motion below 15 Hz of one IMU for the truth, gives each of
+several IMUs a clock, a rotation, a lever arm and errors of known Allan variance (white noise,
+differenced white noise, random walk), and prints the ratio of the variances to the truth, the
+coverage of 95 % intervals, and the errors of clocks and lever arms in standard errors. `sessions`
+prints in-motion over static Allan deviation by session. `predict` takes the numbers from every
+second flight of a session, and prints on the others the NEES of the difference of two IMUs.
+"""
+
+from __future__ import annotations
+
+import argparse
+from itertools import combinations
+from pathlib import Path
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+from scipy.signal import butter, sosfiltfilt
+from scipy.spatial.transform import Rotation
+
+import gmwm
+
+SESSIONS = {"1-7": (1, 3, 5, 7), "9-15": (9, 11, 13, 15), "17-21": (17, 19, 21),
+            "23-27": (23, 25, 27)}  # fmt: skip
+AXES = [f"{sensor}_{axis}" for sensor in ("gyro", "accel") for axis in "xyz"]
+DT = 1.0 / 120.0
+
+
+def flight(folder: Path, number: int) -> list[gmwm.Recording]:
+    return [gmwm.read(folder / f"flight_{number:02d}_imu_{k}.csv.gz") for k in range(1, 5)]
+
+
+def simulated(recording, imus, rng, offset, drift, turn, arm):
+    """Recordings of IMUs on a motion with their Allan variances, clocks and lever arms."""
+    truth = np.stack([recording[name].values for name in AXES], axis=1)
+    truth = np.where(np.isnan(truth), np.nanmean(truth, axis=0), truth)
+    smooth = sosfiltfilt(butter(4, 15.0, fs=1.0 / DT, output="sos"), truth, axis=0)
+    spline = CubicSpline(np.arange(len(smooth)) * DT, smooth)
+    found = []
+    for k in range(imus):
+        ahead, slow = (offset * k * (-1) ** k, drift * k) if k else (0.0, 0.0)
+        # The time of the first IMU at samples of this one.
+        time = (np.arange(len(truth)) * DT - ahead) / (1.0 + slow)
+        time = np.clip(time, 0.0, spline.x[-1])
+        axis, lever = rng.normal(size=(2, 3))
+        lever *= arm * bool(k) / np.linalg.norm(lever)
+        angle = np.deg2rad(turn) * bool(k) / np.linalg.norm(axis)
+        rotation = Rotation.from_rotvec(angle * axis).as_matrix()
+        rates, slopes = spline(time)[:, :3], spline(time, 1)[:, :3]
+        forces = spline(time)[:, 3:] + np.cross(slopes, lever)
+        forces += np.cross(rates, np.cross(rates, lever))
+        N = 1e-3 * (1.0 + 0.3 * k) * np.array([1.0] * 3 + [10.0] * 3)
+        n = len(time)
+        errors = rng.normal(size=(n, 6)) / np.sqrt(DT)
+        errors += 10.0 * np.diff(rng.normal(size=(n + 1, 6)), axis=0)
+        errors += 0.3 * np.sqrt(DT) * np.cumsum(rng.normal(size=(n, 6)), axis=0)
+        values = np.hstack([rates @ rotation.T, forces @ rotation.T]) + N * errors
+        units = {"gyro": "rad/s", "accel": "m/s^2"}
+        arrays = dict(zip(AXES, values.T, strict=True))
+        found.append((gmwm.Recording.from_arrays(arrays, 1.0 / DT, units), N, (ahead, slow, lever)))
+    return found
+
+
+def allan(tau, N):
+    """Of the errors above, u^2."""
+    return N**2 * (
+        1.0 / tau + 300.0 * (DT / tau) ** 2 + 0.09 * tau * (1 + 0.5 * (DT / tau) ** 2) / 3
+    )
+
+
+def simulate(folder: Path, args: argparse.Namespace) -> None:
+    rng = np.random.default_rng(args.seed)
+    numbers = [n for own in SESSIONS.values() for n in own]
+    motions = {n: flight(folder, n)[0] for n in numbers}
+    ratios, covered, away = {}, {}, {"offset": [], "drift": [], "lever arm": []}
+    for run in range(args.runs):
+        recording = motions[numbers[run % len(numbers)]]
+        imus = simulated(recording, args.imus, rng, args.offset, args.drift, args.turn, args.arm)
+        found = gmwm.motion([each[0] for each in imus])
+        for curve in found.curves:
+            N = imus[found.imus.index(curve.imu)][1][AXES.index(curve.channel)]
+            truth = allan(curve.tau, N)
+            used = curve.tau <= found.durations[0] / args.least
+            inside = (curve.lower <= truth) & (truth <= curve.upper)
+            for tau, ratio, is_in in zip(curve.tau[used], (curve.variance / truth)[used],
+                                         inside[used], strict=True):  # fmt: skip
+                key = curve.quantity, round(float(tau), 4)
+                ratios.setdefault(key, []).append(ratio)
+                covered.setdefault(key, []).append(is_in)
+        for clock, (_, _, (ahead, slow, _)) in zip(found.clocks, imus[1:], strict=True):
+            away["offset"].append((clock.offset - ahead) / clock.offset_error)
+            away["drift"].append((clock.drift - slow) / clock.drift_error)
+        for each in found.mountings:
+            if each.sensor == "accel" and each.target == "imu 1":
+                true = imus[found.imus.index(each.imu)][2][2]
+                away["lever arm"] += list((-true - each.lever_arm) / each.lever_arm_error)
+    print(f"{args.imus} IMUs, {args.runs} runs, seed {args.seed}: {vars(args)}")
+    for key in sorted(ratios):
+        own = np.array(ratios[key])
+        error = own.std() / np.sqrt(len(own))
+        print(f"{key[0]:5s} {key[1]:7.4f} s  variance / truth {own.mean():.3f} +-{error:.3f}  "
+              f"covered {100 * np.mean(covered[key]):.1f} % of {len(own)}")  # fmt: skip
+    for name, values in away.items():
+        print(f"{name}: rms error {np.sqrt(np.mean(np.square(values))):.2f} standard errors")
+
+
+def sessions(folder: Path, args: argparse.Namespace) -> None:
+    static = gmwm.load(args.static) if args.static else None
+    for name, numbers in SESSIONS.items():
+        found = gmwm.motion([flight(folder, n) for n in numbers], static=static)
+        print(f"\nFlights {name}\n{found}")
+
+
+def predict(folder: Path, args: argparse.Namespace) -> None:
+    """The mean over octaves and axes of the measured over the predicted variance of differences."""
+    static = gmwm.load(args.static)
+    print("NEES of the difference of two IMUs: in motion / static / static times ten")
+    for name, numbers in SESSIONS.items():
+        first = gmwm.motion([flight(folder, n) for n in numbers[::2]], static=static)
+        for number in numbers[1::2]:
+            recordings = flight(folder, number)
+            for sensor in ("gyro", "accel"):
+                nees = {}
+                for a, b in combinations(range(4), 2):
+                    own = gmwm.motion([recordings[a], recordings[b]])
+                    sums, rest, seen = [], [], []
+                    for axis in "xyz":
+                        channel = f"{sensor}_{axis}"
+                        two = [first.curve(f"imu {k + 1}", channel) for k in (a, b)]
+                        measured = own.curve("imu 1", channel)
+                        both = sum(np.maximum(each.variance, each.static) for each in two)
+                        J = min(len(both), len(measured.tau))
+                        used = (measured.tau[:J] >= 0.06) & (measured.tau[:J] < 5.0)
+                        sums.append((measured.variance[:J] / both[:J])[used])
+                        static_sum = (two[0].static + two[1].static)[:J]
+                        rest.append((measured.variance[:J] / static_sum)[used])
+                        seen.append(measured.tau[:J][used])
+                    nees[a + 1, b + 1] = np.mean(sums), np.mean(rest)
+                texts = [
+                    f"{a}-{b} {m:.2f}/{r:.0f}/{r / 100:.2f}" for (a, b), (m, r) in nees.items()
+                ]
+                print(f"{name}, flight {number}, {sensor}: {', '.join(texts)}")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("what", choices=("simulate", "sessions", "predict"))
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--static")
+    parser.add_argument("--runs", type=int, default=100)
+    parser.add_argument("--imus", type=int, default=3)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--offset", type=float, default=0.01)
+    parser.add_argument("--drift", type=float, default=3e-5)
+    parser.add_argument("--turn", type=float, default=20.0)
+    parser.add_argument("--arm", type=float, default=0.1)
+    parser.add_argument("--least", type=float, default=20.0, help="averaging times in a record")
+    args = parser.parse_args()
+    {"simulate": simulate, "sessions": sessions, "predict": predict}[args.what](args.folder, args)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,83 @@
+"""``gmwm motion``: noise in motion, from several IMUs on one body."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import click
+
+from gmwm.cli.console import print_result, progress_bar
+from gmwm.cli.options import FILE_TO_WRITE, PATH, options, read_recording
+from gmwm.errors import InputError
+
+
+@click.command()
+@click.argument("files", metavar="FILE FILE FILE...", nargs=-1, required=True, type=PATH)
+@options(
+    """
+    --static FILE  Calibration of a recording at rest, of one of the IMUs or of their kind.
+    --imus N  Number of IMUs: the files are those of one flight, then those of the next, each in one
+        order. By default all files are of one flight.
+    -o --output JSON  File to save the result in.
+    --plot PNG  Picture of the Allan deviations, a panel a channel.
+    --reading
+    --part
+    --json
+    --quiet
+    """,
+    output=FILE_TO_WRITE,
+    plot=FILE_TO_WRITE,
+)
+def motion(
+    files: Sequence[Path],
+    static: Path | None,
+    imus: int | None,
+    output: Path | None,
+    plot: Path | None,
+    as_json: bool,
+    quiet: bool,
+    **reading: Any,
+) -> None:
+    """Measure the noise of IMUs in motion, from three or more on one rigid body.
+
+    FILE is the recording of an IMU, all of the same motion; clocks need not agree. Clocks, mounting
+    and lever arms are estimated; what the IMUs do not have in common is their noise. The first
+    table says how they stand against the first IMU, the second one the Allan deviation of each in
+    motion, with --static also at rest and the factor between both. Two IMUs give only the sum of
+    their errors.
+
+    \b
+    Examples:
+      gmwm motion imu1.csv imu2.csv imu3.csv --static calibration.json
+      gmwm motion flight*_imu*.csv --imus 4 -o motion.json --plot motion.png
+    """
+    from gmwm.calibration import Calibration
+    from gmwm.motion import motion as run
+
+    count = imus or len(files)
+    if len(files) % count:
+        raise InputError(f"{len(files)} files are no flights of {count} IMUs: give all of each")
+    at_rest = None if static is None else Calibration.load(static)
+    recordings = [read_recording(file, **reading) for file in files]
+    flights = [recordings[k : k + count] for k in range(0, len(files), count)]
+    with progress_bar("motion", "flights", quiet=quiet) as bar:
+        found = run(flights, static=at_rest, progress=bar)
+    if output is not None:
+        found.save(output)
+    if plot is not None:
+        _draw(found, plot)
+    print_result(found, output, plot, as_json=as_json, quiet=quiet)
+
+
+def _draw(found: Any, path: Path) -> None:
+    import matplotlib.pyplot as plt
+
+    channels = list(dict.fromkeys(each.channel for each in found.curves))
+    figure, axes = plt.subplots(-(-len(channels) // 3), 3, squeeze=False, layout="constrained")
+    figure.set_size_inches(15.0, 5.0 * len(axes))
+    for channel, ax in zip(channels, axes.flat, strict=True):
+        found.plot(channel, ax=ax)
+    figure.savefig(path)
+    plt.close(figure)

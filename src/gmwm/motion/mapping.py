@@ -1,0 +1,152 @@
+"""One IMU's signals as another one on the same rigid body measures them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from gmwm._core.documents import Array, Document, Text
+from gmwm._core.frozen import freeze
+from gmwm._core.typing import FloatArray
+from gmwm.motion import tuning
+from gmwm.motion.clocks import means
+
+_AXES = 3
+_LAG = 9  # place of the lag behind the nine entries of the matrix
+
+
+@dataclass(frozen=True)
+class Mounting(Document):
+    """How an IMU stands against the target, from one sensor of a flight.
+
+    Attributes
+    ----------
+    flight : int
+    sensor : {"gyro", "accel"}
+    imu, target : str
+    rotation : (3,) ndarray
+        Rotation vector that turns the IMU's axes into the target's, rad.
+    correction, correction_error : (9,) ndarray
+        Rows of the matrix that multiplies turned signals beside the identity (scale on the
+        diagonal, misalignment beside it), with standard errors.
+    lag, lag_error : float
+        Delay beside that of the clock, s.
+    lever_arm, lever_arm_error : (3,) ndarray
+        From the IMU to the target, m, in the target's axes; empty for gyros.
+    """
+
+    flight: int
+    sensor: Text
+    imu: Text
+    target: Text
+    rotation: Array
+    correction: Array
+    correction_error: Array
+    lag: float
+    lag_error: float
+    lever_arm: Array
+    lever_arm_error: Array
+
+    def __post_init__(self) -> None:
+        freeze(self, "rotation", "correction", "correction_error", "lever_arm", "lever_arm_error")
+
+
+@dataclass(frozen=True)
+class Signals:
+    """One sensor of one IMU at the instants of the target, turned into its axes.
+
+    values, slopes: (n, 3), and their time derivatives.
+    arms: (n, 3, 3), what a lever arm of 1 m along each axis adds; None for gyros.
+    """
+
+    values: FloatArray
+    slopes: FloatArray
+    arms: FloatArray | None = None
+
+    @property
+    def spreads(self) -> FloatArray:
+        """Spread of each parameter before the data: matrix, lag, lever arm."""
+        arm = [] if self.arms is None else [tuning.ARM_SPREAD] * _AXES
+        return np.array([tuning.SCALE_SPREAD] * _LAG + [tuning.LAG_SPREAD, *arm])
+
+    def regressors(self, size: int) -> FloatArray:
+        """(m, 3, p) means over blocks of what each parameter adds to the target's axes."""
+        values = means(self.values, size)
+        found = np.zeros((len(values), _AXES, len(self.spreads)))
+        for axis in range(_AXES):
+            found[:, axis, _AXES * axis : _AXES * (axis + 1)] = values
+        found[:, :, _LAG] = means(self.slopes, size)
+        if self.arms is not None:
+            found[:, :, _LAG + 1 :] = means(self.arms, size)
+        return np.asarray(found - found.mean(axis=0))
+
+    def mapped(self, parameters: FloatArray) -> FloatArray:
+        """(n, 3) as the target measures them, but for a constant."""
+        matrix = np.eye(_AXES) + parameters[:_LAG].reshape(_AXES, _AXES)
+        found = self.values @ matrix.T + parameters[_LAG] * self.slopes
+        if self.arms is not None:
+            found += self.arms @ parameters[_LAG + 1 :]
+        return np.asarray(found)
+
+
+def rotation_to(target: FloatArray, rates: FloatArray) -> FloatArray:
+    """The rotation that turns rates into those of the target best (Wahba's problem)."""
+    left, _, right = np.linalg.svd((target - target.mean(0)).T @ (rates - rates.mean(0)))
+    return np.asarray(left @ np.diag([1.0, 1.0, np.linalg.det(left @ right)]) @ right)
+
+
+def arms_of(rates: FloatArray, slopes: FloatArray) -> FloatArray:
+    """(n, 3, 3) matrices that take a lever arm to the specific force that it adds (m -> m/s^2)."""
+    turning = _cross(rates)
+    return np.asarray(_cross(slopes) + turning @ turning)
+
+
+def _cross(vectors: FloatArray) -> FloatArray:
+    found = np.zeros((len(vectors), _AXES, _AXES))
+    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        found[:, i, j], found[:, j, i] = -vectors[:, k], vectors[:, k]
+    return found
+
+
+def map_onto(
+    target: FloatArray, others: Sequence[Signals], dt: float
+) -> tuple[list[FloatArray], list[FloatArray], list[FloatArray]]:
+    """Differences of the target and each other, and the parameters of each with their errors.
+
+    target: (n, 3), unfiltered.
+    dt: Of the target, s.
+
+    The mapping of one IMU has the signals of the others as instruments: their errors are not its
+    own, so that noise in what is mapped does not shrink the mapping, as least squares would. Two
+    IMUs leave only least squares.
+    """
+    size = max(1, round(tuning.MEAN_OVER / dt))
+    wanted = means(target - target.mean(axis=0), size)
+    spreads = others[0].spreads
+    known = [each.regressors(size) * spreads for each in others]
+    part = np.arange(len(wanted)) * size * dt // tuning.ERROR_PART
+    ends = np.flatnonzero(np.diff(part, prepend=-1.0))
+    differences, parameters, errors = [], [], []
+    for j, each in enumerate(others):
+        used = [k for k in range(len(others)) if k != j] or [j]
+        instruments = sum((known[k] for k in used), np.zeros(known[j].shape)) / len(used)
+        left = wanted - means(each.values - each.values.mean(axis=0), size)
+        z, x = (array.reshape(-1, len(spreads)) for array in (instruments, known[j]))
+        # Two-stage least squares: what the others explain of the regressors has no noise of theirs.
+        shared = z @ np.linalg.lstsq(z, x, rcond=None)[0]
+        product = shared.T @ shared
+        found = np.zeros(len(spreads))
+        for _ in range(tuning.REWEIGHTED):
+            scatter = tuning.CORRELATION * float(np.var(left.ravel() - x @ found))
+            inverse = np.linalg.inv(product + scatter * np.eye(len(spreads)))
+            found = inverse @ (shared.T @ left.ravel())
+        rest = (left.ravel() - x @ found).reshape(wanted.shape)
+        by_row = np.einsum("nap,na->np", shared.reshape(instruments.shape), rest)
+        sums = np.add.reduceat(by_row, ends)
+        spread = inverse @ (sums.T @ sums + scatter**2 * np.eye(len(spreads))) @ inverse
+        parameters.append(found * spreads)
+        errors.append(np.sqrt(np.diag(spread)) * spreads)
+        differences.append(target - each.mapped(found * spreads))
+    return differences, parameters, errors

@@ -1,0 +1,278 @@
+"""`motion`: the noise of each IMU in motion, from several on one rigid body."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+from scipy.spatial.transform import Rotation
+
+from gmwm._core import checks
+from gmwm._core.typing import FloatArray, Progress
+from gmwm.errors import InputError
+from gmwm.estimate import Fit
+from gmwm.issues import Notice, notice
+from gmwm.motion import tuning
+from gmwm.motion.clocks import Clock, join, means
+from gmwm.motion.curves import Curves, curves_of
+from gmwm.motion.mapping import Mounting, Signals, arms_of, map_onto, rotation_to
+from gmwm.motion.result import InMotion, MotionCurve, static_variance
+from gmwm.readers import Recording, require_recording
+
+_AXES = "xyz"
+
+
+@dataclass(frozen=True)
+class _Imu:
+    """Samples of an IMU in a flight: (n, 3) by sensor, SI, and the sampling interval, s."""
+
+    label: str
+    dt: float
+    samples: Mapping[str, FloatArray]
+
+    @property
+    def time(self) -> FloatArray:
+        return np.asarray(np.arange(len(self.samples["gyro"])) * self.dt, dtype=float)
+
+
+def motion(
+    sources: Sequence[Any] | Mapping[str, Recording],
+    *,
+    static: Mapping[str, Any] | None = None,
+    progress: Progress | None = None,
+) -> InMotion:
+    """Measure the noise of IMUs in motion, from three or more on one rigid body.
+
+    Each IMU in turn is the target. The others are mapped onto it: clocks are joined by the rates,
+    and rotation, scale, misalignment, lag and lever arm are estimated together. The difference of
+    the target and a mapped IMU has the errors of both. What two such differences have in common
+    is the error of the target, whose samples no filter has changed.
+
+    Parameters
+    ----------
+    sources : sequence of Recording, or of sequences of them
+        The IMUs of one flight, or the IMUs, in one order, of each of several flights. Keys of a
+        mapping name the IMUs.
+    static : Calibration, or mapping of str to each, optional
+        At rest: of the kind of sensor, or by the name of the IMU.
+    progress : callable, optional
+        Called as ``progress(done, total, flight)``.
+
+    Raises
+    ------
+    InputError
+        If there are fewer than two IMUs, one lacks a gyro axis, they are not on one rigid body, or
+        a clock wanders.
+
+    Notes
+    -----
+    With instruments in place of least squares, mapped noise shrinks nothing: on simulated errors
+    over real flights the variances are within 3 % of the truth, for three and four IMUs
+    (`benchmarks/motion.py`). Errors that all IMUs have in common are not seen. A three-cornered hat
+    would take mapped sensors, whose noise a mapping may filter, for targets.
+    """
+    flights, filled = _flights(sources)
+    notices = [notice("motion-filled", values={"samples": filled})] if filled else []
+    labels = tuple(imu.label for imu in flights[0])
+    clocks: list[Clock] = []
+    mountings: list[Mounting] = []
+    differences: dict[tuple[str, str], list[list[FloatArray]]] = {}
+    for number, imus in enumerate(flights, start=1):
+        if progress is not None:
+            progress(number - 1, len(flights), f"flight {number}")
+        joined = [_joined(number, imus[0], imu) for imu in imus[1:]]
+        moving = [clock for clock in joined if clock is not None]
+        if len(moving) < len(joined):
+            notices.append(notice("motion-at-rest", f"flight {number}"))
+            moving = []
+        clocks += moving
+        for k in range(len(imus)):
+            found, mounted = _of_target(number, imus, k, moving)
+            mountings += mounted
+            for sensor, own in found.items():
+                differences.setdefault((labels[k], sensor), []).append(own)
+    curves = []
+    for k, label in enumerate(labels):
+        own_static = static.get(label, static) if static is not None else None
+        for sensor in flights[0][0].samples:
+            found_curves = curves_of(differences[label, sensor], flights[0][k].dt)
+            curves += _by_axis(label, sensor, found_curves, own_static)
+    notices += _notices(curves, len(labels))
+    durations = tuple(float(imus[0].time[-1]) for imus in flights)
+    return InMotion(
+        labels, durations, tuple(curves), tuple(clocks), tuple(mountings), tuple(notices)
+    )
+
+
+def _flights(sources: Any) -> tuple[list[list[_Imu]], int]:
+    """The IMUs of each flight, and the number of samples that were filled."""
+    if isinstance(sources, Recording | str) or not isinstance(sources, Sequence | Mapping):
+        raise InputError(
+            f"{checks.shown(sources)} is not a list of recordings: give those of two IMUs or more"
+        )
+    single = isinstance(sources, Mapping) or not sources or isinstance(sources[0], Recording | str)
+    given = [sources] if single else list(sources)
+    named = [
+        flight
+        if isinstance(flight, Mapping)
+        else {f"imu {k}": each for k, each in enumerate(flight, start=1)}
+        for flight in given
+    ]
+    if any([*flight] != [*named[0]] for flight in named):
+        raise InputError("flights have different IMUs: give the same ones, in one order, for each")
+    if len(named[0]) < 2:
+        raise InputError("motion needs two IMUs on one body, better three: give more recordings")
+    filled = 0
+    flights: list[list[_Imu]] = []
+    for number, own in enumerate(named, start=1):
+        flights.append([])
+        for label, recording in own.items():
+            imu, gone = _imu(f"flight {number}, {label}", label, recording)
+            flights[-1].append(imu)
+            filled += gone
+    with_accel = all("accel" in imu.samples for flight in flights for imu in flight)
+    sensors = ("gyro", "accel") if with_accel else ("gyro",)
+    for flight in flights:
+        for k, imu in enumerate(flight):
+            if abs(imu.dt / flights[0][k].dt - 1.0) > 0.01:
+                raise InputError(f"{imu.label} has several sampling rates: give flights of one")
+    return [
+        [replace(imu, samples={s: imu.samples[s] for s in sensors}) for imu in flight]
+        for flight in flights
+    ], filled
+
+
+def _imu(where: str, label: str, given: Any) -> tuple[_Imu, int]:
+    """Samples of a recording, and how many are missing: they lie on lines between others."""
+    require_recording(given)
+    recording = given.of_one_rate("motion")
+    samples, filled = {}, 0
+    for sensor in ("gyro", "accel"):
+        names = [f"{sensor}_{axis}" for axis in _AXES]
+        if missing := [name for name in names if name not in recording]:
+            if sensor == "gyro" or len(missing) < len(names):
+                raise InputError(f"{where}: there is no {missing[0]}: give all three axes")
+            continue
+        values = np.array(np.stack([recording[name].values for name in names], axis=1))
+        gone = np.isnan(values)
+        for axis in np.flatnonzero(gone.any(axis=0)):
+            there = np.flatnonzero(~gone[:, axis])
+            values[:, axis] = np.interp(np.arange(len(values)), there, values[there, axis])
+        filled = max(filled, int(gone.any(axis=1).sum()))
+        samples[sensor] = values
+    if filled > tuning.MOST_FILLED * recording.n:
+        raise InputError(f"{where}: {filled} of {recording.n} samples are missing: give whole ones")
+    return _Imu(label, recording.dt, samples), filled
+
+
+def _joined(flight: int, first: _Imu, imu: _Imu) -> Clock | None:
+    rates = first.samples["gyro"], imu.samples["gyro"]
+    return join(flight, imu.label, rates, (first.dt, imu.dt))
+
+
+def _of_target(
+    flight: int, imus: Sequence[_Imu], k: int, clocks: Sequence[Clock]
+) -> tuple[dict[str, list[FloatArray]], list[Mounting]]:
+    """By sensor, differences of one IMU and each other; at rest its own samples in their place.
+
+    clocks: Of all IMUs but the first; none at rest.
+    """
+    target, others = imus[k], [imu for j, imu in enumerate(imus) if j != k]
+    if not clocks:
+        whole = {s: v - v.mean(axis=0) for s, v in target.samples.items()}
+        return {s: [v for _ in others] for s, v in whole.items()}, []
+    first = Clock(flight, imus[0].label, 0.0, 0.0, 0.0, 0.0)
+    by_imu = {clock.imu: clock for clock in (first, *clocks)}
+    time = by_imu[target.label].of_first(target.time)
+    own = [by_imu[imu.label].own(time) for imu in others]
+    inside = np.all(
+        [
+            (t > tuning.EDGE * i.dt) & (t < i.time[-1] - tuning.EDGE * i.dt)
+            for t, i in zip(own, others, strict=True)
+        ],
+        axis=0,
+    )
+    size = max(1, round(tuning.MEAN_OVER / target.dt))
+    found: dict[str, list[FloatArray]] = {}
+    mountings = []
+    turns: list[FloatArray] = []
+    arms: list[FloatArray | None] = [None] * len(others)
+    for sensor, samples in target.samples.items():
+        wanted, signals = samples[inside], []
+        for j, (imu, at) in enumerate(zip(others, own, strict=True)):
+            spline = CubicSpline(imu.time, imu.samples[sensor])
+            behind2, behind, values, ahead, ahead2 = (
+                spline(at[inside] + k * imu.dt) for k in (-2, -1, 0, 1, 2)
+            )
+            # Of fourth order: the second order takes 2 % of a lever arm at a fifteenth of the rate.
+            slopes = (8.0 * (ahead - behind) - ahead2 + behind2) / (12.0 * imu.dt)
+            if sensor == "gyro":
+                turns.append(rotation_to(means(wanted, size), means(values, size)))
+            values, slopes = values @ turns[j].T, slopes @ turns[j].T
+            signals.append(Signals(values, slopes, arms[j]))
+            if sensor == "gyro":
+                arms[j] = arms_of(values, slopes)
+        found[sensor], parameters, errors = map_onto(wanted, signals, target.dt)
+        for imu, turn, value, error in zip(others, turns, parameters, errors, strict=True):
+            rotation = Rotation.from_matrix(turn).as_rotvec()
+            mountings.append(
+                Mounting(
+                    flight,
+                    sensor,
+                    imu.label,
+                    target.label,
+                    rotation,
+                    value[:9],
+                    error[:9],
+                    float(value[9]),
+                    float(error[9]),
+                    value[10:],
+                    error[10:],
+                )
+            )
+    return found, mountings
+
+
+def _by_axis(
+    label: str, sensor: str, curves: Curves, static: Mapping[str, Fit] | None
+) -> list[MotionCurve]:
+    found = []
+    for axis, name in enumerate(_AXES):
+        channel = f"{sensor}_{name}"
+        found.append(
+            MotionCurve(
+                imu=label,
+                channel=channel,
+                quantity=sensor,
+                tau=curves.tau,
+                variance=curves.variance[axis],
+                lower=curves.lower[axis],
+                upper=curves.upper[axis],
+                shared=curves.shared[axis],
+                pairs=curves.pairs[:, axis],
+                agree=curves.agree[axis],
+                static=static_variance(static, channel, curves.tau),
+            )
+        )
+    return found
+
+
+def _notices(curves: Sequence[MotionCurve], imus: int) -> list[Notice]:
+    """What cannot be seen, and where the pairs of others contradict each other."""
+    if imus == 2:
+        return [notice("motion-two-imus")]
+    found = [notice("motion-common", values={"imus": imus})]
+    unseen = [each for each in curves if np.any(each.variance <= 0.0)]
+    if unseen:
+        times = [each.tau[each.variance <= 0.0].min() for each in unseen]
+        values = {"curves": len(unseen), "all": len(curves), "tau": float(min(times))}
+        found.append(notice("motion-unseen", values=values))
+    apart = [each for each in curves if np.any(each.agree < tuning.CONTRADICT)]
+    if apart:
+        longest = max(each.tau[each.agree < tuning.CONTRADICT].max() for each in apart)
+        values = {"curves": len(apart), "all": len(curves), "tau": float(longest)}
+        found.append(notice("motion-pairs-differ", values=values))
+    return found

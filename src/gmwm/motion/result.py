@@ -1,0 +1,299 @@
+"""The result of `motion`: curves of each IMU in motion, clocks and mountings."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+
+from gmwm import plotting
+from gmwm._core import checks
+from gmwm._core.documents import Array, Document, Positive, Text
+from gmwm._core.frozen import freeze
+from gmwm._core.tables import frame, plain_table
+from gmwm._core.text import Printed, brief, bullets, per_cent
+from gmwm._core.typing import FloatArray
+from gmwm._core.units import SI_UNIT, factor
+from gmwm.errors import MissingNameError
+from gmwm.issues import Notice, worst_first
+from gmwm.motion import tuning
+from gmwm.motion.clocks import Clock
+from gmwm.motion.mapping import Mounting
+
+if TYPE_CHECKING:
+    import pandas
+    from matplotlib.axes import Axes
+
+_COLUMNS = (
+    *("imu", "channel", "tau", "deviation", "lower", "upper", "shared", "static", "factor"),
+    "unit",
+)
+_UNITS = {"gyro": "deg/s", "accel": "mg"}
+
+
+def _shown(sensor: str, units: str = "field") -> tuple[str, float]:
+    """Unit in which deviations in motion are shown, and how many of it one SI unit is."""
+    unit = (
+        _UNITS[sensor]
+        if checks.choice("units", units, ("field", "si")) == "field"
+        else (SI_UNIT[sensor])
+    )
+    return unit, 1.0 / factor(unit, SI_UNIT[sensor])
+
+
+@dataclass(frozen=True)
+class MotionCurve(Document):
+    """The Allan variance of one axis of one IMU in motion.
+
+    Attributes
+    ----------
+    imu, channel, quantity : str
+    tau : (J,) ndarray
+        Averaging times, s.
+    variance, lower, upper : (J,) ndarray
+        u^2, with the ends of 95 % intervals. By chance a variance can be negative. Of two IMUs it
+        is the sum of both.
+    shared : (J,) ndarray
+        Correlation of two differences to other IMUs: the share of its own error in them.
+    pairs : (P, J) ndarray
+        Of each pair of the other IMUs in their order, u^2: ``variance`` is their mean. Pairs
+        differ where IMUs share errors, as of one place of a body that flexes.
+    agree : (J,) ndarray
+        p-value of the equality of what pairs of others give; NaN with fewer than four IMUs.
+    static : (J,) ndarray
+        Allan variance at rest, u^2, NaN where it is not known.
+    """
+
+    imu: Text
+    channel: Text
+    quantity: Text
+    tau: Array
+    variance: Array
+    lower: Array
+    upper: Array
+    shared: Array
+    pairs: Array
+    agree: Array
+    static: Array
+
+    def __post_init__(self) -> None:
+        freeze(self, "tau", "variance", "lower", "upper", "shared", "pairs", "agree", "static")
+
+    @property
+    def deviation(self) -> FloatArray:
+        """(J,) Allan deviation, u; NaN where the variance is not positive."""
+        return np.asarray(np.sqrt(np.where(self.variance > 0.0, self.variance, np.nan)))
+
+    @property
+    def factor(self) -> FloatArray:
+        """(J,) Allan deviation in motion over that at rest."""
+        return np.asarray(self.deviation / np.sqrt(self.static))
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class InMotion(Document, Printed):
+    """Noise of IMUs in motion.
+
+    Attributes
+    ----------
+    imus : tuple of str
+    durations : tuple of float
+        Of the flights, s.
+    curves : tuple of MotionCurve
+        Of each channel of each IMU; see `curve`.
+    clocks : tuple of Clock
+        Of each flight and each IMU but the first; none where a flight is at rest.
+    mountings : tuple of Mounting
+        Of each flight, target, other IMU and sensor.
+    notices : tuple of Notice
+    """
+
+    SCHEMA: ClassVar[str] = "gmwm.in_motion"
+
+    imus: tuple[Text, ...]
+    durations: tuple[Positive, ...]
+    curves: tuple[MotionCurve, ...]
+    clocks: tuple[Clock, ...]
+    mountings: tuple[Mounting, ...]
+    notices: tuple[Notice, ...] = ()
+
+    def curve(self, imu: str, channel: str) -> MotionCurve:
+        """The curve of a channel of an IMU.
+
+        Raises MissingNameError if there is none.
+        """
+        for each in self.curves:
+            if (each.imu, each.channel) == (imu, channel):
+                return each
+        known = ", ".join(dict.fromkeys(c.channel for c in self.curves))
+        raise MissingNameError(
+            f"there is no curve of {imu!r}, {channel!r}: there are {', '.join(self.imus)}, each "
+            f"with {known}"
+        )
+
+    @property
+    def sensors(self) -> tuple[str, ...]:
+        """Gyro, and accel where all IMUs have one."""
+        return tuple(dict.fromkeys(each.quantity for each in self.curves))
+
+    def to_frame(self, *, units: str = "field") -> pandas.DataFrame:
+        """A row per IMU, channel and averaging time; needs pandas.
+
+        Parameters
+        ----------
+        units : {"field", "si"}, optional
+        """
+        return frame(self._rows(units), _COLUMNS)
+
+    def _rows(self, units: str) -> Iterator[dict[str, Any]]:
+        for each in self.curves:
+            unit, scale = _shown(each.quantity, units)
+            ends = (scale * np.sqrt(np.maximum(end, 0.0)) for end in (each.lower, each.upper))
+            values = (
+                each.tau,
+                scale * each.deviation,
+                *ends,
+                each.shared,
+                scale * np.sqrt(each.static),
+                each.factor,
+            )
+            for row in zip(*values, strict=True):
+                yield dict(zip(_COLUMNS, (each.imu, each.channel, *row, unit), strict=True))
+
+    def plot(self, channel: str = "gyro_x", *, ax: Axes | None = None) -> Axes:
+        """Allan deviations of a channel of each IMU, in motion and at rest.
+
+        Parameters
+        ----------
+        channel : str, optional
+        ax : matplotlib Axes, optional
+
+        Returns
+        -------
+        matplotlib Axes
+        """
+        own = [self.curve(imu, channel) for imu in self.imus]
+        unit, scale = _shown(own[0].quantity)
+        kinds = {}
+        for each in own:
+            seen = each.variance > 0.0
+            value, low, high = (
+                scale * np.sqrt(np.maximum(part[seen], 0.0))
+                for part in (each.variance, each.lower, each.upper)
+            )
+            kinds[f"{each.imu}, in motion"] = (each.tau[seen], value, low, high)
+        for each in own:
+            known = np.isfinite(each.static)
+            if np.any(known):
+                rest = scale * np.sqrt(each.static[known])
+                kinds[f"{each.imu}, at rest"] = (each.tau[known], rest, rest, rest)
+        places = [k % len(own) for k in range(len(kinds))]
+        return plotting.deviations(kinds, unit=unit, places=places, title=channel, ax=ax)
+
+    def __repr__(self) -> str:
+        size = f"{len(self.durations)} flight{'s' * (len(self.durations) > 1)}"
+        return f"<InMotion: {', '.join(self.imus)}; {size}, {sum(self.durations):.4g} s>"
+
+    def __str__(self) -> str:
+        what = "both IMUs together" if len(self.imus) == 2 else "each IMU"
+        size = f"{len(self.durations)} flight{'s' * (len(self.durations) > 1)}"
+        lines = [f"Allan deviation of {what} in motion: {size}, {sum(self.durations):.4g} s", ""]
+        lines += self._stand().splitlines() if self.clocks else []
+        for sensor in self.sensors:
+            lines += self._table(sensor).splitlines()
+        return "\n".join([*lines, "", *bullets(worst_first(self.notices))])
+
+    def _stand(self) -> str:
+        """Clock, rotation, scale and lever arm of each IMU against the first."""
+        rows = []
+        for imu in self.imus[1:]:
+            clocks = [each for each in self.clocks if each.imu == imu]
+            own = [m for m in self.mountings if (m.imu, m.target) == (imu, self.imus[0])]
+            gyros = [m for m in own if m.sensor == "gyro"]
+            arms = [m for m in own if m.sensor == "accel"]
+            angle = np.rad2deg(np.linalg.norm(np.mean([m.rotation for m in gyros], axis=0)))
+            tilt = np.rad2deg(max(_off_diagonal(m.correction_error).max() for m in gyros))
+            scale = max(np.abs(m.correction[::4]).max() for m in gyros)
+            offsets = 1e3 * np.array([each.offset for each in clocks])
+            drifts = 1e6 * np.array([each.drift for each in clocks])
+            arm = "-"
+            if arms:
+                mean = 100.0 * np.mean([m.lever_arm for m in arms], axis=0)
+                error = 100.0 * max(m.lever_arm_error.max() for m in arms)
+                arm = f"{' '.join(f'{v:.1f}' for v in mean)} +-{error:.1g}"
+            rows.append(
+                (
+                    imu,
+                    _ends(offsets, 1),
+                    _ends(drifts, 0),
+                    f"{angle:.1f} +-{tilt:.1g}",
+                    per_cent(scale),
+                    arm,
+                )
+            )
+        heads = (
+            f"to {self.imus[0]}",
+            "clock, ms",
+            "drift, ppm",
+            "turned, deg",
+            "scale",
+            "lever arm, cm",
+        )
+        return plain_table(heads, rows)
+
+    def _table(self, sensor: str) -> str:
+        """Root mean square deviations over the axes at some averaging times, and the factor.
+
+        Below them the typical 95 % interval of one axis, and the range over pairs of other IMUs.
+        """
+        own = [each for each in self.curves if each.quantity == sensor]
+        tau, (unit, scale) = own[0].tau, _shown(sensor)
+        chosen = sorted({int(np.argmin(np.abs(np.log(tau / t)))) for t in tuning.SHOWN_AT})
+        rows = []
+        for imu in self.imus if len(self.imus) > 2 else ("both",):
+            mean = np.mean([c.variance for c in own if imu in (c.imu, "both")], axis=0)
+            rows.append((imu, *_texts(mean, scale, chosen)))
+        reach = np.nanmedian([np.sqrt(np.maximum(c.upper, 0.0)) / c.deviation for c in own], 0)
+        rows.append(("95 %", *(f"x/{reach[k]:.2f}" for k in chosen)))
+        ratios = np.array([c.pairs / np.where(c.variance > 0.0, c.variance, np.nan) for c in own])
+        if ratios.shape[1] > 1:
+            ends = [np.nanmedian(end(ratios, axis=1), axis=0) for end in (np.min, np.max)]
+            low, high = (np.sqrt(np.maximum(end, 0.0)) for end in ends)
+            rows.append(("by pair", *(f"{low[k]:.1f}-{high[k]:.1f}" for k in chosen)))
+        rest = np.mean([c.static for c in own], axis=0)
+        if np.any(np.isfinite(rest)):
+            times = self.factor(sensor)
+            rows.append(("at rest", *_texts(rest, scale, chosen)))
+            rows.append(("times", *(brief(times[k]) for k in chosen)))
+        return plain_table((f"{sensor}, {unit}", *(f"{tau[k]:.2g} s" for k in chosen)), rows)
+
+    def factor(self, sensor: str) -> FloatArray:
+        """(J,) Median over IMUs and axes of the deviation in motion over that at rest."""
+        own = [each.factor for each in self.curves if each.quantity == sensor]
+        return np.asarray(np.nanmedian(own, axis=0))
+
+
+def _off_diagonal(matrix: FloatArray) -> FloatArray:
+    return np.asarray(matrix.reshape(3, 3)[~np.eye(3, dtype=bool)])
+
+
+def _texts(variance: FloatArray, scale: float, chosen: Sequence[int]) -> list[str]:
+    own = (variance[k] for k in chosen)
+    return [brief(scale * np.sqrt(v)) if v > 0.0 else "-" for v in own]
+
+
+def _ends(values: FloatArray, digits: int) -> str:
+    ends = (f"{end:.{digits}f}" for end in (values.min(), values.max()))
+    return " to ".join(dict.fromkeys(ends))
+
+
+def static_variance(curve: Mapping[str, Any] | None, channel: str, tau: FloatArray) -> FloatArray:
+    """(J,) Allan variance at rest of a channel of a calibration, NaN beyond its curve."""
+    if curve is None or channel not in curve:
+        return np.full(tau.shape, np.nan)
+    wv = curve[channel].wv
+    inside = (tau >= 0.99 * wv.tau[0]) & (tau <= wv.tau[-1])
+    found = 2.0 * np.exp(np.interp(np.log(tau), np.log(wv.tau), np.log(wv.variance)))
+    return np.where(inside, found, np.nan)

@@ -1,0 +1,35 @@
+"""Constants of the comparison of IMUs in motion, each with its reason or the study that set it."""
+
+MEAN_OVER = 0.1  # s: means on which clocks and mappings are fitted, where bodies are still rigid
+EDGE = 3  # samples at each end, where a cubic spline has neighbours on one side only
+
+# -- clocks ---------------------------------------------------------------------------------------
+
+CORRELATED = 0.5  # of the lengths of the rates: flights have 0.97 and more, noise up to 0.4
+MOVING = 0.035  # rad/s rms of means over 0.1 s; noise alone has 0.01 in coarse sensors
+PART = 5.0  # s: parts whose own delays tell a clock that wanders from a steady one
+# Share of the variance of residuals that delays of the parts explain beyond a steady clock: the
+# flights of `benchmarks/motion.py` have at most 0.12, steady simulated clocks 0.02.
+WANDER = 0.25
+PASSES, CLOSE = 12, 1e-7  # of the delay, s
+
+# -- mapping --------------------------------------------------------------------------------------
+
+# Spread of what a mapping may correct after the rotation that gyros have in common. What the motion
+# does not determine stays at its usual value: hovering turns forces little, and scale is then open.
+SCALE_SPREAD, LAG_SPREAD, ARM_SPREAD = 0.03, 0.003, 0.3  # share, s, m
+# Residuals of means are correlated: their variance counts so often against the spread.
+CORRELATION = 3.0
+REWEIGHTED = 3  # times the spread of the residuals is found again
+ERROR_PART = 2.0  # s: parts whose sums give the errors of a mapping
+
+# -- curves ---------------------------------------------------------------------------------------
+
+WINDOWS = 10  # averaging times that a flight needs to hold
+# Averaging times, and s, of a block whose means are taken as independent: vibration comes and goes
+# with the motion.
+BLOCK_LEVELS, BLOCK_LEAST = 4.0, 1.0
+FEWEST_FLIGHTS = 5  # from so many on, flights are the unit, of which blocks are not independent
+SHOWN_AT = (0.008, 0.03, 0.13, 0.5, 1.0, 2.0, 4.0)  # s, averaging times that are printed
+CONTRADICT = 1e-4  # p-value of one curve and octave; a result has some 200 of them
+MOST_FILLED = 0.02  # share of missing samples that lines may replace

@@ -1,0 +1,188 @@
+"""Noise in motion: errors of known variance on IMUs that share a motion."""
+
+import numpy as np
+import pytest
+from scipy.interpolate import CubicSpline
+from scipy.spatial.transform import Rotation
+
+import gmwm
+
+RATE, SECONDS = 50.0, 90.0
+DT = 1.0 / RATE
+AXES = [f"{sensor}_{axis}" for sensor in ("gyro", "accel") for axis in "xyz"]
+SIZE = np.array([2e-3] * 3 + [2e-2] * 3)  # white noise of a sample, rad/s and m/s^2
+
+
+def motion_of(rng):
+    """Rates and forces of a body as splines: 40 lines up to 3 Hz each, and gravity."""
+    time = np.arange(-1.0, SECONDS + 1.0, 0.01)
+    frequency, phase = rng.uniform(0.05, 3.0, (40, 6)), rng.uniform(0.0, 2.0 * np.pi, (40, 6))
+    waves = np.cos(2.0 * np.pi * frequency * time[:, None, None] + phase).sum(axis=1)
+    size = np.array([0.06] * 3 + [0.5] * 3)
+    return CubicSpline(time, waves * size + np.array([0.0] * 5 + [9.8]))
+
+
+def imu(body, errors, *, offset=0.0, drift=0.0, turn=(0.0, 0.0, 0.0), arm=(0.0, 0.0, 0.0)):
+    """A recording of an IMU at ``-arm`` from the first one, with its own clock and axes."""
+    time = (np.arange(len(errors)) * DT - offset) / (1.0 + drift)
+    signal, slope = body(time), body(time, 1)
+    rates, lever = signal[:, :3], -np.array(arm)
+    forces = signal[:, 3:] + np.cross(slope[:, :3], lever)
+    forces += np.cross(rates, np.cross(rates, lever))
+    turned = Rotation.from_rotvec(turn).as_matrix()
+    values = np.hstack([rates @ turned, forces @ turned]) + errors
+    return recording(values)
+
+
+def recording(values):
+    units = {"gyro": "rad/s", "accel": "m/s^2"}
+    return gmwm.Recording.from_arrays(dict(zip(AXES, values.T, strict=True)), RATE, units)
+
+
+def white(rng, count):
+    return SIZE * rng.normal(size=(count, int(SECONDS * RATE), 6))
+
+
+POSES = (
+    {},
+    {"offset": 0.01, "drift": 3e-5, "turn": (0.2, -0.25, 0.1), "arm": (0.1, 0.0, 0.02)},
+    {"offset": -0.002, "drift": -2e-5, "turn": (0.0, 0.0, 0.3), "arm": (0.0, -0.1, 0.0)},
+    {"offset": 0.31, "turn": (0.1, 0.1, 0.1), "arm": (0.05, 0.05, -0.05)},
+)
+
+
+def imus(rng, count, errors=None):
+    body = motion_of(rng)
+    errors = white(rng, count) if errors is None else errors
+    return [imu(body, own, **pose) for own, pose in zip(errors, POSES, strict=False)]
+
+
+@pytest.mark.parametrize("count", [3, 4])
+def test_variances_are_those_of_the_errors(count):
+    rng = np.random.default_rng(count)
+    scale = 1.0 + 0.5 * np.arange(count)[:, None, None]
+    found = gmwm.motion(imus(rng, count, scale * white(rng, count)))
+    size = {name: own for name, own in zip(AXES, SIZE, strict=True)}
+    ratios, inside = [], []
+    for curve in found.curves:
+        own = size[curve.channel] * (1.0 + 0.5 * found.imus.index(curve.imu))
+        truth = own**2 * DT / curve.tau
+        ratios.append((curve.variance / truth)[:8])  # up to 2.6 s, 1/35 of the record
+        inside.append(((curve.lower <= truth) & (truth <= curve.upper))[:8])
+    mean, error = np.mean(ratios, axis=0), np.std(ratios, axis=0) / np.sqrt(len(ratios))
+    # Fits of a dozen parameters take up to 3 % at the longest times.
+    assert np.all(np.abs(mean - 1.0) < 4.0 * error + 0.03)
+    assert 0.85 < np.mean(inside) < 0.99
+    assert np.all(np.abs(mean[:3] - 1.0) < 0.03)
+
+
+def test_clocks_and_mountings_are_found():
+    found = gmwm.motion(imus(np.random.default_rng(5), 4))
+    for clock, pose in zip(found.clocks, POSES[1:], strict=True):
+        assert abs(clock.offset - pose["offset"]) < 4.0 * clock.offset_error < 2e-3
+        assert abs(clock.drift - pose.get("drift", 0.0)) < 4.0 * clock.drift_error < 4e-5
+    to_first = [m for m in found.mountings if m.target == "imu 1" and m.sensor == "accel"]
+    for mounting, pose in zip(to_first, POSES[1:], strict=True):
+        assert np.allclose(mounting.rotation, pose["turn"], atol=2e-3)
+        error = mounting.lever_arm_error
+        assert np.all(np.abs(mounting.lever_arm - pose["arm"]) < 4.0 * error)
+        assert np.all(error < 0.02)
+        assert np.all(np.abs(mounting.correction) < 5.0 * mounting.correction_error)
+
+
+def test_two_imus_give_the_sum_and_say_so():
+    rng = np.random.default_rng(6)
+    found = gmwm.motion(imus(rng, 2))
+    curve = found.curve("imu 1", "gyro_y")
+    both = 2.0 * SIZE[1] ** 2  # half a variance of differences, of two IMUs
+    # Interpolation between samples takes some of the mapped IMU's noise.
+    assert 0.75 * both < curve.variance[0] < 1.03 * both
+    assert curve.variance[4] == pytest.approx(both / 16.0, rel=0.15)
+    assert [n.code for n in found.notices] == ["motion-two-imus"]
+    assert "both IMUs together" in str(found)
+
+
+def test_rest_gives_the_static_allan_variance():
+    rng = np.random.default_rng(7)
+    at_rest = [recording(own + np.array([0.0] * 5 + [9.8])) for own in white(rng, 3)]
+    static = {name: gmwm.fit("N", gmwm.wavelet_variance(at_rest[0][name])) for name in AXES}
+    found = gmwm.motion(at_rest, static=static)
+    curve = found.curve("imu 1", "accel_z")
+    assert curve.factor[1:] == pytest.approx(np.ones(len(curve.tau) - 1), rel=0.02)
+    assert {n.code for n in found.notices} == {"motion-at-rest", "motion-common"}
+    assert found.clocks == () == found.mountings
+
+
+def test_neighbours_that_share_an_error_are_reported():
+    rng = np.random.default_rng(8)
+    errors = white(rng, 4)
+    errors[:2] += 2.0 * SIZE * rng.normal(size=errors[0].shape)
+    body = motion_of(rng)
+    found = gmwm.motion([imu(body, own) for own in errors])
+    assert "motion-pairs-differ" in {n.code for n in found.notices}
+    curve = found.curve("imu 1", "gyro_x")
+    # Pairs (2, 3) and (2, 4) are without what the first two share; (3, 4) is not.
+    assert curve.pairs[:, 0] / SIZE[0] ** 2 == pytest.approx([1.0, 1.0, 5.0], rel=0.2)
+
+
+def test_what_all_have_in_common_is_not_seen_and_that_is_said():
+    rng = np.random.default_rng(9)
+    errors = white(rng, 3)
+    common = 3.0 * SIZE * rng.normal(size=errors[0].shape)
+    body = motion_of(rng)
+    found = gmwm.motion([imu(body, own + common) for own in errors])
+    variance = found.curve("imu 2", "gyro_z").variance
+    assert variance[0] == pytest.approx(SIZE[2] ** 2, rel=0.2)
+    assert [n.values for n in found.notices if n.code == "motion-common"] == [{"imus": 3}]
+
+
+def test_a_clock_that_wanders_is_rejected():
+    rng = np.random.default_rng(10)
+    body, errors = motion_of(rng), white(rng, 3)
+    time = np.arange(errors.shape[1]) * DT
+    late = 0.01 * np.sin(2.0 * np.pi * time / 40.0)
+    wandering = recording(body(time - late) + errors[2])
+    with pytest.raises(gmwm.InputError, match=r"clock of imu 3 wanders .* by \d"):
+        gmwm.motion([imu(body, errors[0]), imu(body, errors[1]), wandering])
+
+
+def test_imus_on_different_bodies_are_rejected():
+    rng = np.random.default_rng(11)
+    others = [imu(motion_of(rng), own) for own in white(rng, 3)]
+    with pytest.raises(gmwm.InputError, match="one rigid body"):
+        gmwm.motion(others)
+
+
+@pytest.mark.parametrize(
+    ("sources", "message"),
+    [
+        ("imu.csv", "list of recordings"),
+        ([], "two IMUs"),
+        ([recording(np.ones((200, 6)))], "two IMUs"),
+        ([recording(np.ones((200, 6))), "imu.csv"], "read it first"),
+        ([[recording(np.ones((200, 6)))] * 2, [recording(np.ones((200, 6)))] * 3], "one order"),
+    ],
+)
+def test_what_cannot_be_used_is_rejected(sources, message):
+    with pytest.raises(gmwm.InputError, match=message):
+        gmwm.motion(sources)
+
+
+def test_several_flights_are_joined_and_the_result_is_stored(tmp_path):
+    rng = np.random.default_rng(12)
+    flights = [
+        {f"unit {k}": each.part(0.0, 20.0 + 5.0 * f) for k, each in enumerate(imus(rng, 3))}
+        for f in range(5)
+    ]
+    found = gmwm.motion(flights)
+    loaded = gmwm.load(found.save(tmp_path / "motion.json"))
+    assert str(loaded) == str(found)
+    assert loaded.imus == ("unit 0", "unit 1", "unit 2")
+    lines = str(found).splitlines()
+    assert len(lines) <= 30
+    assert max(map(len, lines)) <= 80
+    table = found.to_frame(units="si")
+    assert len(table) == sum(len(each.tau) for each in found.curves)
+    assert found.plot("accel_x").get_title() == "accel_x"
+    with pytest.raises(gmwm.MissingNameError):
+        found.curve("unit 9", "gyro_x")
