@@ -176,13 +176,18 @@ class AxisFilterNumbers(Document, InUnits):
         values = {key: float(value or 0.0) for key, value in self.model.params.items()}
         return values | {"initial_sd": self.initial_sd}
 
-    def row(self) -> dict[str, Any]:
-        """A row of `FilterNumbers.to_frame`, SI."""
+    def row(self, units: str) -> dict[str, Any]:
+        """A row of `FilterNumbers.to_frame`; units: "field" or "si"."""
         first = self.predicted[0] if self.predicted else Predicted(self.horizon, _NAN, _NAN)
+        values: dict[str, Any] = {}
+        for key, value in self._shown().items():
+            unit, scale = shown_unit(key, self.quantity, units)
+            values |= {key: value * scale, f"{key}_unit": unit}
+            if key in self.stderr:
+                values[f"{key}_stderr"] = self.stderr[key] * scale
         return {
             "form": self.form,
-            **self._shown(),
-            **{f"{key}_stderr": value for key, value in self.stderr.items()},
+            **values,
             "horizon": self.horizon,
             "nees": first.nees,
             "tightness": first.tightness,
@@ -268,9 +273,15 @@ class FilterNumbers(ByName[AxisFilterNumbers], Document, InUnits):
         lines += bullets(f"{', '.join(names)}: {text}" for text, names in places.items())
         return "\n".join(lines)
 
-    def to_frame(self) -> pandas.DataFrame:
-        """A table with one row a channel, in SI units; needs pandas."""
-        rows = [{"channel": name, **each.row()} for name, each in self.items()]
+    def to_frame(self, *, units: str = "field") -> pandas.DataFrame:
+        """A table with one row a channel, each number with its unit; needs pandas.
+
+        Parameters
+        ----------
+        units : {"field", "si"}, optional
+            Data-sheet units, or SI.
+        """
+        rows = [{"channel": name, **each.row(units)} for name, each in self.items()]
         return frame(rows, tuple(dict.fromkeys(key for row in rows for key in row)))
 
 

@@ -165,7 +165,7 @@ class AxisComparison:
                 for d in (equality.differences if equality else ())
             ],
             "structure": asdict(self.structure),
-            "filter_numbers": {label: each.row() for label, each in self.covering.items()},
+            "filter_numbers": {label: each.row("si") for label, each in self.covering.items()},
         }
         return dict(json.loads(to_json(content, inf_nan_mode="null")))
 

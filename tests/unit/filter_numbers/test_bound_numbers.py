@@ -461,7 +461,7 @@ def test_standard_errors_of_parameters_that_are_decades_apart():
     root = np.linalg.cholesky(np.full((7, 7), 0.5) + 0.5 * np.eye(7)) * sizes[:, None]
     problem = Problem((RequiredSpectrum.of(truth, 0.1, 60.0),), 60.0)
     known = Estimated(truth, tuple(truth.params), root @ root.T)
-    found = standard_errors(problem, gmwm.bound(truth, dt=0.1).model, [known])
+    found = standard_errors(problem, gmwm.bound(truth, dt=0.1).model, known)
     total = {"N": 0.0, "K": 0.0}
     for column in root.T:
         ends = [

@@ -3,6 +3,7 @@
 import math
 from dataclasses import FrozenInstanceError, replace
 
+import numpy as np
 import pytest
 
 import gmwm
@@ -113,8 +114,10 @@ def test_tables_fit_a_terminal(name):
 
 def test_table():
     pandas = pytest.importorskip("pandas")
-    table = SENSOR.to_frame()
+    table, shown = SENSOR.to_frame(units="si"), SENSOR.to_frame()
     assert isinstance(table, pandas.DataFrame)
     assert list(table["channel"]) == ["gyro_x", "accel_x"]
-    assert table.loc[0, "K"] == 5e-6
-    assert table.loc[1, "tau_2"] == 500.0
+    assert (table.loc[0, "K"], table.loc[0, "K_unit"]) == (5e-6, "rad/s^2/sqrt(Hz)")
+    assert (shown.loc[0, "K_unit"], shown.loc[1, "N_unit"]) == ("deg/h/sqrt(h)", "ug/sqrt(Hz)")
+    assert shown.loc[0, "K"] == pytest.approx(np.degrees(5e-6) * 3600.0**1.5)
+    assert table.loc[1, "tau_2"] == shown.loc[1, "tau_2"] == 500.0

@@ -305,13 +305,11 @@ def least_sum(rows: FloatArray, least: FloatArray) -> FloatArray:
 _STEP = 1e-3  # standard errors
 
 
-def standard_errors(
-    problem: Problem, model: Model, estimates: Sequence[Estimated]
-) -> dict[str, float]:
+def standard_errors(problem: Problem, model: Model, estimate: Estimated) -> dict[str, float]:
     """Standard errors of the amplitudes of a bound, by their keys.
 
+    problem: Of one target, which was estimated.
     model: The bound.
-    estimates: One for each target, independent of each other.
     """
     terms = [term.with_amplitude(1.0) for term in model.terms]
     columns = columns_of(problem, terms)
@@ -324,14 +322,9 @@ def standard_errors(
     f = np.append(problem.f[touched], np.full(at_limit.size, problem.f[0]))
     is_white = np.append(np.zeros(touched.size, dtype=bool), at_limit == 0)
     rows = np.vstack([columns[touched] * shares, np.eye(len(terms))[at_limit]])
-    largest = [_densities(target, f, is_white) for target in problem.targets]
-    owner = np.argmax(largest, axis=0)
-    changes = [
-        np.where((owner == i)[:, None], _changes(target, estimate, f, is_white), 0.0)
-        for i, (target, estimate) in enumerate(zip(problem.targets, estimates, strict=True))
-    ]
+    changes = _changes(problem.targets[0], estimate, f, is_white)
     counts = shares > 0.0
-    moved = np.linalg.lstsq(rows[:, counts], np.hstack(changes), rcond=None)[0]
+    moved = np.linalg.lstsq(rows[:, counts], changes, rcond=None)[0]
     relative = np.zeros(len(terms))
     relative[counts] = 0.5 * np.sqrt(np.sum(moved**2, axis=1))
     # The amplitude comes first of the parameters of a term.

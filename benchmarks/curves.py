@@ -1,0 +1,185 @@
+"""Allan curves without samples against the samples, against their own -1/2 lines, and the truth.
+
+    python benchmarks/curves.py line calibration_1.json [...]
+    python benchmarks/curves.py samples a.csv.gz b.csv.gz --rate 100 --gyro deg/s --accel g
+    python benchmarks/curves.py stored curves.json
+    python benchmarks/curves.py coverage --runs 200 --seed 21
+
+``line``: N of each axis over N of the -1/2 line of its Allan curve in per cent. That is the median
+of sigma sqrt(tau) at the octaves where the log slope of the curve, over an octave each way, is
+within 0.05 of -1/2. In the second column the curve is without what the model's periodic lines and
+resonances add, whose humps cross that slope by chance.
+
+``samples``: a model of the structure of each valid axis, departures removed, is fitted to the curve
+at octaves without the first two and the last and, where nothing was removed, at 92 log-spaced
+averaging times. Printed are N and K of the sensor and of a filter for 60 s over those of the fit to
+samples, in per cent.
+
+``stored``: the -1/2 line of curves of imu_utils by sensor and axis, and what is selected.
+
+``coverage``: how often 95 % intervals of fits to curves hold the truth, 20,000 samples at 20 Hz.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from pathlib import Path
+
+import numpy as np
+
+import gmwm
+from gmwm import (
+    BiasInstability,
+    GaussMarkov,
+    Model,
+    QuantizationNoise,
+    RandomWalk,
+    Resonance,
+    WhiteNoise,
+)
+from gmwm.calibration import axis_numbers
+from gmwm.errors import InputError
+
+SLOPE, MANY, HORIZON = 0.05, 92, 60.0
+DT, SAMPLES = 0.05, 20_000
+WHITE = WhiteNoise(1e-4)
+TRUTHS = {
+    "N + K": WHITE + RandomWalk(3e-6),
+    "N + B": WHITE + BiasInstability(2e-5),
+    "N + GM": WHITE + GaussMarkov(5e-5, 30.0),
+    "Q + N + K": QuantizationNoise(1e-5) + WHITE + RandomWalk(3e-6),
+}
+
+
+def line(tau: np.ndarray, deviation: np.ndarray) -> tuple[float, int]:
+    """N of the -1/2 line, and at how many averaging times there is one."""
+    x, y = np.log(tau), np.log(deviation)
+    lower, upper = (np.interp(x + step, x, y) for step in (-np.log(2.0), np.log(2.0)))
+    inside = (x - np.log(2.0) >= x[0]) & (x + np.log(2.0) <= x[-1])
+    slope = (upper - lower) / (2.0 * np.log(2.0))
+    there = inside & (np.abs(slope + 0.5) <= SLOPE)
+    if not there.any():
+        return float("nan"), 0
+    return float(np.median(deviation[there] * np.sqrt(tau[there]))), int(there.sum())
+
+
+def change(value: float, other: float) -> str:
+    """Per cent above another."""
+    return f"{100.0 * (value / other - 1.0):+8.1f}" if value > 0.0 < other else f"{'-':>8}"
+
+
+def of_lines(options: argparse.Namespace) -> None:
+    """A row for each axis of calibrations: N over that of the -1/2 line, and octaves on it."""
+    print("N over that of the -1/2 line, octaves on it    as measured   without vibration")
+    for file in options.files:
+        calibration = gmwm.load(file)
+        for name, fit in calibration.items():
+            wv, cells = fit.wv, ""
+            bent = [t for t in fit.model.terms if t.is_line or isinstance(t, Resonance)]
+            added = Model(tuple(bent)).haar_variance(wv.tau, wv.dt) if bent else 0.0
+            for part in (0.0, added):
+                left = np.maximum(wv.variance - part, np.finfo(float).tiny)
+                N, many = line(wv.tau, np.sqrt(2.0 * left))
+                cells += f"  {change(calibration.numbers[name].N.value, N)} % {many:3}"
+            state = "valid" if fit.valid else "not valid"
+            print(f"{calibration.source:24}{name:9}{state:10}{cells}", flush=True)
+
+
+def of_samples(options: argparse.Namespace) -> None:
+    """A row for each axis, of curves and of what was found of the samples."""
+    print("per cent    -1/2 line  octaves [2:-1]: sensor  filter, 60 s    92 times: the same")
+    print(
+        "axis      at       N         N       K       N       K         N       K       N       K"
+    )
+    for file in options.files:
+        recording = gmwm.read(
+            file, rate=options.rate, units={"gyro": options.gyro, "accel": options.accel}
+        )
+        found = gmwm.calibrate(recording, remove_departures=True)
+        print(Path(file).name)
+        for name, fit in found.items():
+            if not fit.valid:
+                print(f"{name}: not valid")
+                continue
+            wv, cells = fit.wv, ""
+            known = {"rate": 1.0 / wv.dt, "duration": wv.n * wv.dt, "unit": wv.unit, "name": name}
+            curves = [
+                gmwm.curve(wv.tau[2:-1], wv.variance[2:-1], kind="wavelet", **known),
+            ]
+            if not any(
+                n.values.get("removed") for n in fit.notices
+            ):  # else samples still have them
+                x = np.asarray(recording[name].values, dtype=float)
+                times = np.geomspace(wv.dt, wv.n * wv.dt / 6.0, MANY)
+                found_at = gmwm.deviations(x[np.isfinite(x)], wv.dt, ["overlapping"], times)
+                tau, own_curve = (getattr(found_at, k)["overlapping"] for k in ("tau", "deviation"))
+                curves.append(gmwm.curve(tau, own_curve, **known))
+            free = fit.model.with_params(dict.fromkeys(fit.keys))
+            own, bound = axis_numbers(fit), gmwm.bound(fit, horizon=HORIZON)
+            for curve in curves:
+                try:
+                    other = gmwm.fit(free, curve)
+                except InputError as error:
+                    cells += f"   {error}"[:36]
+                    continue
+                new, filters = axis_numbers(other), gmwm.bound(other, horizon=HORIZON)
+                cells += "  " + change(new.N.value, own.N.value) + change(new.K.value, own.K.value)
+                cells += change(filters.N, bound.N) + change(filters.K, bound.K)
+            print(f"{name:8}{cells}", flush=True)
+
+
+def of_stored(options: argparse.Namespace) -> None:
+    """A row for each axis of imu_utils' curves."""
+    print("sensor, axis     at  line N [SI]   N over it [%]  valid  selected")
+    for sensor, content in json.loads(Path(options.files[0]).read_text()).items():
+        for kind in ("gyr", "acc"):
+            own = content[kind]
+            for axis in "xyz":
+                curve = gmwm.curve(
+                    own["tau"], own[axis], unit=own["unit_adev"], name=f"{kind}_{axis}"
+                )
+                N, many = line(curve.tau, np.sqrt(2.0 * curve.variance))
+                fit = gmwm.select(curve).fit
+                found = axis_numbers(fit).N.value
+                print(
+                    f"{sensor:8}{kind}_{axis} {many:6} {N:12.3e} {change(found, N):>14}"
+                    f"  {fit.valid!s:5}  {fit.model!r}",
+                    flush=True,
+                )
+
+
+def coverage(options: argparse.Namespace) -> None:
+    """A row for each truth."""
+    print(f"{options.runs} curves each, seed {options.seed}: per cent of 95 % intervals that hold")
+    for place, (name, truth) in enumerate(TRUTHS.items()):
+        held = dict.fromkeys(truth.params, 0)
+        times = np.geomspace(DT, SAMPLES * DT / 6.0, MANY)
+        for run in range(options.runs):
+            x = truth.simulate(SAMPLES, DT, np.random.default_rng([options.seed, place, run]))
+            found = gmwm.deviations(x, DT, ["overlapping"], times)
+            tau, deviation = (getattr(found, key)["overlapping"] for key in ("tau", "deviation"))
+            curve = gmwm.curve(tau, deviation, rate=1.0 / DT, duration=SAMPLES * DT)
+            for key, (low, high) in gmwm.fit(name, curve).interval(0.95).items():
+                held[key] += bool(low <= truth.params[key] <= high)
+        cells = ", ".join(f"{key} {100.0 * n / options.runs:.1f}" for key, n in held.items())
+        print(f"{name:10} {cells}", flush=True)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("what", choices=("line", "samples", "stored", "coverage"))
+    parser.add_argument("files", nargs="*")
+    parser.add_argument("--rate", type=float, default=100.0)
+    parser.add_argument("--gyro", default="rad/s")
+    parser.add_argument("--accel", default="m/s^2")
+    parser.add_argument("--runs", type=int, default=200)
+    parser.add_argument("--seed", type=int, default=21)
+    options = parser.parse_args()
+    {"line": of_lines, "samples": of_samples, "stored": of_stored, "coverage": coverage}[
+        options.what
+    ](options)
+
+
+if __name__ == "__main__":
+    main()
