@@ -626,6 +626,12 @@ _FILTER_NUMBERS = (
         "|R| times the horizon", "for longer outages add a state for it", severity="warning"),
     _filter("from-data-sheet", "a data sheet states typical values, not those of your unit",
         "record an hour at rest: gmwm calibrate"),
+    _filter("unlikely-sheet", {
+        "": "N is {ratio:.2g} times the {end} of usual sensors",
+        "pair": "N and the lowest deviation seldom go together: N alone reaches it after "
+        "{time:.2g} s, that of usual sensors after 3 to 400 s"},
+        "check their units: mdeg/s for deg/s, or ug for mg, is a factor of 1,000",
+        severity="warning"),
     _filter("short-horizon", "{horizon:g} s is too short: within a second N and K follow the "
         "sensor's low-pass and its vibration, not its slow errors", "give the longest outage, or "
         "60 s if there is none: it costs an aided filter little", severity="warning"),

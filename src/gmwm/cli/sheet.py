@@ -119,6 +119,8 @@ def _for_filter(numbers: FilterNumbers, unit_spread: float) -> str:
         else []
     )
     worst = [f"{k} {max(n.nees.values()):.2g}" for k, n in numbers.items()]
+    warnings = [n for each in numbers.values() for n in each.notices if n.severity == "warning"]
+    lines += bullets(dict.fromkeys(map(str, warnings)))
     lines += wrapped(f"NEES at most {', '.join(worst)} (1: consistent, below: cautious)")
     return "\n".join([*lines, "", *wrapped("An hour of recording tells more: gmwm calibrate")])
 

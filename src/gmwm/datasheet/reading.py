@@ -23,6 +23,7 @@ _WORDS = {
     "rate_random_walk": "K",
 }
 _VALUE = re.compile(r"\s*([-+.\deE]+)\s+(\S.*?)(?:\s+\((.+)\))?\s*")
+_ABOUT = ("name", "document", "temperature")
 _HINT = "write it like 'N: 0.15 deg/sqrt(h)', 'B: 7 deg/h'"
 _SHEETS = files("gmwm.datasheet").joinpath("sheets")
 
@@ -53,6 +54,8 @@ def datasheet(source: str | os.PathLike[str] | Mapping[str, Any]) -> Datasheet:
             Of a Gauss-Markov process.
         turn_on_bias
             1 sigma.
+
+        Beside the sensors may stand texts: name, document, temperature (such as "-40 to 85 degC").
 
     Returns
     -------
@@ -98,7 +101,7 @@ def read_datasheet(
 def _read(place: str, content: Any, channels: dict[str, str] | None) -> Datasheet:
     if not isinstance(content, dict):
         content = {}
-    about = {key: str(content.pop(key)) for key in ("name", "document") if key in content}
+    about = {key: str(content.pop(key)) for key in _ABOUT if key in content}
     if not content:
         raise InputError(f"{place}: holds no sensors: begin with 'gyro:' or 'accel:', and {_HINT}")
     if channels is None:
@@ -121,7 +124,8 @@ def _read(place: str, content: Any, channels: dict[str, str] | None) -> Datashee
         pages[name] = {key: page for key, _, page in found if page}
         if len(entries[name]) < len(found):
             raise InputError(f"{place}: {name} states a number twice: leave one out")
-    return Datasheet(about.get("name", Path(place).name), entries, about.get("document", ""), pages)
+    about.setdefault("name", Path(place).name)
+    return Datasheet(entries=entries, pages=pages, **about)
 
 
 def _value(where: str, key: Any, value: Any, quantity: str) -> tuple[str, float, str]:

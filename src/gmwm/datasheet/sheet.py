@@ -28,7 +28,7 @@ from gmwm.filter_numbers import (
     certify,
     shown_unit,
 )
-from gmwm.issues import notice
+from gmwm.issues import Notice, notice
 from gmwm.process import BiasInstability, Model, Process, RandomWalk, WhiteNoise
 
 if TYPE_CHECKING:
@@ -72,12 +72,15 @@ class Datasheet(InUnits):
         Where the values are from; empty if unknown.
     pages : dict
         Sensor -> key -> page of the document.
+    temperature : str
+        Range for which the values are stated; empty if unknown.
     """
 
     name: str
     entries: dict[str, dict[str, float]]
     document: str = ""
     pages: dict[str, dict[str, str]] = field(default_factory=dict)
+    temperature: str = ""
 
     @property
     def letters(self) -> dict[str, dict[str, float]]:
@@ -174,9 +177,9 @@ class Datasheet(InUnits):
                 reasons.append(error)
                 continue
             sd = values.get("turn_on_bias", 0.0)
-            found[sensor] = _of_all(
-                [*bound(models, form, horizon, bias_sd=sd, shared=True).values()]
-            )
+            axes = [*bound(models, form, horizon, bias_sd=sd, shared=True).values()]
+            N = next(iter(_white(sensor, values).values()))
+            found[sensor] = _of_all(axes, _unlikely(sensor.partition("_")[0], values, N))
         if not found:
             raise reasons[0]
         return FilterNumbers(
@@ -261,6 +264,9 @@ class Datasheet(InUnits):
         what = "typical values of a data sheet. Models that agree with it, and N and K of a filter"
         title = f"{about}: {what} for each, for outages up to {horizon:g} s:"
         parts = ["\n".join(wrapped(title))]
+        if self.temperature:
+            said = f"stated for {self.temperature}: add what the bias changes with temperature"
+            parts.append("\n".join(wrapped(said)))
         for sensor in self.entries:
             try:
                 models = self.models(sensor)
@@ -286,18 +292,31 @@ class Datasheet(InUnits):
         return "\n\n".join(parts)
 
 
-def _of_all(axes: Sequence[AxisFilterNumbers]) -> AxisFilterNumbers:
-    """Numbers that models share, as those of one axis."""
+def _unlikely(quantity: str, values: Mapping[str, float], N: float) -> list[Notice]:
+    """Where N (u/sqrt(Hz)) is out of the range of sensors, or does not belong to what is stated."""
+    least, largest = tuning.DENSITIES.get(quantity, (0.0, np.inf))
+    if not least <= N <= largest:
+        end, limit = ("least", least) if least > N else ("largest", largest)
+        return [notice("unlikely-sheet", quantity, ratio=N / limit, end=end)]
+    lowest = lowest_deviation(values)
+    time = (N / lowest) ** 2 if lowest else 1.0
+    first, last = tuning.CROSSINGS
+    is_usual = first <= time <= last
+    return [] if is_usual else [notice("unlikely-sheet", quantity, variant="pair", time=time)]
+
+
+def _of_all(axes: Sequence[AxisFilterNumbers], notices: Sequence[Notice]) -> AxisFilterNumbers:
+    """Numbers that models share, as those of one axis, with what is to be said."""
     worst = tuple(
         Predicted(same[0].time, max(e.nees for e in same), min(e.tightness for e in same))
         for same in zip(*(each.predicted for each in axes), strict=True)
     )
-    return replace(axes[0], predicted=worst, notices=(notice("from-data-sheet"),))
+    return replace(axes[0], predicted=worst, notices=(*notices, notice("from-data-sheet")))
 
 
 def _kind(label: str) -> str:
     """The terms of a model without its correlation time."""
-    return re.sub(r" [\d.,e+]+ s| \(.*\)", "", label.partition("_")[2]).replace("+", " + ")
+    return re.sub(r" [\d.,e+-]+ s| \(.*\)", "", label.partition("_")[2]).replace("+", " + ")
 
 
 def _ends(values: Sequence[float], scale: float) -> str:

@@ -18,6 +18,7 @@ from gmwm.report.summary import (
     covers,
     filter_key,
     filter_values,
+    intervals,
     reason,
     state,
     unusable,
@@ -104,8 +105,10 @@ def filter_table(calibration: Calibration, numbers: Certified) -> list[dict[str,
         fits = {axis.name: calibration[axis.name] for axis in triad.axes}
         texts = {k: text.replace("<=", "≤") for k, text in filter_values(triad).items()}
         keys = {letter: filter_key(triad.quantity, letter) for letter in KEYS}
+        errors = intervals(triad, calibration)
+        texts |= {k: f"{texts[k]} ({e.replace('+-', '±')})" for k, e in errors.items()}
         about = {"covers": covers(triad, calibration.numbers), "warning": unusable(fits)}
-        mark = "*" * (use(fits) == "usable *")
+        mark = "*" * (use(fits) == "*")
         rows.append({"name": triad.quantity, "mark": mark, **texts, **about, "keys": keys})
     return rows
 

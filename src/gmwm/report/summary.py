@@ -24,9 +24,13 @@ _LINES = 30  # of the page, with those about files
 _ACTIONS = 3  # notices that matter most
 _AXES, _FEWEST = 6, 4  # lines of them beside the numbers of more axes
 _NAME, _SOURCE, _TEXT = 18, 40, 60  # characters; longer ones are shortened
-_NOTABLE, _APART = 1.1, 1.15  # times the table's N or K, times the filter's
+_NOTABLE = 1.1  # times the table's N or K
+_NORMAL = 1.96  # standard errors of a 95 % interval
 _LEAST = 0.1  # smallest number without an exponent
-_LEGEND = "+-, (a to b): 95 % interval. <=: 95 % upper limit. B: lowest deviation / 0.664"
+_LEGEND = (
+    "+-, (a to b), -a +b %: 95 % interval. <= x: below x (95 %), too small to be seen",
+    "B at t: lowest point of the Allan plot / 0.664, at averaging time t",
+)
 _FILTER = "For your filter, outages up to {:g} s (keys of OpenVINS, Kalibr; GTSAM: N^2, K^2)"
 KEYS = {"N": "noise_density", "K": "random_walk"}
 """Ends of the keys of OpenVINS and Kalibr, which begin with the names of `SENSORS`."""
@@ -61,8 +65,8 @@ def summary_text(calibration: Calibration, files: Iterable[str] = ()) -> str:
         Lines about the files that were written.
     """
     first, last, texts = wrapped(verdict_line(calibration)), list(files), actions(calibration)
-    for notes in (2, 1, 0):  # rather every axis than what explains the numbers
-        numbers = _filter(calibration, notes)
+    for explained in (True, False):  # rather every axis than what explains the numbers
+        numbers = _filter(calibration, explained)
         left = _LINES - sum(len(part) + 1 for part in (first, numbers, last) if part)
         least = len(_to_do(texts[:1], left))
         many = min(len(_to_do(texts, left)), _FEWEST + 1) if len(calibration) > _AXES else 0
@@ -175,7 +179,7 @@ def _sensor(calibration: Calibration, most: int) -> list[str]:
         missing = len(calibration) - len(names)
         lines += [f"and {missing} more channels"] if missing else []
         if len(lines) + len(skipped) < most or len(names) <= _AXES:
-            return [*lines, *skipped, _LEGEND]
+            return [*lines, *skipped, *_LEGEND]
         names.pop()
 
 
@@ -218,12 +222,12 @@ def reason(name: str, calibration: Calibration) -> str:
 # -- filter numbers --------------------------------------------------------------------------------
 
 
-def _filter(calibration: Calibration, notes: int) -> list[str]:
+def _filter(calibration: Calibration, explained: bool) -> list[str]:
     """N and K of each sensor by key, and the start bias.
 
-    notes: 1: with those of models that fit equally well; 2: with what else they cover, too.
+    explained: With what else they cover.
     """
-    lines, starts, covered, others = [], [], [], []
+    lines, starts, covered = [], [], []
     for quantity in (q for q in SENSORS if q in {f.wv.quantity for f in calibration.values()}):
         fits = {name: fit for name, fit in calibration.items() if fit.wv.quantity == quantity}
         try:
@@ -231,13 +235,15 @@ def _filter(calibration: Calibration, notes: int) -> list[str]:
         except InputError as error:
             lines += wrapped(f"no filter numbers: {error}", f"{quantity:<6} ", 7)[:2]
             continue
-        values = filter_values(triad)
+        values, errors = filter_values(triad), intervals(triad, calibration)
         for letter in KEYS:
             row = f"{filter_key(quantity, letter):<27}  filter {letter} {values[letter]}"
-            lines.append(f"{row:<62}  {use(fits, letter)}".rstrip())
+            about = use(fits, letter)
+            if letter in errors and about != "do not use":
+                about = f"{errors[letter]:<9} {about}"
+            lines.append(f"{row:<62} {about}".rstrip())
         starts += [f"{quantity} {values['start']}"] if values["start"][0] != "0" else []
-        others += _of_rivals(triad, calibration) if notes else []
-        if notes > 1 and use(fits, "K") != "do not use":
+        if explained and use(fits, "K") != "do not use":
             covered += wrapped(covers(triad, calibration.numbers), indent=2)
     if not lines:
         return []
@@ -245,26 +251,29 @@ def _filter(calibration: Calibration, notes: int) -> list[str]:
         short = is_short(calibration.values(), SHOWN)
         what = "too short: do not use" if short else "add turn-on bias"
         lines += wrapped(f"start bias, 1 sigma ({what}): {', '.join(starts)}", indent=2)
-    if others:
-        lines += wrapped(
-            f"models that fit equally well have {', '.join(others)} as large", indent=2
-        )
     return [_FILTER.format(SHOWN), *lines, *covered]
 
 
-def _of_rivals(triad: Triad, calibration: Calibration) -> list[str]:
-    """N and K as large as models that fit equally well have them, where that is more."""
-    found = [
+def intervals(triad: Triad, calibration: Calibration) -> dict[str, str]:
+    """95 % intervals of N and K for all axes in per cent, if the fits of all are valid.
+
+    They reach to the numbers of models that fit equally well.
+    """
+    rivals = [
         bound(model, horizon=SHOWN, dt=calibration[axis.name].wv.dt)
         for axis in triad.axes
         for model in calibration.rivals.get(axis.name, ())
     ]
-    largest = {letter: max((getattr(n, letter) for n in found), default=0.0) for letter in KEYS}
-    return [
-        f"{triad.quantity} {letter} up to {brief(value / getattr(triad, letter), 2)} times"
-        for letter, value in largest.items()
-        if value > _APART * getattr(triad, letter)
-    ]
+    texts = {}
+    for letter, error in triad.common.stderr.items() if triad.common is not None else ():
+        value = getattr(triad, letter)
+        lower = upper = _NORMAL * error / value
+        if triad.is_upper(letter):
+            continue
+        upper = max([upper, *(getattr(each, letter) / value - 1.0 for each in rivals)])
+        ends = [brief(100.0 * end, 1 + (end >= 0.1)) for end in (min(lower, 0.99), upper)]
+        texts[letter] = f"-{ends[0]} +{ends[1]} %" if ends[0] != ends[1] else f"+-{ends[0]} %"
+    return texts
 
 
 def filter_key(quantity: str, letter: str) -> str:
@@ -283,11 +292,11 @@ def filter_values(triad: Triad) -> dict[str, str]:
 
 
 def use(fits: Mapping[str, Fit], letter: str = "N") -> str:
-    """Whether N or K for all axes of a sensor can be used; empty if nothing is wrong."""
+    """Whether N or K for all axes can be used, "*" with reservation; empty if nothing is wrong."""
     states, short = {state(fit) for fit in fits.values()}, is_short(fits.values(), SHOWN)
     if "not valid" in states or (short and letter != "N"):
         return "do not use"
-    return "usable *" if "reserved" in states else "usable" * short
+    return "*" if "reserved" in states else "usable" * short
 
 
 def unusable(fits: Mapping[str, Fit]) -> str:

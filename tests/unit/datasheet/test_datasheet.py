@@ -89,6 +89,21 @@ def test_units_that_are_noisier_scale_the_numbers():
     assert usual.initial_sd == pytest.approx(np.radians(0.1), rel=0.01)
 
 
+@pytest.mark.parametrize(
+    ("factor", "is_said"), [(1e-3, True), (1.0, False), (1e3, True)], ids=["small", "as is", "large"]
+)
+def test_a_noise_density_a_thousand_times_off_is_said(factor, is_said):
+    for N, lowest in ((0.15, 0.5), (0.3, 8.0), (2.0, 25.0)):  # deg/sqrt(h), deg/h: sheets
+        gyro = {"N": f"{N * factor} deg/sqrt(h)", "lowest_deviation": f"{lowest} deg/h"}
+        codes = [n.code for n in gmwm.datasheet({"gyro": gyro}).numbers().notices]
+        assert ("unlikely-sheet" in codes) == is_said
+
+
+def test_a_temperature_range_is_printed():
+    sheet = {"temperature": "-40 to 85 degC", "gyro": {"N": "1 deg/sqrt(h)", "B": "8 deg/h"}}
+    assert "stated for -40 to 85 degC" in gmwm.datasheet(sheet).text()
+
+
 def test_numbers_in_use_are_judged():
     sheet = with_lines()
     least, largest = sheet.judged({"gyro": (N, 1e-9)})["gyro"]

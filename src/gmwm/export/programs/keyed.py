@@ -59,6 +59,8 @@ class KeyedFile(ImuFile):
         ):
             value = self.keys.written(letter, getattr(triad, letter), rate)
             unit = self.units[triad.quantity, letter]
+            if any(axis.name in imu.invalid for axis in triad.axes):
+                unit += ", do not use: not valid"
             lines.append(self.line.format(key=key, value=value, unit=unit))
         indent = self.template.partition("{values}")[0].rpartition("\n")[2]
         values = f"\n{indent}".join(lines)
