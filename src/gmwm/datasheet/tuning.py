@@ -18,9 +18,10 @@ FASTEST_SHOULDER = 1.0  # s, below which it counts as white noise, which is read
 # simulated sensors, K of recordings lies between the ends in 96 %: benchmarks/sheets.py
 UNIT_SPREAD = 1.25
 
-# Densities of white noise that sensors have, SI: from hemispherical resonator gyros (1e-5 deg/sqrt(h))
-# to 0.5 deg/s/sqrt(Hz), as for recordings; from seismic accelerometers (2 ng/sqrt(Hz)) to 10 mg/sqrt(Hz):
+# Densities of white noise that sensors have, SI: from hemispherical resonator gyros (1e-5
+# deg/sqrt(h)) to 0.5 deg/s/sqrt(Hz), as for recordings; from seismic accelerometers (2 ng/sqrt(Hz))
+# to 10 mg/sqrt(Hz):
 DENSITIES = {"gyro": (3e-9, 8.7e-3), "accel": (2e-8, 0.1)}
-# s, averaging time at which white noise alone reaches the lowest deviation: 3 to 400 s for the sheets
-# installed, and fibre and resonator gyros. The ends are a factor of 1,000 in N apart:
+# s, averaging time at which white noise alone reaches the lowest deviation: 3 to 400 s for the
+# sheets installed. The ends are a factor of 1,000 in N apart:
 CROSSINGS = (0.1, 1e5)

@@ -13,11 +13,12 @@ import numpy as np
 from gmwm._core import checks
 from gmwm._core.text import brief
 from gmwm._core.units import field_units
-from gmwm.calibration import Calibration
+from gmwm.calibration import Calibration, fast_density
 from gmwm.errors import InputError
 from gmwm.estimate import Fit
 from gmwm.filter_numbers import HORIZON, AxisFilterNumbers, FilterNumbers, usable
 from gmwm.issues import Notice, cause
+from gmwm.process import Model, Process
 
 SENSORS = {"gyro": "gyroscope", "accel": "accelerometer"}
 """Quantity -> how messages and most consumers call the sensor."""
@@ -373,16 +374,19 @@ def _covered(numbers: AxisFilterNumbers, fitted: Fit | None) -> str:
         if notice.code in _COVERED:
             for label, share in notice.values.items():
                 shares[label] = max(share, shares.get(label, 0.0))
-    labels = fitted.model.term_labels() if fitted is not None else ()
-    for label, one in zip(labels, fitted.model.terms if fitted is not None else (), strict=True):
-        if one.is_white or one.is_band_limited:
-            shares.pop(label, None)
+    terms: dict[str, Process] = {}
+    if fitted is not None:
+        terms = dict(zip(fitted.model.term_labels(), fitted.model.terms, strict=True))
+        for label, one in terms.items():
+            is_fast = one.is_band_limited or fast_density(Model((one,)), fitted.wv.dt) > 0.0
+            if one.is_white or is_fast:
+                shares.pop(label, None)  # N of the sensor has it, too
     if not shares:
         return ""
     label = max(shares, key=lambda each: shares[each])
-    if fitted is None or label not in labels:
+    if label not in terms:
         return label
-    term = fitted.model.terms[labels.index(label)]
+    term = terms[label]
     size, tau = term.linear_parameter, term.values.get("tau")
     text = label.rstrip(" 0123456789")
     if size is not None:

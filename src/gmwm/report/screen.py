@@ -106,7 +106,9 @@ def filter_table(calibration: Calibration, numbers: Certified) -> list[dict[str,
         texts = {k: text.replace("<=", "≤") for k, text in filter_values(triad).items()}
         keys = {letter: filter_key(triad.quantity, letter) for letter in KEYS}
         errors = intervals(triad, calibration)
-        texts |= {k: f"{texts[k]} ({e.replace('+-', '±')})" for k, e in errors.items()}
+        for key, text in errors.items():  # which does not break in its middle
+            error = text.replace("+-", "±").replace(" ", "\N{NO-BREAK SPACE}")
+            texts[key] += f" ({error})"
         about = {"covers": covers(triad, calibration.numbers), "warning": unusable(fits)}
         mark = "*" * (use(fits) == "*")
         rows.append({"name": triad.quantity, "mark": mark, **texts, **about, "keys": keys})

@@ -90,7 +90,9 @@ def test_units_that_are_noisier_scale_the_numbers():
 
 
 @pytest.mark.parametrize(
-    ("factor", "is_said"), [(1e-3, True), (1.0, False), (1e3, True)], ids=["small", "as is", "large"]
+    ("factor", "is_said"),
+    [(1e-3, True), (1.0, False), (1e3, True)],
+    ids=["small", "as is", "large"],
 )
 def test_a_noise_density_a_thousand_times_off_is_said(factor, is_said):
     for N, lowest in ((0.15, 0.5), (0.3, 8.0), (2.0, 25.0)):  # deg/sqrt(h), deg/h: sheets

@@ -13,7 +13,7 @@ import gmwm
 import marks
 from gmwm import Channel, GaussMarkov, InputError, RandomWalk, Recording, WhiteNoise, bound, reduce
 from gmwm._core.text import brief
-from gmwm.export import TARGETS, refusal
+from gmwm.export import TARGETS, axis_of, refusal
 from gmwm.filter_numbers import usable
 from gmwm.issues import Notice
 from imu_numbers import numbers
@@ -250,6 +250,21 @@ def test_files_have_six_lines_and_yaml_twelve(slow, stepped, name, is_valid, sou
     assert sum("not valid, do not use: gyro_y" in line for line in comments) == (not is_valid)
     if name in YAML:
         assert len(lines) <= 12
+    if name == "kalibr":
+        invalid = tuple(each.partition("_")[0] for each, fit in given.items() if not fit.valid)
+        marked = [
+            line.partition(":")[0] for line in lines if line.endswith("do not use: not valid")
+        ]
+        assert marked == [key for key in NUMBERS if key.startswith(invalid)]
+
+
+def test_a_fast_term_of_the_sensors_n_is_not_named_as_covered():
+    model = WhiteNoise(1e-4) + GaussMarkov(6e-3, 0.005) + GaussMarkov(2e-4, 40.0)
+    wv = gmwm.wavelet_variance(model.simulate(200_000, DT, 8), DT)
+    fit = gmwm.fit("N + 2 GM", replace(wv, name="gyro_x", quantity="gyro", unit="rad/s"))
+    axis = axis_of("gyro_x", gmwm.bound(fit), float("nan"), fit)
+    tau = float(re.search(r", ([\d.]+) s$", axis.covers)[1])
+    assert tau == pytest.approx(fit.params["tau_2"], rel=0.05)
 
 
 def test_what_to_do_is_said_once_where_it_is_the_same():
