@@ -118,33 +118,28 @@ def sessions(folder: Path, args: argparse.Namespace) -> None:
 
 
 def predict(folder: Path, args: argparse.Namespace) -> None:
-    """The mean over octaves and axes of the measured over the predicted variance of differences."""
+    """Mean over octaves and axes of the measured over the predicted variance of differences."""
     static = gmwm.load(args.static)
-    print("NEES of the difference of two IMUs: in motion / static / static times ten")
+    print("NEES of the difference of two IMUs, in motion; static; ten times the static deviation")
     for name, numbers in SESSIONS.items():
-        first = gmwm.motion([flight(folder, n) for n in numbers[::2]], static=static)
-        for number in numbers[1::2]:
-            recordings = flight(folder, number)
+        first = gmwm.motion([flight(folder, n) for n in numbers[args.half :: 2]], static=static)
+        for number in numbers[1 - args.half :: 2]:
+            found = gmwm.motion(flight(folder, number))
             for sensor in ("gyro", "accel"):
-                nees = {}
+                texts = []
                 for a, b in combinations(range(4), 2):
-                    own = gmwm.motion([recordings[a], recordings[b]])
-                    sums, rest, seen = [], [], []
-                    for axis in "xyz":
-                        channel = f"{sensor}_{axis}"
+                    own, rest = [], []
+                    for channel in (f"{sensor}_{axis}" for axis in "xyz"):
                         two = [first.curve(f"imu {k + 1}", channel) for k in (a, b)]
-                        measured = own.curve("imu 1", channel)
-                        both = sum(np.maximum(each.variance, each.static) for each in two)
-                        J = min(len(both), len(measured.tau))
-                        used = (measured.tau[:J] >= 0.06) & (measured.tau[:J] < 5.0)
-                        sums.append((measured.variance[:J] / both[:J])[used])
-                        static_sum = (two[0].static + two[1].static)[:J]
-                        rest.append((measured.variance[:J] / static_sum)[used])
-                        seen.append(measured.tau[:J][used])
-                    nees[a + 1, b + 1] = np.mean(sums), np.mean(rest)
-                texts = [
-                    f"{a}-{b} {m:.2f}/{r:.0f}/{r / 100:.2f}" for (a, b), (m, r) in nees.items()
-                ]
+                        curve = found.curve(f"imu {a + 1}", channel)
+                        J = min(len(two[0].tau), len(curve.tau))
+                        used = (curve.tau[:J] >= 0.06) & (curve.tau[:J] < 5.0)
+                        measured = curve.differences[b - 1, :J][used]
+                        both = sum(np.maximum(each.variance, each.static)[:J] for each in two)
+                        own.append(measured / both[used])
+                        rest.append(measured / (two[0].static + two[1].static)[:J][used])
+                    nees, at_rest = np.mean(own), np.mean(rest)
+                    texts.append(f"{a + 1}-{b + 1} {nees:.2f};{at_rest:.0f};{at_rest / 100:.2f}")
                 print(f"{name}, flight {number}, {sensor}: {', '.join(texts)}")
 
 
@@ -153,6 +148,7 @@ def main() -> None:
     parser.add_argument("what", choices=("simulate", "sessions", "predict"))
     parser.add_argument("folder", type=Path)
     parser.add_argument("--static")
+    parser.add_argument("--half", type=int, default=0, help="flights that `predict` learns from")
     parser.add_argument("--runs", type=int, default=100)
     parser.add_argument("--imus", type=int, default=3)
     parser.add_argument("--seed", type=int, default=1)

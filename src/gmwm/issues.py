@@ -505,6 +505,7 @@ _CALIBRATION = (
     # Of the noise in motion.
     Issue("motion-at-rest", "the rates do not correlate: taken as at rest, nothing is mapped"),
     Issue("motion-common", "errors that all {imus} IMUs have in common are not seen"),
+    Issue("motion-events", "{events} instant{events:s?} far off left out"),
     Issue("motion-filled", "{samples} missing sample{samples:s?} interpolated"),
     Issue("motion-pairs-differ", "pairs of the other IMUs disagree in {curves} of {all} curves, up "
         "to {tau:.2g} s: IMUs share errors, or the body flexes", "the least pair is without what "

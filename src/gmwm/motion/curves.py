@@ -21,8 +21,8 @@ class Curves:
     variance, lower, upper: (3, J), u^2, with the ends of 95 % intervals; of two IMUs that of the
         difference. A variance can be negative by chance; its lower end is zero then.
     pairs: (P, 3, J), from each pair of others.
+    differences: (K - 1, 3, J), of the difference to each other.
     agree: (3, J), p-value of the equality of the pairs; NaN where there is one.
-    shared: (3, J), correlation of the differences of a pair: the share of the target's own error.
     """
 
     tau: FloatArray
@@ -30,8 +30,8 @@ class Curves:
     lower: FloatArray
     upper: FloatArray
     pairs: FloatArray
+    differences: FloatArray
     agree: FloatArray
-    shared: FloatArray
 
 
 def haar(values: FloatArray, m: int) -> FloatArray:
@@ -96,10 +96,8 @@ def _octave(flights: Sequence[Sequence[FloatArray]], m: int, dt: float) -> tuple
     apart = list(combinations(range(len(pairs)), 2))
     agree = np.full(3, np.nan)
     for a, b in apart:
-        away = np.abs(by_pair[a] - by_pair[b]) / error(each[:, a] - each[:, b])
+        unsure = error(each[:, a] - each[:, b])
+        away = np.abs(by_pair[a] - by_pair[b]) / np.maximum(unsure, np.finfo(float).tiny)
         chance = 2.0 * student.sf(away, n - 1) * len(apart)
         agree = np.fmin(agree, np.minimum(chance, 1.0))
-    power = 0.5 * powers / np.sum(weights)
-    bases = [np.sqrt(power[a] * power[b]) for a, b in pairs]
-    shared = np.mean([own / base for own, base in zip(by_pair, bases, strict=True)], axis=0)
-    return variance, lower, upper, by_pair, agree, shared
+    return variance, lower, upper, by_pair, 0.5 * powers / np.sum(weights), agree

@@ -6,10 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.ndimage import uniform_filter1d
 
 from gmwm._core.documents import Array, Document, Text
 from gmwm._core.frozen import freeze
-from gmwm._core.typing import FloatArray
+from gmwm._core.typing import QUARTILE, BoolArray, FloatArray
 from gmwm.motion import tuning
 from gmwm.motion.clocks import means
 
@@ -111,11 +112,12 @@ def _cross(vectors: FloatArray) -> FloatArray:
 
 
 def map_onto(
-    target: FloatArray, others: Sequence[Signals], dt: float
+    target: FloatArray, others: Sequence[Signals], good: BoolArray, dt: float
 ) -> tuple[list[FloatArray], list[FloatArray], list[FloatArray]]:
     """Differences of the target and each other, and the parameters of each with their errors.
 
     target: (n, 3), unfiltered.
+    good: (n,), where no IMU lost a sample.
     dt: Of the target, s.
 
     The mapping of one IMU has the signals of the others as instruments: their errors are not its
@@ -123,16 +125,17 @@ def map_onto(
     IMUs leave only least squares.
     """
     size = max(1, round(tuning.MEAN_OVER / dt))
-    wanted = means(target - target.mean(axis=0), size)
+    used_means = means(good.astype(float), size) == 1.0
+    wanted = means(target - target.mean(axis=0), size)[used_means]
     spreads = others[0].spreads
-    known = [each.regressors(size) * spreads for each in others]
-    part = np.arange(len(wanted)) * size * dt // tuning.ERROR_PART
+    known = [each.regressors(size)[used_means] * spreads for each in others]
+    part = np.flatnonzero(used_means) * size * dt // tuning.ERROR_PART
     ends = np.flatnonzero(np.diff(part, prepend=-1.0))
     differences, parameters, errors = [], [], []
     for j, each in enumerate(others):
         used = [k for k in range(len(others)) if k != j] or [j]
         instruments = sum((known[k] for k in used), np.zeros(known[j].shape)) / len(used)
-        left = wanted - means(each.values - each.values.mean(axis=0), size)
+        left = wanted - means(each.values - each.values.mean(axis=0), size)[used_means]
         z, x = (array.reshape(-1, len(spreads)) for array in (instruments, known[j]))
         # Two-stage least squares: what the others explain of the regressors has no noise of theirs.
         shared = z @ np.linalg.lstsq(z, x, rcond=None)[0]
@@ -150,3 +153,33 @@ def map_onto(
         errors.append(np.sqrt(np.diag(spread)) * spreads)
         differences.append(target - each.mapped(found * spreads))
     return differences, parameters, errors
+
+
+def without_events(
+    differences: Sequence[FloatArray], good: BoolArray, dt: float
+) -> tuple[list[FloatArray], int]:
+    """Differences at their local level where samples are lost or far out, and how many times.
+
+    A mean over 0.1 s is far out at ten robust deviations; if that is more than 1 % of the record,
+    as where a part of it is at rest, it is no event and stays.
+    """
+    size = max(1, round(tuning.MEAN_OVER / dt))
+    away = np.zeros(len(good) // size, dtype=bool)
+    for each in differences:
+        level = means(each - np.median(each, axis=0), size)
+        spread = np.median(np.abs(level), axis=0) / QUARTILE
+        away |= np.any(np.abs(level) > tuning.FAR_OUT * spread, axis=1)
+    if away.mean() > tuning.MOST_EVENTS:
+        away[:] = False
+    count = int(np.count_nonzero(np.diff(away, prepend=False) & away))
+    used = good & ~np.append(np.repeat(away, size), np.zeros(len(good) - away.size * size, bool))
+    if np.all(used):
+        return list(differences), 0
+    width = round(tuning.LEVEL_OVER / dt)
+    share = uniform_filter1d(used.astype(float), width)
+    found = []
+    for each in differences:
+        total = uniform_filter1d(np.where(used[:, None], each, 0.0), width, axis=0)
+        level = total / np.maximum(share, 1e-9)[:, None]
+        found.append(np.where(used[:, None], each, level))
+    return found, count

@@ -11,14 +11,14 @@ from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
 from gmwm._core import checks
-from gmwm._core.typing import FloatArray, Progress
+from gmwm._core.typing import BoolArray, FloatArray, Progress
 from gmwm.errors import InputError
 from gmwm.estimate import Fit
 from gmwm.issues import Notice, notice
 from gmwm.motion import tuning
 from gmwm.motion.clocks import Clock, join, means
 from gmwm.motion.curves import Curves, curves_of
-from gmwm.motion.mapping import Mounting, Signals, arms_of, map_onto, rotation_to
+from gmwm.motion.mapping import Mounting, Signals, arms_of, map_onto, rotation_to, without_events
 from gmwm.motion.result import InMotion, MotionCurve, static_variance
 from gmwm.readers import Recording, require_recording
 
@@ -27,11 +27,17 @@ _AXES = "xyz"
 
 @dataclass(frozen=True)
 class _Imu:
-    """Samples of an IMU in a flight: (n, 3) by sensor, SI, and the sampling interval, s."""
+    """An IMU in a flight.
+
+    dt: Sampling interval, s.
+    samples: (n, 3) by sensor, SI.
+    lost: (n,), whether a sample within 0.1 s is missing: those beside one are often wrong.
+    """
 
     label: str
     dt: float
     samples: Mapping[str, FloatArray]
+    lost: BoolArray
 
     @property
     def time(self) -> FloatArray:
@@ -80,6 +86,7 @@ def motion(
     clocks: list[Clock] = []
     mountings: list[Mounting] = []
     differences: dict[tuple[str, str], list[list[FloatArray]]] = {}
+    events: dict[int, int] = {}
     for number, imus in enumerate(flights, start=1):
         if progress is not None:
             progress(number - 1, len(flights), f"flight {number}")
@@ -90,8 +97,9 @@ def motion(
             moving = []
         clocks += moving
         for k in range(len(imus)):
-            found, mounted = _of_target(number, imus, k, moving)
+            found, mounted, count = _of_target(number, imus, k, moving)
             mountings += mounted
+            events[number] = max(events.get(number, 0), count)
             for sensor, own in found.items():
                 differences.setdefault((labels[k], sensor), []).append(own)
     curves = []
@@ -100,6 +108,8 @@ def motion(
         for sensor in flights[0][0].samples:
             found_curves = curves_of(differences[label, sensor], flights[0][k].dt)
             curves += _by_axis(label, sensor, found_curves, own_static)
+    if count := sum(events.values()):
+        notices.append(notice("motion-events", values={"events": count}))
     notices += _notices(curves, len(labels))
     durations = tuple(float(imus[0].time[-1]) for imus in flights)
     return InMotion(
@@ -149,7 +159,7 @@ def _imu(where: str, label: str, given: Any) -> tuple[_Imu, int]:
     """Samples of a recording, and how many are missing: they lie on lines between others."""
     require_recording(given)
     recording = given.of_one_rate("motion")
-    samples, filled = {}, 0
+    samples, lost = {}, np.zeros(recording.n, dtype=bool)
     for sensor in ("gyro", "accel"):
         names = [f"{sensor}_{axis}" for axis in _AXES]
         if missing := [name for name in names if name not in recording]:
@@ -161,11 +171,14 @@ def _imu(where: str, label: str, given: Any) -> tuple[_Imu, int]:
         for axis in np.flatnonzero(gone.any(axis=0)):
             there = np.flatnonzero(~gone[:, axis])
             values[:, axis] = np.interp(np.arange(len(values)), there, values[there, axis])
-        filled = max(filled, int(gone.any(axis=1).sum()))
+        lost |= gone.any(axis=1)
         samples[sensor] = values
+    filled = int(lost.sum())
     if filled > tuning.MOST_FILLED * recording.n:
         raise InputError(f"{where}: {filled} of {recording.n} samples are missing: give whole ones")
-    return _Imu(label, recording.dt, samples), filled
+    near = 2 * round(tuning.BESIDE_LOST / recording.dt) + 1
+    lost = np.convolve(lost, np.ones(near), "same") > 0.5
+    return _Imu(label, recording.dt, samples, lost), filled
 
 
 def _joined(flight: int, first: _Imu, imu: _Imu) -> Clock | None:
@@ -175,15 +188,17 @@ def _joined(flight: int, first: _Imu, imu: _Imu) -> Clock | None:
 
 def _of_target(
     flight: int, imus: Sequence[_Imu], k: int, clocks: Sequence[Clock]
-) -> tuple[dict[str, list[FloatArray]], list[Mounting]]:
-    """By sensor, differences of one IMU and each other; at rest its own samples in their place.
+) -> tuple[dict[str, list[FloatArray]], list[Mounting], int]:
+    """By sensor, differences of one IMU and each other, their mountings, and how many events.
+
+    At rest its own samples are in place of differences.
 
     clocks: Of all IMUs but the first; none at rest.
     """
     target, others = imus[k], [imu for j, imu in enumerate(imus) if j != k]
     if not clocks:
         whole = {s: v - v.mean(axis=0) for s, v in target.samples.items()}
-        return {s: [v for _ in others] for s, v in whole.items()}, []
+        return {s: [v for _ in others] for s, v in whole.items()}, [], 0
     first = Clock(flight, imus[0].label, 0.0, 0.0, 0.0, 0.0)
     by_imu = {clock.imu: clock for clock in (first, *clocks)}
     time = by_imu[target.label].of_first(target.time)
@@ -195,9 +210,12 @@ def _of_target(
         ],
         axis=0,
     )
+    good = ~target.lost[inside]
+    for t, i in zip(own, others, strict=True):
+        good &= ~i.lost[np.round(t[inside] / i.dt).astype(int)]
     size = max(1, round(tuning.MEAN_OVER / target.dt))
     found: dict[str, list[FloatArray]] = {}
-    mountings = []
+    mountings, events = [], 0
     turns: list[FloatArray] = []
     arms: list[FloatArray | None] = [None] * len(others)
     for sensor, samples in target.samples.items():
@@ -215,7 +233,9 @@ def _of_target(
             signals.append(Signals(values, slopes, arms[j]))
             if sensor == "gyro":
                 arms[j] = arms_of(values, slopes)
-        found[sensor], parameters, errors = map_onto(wanted, signals, target.dt)
+        mapped, parameters, errors = map_onto(wanted, signals, good, target.dt)
+        found[sensor], count = without_events(mapped, good, target.dt)
+        events = max(events, count)
         for imu, turn, value, error in zip(others, turns, parameters, errors, strict=True):
             rotation = Rotation.from_matrix(turn).as_rotvec()
             mountings.append(
@@ -233,7 +253,7 @@ def _of_target(
                     error[10:],
                 )
             )
-    return found, mountings
+    return found, mountings, events
 
 
 def _by_axis(
@@ -251,8 +271,8 @@ def _by_axis(
                 variance=curves.variance[axis],
                 lower=curves.lower[axis],
                 upper=curves.upper[axis],
-                shared=curves.shared[axis],
                 pairs=curves.pairs[:, axis],
+                differences=curves.differences[:, axis],
                 agree=curves.agree[axis],
                 static=static_variance(static, channel, curves.tau),
             )

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 _COLUMNS = (
-    *("imu", "channel", "tau", "deviation", "lower", "upper", "shared", "static", "factor"),
+    *("imu", "channel", "tau", "deviation", "lower", "upper", "coherence", "static", "factor"),
     "unit",
 )
 _UNITS = {"gyro": "deg/s", "accel": "mg"}
@@ -55,11 +55,11 @@ class MotionCurve(Document):
     variance, lower, upper : (J,) ndarray
         u^2, with the ends of 95 % intervals. By chance a variance can be negative. Of two IMUs it
         is the sum of both.
-    shared : (J,) ndarray
-        Correlation of two differences to other IMUs: the share of its own error in them.
     pairs : (P, J) ndarray
         Of each pair of the other IMUs in their order, u^2: ``variance`` is their mean. Pairs
         differ where IMUs share errors, as of one place of a body that flexes.
+    differences : (K - 1, J) ndarray
+        Of the difference to each of the other IMUs in their order, u^2.
     agree : (J,) ndarray
         p-value of the equality of what pairs of others give; NaN with fewer than four IMUs.
     static : (J,) ndarray
@@ -73,18 +73,25 @@ class MotionCurve(Document):
     variance: Array
     lower: Array
     upper: Array
-    shared: Array
     pairs: Array
+    differences: Array
     agree: Array
     static: Array
 
     def __post_init__(self) -> None:
-        freeze(self, "tau", "variance", "lower", "upper", "shared", "pairs", "agree", "static")
+        freeze(self, "tau", "variance", "lower", "upper", "pairs", "differences", "agree", "static")
 
     @property
     def deviation(self) -> FloatArray:
         """(J,) Allan deviation, u; NaN where the variance is not positive."""
         return np.asarray(np.sqrt(np.where(self.variance > 0.0, self.variance, np.nan)))
+
+    @property
+    def coherence(self) -> FloatArray:
+        """(J,) Mean coherence of two differences to other IMUs: the share of its own error."""
+        first, second = np.triu_indices(len(self.differences), min(1, len(self.differences) - 1))
+        power = np.sqrt(self.differences[first] * self.differences[second])
+        return np.asarray(np.mean(self.pairs / power, axis=0))
 
     @property
     def factor(self) -> FloatArray:
@@ -155,7 +162,7 @@ class InMotion(Document, Printed):
                 each.tau,
                 scale * each.deviation,
                 *ends,
-                each.shared,
+                each.coherence,
                 scale * np.sqrt(each.static),
                 each.factor,
             )
@@ -246,7 +253,8 @@ class InMotion(Document, Printed):
     def _table(self, sensor: str) -> str:
         """Root mean square deviations over the axes at some averaging times, and the factor.
 
-        Below them the typical 95 % interval of one axis, and the range over pairs of other IMUs.
+        Below them the typical 95 % interval of one axis, and the range of the deviation over pairs
+        of other IMUs, in all curves, as a share of it.
         """
         own = [each for each in self.curves if each.quantity == sensor]
         tau, (unit, scale) = own[0].tau, _shown(sensor)
@@ -259,7 +267,7 @@ class InMotion(Document, Printed):
         rows.append(("95 %", *(f"x/{reach[k]:.2f}" for k in chosen)))
         ratios = np.array([c.pairs / np.where(c.variance > 0.0, c.variance, np.nan) for c in own])
         if ratios.shape[1] > 1:
-            ends = [np.nanmedian(end(ratios, axis=1), axis=0) for end in (np.min, np.max)]
+            ends = (np.nanmin(ratios, axis=(0, 1)), np.nanmax(ratios, axis=(0, 1)))
             low, high = (np.sqrt(np.maximum(end, 0.0)) for end in ends)
             rows.append(("by pair", *(f"{low[k]:.1f}-{high[k]:.1f}" for k in chosen)))
         rest = np.mean([c.static for c in own], axis=0)

@@ -5,12 +5,12 @@ EDGE = 3  # samples at each end, where a cubic spline has neighbours on one side
 
 # -- clocks ---------------------------------------------------------------------------------------
 
-CORRELATED = 0.5  # of the lengths of the rates: flights have 0.97 and more, noise up to 0.4
-MOVING = 0.035  # rad/s rms of means over 0.1 s; noise alone has 0.01 in coarse sensors
+CORRELATED = 0.5  # of the lengths of the rates: flights have 0.998 and more, noise up to 0.24
+MOVING = 0.01  # rad/s rms of means over 0.1 s; noise of the same IMUs at rest has 0.0004
 PART = 5.0  # s: parts whose own delays tell a clock that wanders from a steady one
-# Share of the variance of residuals that delays of the parts explain beyond a steady clock: the
-# flights of `benchmarks/motion.py` have at most 0.12, steady simulated clocks 0.02.
-WANDER = 0.25
+# Share of the variance of residuals that delays of the parts explain beyond a steady clock: 14
+# flights have at most 0.04, steady simulated clocks on their motions 0.014.
+WANDER = 0.1
 PASSES, CLOSE = 12, 1e-7  # of the delay, s
 
 # -- mapping --------------------------------------------------------------------------------------
@@ -33,3 +33,8 @@ FEWEST_FLIGHTS = 5  # from so many on, flights are the unit, of which blocks are
 SHOWN_AT = (0.008, 0.03, 0.13, 0.5, 1.0, 2.0, 4.0)  # s, averaging times that are printed
 CONTRADICT = 1e-4  # p-value of one curve and octave; a result has some 200 of them
 MOST_FILLED = 0.02  # share of missing samples that lines may replace
+BESIDE_LOST = 0.1  # s: samples beside a lost packet are up to 24 deg/s off in a flight
+# Robust deviations of a mean over 0.1 s that make it an event, and the largest share of events: in
+# 14 flights three instants are.
+FAR_OUT, MOST_EVENTS = 10.0, 0.01
+LEVEL_OVER = 2.0  # s, whose mean stands for what is left out
