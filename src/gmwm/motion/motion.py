@@ -199,20 +199,7 @@ def _of_target(
     if not clocks:
         whole = {s: v - v.mean(axis=0) for s, v in target.samples.items()}
         return {s: [v for _ in others] for s, v in whole.items()}, [], 0
-    first = Clock(flight, imus[0].label, 0.0, 0.0, 0.0, 0.0)
-    by_imu = {clock.imu: clock for clock in (first, *clocks)}
-    time = by_imu[target.label].of_first(target.time)
-    own = [by_imu[imu.label].own(time) for imu in others]
-    inside = np.all(
-        [
-            (t > tuning.EDGE * i.dt) & (t < i.time[-1] - tuning.EDGE * i.dt)
-            for t, i in zip(own, others, strict=True)
-        ],
-        axis=0,
-    )
-    good = ~target.lost[inside]
-    for t, i in zip(own, others, strict=True):
-        good &= ~i.lost[np.round(t[inside] / i.dt).astype(int)]
+    own, inside, good = _instants(target, others, imus[0].label, clocks)
     size = max(1, round(tuning.MEAN_OVER / target.dt))
     found: dict[str, list[FloatArray]] = {}
     mountings, events = [], 0
@@ -223,7 +210,7 @@ def _of_target(
         for j, (imu, at) in enumerate(zip(others, own, strict=True)):
             spline = CubicSpline(imu.time, imu.samples[sensor])
             behind2, behind, values, ahead, ahead2 = (
-                spline(at[inside] + k * imu.dt) for k in (-2, -1, 0, 1, 2)
+                spline(at + k * imu.dt) for k in (-2, -1, 0, 1, 2)
             )
             # Of fourth order: the second order takes 2 % of a lever arm at a fifteenth of the rate.
             slopes = (8.0 * (ahead - behind) - ahead2 + behind2) / (12.0 * imu.dt)
@@ -254,6 +241,25 @@ def _of_target(
                 )
             )
     return found, mountings, events
+
+
+def _instants(
+    target: _Imu, others: Sequence[_Imu], first: str, clocks: Sequence[Clock]
+) -> tuple[list[FloatArray], BoolArray, BoolArray]:
+    """Times of the others' clocks (m,) at the target's samples, which these are, and the good ones.
+
+    Samples are those (n,) at which every IMU has some on both sides; good ones (m,) are those where
+    none is lost nearby.
+    """
+    by_imu = {clock.imu: clock for clock in (Clock(0, first, 0.0, 0.0, 0.0, 0.0), *clocks)}
+    time = by_imu[target.label].of_first(target.time)
+    own = [by_imu[imu.label].own(time) for imu in others]
+    inside, good = np.ones(len(time), dtype=bool), ~target.lost
+    for at, imu in zip(own, others, strict=True):
+        edge = tuning.EDGE * imu.dt
+        inside &= (at > edge) & (at < imu.time[-1] - edge)
+        good &= ~imu.lost[np.clip(np.round(at / imu.dt).astype(int), 0, len(imu.lost) - 1)]
+    return [at[inside] for at in own], inside, good[inside]
 
 
 def _by_axis(
