@@ -3,6 +3,7 @@
     python benchmarks/motion.py simulate FOLDER [--runs 100 --imus 3 --seed 1 --offset 0.01]
     python benchmarks/motion.py sessions FOLDER --static calibration.json
     python benchmarks/motion.py predict FOLDER --static calibration.json
+    python benchmarks/motion.py picture FOLDER --static calibration.json [--svg in-motion.svg]
 
 FOLDER holds ``flight_NN_imu_K.csv.gz`` of four IMUs on one quadrotor, 120 Hz (Hurwitz and Klein
 2023, CC BY 4.0). `simulate` takes the motion below 15 Hz of one IMU for the truth, gives each of
@@ -10,15 +11,17 @@ several IMUs a clock, a rotation, a lever arm and errors of known Allan variance
 differenced white noise, random walk), and prints the ratio of the variances to the truth, the
 coverage of 95 % intervals, and the errors of clocks and lever arms in standard errors. `sessions`
 prints in-motion over static Allan deviation by session. `predict` takes the numbers from every
-second flight of a session, and prints on the others the NEES of the difference of two IMUs.
+second flight of a session, and prints on the others, and the other way round, the NEES of the
+difference of two IMUs.
 """
 
 from __future__ import annotations
 
 import argparse
-from itertools import combinations
+from itertools import combinations, product
 from pathlib import Path
 
+import matplotlib.pyplot as plt
 import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.signal import butter, sosfiltfilt
@@ -120,10 +123,11 @@ def sessions(folder: Path, args: argparse.Namespace) -> None:
 def predict(folder: Path, args: argparse.Namespace) -> None:
     """Mean over octaves and axes of the measured over the predicted variance of differences."""
     static = gmwm.load(args.static)
+    ranges = {}
     print("NEES of the difference of two IMUs, in motion; static; ten times the static deviation")
-    for name, numbers in SESSIONS.items():
-        first = gmwm.motion([flight(folder, n) for n in numbers[args.half :: 2]], static=static)
-        for number in numbers[1 - args.half :: 2]:
+    for (name, numbers), half in product(SESSIONS.items(), (0, 1)):
+        first = gmwm.motion([flight(folder, n) for n in numbers[half::2]], static=static)
+        for number in numbers[1 - half :: 2]:
             found = gmwm.motion(flight(folder, number))
             for sensor in ("gyro", "accel"):
                 texts = []
@@ -138,17 +142,49 @@ def predict(folder: Path, args: argparse.Namespace) -> None:
                         both = sum(np.maximum(each.variance, each.static)[:J] for each in two)
                         own.append(measured / both[used])
                         rest.append(measured / (two[0].static + two[1].static)[:J][used])
-                    nees, at_rest = np.mean(own), np.mean(rest)
-                    texts.append(f"{a + 1}-{b + 1} {nees:.2f};{at_rest:.0f};{at_rest / 100:.2f}")
+                    nees = np.mean(own), np.mean(rest), np.mean(rest) / 100.0
+                    texts.append(f"{a + 1}-{b + 1} {nees[0]:.2f};{nees[1]:.0f};{nees[2]:.2f}")
+                    group = "1-15" if number < 16 else "17-27"
+                    ranges.setdefault((group, sensor), []).append(nees)
                 print(f"{name}, flight {number}, {sensor}: {', '.join(texts)}")
+    for (group, sensor), values in ranges.items():
+        ends = np.quantile(values, [0.0, 0.05, 0.5, 0.95, 1.0], axis=0).T
+        texts = ["least {:.2f} 5 % {:.2f} median {:.2f} 95 % {:.2f} largest {:.2f}".format(*each)
+                 for each in ends]  # fmt: skip
+        print(f"flights {group}, {sensor}, {len(values)} pairs: {'; '.join(texts)}")
+
+
+def picture(folder: Path, args: argparse.Namespace) -> None:
+    """Deviations of all flights, rms over IMUs and axes of a sensor, and at rest."""
+    static = gmwm.load(args.static)
+    figure, axes = plt.subplots(1, 2, figsize=(10.0, 4.2), layout="constrained")
+    scales = {"gyro": (np.degrees(1.0), "deg/s"), "accel": (1e3 / 9.80665, "mg")}
+    for name, numbers in SESSIONS.items():
+        found = gmwm.motion([flight(folder, n) for n in numbers], static=static)
+        for ax, sensor in zip(axes, found.sensors, strict=True):
+            own = [each for each in found.curves if each.quantity == sensor]
+            scale, unit = scales[sensor]
+            rms = scale * np.sqrt(np.mean([each.variance for each in own], axis=0))
+            ax.loglog(own[0].tau, rms, "o-", markersize=4, label=f"in motion, flights {name}")
+            if name == "9-15":
+                rest = scale * np.sqrt(np.mean([each.static for each in own], axis=0))
+                ax.loglog(own[0].tau, rest, "k.--", label="at rest")
+                for tau, top, low in zip(own[0].tau[::2], rms[::2], rest[::2], strict=True):
+                    ax.annotate(
+                        f"x{top / low:.{1 if top < 10.0 * low else 0}f}",
+                        (tau, np.sqrt(top * low)),
+                        ha="center",
+                    )
+            ax.set(xlabel="averaging time [s]", ylabel=f"Allan deviation [{unit}]", title=sensor)
+    axes[0].legend(fontsize="small")
+    figure.savefig(args.svg)
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("what", choices=("simulate", "sessions", "predict"))
+    parser.add_argument("what", choices=("simulate", "sessions", "predict", "picture"))
     parser.add_argument("folder", type=Path)
     parser.add_argument("--static")
-    parser.add_argument("--half", type=int, default=0, help="flights that `predict` learns from")
     parser.add_argument("--runs", type=int, default=100)
     parser.add_argument("--imus", type=int, default=3)
     parser.add_argument("--seed", type=int, default=1)
@@ -157,8 +193,10 @@ def main() -> None:
     parser.add_argument("--turn", type=float, default=20.0)
     parser.add_argument("--arm", type=float, default=0.1)
     parser.add_argument("--least", type=float, default=20.0, help="averaging times in a record")
+    parser.add_argument("--svg", default="in-motion.svg")
     args = parser.parse_args()
-    {"simulate": simulate, "sessions": sessions, "predict": predict}[args.what](args.folder, args)
+    runs = {"simulate": simulate, "sessions": sessions, "predict": predict, "picture": picture}
+    runs[args.what](args.folder, args)
 
 
 if __name__ == "__main__":

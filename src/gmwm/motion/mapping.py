@@ -155,31 +155,26 @@ def map_onto(
     return differences, parameters, errors
 
 
-def without_events(
-    differences: Sequence[FloatArray], good: BoolArray, dt: float
-) -> tuple[list[FloatArray], int]:
-    """Differences at their local level where samples are lost or far out, and how many times.
+def far_out(differences: Sequence[FloatArray], dt: float) -> BoolArray:
+    """(n,) Whether a mean over 0.1 s of a difference is far out: ten robust deviations.
 
-    A mean over 0.1 s is far out at ten robust deviations; if that is more than 1 % of the record,
-    as where a part of it is at rest, it is no event and stays.
+    More than 1 % of a record, as where a part of it is at rest, are no events.
     """
     size = max(1, round(tuning.MEAN_OVER / dt))
-    away = np.zeros(len(good) // size, dtype=bool)
+    away = np.zeros(len(differences[0]), dtype=bool)
     for each in differences:
         level = means(each - np.median(each, axis=0), size)
         spread = np.median(np.abs(level), axis=0) / QUARTILE
-        away |= np.any(np.abs(level) > tuning.FAR_OUT * spread, axis=1)
-    if away.mean() > tuning.MOST_EVENTS:
-        away[:] = False
-    count = int(np.count_nonzero(np.diff(away, prepend=False) & away))
-    used = good & ~np.append(np.repeat(away, size), np.zeros(len(good) - away.size * size, bool))
+        here = np.repeat(np.any(np.abs(level) > tuning.FAR_OUT * spread, axis=1), size)
+        away[: here.size] |= here
+    return away if away.mean() <= tuning.MOST_EVENTS else np.zeros_like(away)
+
+
+def bridged(difference: FloatArray, used: BoolArray, dt: float) -> FloatArray:
+    """The difference (n, 3) with its local level where samples are not used."""
     if np.all(used):
-        return list(differences), 0
+        return difference
     width = round(tuning.LEVEL_OVER / dt)
     share = uniform_filter1d(used.astype(float), width)
-    found = []
-    for each in differences:
-        total = uniform_filter1d(np.where(used[:, None], each, 0.0), width, axis=0)
-        level = total / np.maximum(share, 1e-9)[:, None]
-        found.append(np.where(used[:, None], each, level))
-    return found, count
+    total = uniform_filter1d(np.where(used[:, None], difference, 0.0), width, axis=0)
+    return np.where(used[:, None], difference, total / np.maximum(share, 1e-9)[:, None])

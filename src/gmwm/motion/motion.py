@@ -18,7 +18,7 @@ from gmwm.issues import Notice, notice
 from gmwm.motion import tuning
 from gmwm.motion.clocks import Clock, join, means
 from gmwm.motion.curves import Curves, curves_of
-from gmwm.motion.mapping import Mounting, Signals, arms_of, map_onto, rotation_to, without_events
+from gmwm.motion.mapping import Mounting, Signals, arms_of, bridged, far_out, map_onto, rotation_to
 from gmwm.motion.result import InMotion, MotionCurve, static_variance
 from gmwm.readers import Recording, require_recording
 
@@ -221,8 +221,11 @@ def _of_target(
             if sensor == "gyro":
                 arms[j] = arms_of(values, slopes)
         mapped, parameters, errors = map_onto(wanted, signals, good, target.dt)
-        found[sensor], count = without_events(mapped, good, target.dt)
-        events = max(events, count)
+        if np.any(away := far_out(mapped, target.dt)):
+            good = good & ~away
+            events += int(np.count_nonzero(np.diff(away, prepend=False) & away))
+            mapped, parameters, errors = map_onto(wanted, signals, good, target.dt)
+        found[sensor] = [bridged(each, good, target.dt) for each in mapped]
         for imu, turn, value, error in zip(others, turns, parameters, errors, strict=True):
             rotation = Rotation.from_matrix(turn).as_rotvec()
             mountings.append(

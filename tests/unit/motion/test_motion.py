@@ -136,6 +136,18 @@ def test_what_all_have_in_common_is_not_seen_and_that_is_said():
     assert [n.values for n in found.notices if n.code == "motion-common"] == [{"imus": 3}]
 
 
+def test_glitches_and_lost_samples_cost_an_instant():
+    rng = np.random.default_rng(13)
+    body, errors = motion_of(rng), white(rng, 3)
+    whole = gmwm.motion([imu(body, own) for own in errors])
+    errors[0, 2000:2005] += 200.0 * SIZE
+    errors[1, 3000] = np.nan
+    found = gmwm.motion([imu(body, own) for own in errors])
+    assert {"motion-events", "motion-filled"} <= {n.code for n in found.notices}
+    for damaged, curve in zip(found.curves, whole.curves, strict=True):
+        assert damaged.variance[:6] == pytest.approx(curve.variance[:6], rel=0.05)
+
+
 def test_a_clock_that_wanders_is_rejected():
     rng = np.random.default_rng(10)
     body, errors = motion_of(rng), white(rng, 3)
