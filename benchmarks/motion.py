@@ -1,9 +1,8 @@
 """Noise in motion of simulated errors on real flights, and of these flights themselves.
 
     python benchmarks/motion.py simulate FOLDER [--runs 100 --imus 3 --seed 1 --offset 0.01]
-    python benchmarks/motion.py sessions FOLDER --static calibration.json
+    python benchmarks/motion.py sessions FOLDER --static calibration.json --save .
     python benchmarks/motion.py predict FOLDER --static calibration.json
-    python benchmarks/motion.py picture FOLDER --static calibration.json [--svg in-motion.svg]
 
 FOLDER holds ``flight_NN_imu_K.csv.gz`` of four IMUs on one quadrotor, 120 Hz (Hurwitz and Klein
 2023, CC BY 4.0). `simulate` takes the motion below 15 Hz of one IMU for the truth, gives each of
@@ -21,7 +20,6 @@ import argparse
 from itertools import combinations, product
 from pathlib import Path
 
-import matplotlib.pyplot as plt
 import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.signal import butter, sosfiltfilt
@@ -118,6 +116,8 @@ def sessions(folder: Path, args: argparse.Namespace) -> None:
     for name, numbers in SESSIONS.items():
         found = gmwm.motion([flight(folder, n) for n in numbers], static=static)
         print(f"\nFlights {name}\n{found}")
+        if args.save is not None:
+            found.save(args.save / f"flights {name}.json")
 
 
 def predict(folder: Path, args: argparse.Namespace) -> None:
@@ -154,35 +154,9 @@ def predict(folder: Path, args: argparse.Namespace) -> None:
         print(f"flights {group}, {sensor}, {len(values)} pairs: {'; '.join(texts)}")
 
 
-def picture(folder: Path, args: argparse.Namespace) -> None:
-    """Deviations of all flights, rms over IMUs and axes of a sensor, and at rest."""
-    static = gmwm.load(args.static)
-    figure, axes = plt.subplots(1, 2, figsize=(10.0, 4.2), layout="constrained")
-    scales = {"gyro": (np.degrees(1.0), "deg/s"), "accel": (1e3 / 9.80665, "mg")}
-    for name, numbers in SESSIONS.items():
-        found = gmwm.motion([flight(folder, n) for n in numbers], static=static)
-        for ax, sensor in zip(axes, found.sensors, strict=True):
-            own = [each for each in found.curves if each.quantity == sensor]
-            scale, unit = scales[sensor]
-            rms = scale * np.sqrt(np.mean([each.variance for each in own], axis=0))
-            ax.loglog(own[0].tau, rms, "o-", markersize=4, label=f"in motion, flights {name}")
-            if name == "9-15":
-                rest = scale * np.sqrt(np.mean([each.static for each in own], axis=0))
-                ax.loglog(own[0].tau, rest, "k.--", label="at rest")
-                for tau, top, low in zip(own[0].tau[::2], rms[::2], rest[::2], strict=True):
-                    ax.annotate(
-                        f"x{top / low:.{1 if top < 10.0 * low else 0}f}",
-                        (tau, np.sqrt(top * low)),
-                        ha="center",
-                    )
-            ax.set(xlabel="averaging time [s]", ylabel=f"Allan deviation [{unit}]", title=sensor)
-    axes[0].legend(fontsize="small")
-    figure.savefig(args.svg)
-
-
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("what", choices=("simulate", "sessions", "predict", "picture"))
+    parser.add_argument("what", choices=("simulate", "sessions", "predict"))
     parser.add_argument("folder", type=Path)
     parser.add_argument("--static")
     parser.add_argument("--runs", type=int, default=100)
@@ -193,9 +167,9 @@ def main() -> None:
     parser.add_argument("--turn", type=float, default=20.0)
     parser.add_argument("--arm", type=float, default=0.1)
     parser.add_argument("--least", type=float, default=20.0, help="averaging times in a record")
-    parser.add_argument("--svg", default="in-motion.svg")
+    parser.add_argument("--save", type=Path, help="folder for the results of `sessions`")
     args = parser.parse_args()
-    runs = {"simulate": simulate, "sessions": sessions, "predict": predict, "picture": picture}
+    runs = {"simulate": simulate, "sessions": sessions, "predict": predict}
     runs[args.what](args.folder, args)
 
 
