@@ -25,6 +25,8 @@ from gmwm.population.comparison import AxisComparison, SensorComparison
 from gmwm.population.curves import Equality
 from gmwm.population.unit import Choice
 from gmwm.readers import Recording, is_frame
+from gmwm.selection import select
+from gmwm.variance import WaveletVariance
 
 _LONGEST_LABEL = 28  # characters
 
@@ -46,7 +48,8 @@ def compare(
     ----------
     sources : sequence or mapping of str to each
         Two or more: `Calibration`, the path of a saved one, or a `Recording` or DataFrame, which
-        is calibrated first. The keys of a mapping name them.
+        is calibrated first; or an Allan curve, or those of `gmwm.read_curves`, at the same
+        averaging times. The keys of a mapping name them.
     horizon : float, optional
         Longest outage that the filter numbers are for, s.
     progress : callable, optional
@@ -67,7 +70,9 @@ def compare(
     curve are called close: with a million samples a change of temperature shows.
     """
     horizon = checks.positive("horizon", horizon, "give the longest outage in seconds")
-    single = isinstance(sources, str | os.PathLike | Calibration | Recording) or is_frame(sources)
+    single = isinstance(
+        sources, str | os.PathLike | Calibration | Recording | WaveletVariance
+    ) or is_frame(sources)
     if single or not isinstance(sources, Iterable):
         raise InputError(
             f"{checks.shown(sources)} is not a list of recordings: give two calibrations or more"
@@ -122,9 +127,15 @@ def _calibration(source: Any) -> Calibration:
         return Calibration.load(source)
     if isinstance(source, Recording) or is_frame(source):
         return calibrate(source)
+    if isinstance(source, WaveletVariance):
+        source = {source.name or "curve": source}
+    curves = [*source.values()] if isinstance(source, Mapping) else []
+    if curves and all(isinstance(each, WaveletVariance) for each in curves):
+        fits, first = {name: select(each).fit for name, each in source.items()}, curves[0]
+        return Calibration(fits, {}, "curve", 1.0 / first.dt, first.n)
     raise InputError(
         f"{checks.shown(source)} is neither a calibration nor a recording: give a "
-        "result of gmwm.calibrate or its path, or a recording from gmwm.read"
+        "result of gmwm.calibrate or its path, a recording from gmwm.read, or curves"
     )
 
 

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from gmwm._core.distributions import chi2, norm
 from gmwm._core.typing import FloatArray
+from gmwm.errors import InputError
 from gmwm.estimate import Fit
 from gmwm.estimate.problem import (
     Scales,
@@ -152,13 +153,22 @@ class Equality:
 
     @classmethod
     def of(cls, fits: Sequence[Fit]) -> Equality:
-        """The test for fits to several recordings of one channel at one rate."""
+        """The test for fits to several recordings of one channel at one rate.
+
+        Raises InputError if curves are known at different averaging times.
+        """
         drifting = any(term.is_drift for fit in fits for term in fit.model.terms)
         terms = [tuple(t for t in fit.model.terms if not t.is_drift) for fit in fits]
         noises = [Model(each) for each in terms if each]  # an Allan fit may have a ramp only
         curves = [Curve.of(fit, noises, drifting=drifting) for fit in fits]
         levels = sorted(curve.tau.size for curve in curves)[-2]
         tau = next(curve.tau[:levels] for curve in curves if curve.tau.size >= levels)
+        for curve in curves:
+            moved = np.abs(np.log(curve.tau[:levels] / tau[: curve.tau.size]))
+            if np.any(moved > 2.0 * tuning.SAME_RATE):
+                raise InputError(
+                    "the curves have other averaging times: give them to gmwm.curve at the same"
+                )
         variance, share = np.full((2, len(curves), levels), np.nan)
         for row, part, curve in zip(variance, share, curves, strict=True):
             own = min(curve.tau.size, levels)

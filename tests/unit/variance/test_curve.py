@@ -127,6 +127,16 @@ def test_everything_that_takes_wavelet_variances_takes_it(tmp_path):
     assert both.stderr["N"] == pytest.approx(chosen.fit.stderr["N"] / np.sqrt(2.0), rel=0.02)
 
 
+def test_curves_are_compared():
+    axis = {"unit": "rad/s", "name": "gyro_x"}
+    one, near, noisier = (
+        exact(WhiteNoise(N) + RandomWalk(3e-6), duration=1e4, **axis)
+        for N in (1e-4, 1.0001e-4, 1.3e-4)
+    )
+    assert gmwm.compare([one, near])["gyro_x"].state == "agree"
+    assert gmwm.compare({"a": {"gyro_x": one}, "b": noisier})["gyro_x"].state == "differ"
+
+
 @pytest.mark.parametrize(
     ("use", "words"),
     [
@@ -140,7 +150,8 @@ def test_everything_that_takes_wavelet_variances_takes_it(tmp_path):
         (lambda c: gmwm.health(c), "not a recording of samples"),
         (lambda c: gmwm.find_still(c), "not a recording of samples"),
         (lambda c: gmwm.calibrate(c), "not a recording of samples"),
-        (lambda c: gmwm.compare([c, c]), "a calibration nor a recording"),
+        (lambda c: gmwm.compare([c, exact(tau=3 * c.tau)]), "other averaging times"),
+        (lambda c: gmwm.compare([c, 3]), "a calibration nor a recording"),
     ],
 )
 def test_what_needs_samples_says_so(use, words):
