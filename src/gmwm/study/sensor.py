@@ -38,7 +38,7 @@ _HORIZON = 60.0  # s, of the paper's outage
 _POINTS = 2000  # of a signal that is drawn
 _STEPS = (
     "1, the signal",
-    "2, its wavelet variance $\\hat\\nu^2$",
+    "2, its wavelet variance $\\hat\\nu^2$, half the Allan variance",
     "3 and 4, $\\nu^2(\\theta)$ calibrated to it",
 )
 """Of the paper's Figure 1."""
