@@ -40,15 +40,16 @@ def haar(values: FloatArray, m: int) -> FloatArray:
     return np.asarray((total[2 * m :] - 2.0 * total[m:-m] + total[: -2 * m]) / m)
 
 
-def curves_of(flights: Sequence[Sequence[FloatArray]], dt: float) -> Curves:
+def curves_of(flights: Sequence[Sequence[FloatArray]], dt: float, longest: int) -> Curves:
     """Curves from the differences (n, 3) of the target and each other, by flight.
+
+    longest: Samples of the longest flight, as all targets have them.
 
     The Allan variance at an octave is half the mean, over pairs of others and over time, of the
     product of Haar coefficients of two differences: only the target's own errors are in both.
     Means over blocks of four averaging times, or over flights where there are five or more, are
     the unit of the interval (Student's t on the logarithm): motion is not stationary.
     """
-    longest = max(len(flight[0]) for flight in flights)
     octaves = int(np.log2(max(1, longest // tuning.WINDOWS)))
     rows = [
         _octave([each for each in flights if len(each[0]) >= tuning.WINDOWS * 2**k], 2**k, dt)

@@ -102,11 +102,12 @@ def motion(
             events[number] = max(events.get(number, 0), count)
             for sensor, own in found.items():
                 differences.setdefault((labels[k], sensor), []).append(own)
+    longest = min(max(len(each[0]) for each in own) for own in differences.values())
     curves = []
-    for k, label in enumerate(labels):
+    for label in labels:
         own_static = static.get(label, static) if static is not None else None
         for sensor in flights[0][0].samples:
-            found_curves = curves_of(differences[label, sensor], flights[0][k].dt)
+            found_curves = curves_of(differences[label, sensor], flights[0][0].dt, longest)
             curves += _by_axis(label, sensor, found_curves, own_static)
     if count := sum(events.values()):
         notices.append(notice("motion-events", values={"events": count}))
@@ -145,10 +146,11 @@ def _flights(sources: Any) -> tuple[list[list[_Imu]], int]:
             filled += gone
     with_accel = all("accel" in imu.samples for flight in flights for imu in flight)
     sensors = ("gyro", "accel") if with_accel else ("gyro",)
-    for flight in flights:
-        for k, imu in enumerate(flight):
-            if abs(imu.dt / flights[0][k].dt - 1.0) > 0.01:
-                raise InputError(f"{imu.label} has several sampling rates: give flights of one")
+    rates = [1.0 / imu.dt for flight in flights for imu in flight]
+    if max(rates) > 1.01 * min(rates):
+        raise InputError(
+            f"the recordings have {min(rates):.6g} to {max(rates):.6g} Hz: give IMUs of one rate"
+        )
     return [
         [replace(imu, samples={s: imu.samples[s] for s in sensors}) for imu in flight]
         for flight in flights

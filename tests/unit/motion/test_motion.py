@@ -34,9 +34,9 @@ def imu(body, errors, *, offset=0.0, drift=0.0, turn=(0.0, 0.0, 0.0), arm=(0.0, 
     return recording(values)
 
 
-def recording(values):
+def recording(values, rate=RATE):
     units = {"gyro": "rad/s", "accel": "m/s^2"}
-    return gmwm.Recording.from_arrays(dict(zip(AXES, values.T, strict=True)), RATE, units)
+    return gmwm.Recording.from_arrays(dict(zip(AXES, values.T, strict=True)), rate, units)
 
 
 def white(rng, count):
@@ -172,6 +172,7 @@ def test_imus_on_different_bodies_are_rejected():
         ([], "two IMUs"),
         ([recording(np.ones((200, 6)))], "two IMUs"),
         ([recording(np.ones((200, 6))), "imu.csv"], "read it first"),
+        ([recording(np.ones((200, 6))), recording(np.ones((200, 6)), 60.0)], "50 to 60 Hz"),
         ([[recording(np.ones((200, 6)))] * 2, [recording(np.ones((200, 6)))] * 3], "one order"),
     ],
 )
