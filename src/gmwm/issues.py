@@ -285,6 +285,8 @@ _READERS = (
         "one": "{each}{missing:,} of {n:,} samples missing, in one gap",
         "many": "{each}{missing:,} of {n:,} samples missing, in {gaps:,} gaps, the longest "
         "{longest:,} sample{longest:s?}"}, repeats="diagnosis"),
+    _reading("other-run", "{files} beside it: written with another calibration.json", "take all "
+        "files of one run, or calibrate again", severity="warning"),
     _reading("part", "the part from {start:.6g} to {stop:.6g} s is used; times count from its "
         "start"),
     _reading("partial-record", "the last record is incomplete ({bytes} of {size} bytes) and left "

@@ -115,7 +115,28 @@ def test_calibrate_writes_the_same_file(run, tmp_path):
     assert code == 0
     code, printed, _ = run("export", "out/calibration.json", "--to", "kalibr")
     assert code == 0
-    assert (tmp_path / "out" / "imu.yaml").read_text() == printed
+    *same, run_line = (tmp_path / "out" / "imu.yaml").read_text().splitlines()
+    assert same == printed.splitlines()
+    assert run_line.startswith("# run: calibration.json sha256 ")
+
+
+def test_files_of_two_runs_in_one_folder_are_reported(run, tmp_path):
+    """A page or a Kalibr file that another calibration.json was written with is told apart."""
+    units = ("--rate", "100", "--gyro-unit", "rad/s", "--accel-unit", "m/s^2")
+    for name, seed in (("a", 8), ("b", 9)):
+        rows = np.random.default_rng(seed).normal(size=(3000, 2)) * [1e-3, 1e-2]
+        lines = ["gyro_x,accel_x", *(f"{x:.9g},{y:.9g}" for x, y in rows), ""]
+        (tmp_path / f"{name}.csv").write_text("\n".join(lines))
+        assert run("calibrate", f"{name}.csv", *units, "-o", name)[0] == 0
+    path = tmp_path / "a" / "calibration.json"
+    assert "other-run" not in [each.code for each in gmwm.load(path).notices]
+    assert run("export", path, "--to", "kalibr")[2] == ""
+    for name in ("imu.yaml", "report.html"):
+        (tmp_path / "a" / name).write_bytes((tmp_path / "b" / name).read_bytes())
+    (found,) = (each for each in gmwm.load(path).notices if each.code == "other-run")
+    assert found.values == {"files": "report.html, imu.yaml"}
+    code, _, told = run("export", path, "--to", "kalibr")
+    assert (code, told) == (0, f"gmwm: {found}\n")
 
 
 @pytest.mark.parametrize(

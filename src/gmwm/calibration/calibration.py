@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
@@ -13,6 +13,7 @@ from annotated_types import Ge, MinLen
 
 from gmwm._core import checks
 from gmwm._core.documents import Document, Rate, Samples, Text, load_document
+from gmwm._core.files import of_other_runs
 from gmwm._core.frozen import ByName, freeze
 from gmwm._core.pages import make
 from gmwm._core.tables import frame
@@ -20,7 +21,7 @@ from gmwm._core.text import wrapped
 from gmwm.calibration.numbers import SensorNumbers, axis_numbers
 from gmwm.errors import InputError, MissingNameError
 from gmwm.estimate import Estimate, Fit
-from gmwm.issues import Notice
+from gmwm.issues import Notice, notice
 from gmwm.plotting import straight_lines
 from gmwm.process import Model
 from gmwm.readers import Recording
@@ -31,6 +32,9 @@ if TYPE_CHECKING:
 
 
 Index = Annotated[int, Ge(0)]
+
+COMPANIONS = ("report.html", "imu.yaml")
+"""Files that are written with a calibration's own, and carry its mark."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -133,8 +137,8 @@ class Calibration(ByName[Fit], Document):
         health = make("verdict", self)
         lines += [*wrapped(f"{health['word']}: {health['text']}.", indent=2), ""]
         lines += str(self.numbers).splitlines()
-        for name, notice in self.skipped.items():
-            lines += wrapped(f"{name}: skipped, {notice.text}", indent=2)
+        for name, why in self.skipped.items():
+            lines += wrapped(f"{name}: skipped, {why.text}", indent=2)
         return "\n".join(lines)
 
     def plot(self, channels: Iterable[str] | None = None, *, units: str = "field") -> Figure:
@@ -187,6 +191,11 @@ class Calibration(ByName[Fit], Document):
 
     def derived(self) -> dict[str, Any]:
         return {"numbers": self.numbers.to_dict()}
+
+    def beside(self, path: Path) -> Calibration:
+        files = ", ".join(of_other_runs(path, COMPANIONS))
+        told = (notice("other-run", values={"files": files}),) if files else ()
+        return replace(self, notices=(*self.notices, *told)) if told else self
 
     # -- files ------------------------------------------------------------------------------------
 

@@ -12,7 +12,14 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from gmwm._core.files import folder_to_fill, moved_together, opened, replaceable
+from gmwm._core.files import (
+    folder_to_fill,
+    moved_together,
+    opened,
+    replaceable,
+    run_of,
+    write_text,
+)
 from gmwm.cli.console import command_line, in_options, print_result, progress_bar
 from gmwm.cli.options import FILE_TO_WRITE, PATH, folder_to_write, options, read_recording
 from gmwm.errors import InputError
@@ -275,14 +282,16 @@ def write_files(
     written, lines = [f"{page.name} (open this)", document.name], []
     shown = in_options(result)
     with moved_together(folder) as new:
-        with stage("report"):
-            shown.report(new / page.name, recording, datasheet=datasheet, provenance=origin)
         with stage("exports"):
-            result.save(new / document.name)
+            mark = run_of(result.save(new / document.name))
+        with stage("report"):
+            source = {**(origin or {}), "run": mark}
+            shown.report(new / page.name, recording, datasheet=datasheet, provenance=source)
         if {"gyro", "accel"} <= {fit.wv.quantity for fit in result.values()}:
             try:
                 with stage("exports"):
-                    export(shown, "kalibr", path=new / kalibr.name)
+                    text = export(shown, "kalibr")
+                    write_text(new / kalibr.name, f"{text}# run: {mark}")
                 written.insert(1, f"{kalibr.name} (Kalibr)")
             except InputError as error:  # the other files are no worse for it
                 lines = wrapped(f"no {kalibr.name}: {error}")

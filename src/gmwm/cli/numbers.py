@@ -323,6 +323,8 @@ def export(
 
     checks.choice("--to", target, tuple(TARGETS))
     given = [load(file) for file in files]
+    for each in (n for one in given for n in getattr(one, "notices", ()) if n.code == "other-run"):
+        click.echo(f"gmwm: {each}", err=True)
     if explain:
         click.echo(TARGETS[target].explain(given, horizon, form), nl=False)
         return
