@@ -54,6 +54,7 @@ FOUND = [
     ("odd", 2514, 85),  # a channel that no block of a log that moves has samples of
     slow("odd", 42, 147),  # a deviation that may be none
     ("document", 41, 1335),  # an efficiency of next to nothing
+    ("document", 4320, 1668),  # a certificate whose axes have checks at other times
     ("document", 41, 4884),  # more degrees of freedom than numbers have digits
 ]
 

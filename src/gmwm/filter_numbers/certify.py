@@ -130,6 +130,17 @@ class Certificate(Document, InUnits):
         kinds = [cause.quantity for cause in self.causes]
         if any(kinds.count(kind) < 2 for kind in kinds):
             raise InputError("causes begin with the numbers in use and the error model")
+        times = [set(each) for each in self._times.values()]
+        if not self.of("keyframes") or not times[0] or any(each != times[0] for each in times):
+            raise InputError("checks are not of the same times on all axes, and at keyframes")
+
+    @property
+    def _times(self) -> dict[str, list[float]]:
+        """Axis, or "horizontal" -> times of its checks, but those at keyframes, s."""
+        times: dict[str, list[float]] = {check.where: [] for check in self.checks}
+        for check in self.checks:
+            times[check.where] += [check.time] if check.consumer != "keyframes" else []
+        return times
 
     def of(self, consumer: str) -> tuple[Check, ...]:
         """The checks of a consumer; see `CONSUMERS`."""
@@ -152,7 +163,7 @@ class Certificate(Document, InUnits):
 
         verbose: Every check, all notices and the recommended numbers by axis too.
         """
-        longest = max(check.time for check in self.checks)
+        longest = max(max(times) for times in self._times.values())
         lines = [*wrapped(self._verdict()), "", self._errors(longest)]
         lines += wrapped(
             f"true, predicted: 1 sigma after {longest:g} s. NEES per degree of freedom; 1: "

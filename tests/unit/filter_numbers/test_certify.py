@@ -166,6 +166,11 @@ def test_numbers_for_a_time_offset_say_that_its_error_does_not_grow():
     assert white * np.sqrt(30.0) / np.std(gained) == pytest.approx(notice.values["factor"], rel=0.1)
 
 
+def test_keyframes_may_be_farther_apart_than_the_longest_outage_lasts():
+    found = gmwm.certify({"gyro_x": ONE}, (1e-4, 1e-6), outages=(10.0,), keyframe=30.0)
+    assert "1 sigma after 10 s" in str(found)
+
+
 def test_the_uncertainty_of_a_fit_is_a_cause():
     fit = gmwm.fit(WhiteNoise() + GaussMarkov(), ONE.simulate(3600, 1.0, 5), 1.0)
     found = gmwm.certify(fit, (8e-5, 1e-7), keyframe=2.0)
@@ -212,6 +217,11 @@ def test_text_and_files(sheet, tmp_path):
     assert again.to_dict() == sheet.to_dict()
     assert again.checks == sheet.checks
     assert "NEES up to" in repr(sheet)
+    for change in ({"time": 7.0}, {"consumer": "keyframes"}):  # a row of the table would be missing
+        content = sheet.to_dict()
+        content["checks"][0] |= change
+        with pytest.raises(InputError, match="times"):
+            Certificate.from_dict(content)
     pandas = pytest.importorskip("pandas")
     assert isinstance(sheet.to_frame(), pandas.DataFrame)
 
