@@ -1,7 +1,7 @@
 """Numbers for small filters: how tight, how consistent, and how they go with the record.
 
 Run with ``python benchmarks/filter_numbers.py PART``, one of length, errors, balance, coarse,
-tightness, rates, rules, flight and whole, or with ``real FOLDER``, of the four ADIS16405
+tightness, random, rates, rules, flight and whole, or with ``real FOLDER``, of the four ADIS16405
 recordings; the tables of docs/filter-numbers.md and docs/filter-numbers-study.md. All but length
 and errors, which simulate and fit records, and real are exact covariance analyses.
 """
@@ -20,11 +20,13 @@ from gmwm import (
     GaussMarkov,
     InputError,
     Model,
+    Process,
     QuantizationNoise,
     RandomWalk,
+    Resonance,
     WhiteNoise,
 )
-from gmwm.calibration import random_walk
+from gmwm.calibration import axis_numbers
 from gmwm.filter_numbers import Chain, tuning
 from gmwm.filter_numbers.axes import SensorAxes
 from gmwm.filter_numbers.spectra import Estimated, Problem, RequiredSpectrum, standard_errors
@@ -97,8 +99,10 @@ def length() -> None:
             small = gmwm.reduce({"gyro_x": fit.model}, dt=0.1)["gyro_x"]
             errors = chain.errors(truth, small.model, 0.1, OUTAGES, believed_sd=small.initial_sd)
             nees = " ".join(f"{value:6.3f}" for value in errors.nees())
+            own = axis_numbers(fit).K
+            walk = own.upper if own.kind == "bound" else own.value
             cells = (
-                f"{random_walk(fit).value:.2e}", f"{safe.K:.2e}", f"{safe.K / right:.3f}",
+                f"{walk:.2e}", f"{safe.K:.2e}", f"{safe.K / right:.3f}",
                 f"{_least_error(truth, hours):.3f}", f"{safe.stderr.get('K', np.nan) / safe.K:.3f}",
                 f"{small.K:.2e}", f"{small.K / small_right:.3f}",
             )  # fmt: skip
@@ -211,6 +215,40 @@ def tightness() -> None:
                 print(f"{name:<15}{form:<8}{shown}   {worst:.5f}", flush=True)
     for form, values in total.items():
         print(f"{form}: mean {np.mean(values):.2f}, {np.min(values):.2f} to {np.max(values):.2f}")
+
+
+def _drawn(rng: np.random.Generator) -> Model:
+    """White noise, half with a walk, one to three Gauss-Markov processes or a slow resonance."""
+    terms: list[Process] = [WhiteNoise(1e-4)]
+    if rng.random() < 0.5:
+        terms.append(RandomWalk(float(10.0 ** rng.uniform(-7.0, -5.0))))
+    for tau in 10.0 ** rng.uniform(-1.0, 3.5, rng.integers(1, 4)):
+        # Its largest Allan deviation, near 2 tau, is 0.1 to 10 times that of the white noise there.
+        size = float(10.0 ** rng.uniform(-1.0, 1.0))
+        terms.append(GaussMarkov(size * 1e-4 / np.sqrt(2.0 * tau) / 0.6, float(tau)))
+    if rng.random() < 0.25:
+        frequency, damping = 10.0 ** rng.uniform([-2.0, -1.5], [0.0, -0.3])
+        terms.append(Resonance(float(10.0 ** rng.uniform(-5.0, -3.5)), frequency, damping))
+    return Model(tuple(terms))
+
+
+def random() -> None:
+    """Predicted over true standard deviation at 60 s of bounds for random models, seed 4320."""
+    rng, found = np.random.default_rng(4320), []
+    for _ in range(100):
+        truth = _drawn(rng)
+        slow = any(isinstance(each, Resonance) for each in truth.terms)
+        found += [
+            (form, slow, gmwm.bound(truth, form, 60.0, dt=DT).tightness[60.0])
+            for form in ("N+K", "N+K+GM")
+        ]
+    print("predicted/true at 60 s, 100 random models: median, mean, 90 %, largest")
+    for form in ("N+K", "N+K+GM"):
+        for slow, name in ((False, "no resonance"), (True, "slow resonance")):
+            own = np.array([value for f, s, value in found if (f, s) == (form, slow)])
+            ends = (np.median(own), np.mean(own), np.quantile(own, 0.9), np.max(own))
+            cells = "".join(f"{each:7.2f}" for each in ends)
+            print(f"{form:<8}{name:<16}{own.size:>4}{cells}")
 
 
 def rates() -> None:
