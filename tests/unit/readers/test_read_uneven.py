@@ -170,6 +170,15 @@ def test_rounded_stamps_of_an_even_clock_give_its_rate(recorded, rate):
     assert found.rate == pytest.approx(rate, rel=2e-5)
 
 
+@pytest.mark.parametrize("rate", [999.7, 998.5])
+def test_lost_rows_in_milliseconds_hide_a_rate_below_a_kilohertz(recorded, rate):
+    """A limit that the documentation states: both are steps of 1 ms, and some of 2 ms."""
+    clock = Simulated(3, rate)
+    clock.lose(0.01)
+    clock.stamps = np.round(clock.stamps, 3)
+    assert recorded(clock)[0].rate == pytest.approx(1000.0, rel=1e-5)
+
+
 @pytest.mark.parametrize("rate", [700.0, 850.0])
 @pytest.mark.parametrize("loss", [0.1, 0.4])
 def test_coarse_stamps_with_many_losses_are_no_faster_clock(recorded, rate, loss):
