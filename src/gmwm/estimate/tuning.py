@@ -39,6 +39,7 @@ OPEN_TIMES = 16  # correlation times at which a further Gauss-Markov process is 
 OPEN_MOVE = 0.3
 """Share by which parameters may move for a further Gauss-Markov process; beyond it the linear
 approximation fails. ``python benchmarks/faint.py`` prints the coverage."""
+OPEN_REDUNDANT = 1e-6  # size of a combination of parameters that the data do not show, by rounding
 OPEN_APART = 1e-4  # a further process that differs by less from a sum of the terms is left out
 
 EXCLUDED_P = 0.001  # level of the test of every averaging time: 4 standard errors for twenty

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.linalg import solve_triangular
 from scipy.stats import norm
 
 from gmwm.estimate import tuning
@@ -58,7 +57,10 @@ def left_open(fit: Fit, level: float = 0.95) -> tuple[Model, ...]:
             for step in (_STEP, -_STEP)
         )
         columns.append(root @ (up - down) / (2.0 * _STEP))
-    basis, triangle = np.linalg.qr(np.stack(columns, axis=1))
+    # A parameter that changes nothing, or what others change, is not moved.
+    basis, sizes, turn = np.linalg.svd(np.stack(columns, axis=1), full_matrices=False)
+    apart = sizes > tuning.OPEN_REDUNDANT * sizes[0]
+    basis, to_move = basis[:, apart], turn[apart].T / sizes[apart]
     residual = root @ (at.target - at.implied)
     width = float(norm.ppf(0.5 + 0.5 * level))
     powers = np.array([1.0 if item.parameter.role == "shape" else 2.0 for item in free])
@@ -73,7 +75,7 @@ def left_open(fit: Fit, level: float = 0.95) -> tuple[Model, ...]:
             continue  # a copy of terms that are there
         error, found = squared**-0.5, float(own @ residual) / squared
         added = found + error * (width if found > 0.0 else np.hypot(width, found / error))
-        move = -added * solve_triangular(triangle, known)
+        move = -added * (to_move @ known)
         share = tuning.OPEN_MOVE / max(tuning.OPEN_MOVE, float(np.max(np.abs(move))))
         moved = (1.0 + share * powers * move) ** (1.0 / powers)
         values = {key: fit.params[key] * float(x) for key, x in zip(keys, moved, strict=True)}

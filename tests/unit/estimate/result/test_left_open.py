@@ -50,3 +50,11 @@ def test_they_are_as_far_from_the_data_as_the_level_allows(chosen, level, square
         rises.append(max(others) - first)
     assert np.max(rises) == pytest.approx(squared, rel=0.2)
     assert np.count_nonzero(np.array(rises) > 0.5 * squared) >= 3
+
+
+def test_a_parameter_that_changes_nothing_leaves_an_interval():
+    """As the bandwidth of a low-pass above half the sampling rate; the matrix was singular."""
+    x = np.random.default_rng(4320).normal(0.0, 1e-3, (446, 600))[-1]
+    found = gmwm.select(x, 0.1).fit
+    value, low, high = found.deviation_interval(found.wv.tau, rivals=())
+    assert np.all((low > 0.0) & (low <= value) & (value <= high) & np.isfinite(high))
