@@ -44,7 +44,7 @@ def _place(tmp_path, monkeypatch):
 
 def test_every_command_that_writes_is_here():
     files = {name for name, is_folder in COMMANDS.items() if not is_folder}
-    assert files == {"compare", "bound", "reduce", "certify", "export", "health", "sheet"}
+    assert files == {"compare", "bound", "reduce", "certify", "export", "health", "motion", "sheet"}
     assert {"calibrate", "demo", "fleet", "navigate", "reproduce"} == set(COMMANDS) - files
 
 

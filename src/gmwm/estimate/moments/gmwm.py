@@ -210,8 +210,11 @@ class GMWM:
         """
         terms, wv = problem.design.model.terms, problem.moments.wv
         shaped = {term: i for i, term in enumerate(terms) if term.is_open and len(term.values) > 1}
-        for i in shaped.values() if len(terms) > 1 else ():
-            nested = self._cached(Model((*terms[:i], *terms[i + 1 :])), wv)
+        for i in shaped.values():
+            left = (*terms[:i], *terms[i + 1 :])
+            if all(term.is_drift or term.is_line for term in left):
+                continue
+            nested = self._cached(Model(left), wv)
             if nested.discrepancy < found.discrepancy:
                 target = replace(problem.moments, slope=nested.slope).target
                 point = problem.search(target, nested.covariance)
