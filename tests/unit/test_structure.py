@@ -180,7 +180,10 @@ def test_the_formatter_is_not_fought():
 
 
 def test_tests_mirror_the_rooms():
+    """And have names of their own: pytest imports no second file of one name."""
     tests = REPOSITORY / "tests" / "unit"
+    names = [path.name for path in tests.parent.rglob("test_*.py")]
+    assert [name for name in set(names) if names.count(name) > 1] == []
     folders = {path.parent.relative_to(tests) for path in tests.rglob("test_*.py")}
     rooms = {Path(name.replace(".", "/")) for name in PACKAGES | MODULES}
     assert folders <= rooms
