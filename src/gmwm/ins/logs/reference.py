@@ -87,10 +87,9 @@ class ReferenceErrors:
         """Root mean square of some of the nine errors together, and as the filter predicted it."""
         mine = list(errors)
         variance = np.diagonal(self.covariance, axis1=1, axis2=2)[:, mine]
-        return tuple(
-            float(np.sqrt(np.mean(np.sum(each, axis=1))))
-            for each in (self.error[:, mine] ** 2, variance)
-        )  # type: ignore[return-value]
+        squares = self.error[:, mine] ** 2, variance
+        actual, predicted = (float(np.sqrt(np.mean(np.sum(each, axis=1)))) for each in squares)
+        return actual, predicted
 
     def sentence(self) -> str:
         """What people read of it."""
