@@ -642,7 +642,7 @@ _FILTER_NUMBERS = (
         "rest cannot show", "add its variance"),
     _filter("uncertainty-not-covered", {
         "": "parameter uncertainty is not included",
-        "why": "{reason}"}),
+        "why": "no row 'error model, to 95 %': {reason}"}),
     _filter("upper-limit", "no such term was found: {letters} is the 95 % upper limit"),
 )  # fmt: skip
 

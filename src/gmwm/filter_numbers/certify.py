@@ -51,7 +51,7 @@ CONSUMERS = {
 }
 """Users of the numbers."""
 
-_MODEL, _ALL = "error model with slow terms", "all together"
+_MODEL, _ALL = "error model", "all together"
 """Causes that numbers in use are judged by."""
 
 _LOOSE = 0.5  # N and K that are needed over those in use, below which this is said
@@ -229,13 +229,18 @@ class Certificate(Document, InUnits):
     def _advice(self) -> list[str]:
         """What to do with the numbers in use: take others, or keep them."""
         needed = {each.quantity: each for each in self.causes if each.name in (_MODEL, _ALL)}
-        row = f"N and K of the row '{_ALL if _ALL in {c.name for c in self.causes} else _MODEL}'"
+        row = f"the row '{_ALL if _ALL in {c.name for c in self.causes} else _MODEL}'"
+        values = "; ".join(
+            f"{quantity or 'axis'} N {each.N:.3g}, K {each.K:.3g}"
+            for quantity, each in needed.items()
+        )
         loose = [each for each in needed.values() if max(each.N_factor, each.K_factor) < _LOOSE]
         if self._overconfident():
-            text = f"take {row}, for outages of {self.recommended.horizon:g} s"
+            time = f"{self.recommended.horizon:g} s"
+            text = f"take {row}, for outages of {time}: {values} (SI, as gmwm export writes them)"
         elif loose:
             kinds = " and ".join(each.quantity or "axis" for each in loose)
-            text = f"{kinds}: {row} are less than half of those in use, and as safe"
+            text = f"{kinds}: {row} is less than half of those in use, and as safe: {values} (SI)"
         else:
             text = "keep the numbers"
         return wrapped(text, first="- ", indent=2)
@@ -463,10 +468,10 @@ def _causes(
         notices.append(notice("other-units", kind, {"factor": N / first.N}, unit=unit))
     if all(axis.fit is not None for axis in group):
         try:
-            causes.append(row("uncertainty of the fit, 95 %", least(group, 0.95), alone))
+            causes.append(row("error model, to 95 %", least(group, 0.95), alone))
         except InputError as error:
-            where, reason = group[0].name, str(error)
-            notices.append(notice("uncertainty-not-covered", where, variant="why", reason=reason))
+            where, why = kind or group[0].name, error.problem
+            notices.append(notice("uncertainty-not-covered", where, variant="why", reason=why))
     terms = known.terms(kind or "gyro", motion)
     for cause, term in terms.items():
         larger = row(cause, least(_with(group, [term])), alone)

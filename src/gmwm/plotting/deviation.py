@@ -347,7 +347,8 @@ def intervals(
 ) -> Figure:
     """Values that are 1 where nothing is wrong, on a logarithmic axis.
 
-    panels: Title -> row -> single values, and the one over all of them with its interval.
+    panels: Label of the axis -> row -> single values, and the one over all of them with its
+        interval.
     """
     import matplotlib.pyplot as plt
     from matplotlib.ticker import FormatStrFormatter, LogLocator, NullFormatter
@@ -374,7 +375,7 @@ def intervals(
         ax.xaxis.set_major_locator(LogLocator(subs=marked))
         ax.xaxis.set_major_formatter(FormatStrFormatter("%g"))
         ax.xaxis.set_minor_formatter(NullFormatter())
-        ax.set_title(title, fontsize="medium")
+        ax.set_xlabel(title)
         ax.grid(True, axis="x", which="both", color="#dddddd", linewidth=0.6)
         ax.set_axisbelow(True)
         ax.tick_params(labelsize="small")

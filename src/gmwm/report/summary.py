@@ -65,7 +65,7 @@ def summary_text(calibration: Calibration, files: Iterable[str] = ()) -> str:
         Lines about the files that were written.
     """
     first, last, texts = wrapped(verdict_line(calibration)), list(files), actions(calibration)
-    for explained in (True, False):  # rather every axis than what explains the numbers
+    for explained in (2, 1, 0):  # rather every axis than what explains the numbers
         numbers = _filter(calibration, explained)
         left = _LINES - sum(len(part) + 1 for part in (first, numbers, last) if part)
         least = len(_to_do(texts[:1], left))
@@ -222,12 +222,13 @@ def reason(name: str, calibration: Calibration) -> str:
 # -- filter numbers --------------------------------------------------------------------------------
 
 
-def _filter(calibration: Calibration, explained: bool) -> list[str]:
+def _filter(calibration: Calibration, explained: int) -> list[str]:
     """N and K of each sensor by key, and the start bias.
 
-    explained: With what else they cover.
+    explained: For how many sensors it is said what else they cover.
     """
-    lines, starts, covered = [], [], []
+    lines, starts = [], []
+    covered: list[list[str]] = []
     for quantity in (q for q in SENSORS if q in {f.wv.quantity for f in calibration.values()}):
         fits = {name: fit for name, fit in calibration.items() if fit.wv.quantity == quantity}
         try:
@@ -243,15 +244,16 @@ def _filter(calibration: Calibration, explained: bool) -> list[str]:
                 about = f"{errors[letter]:<9} {about}"
             lines.append(f"{row:<62} {about}".rstrip())
         starts += [f"{quantity} {values['start']}"] if values["start"][0] != "0" else []
-        if explained and use(fits, "K") != "do not use":
-            covered += wrapped(covers(triad, calibration.numbers), indent=2)
+        if use(fits, "K") != "do not use":
+            covered.append(wrapped(covers(triad, calibration.numbers), indent=2))
     if not lines:
         return []
     if starts:
         short = is_short(calibration.values(), SHOWN)
         what = "too short: do not use" if short else "add turn-on bias"
         lines += wrapped(f"start bias, 1 sigma ({what}): {', '.join(starts)}", indent=2)
-    return [_FILTER.format(SHOWN), *lines, *covered]
+    more = [line for part in covered[:explained] for line in part]
+    return [_FILTER.format(SHOWN), *lines, *more]
 
 
 def intervals(triad: Triad, calibration: Calibration) -> dict[str, str]:

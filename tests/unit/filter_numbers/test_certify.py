@@ -94,7 +94,7 @@ def test_the_numbers_that_it_recommends_pass(sheet):
         assert check.true < 1.001 * check.believed
         assert check.believed < 1.6 * check.true
     causes = factors(again, "gyro")
-    assert causes["error model with slow terms"] == pytest.approx((1.0, 1.0), rel=1e-3)
+    assert causes["error model"] == pytest.approx((1.0, 1.0), rel=1e-3)
 
 
 def test_the_truth_passes_exactly():
@@ -132,8 +132,8 @@ def test_relative_poses_are_those_of_a_simulated_filter():
 
 def test_causes_multiply_the_numbers(sheet):
     gyro = factors(sheet, "gyro")
-    assert list(gyro) == ["in use", "error model with slow terms"]
-    assert gyro["error model with slow terms"][1] > 100.0
+    assert list(gyro) == ["in use", "error model"]
+    assert gyro["error model"][1] > 100.0
     found = gmwm.certify(
         SENSOR, SHEET, dt=0.1, motion="drone",
         imperfections=Imperfections(
@@ -175,7 +175,7 @@ def test_the_uncertainty_of_a_fit_is_a_cause():
     fit = gmwm.fit(WhiteNoise() + GaussMarkov(), ONE.simulate(3600, 1.0, 5), 1.0)
     found = gmwm.certify(fit, (8e-5, 1e-7), keyframe=2.0)
     names = factors(found, "")
-    assert names["uncertainty of the fit, 95 %"][1] > 1.05
+    assert names["error model, to 95 %"][1] > 1.05
     assert found.of("outage") == ()
     assert [notice.code for notice in found.notices] == ["no-navigation-filter"]
 
@@ -196,7 +196,7 @@ def test_text_and_files(sheet, tmp_path):
         "position by tilt [m]",
         "angle [deg]",
         "whole filter",
-        "- take N and K of the row",
+        "- take the row 'error model'",
     ):
         assert part in text
     for part in (

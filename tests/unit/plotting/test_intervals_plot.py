@@ -11,7 +11,7 @@ def test_every_row_has_its_interval_and_its_single_values():
     rows = {"first": ([0.9, 1.2], (1.0, 0.8, 1.3)), "second": ([3.0, 5.0], (4.0, 2.0, 7.0))}
     figure = intervals({"ratio": rows, "other": {"first": rows["first"]}})
     left, right = figure.axes
-    assert (left.get_title(), right.get_title()) == ("ratio", "other")
+    assert (left.get_xlabel(), right.get_xlabel()) == ("ratio", "other")
     assert left.get_xscale() == "log"
     assert [each.get_text() for each in left.get_yticklabels()] == list(rows)
     drawn = [np.column_stack(line.get_data()) for line in left.lines]
