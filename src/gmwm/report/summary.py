@@ -27,10 +27,7 @@ _NAME, _SOURCE, _TEXT = 18, 40, 60  # characters; longer ones are shortened
 _NOTABLE = 1.1  # times the table's N or K
 _NORMAL = 1.96  # standard errors of a 95 % interval
 _LEAST = 0.1  # smallest number without an exponent
-_LEGEND = (
-    "+-, (a to b), -a +b %: 95 % interval. <= x: below x (95 %), too small to be seen",
-    "B at t: lowest point of the Allan plot / 0.664, at averaging time t",
-)
+_LEGEND = "95 % intervals; <= x: below x (95 %). B at t: Allan minimum / 0.664, at time t"
 _FILTER = "For your filter, outages up to {:g} s (keys of OpenVINS, Kalibr; GTSAM: N^2, K^2)"
 KEYS = {"N": "noise_density", "K": "random_walk"}
 """Ends of the keys of OpenVINS and Kalibr, which begin with the names of `SENSORS`."""
@@ -179,7 +176,7 @@ def _sensor(calibration: Calibration, most: int) -> list[str]:
         missing = len(calibration) - len(names)
         lines += [f"and {missing} more channels"] if missing else []
         if len(lines) + len(skipped) < most or len(names) <= _AXES:
-            return [*lines, *skipped, *_LEGEND]
+            return [*lines, *skipped, _LEGEND]
         names.pop()
 
 
