@@ -194,8 +194,9 @@ class Calibration(ByName[Fit], Document):
 
     def beside(self, path: Path) -> Calibration:
         files = ", ".join(of_other_runs(path, COMPANIONS))
-        told = (notice("other-run", values={"files": files}),) if files else ()
-        return replace(self, notices=(*self.notices, *told)) if told else self
+        if not files:
+            return self
+        return replace(self, notices=(*self.notices, notice("other-run", values={"files": files})))
 
     # -- files ------------------------------------------------------------------------------------
 

@@ -136,8 +136,7 @@ class InMotion(Document, Printed):
                 return each
         known = ", ".join(dict.fromkeys(c.channel for c in self.curves))
         raise MissingNameError(
-            f"there is no curve of {imu!r}, {channel!r}: there are {', '.join(self.imus)}, each "
-            f"with {known}"
+            f"no curve of {imu!r}, {channel!r}: name one of {', '.join(self.imus)}, and of {known}"
         )
 
     @property

@@ -62,12 +62,13 @@ def summary_text(calibration: Calibration, files: Iterable[str] = ()) -> str:
         Lines about the files that were written.
     """
     first, last, texts = wrapped(verdict_line(calibration)), list(files), actions(calibration)
-    for explained in (2, 1, 0):  # rather every axis than what explains the numbers
-        numbers = _filter(calibration, explained)
+    values, covered = _filter(calibration)
+    for many in range(len(covered), -1, -1):  # rather every axis than what explains the numbers
+        numbers = [*values, *(line for part in covered[:many] for line in part)]
         left = _LINES - sum(len(part) + 1 for part in (first, numbers, last) if part)
         least = len(_to_do(texts[:1], left))
-        many = min(len(_to_do(texts, left)), _FEWEST + 1) if len(calibration) > _AXES else 0
-        table = _sensor(calibration, left - 1 - max(least, many))
+        more = min(len(_to_do(texts, left)), _FEWEST + 1) if len(calibration) > _AXES else 0
+        table = _sensor(calibration, left - 1 - max(least, more))
         to_do = _to_do(texts, max(left - len(table) - 1, least))
         is_whole = all(any(line.startswith(name) for line in table) for name in calibration)
         if is_whole and len(table) + 1 + len(to_do) <= left:
@@ -219,10 +220,10 @@ def reason(name: str, calibration: Calibration) -> str:
 # -- filter numbers --------------------------------------------------------------------------------
 
 
-def _filter(calibration: Calibration, explained: int) -> list[str]:
-    """N and K of each sensor by key, and the start bias.
+def _filter(calibration: Calibration) -> tuple[list[str], list[list[str]]]:
+    """Lines of N and K of each sensor by key and of the start bias; by sensor, of what they cover.
 
-    explained: For how many sensors it is said what else they cover.
+    Empty where there are none.
     """
     lines, starts = [], []
     covered: list[list[str]] = []
@@ -244,13 +245,12 @@ def _filter(calibration: Calibration, explained: int) -> list[str]:
         if use(fits, "K") != "do not use":
             covered.append(wrapped(covers(triad, calibration.numbers), indent=2))
     if not lines:
-        return []
+        return [], []
     if starts:
         short = is_short(calibration.values(), SHOWN)
         what = "too short: do not use" if short else "add turn-on bias"
         lines += wrapped(f"start bias, 1 sigma ({what}): {', '.join(starts)}", indent=2)
-    more = [line for part in covered[:explained] for line in part]
-    return [_FILTER.format(SHOWN), *lines, *more]
+    return [_FILTER.format(SHOWN), *lines], covered
 
 
 def intervals(triad: Triad, calibration: Calibration) -> dict[str, str]:
