@@ -29,6 +29,10 @@ FORMATS = {
     "sensor_accel": SINGLE,
     "sensor_gyro_fifo": FIFO,
     "sensor_accel_fifo": FIFO,
+    "vehicle_imu": (
+        "uint64_t timestamp_sample;float[3] delta_angle;float[3] delta_velocity;"
+        "uint32_t delta_angle_dt;uint32_t delta_velocity_dt;"
+    ),
     "vehicle_status": "uint8_t nav_state;",
 }
 CODES = {"float": np.float32, "uint8_t": np.uint8, "int32_t": np.int32, "uint32_t": np.uint32,
@@ -75,6 +79,17 @@ def combined(samples=X, relative=-500, covered=4000):
 def single(sensor, samples, stamps=TIME, instance=0):
     columns = dict(zip("xyz", samples.T, strict=True)) | {"temperature": 41.0}
     return f"sensor_{sensor}", instance, stamps, columns
+
+
+def integrated(samples, instance=0, step=4000, covered=None):
+    """Increments of an IMU over ``covered`` us, by default over the whole step."""
+    stamps = 5_000_000 + step * np.arange(len(samples))
+    dt = step if covered is None else covered
+    columns = {"timestamp_sample": stamps, "delta_angle_dt": dt, "delta_velocity_dt": dt}
+    for i in range(3):
+        columns[f"delta_angle[{i}]"] = samples[:, i] * (dt * 1e-6)
+        columns[f"delta_velocity[{i}]"] = samples[:, 3 + i] * (dt * 1e-6)
+    return "vehicle_imu", instance, stamps + 300, columns
 
 
 def fifo(sensor, counts, scale, dt=125.0, instance=0):

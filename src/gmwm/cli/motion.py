@@ -4,22 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from gmwm.cli.console import print_result, progress_bar
-from gmwm.cli.options import FILE_TO_WRITE, PATH, options, read_recording
+from gmwm.cli.options import FILE_TO_WRITE, PATH, arguments_of_read, options, read_recording
 from gmwm.errors import InputError
+
+if TYPE_CHECKING:
+    from gmwm.readers import Recording
 
 
 @click.command()
-@click.argument("files", metavar="FILE FILE FILE...", nargs=-1, required=True, type=PATH)
+@click.argument("files", metavar="FILE...", nargs=-1, required=True, type=PATH)
 @options(
     """
     --static FILE  Calibration of a recording at rest, of one of the IMUs or of their kind.
     --imus N  Number of IMUs: the files are those of one flight, then those of the next, each in one
         order. By default all files are of one flight.
+    --logs  Each file is a log of one flight with all IMUs; a single file is one anyway.
     -o --output JSON  File to save the result in.
     --plot PNG  Picture of the Allan deviations, a panel a channel.
     --reading
@@ -34,6 +38,7 @@ def motion(
     files: Sequence[Path],
     static: Path | None,
     imus: int | None,
+    logs: bool,
     output: Path | None,
     plot: Path | None,
     as_json: bool,
@@ -42,7 +47,8 @@ def motion(
 ) -> None:
     """Measure the noise of IMUs in motion, from three or more on one rigid body.
 
-    FILE is the recording of an IMU, all of the same motion; clocks need not agree. Clocks, mounting
+    FILE is the recording of an IMU, all of the same motion, or one log with several instances: a
+    bag, or a log of PX4 (vehicle_imu) or ArduPilot; clocks need not agree. Clocks, mounting
     and lever arms are estimated; what the IMUs do not have in common is their noise. The first
     table says how they stand against the first IMU, the second one the Allan deviation of each in
     motion, with --static also at rest and the factor between both. Two IMUs give only the sum of
@@ -52,6 +58,7 @@ def motion(
     Examples:
       gmwm motion imu1.csv imu2.csv imu3.csv --static calibration.json
       gmwm motion flight*_imu*.csv --imus 4 -o motion.json --plot motion.png
+      gmwm motion flight.ulg
     """
     from gmwm.calibration import Calibration
     from gmwm.motion import motion as run
@@ -60,8 +67,12 @@ def motion(
     if len(files) % count:
         raise InputError(f"{len(files)} files are no flights of {count} IMUs: give all of each")
     at_rest = None if static is None else Calibration.load(static)
-    recordings = [read_recording(file, **reading) for file in files]
-    flights = [recordings[k : k + count] for k in range(0, len(files), count)]
+    flights: list[Any]
+    if logs or len(files) == 1:
+        flights = [_of_log(file, **reading) for file in files]
+    else:
+        recordings = [read_recording(file, **reading) for file in files]
+        flights = [recordings[k : k + count] for k in range(0, len(files), count)]
     with progress_bar("motion", "flights", quiet=quiet) as bar:
         found = run(flights, static=at_rest, progress=bar)
     if output is not None:
@@ -69,6 +80,15 @@ def motion(
     if plot is not None:
         _draw(found, plot)
     print_result(found, output, plot, as_json=as_json, quiet=quiet)
+
+
+def _of_log(
+    file: Path, *, start: float, stop: float | None, **reading: Any
+) -> dict[str, Recording]:
+    from gmwm.readers import read_imus
+
+    found = read_imus(file, **arguments_of_read(**reading))
+    return {imu: recording.part(start, stop) for imu, recording in found.items()}
 
 
 def _draw(found: Any, path: Path) -> None:

@@ -6,7 +6,7 @@ from .names import (
     meaning as meaning,
     stated_seconds as stated_seconds,
 )
-from .reader import read as read
+from .reader import read as read, read_imus as read_imus
 from .recording import (
     READING as READING,
     Channel as Channel,

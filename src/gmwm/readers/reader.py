@@ -118,7 +118,43 @@ def read(
     else:
         topics = (topic,) if isinstance(topic, str) else tuple(topic)
         tables = open_tables(path, Wanted(topics, clock, channels is not None, damaged), format)
-    given = Given(rate, units or {}, channels, time)
+    return _recording(tables, Given(rate, units or {}, channels, time))
+
+
+read.__doc__ = str(read.__doc__).replace("FORMATS", ", ".join(f'``"{name}"``' for name in NAMES))
+
+
+def read_imus(
+    path: str | os.PathLike[str],
+    topic: Sequence[str] = (),
+    *,
+    clock: str = "header",
+    format: str | None = None,
+    damaged: bool = False,
+    **given: Any,
+) -> dict[str, Recording]:
+    """The recordings of all IMUs of a bag or a flight log, by instance or topic; see `read`.
+
+    topic: Those to read; by default all of the first kind that several IMUs have.
+    Raises InputError if there is one IMU.
+    """
+    wanted = Wanted(tuple(topic), clock, "channels" in given, damaged, every_imu=True)
+    by_imu: dict[str, list[Table]] = {}
+    for table in open_tables(path, wanted, format):
+        if has_sensors(table):
+            by_imu.setdefault(table.imu, []).append(table)
+    if len(by_imu) == 1:
+        raise InputError(f"{Path(path).name} has one IMU: give a file of each IMU")
+    reading = Given(
+        given.get("rate"), given.get("units", {}), given.get("channels"), given.get("time")
+    )
+    names = by_imu if topic else sorted(by_imu)
+    return {name: _recording(by_imu[name], reading) for name in names}
+
+
+def _recording(tables: Sequence[Table], given: Given) -> Recording:
+    """One recording of the tables of an IMU."""
+    channels = given.channels
     if len(tables) == 1:
         return recording_of(tables[0], given).recording
     own = [table for table in tables if has_sensors(table)]
@@ -128,9 +164,6 @@ def read(
         if table not in own:
             parts[0] = with_temperature(parts[0], table)
     return joined(parts)
-
-
-read.__doc__ = str(read.__doc__).replace("FORMATS", ", ".join(f'``"{name}"``' for name in NAMES))
 
 
 def recording_of(table: Table, given: Given) -> Part:

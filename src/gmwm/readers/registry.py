@@ -30,6 +30,7 @@ class Wanted:
     clock: str = "header"  # which of `CLOCKS` counts
     by_channel: bool = False  # whether channels are named, all of which one sensor may have
     damaged: bool = False  # whether the rest of a damaged file is used
+    every_imu: bool = False  # whether all IMUs of a log are wanted, each with tables of its own
 
 
 @dataclass(frozen=True)

@@ -36,6 +36,7 @@ class Table(ABC):
     # What was noticed while opening and reading the file.
     notices: list[Notice] = field(default_factory=list)
     stamps: str = ""  # what messages call the time stamps, where they are no column of the file
+    imu: str = ""  # of a log of several IMUs, the one whose sensors these are
     origin: str = "the names of the columns"  # what says the units, for messages
 
     @abstractmethod

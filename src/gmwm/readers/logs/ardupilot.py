@@ -231,6 +231,7 @@ def open_ardupilot(path: Path, wanted: Wanted) -> tuple[Table, ...]:
                 names=tuple(series.columns),
                 notices=list(notices),
                 topic=topic,
+                imu=topic.imu,
                 rows=topic.count,
                 path=path,
                 series=series,

@@ -224,6 +224,7 @@ def open_bag(path: Path, wanted: Wanted) -> tuple[BagTable, ...]:
             stamps="times of recording" if is_log else "header stamps",
             origin="sensor_msgs/Imu",
             topic=topic,
+            imu=topic.imu,
             rows=topic.count,
             bag=bag,
             message=message,

@@ -28,6 +28,12 @@ class Topic:
     # "gyro", "accel" or both, if not zeros all the time.
     sensors: frozenset[str] = frozenset(SI_UNIT)
 
+    @property
+    def imu(self) -> str:
+        """Its name in a log of several: ``imu 1`` of an instance, else that of the topic."""
+        _, _, number = self.name.rstrip("]").partition("[")
+        return f"imu {number}" if number else self.name
+
     def __str__(self) -> str:
         only = f", {next(iter(self.sensors))} only" if len(self.sensors) == 1 else ""
         return f"{self.name} ({self.count:,} messages{only})"
@@ -36,16 +42,20 @@ class Topic:
 def choose(source: str, ranks: Sequence[Sequence[Topic]], wanted: Wanted) -> tuple[Topic, ...]:
     """The topics to read: those wanted, else of the first rank that has any.
 
-    There it is the only one, or one of gyros with one of forces. Raises InputError if it cannot be
+    There it is the only one, or one of gyros with one of forces; of every IMU, all of the first
+    rank that has several. Raises InputError if it cannot be
     decided, or the log has one sensor and not the other and no channel is named.
     """
     topics = [t for rank in ranks for t in rank] if wanted.topics else next(filter(None, ranks))
-    chosen = _chosen(source, topics, wanted.topics)
+    if wanted.every_imu and not wanted.topics:
+        several = (rank for rank in ranks if len({topic.imu for topic in rank}) > 1)
+        return tuple(next(several, topics))
+    chosen = _chosen(source, topics, wanted)
     there = frozenset[str]().union(*(topic.sensors for topic in chosen))
     absent = frozenset(SI_UNIT) - there
     # One topic of two was chosen where the other has the other sensor.
     is_part = absent in [topic.sensors for topic in topics]
-    if there and absent and not (is_part or wanted.by_channel):
+    if there and absent and not (is_part or wanted.by_channel or wanted.every_imu):
         (sensor,), (other,) = there, absent
         text = f"{source} has no {_MEASURED[other]}, or only zeros, in {chosen[0].name}"
         hint = f'record them too, or read the rest alone, channels="{sensor}"'
@@ -53,20 +63,20 @@ def choose(source: str, ranks: Sequence[Sequence[Topic]], wanted: Wanted) -> tup
     return chosen
 
 
-def _chosen(source: str, topics: Sequence[Topic], wanted: Sequence[str]) -> tuple[Topic, ...]:
+def _chosen(source: str, topics: Sequence[Topic], wanted: Wanted) -> tuple[Topic, ...]:
     listed = ", ".join(map(str, topics))
-    if not wanted:
+    if not wanted.topics:
         if len(topics) == 1 or _are_parts(topics):
             return tuple(topics)
         text = f"{source} has {len(topics)} topics of an IMU: {listed}"
         raise InputError(text, "topic", f'choose one, topic="{topics[0].name}"')
     by_name = {topic.name.strip("/"): topic for topic in topics}
-    for name in wanted:
+    for name in wanted.topics:
         if name.strip("/") not in by_name:
             text = f"{source} has no topic {name!r} of an IMU: it has {listed}"
             raise InputError(text, "topic-unknown")
-    chosen = tuple(by_name[name.strip("/")] for name in dict.fromkeys(wanted))
-    if len(chosen) > 1 and not _are_parts(chosen):
+    chosen = tuple(by_name[name.strip("/")] for name in dict.fromkeys(wanted.topics))
+    if len(chosen) > 1 and not (wanted.every_imu or _are_parts(chosen)):
         text = f"{source}: {' and '.join(map(str, chosen))} are not one gyro and one accelerometer"
         raise InputError(f"{text}: choose one, or two such", "topic")
     return chosen
@@ -113,7 +123,7 @@ def topic_table(
 ) -> ArrayTable:
     """A table of the samples of a topic that are in memory."""
     entries = {name: array_of(values) for name, values in columns.items()}
-    about = {"stamps": f"stamps of {topic.name}", "origin": origin}
+    about = {"stamps": f"stamps of {topic.name}", "origin": origin, "imu": topic.imu}
     return ArrayTable.of_entries(source, entries, notices, **about)
 
 

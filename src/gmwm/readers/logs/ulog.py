@@ -1,8 +1,9 @@
 """Flight logs of PX4 (ULog) by pyulog.
 
 `sensor_combined` holds every sample that the estimator gets, the FIFO topics every sample of the
-sensor; `sensor_gyro` and `sensor_accel` are thinned to about 1 Hz unless one asks for more
-(docs.px4.io, Logging; msg/SensorCombined.msg, SensorGyroFifo.msg, SensorAccelFifo.msg).
+sensor, `vehicle_imu` the increments of each IMU; this one, `sensor_gyro` and `sensor_accel` are
+thinned to about 1 Hz unless one asks for more (docs.px4.io, Logging; msg/SensorCombined.msg,
+SensorGyroFifo.msg, SensorAccelFifo.msg, VehicleImu.msg).
 """
 
 from __future__ import annotations
@@ -30,7 +31,10 @@ from gmwm.readers.table import damage_named, damage_notice, library
 _COMBINED = "sensor_combined"
 _FIELDS = {"gyro": "gyro_rad", "accel": "accelerometer_m_s2"}
 _FIFO = {"sensor_gyro_fifo": "gyro", "sensor_accel_fifo": "accel"}
+_INTEGRATED = "vehicle_imu"
+_INCREMENTS = {"gyro": "delta_angle", "accel": "delta_velocity"}
 _SINGLE = {"sensor_gyro": "gyro", "sensor_accel": "accel"}
+_RANKS = ((_COMBINED,), _FIFO, (_INTEGRATED,), _SINGLE)
 _TIME = "time [us]"
 _NO_TIME = 2**31 - 1  # RELATIVE_TIMESTAMP_INVALID of SensorCombined.msg
 _HEAD = 3  # bytes of a message before its content
@@ -45,7 +49,7 @@ _Columns = dict[str, AnyArray]
 
 
 def open_ulog(path: Path, wanted: Wanted) -> tuple[ArrayTable, ...]:
-    """The topics wanted (``"sensor_gyro_fifo[1]"``), or `sensor_combined`, else the FIFO topics."""
+    """The topics wanted (``"sensor_gyro_fifo[1]"``), or the first of `_RANKS` that is there."""
     with damage_named(path.name, _DAMAGE):  # formats that are damaged lack fields
         return _tables(path, wanted)
 
@@ -53,13 +57,13 @@ def open_ulog(path: Path, wanted: Wanted) -> tuple[ArrayTable, ...]:
 def _tables(path: Path, wanted: Wanted) -> tuple[ArrayTable, ...]:
     sets, notices = _data_sets(path, wanted.damaged)
     by_name = {_name(each): each for each in sets}
-    ranks: list[list[Topic]] = [[], [], []]
+    ranks: list[list[Topic]] = [[], [], [], []]
     for each in sets:
-        rank = 0 if each.name == _COMBINED else 1 if each.name in _FIFO else 2
+        rank = next(i for i, names in enumerate(_RANKS) if each.name in names)
         only = (_FIFO | _SINGLE).get(each.name)
         not_zero = [
             sensor
-            for sensor, field in _FIELDS.items()
+            for sensor, field in (_FIELDS if rank == 0 else _INCREMENTS).items()
             if not only and any(np.any(each.data[f"{field}[{i}]"]) for i in range(3))
         ]
         sensors = frozenset([only] if only else not_zero)
@@ -72,8 +76,11 @@ def _tables(path: Path, wanted: Wanted) -> tuple[ArrayTable, ...]:
     for topic in chosen:
         kind, data = by_name[topic.name].name, by_name[topic.name].data
         if kind == _COMBINED:
-            _check_every_sample(path.name, data)
+            covered = data.get("gyro_integral_dt", np.zeros(1))
+            _check_every_sample(path.name, kind, covered, data["timestamp"])
             found += [(topic, columns) for columns in _combined(data)]
+        elif kind == _INTEGRATED:
+            found.append((topic, _from_increments(path.name, data)))
         elif kind in _FIFO:
             found.append((topic, _from_fifo(data, _FIFO[kind])))
         else:
@@ -118,7 +125,7 @@ def _check_format(text: bytes) -> None:
     pyulog writes out each element of arrays, and of messages within messages.
     """
     name, _, fields = text.decode(errors="replace").partition(":")
-    if name in (_COMBINED, *_FIFO, *_SINGLE):
+    if any(name in names for names in _RANKS):
         types = [field.split(" ")[0] for field in fields.split(";") if field]
         plain = [_PLAIN.fullmatch(each) for each in types]
         if not all(plain) or sum(int(each[1] or 1) for each in plain if each) > _MOST_NUMBERS:
@@ -131,7 +138,7 @@ def _data_sets(path: Path, is_taken: bool) -> tuple[list[Any], tuple[Notice, ...
     # pyulog prints what is damaged.
     quiet = redirect_stdout(io.StringIO())
     with damage_named(path.name, _DAMAGE), quiet, _Stream(path) as stream:
-        log = reader(stream, [_COMBINED, *_FIFO, *_SINGLE])
+        log = reader(stream, [name for names in _RANKS for name in names])
     sets = [each for each in log.data_list if each.data["timestamp"].size]
     notices = []
     if log.file_corruption or stream.is_cut:
@@ -169,13 +176,22 @@ def _combined(data: Mapping[str, AnyArray]) -> list[_Columns]:
     return [gyro, _columns(stamps[is_new], "accel", [axis[is_new] for axis in axes])]
 
 
-def _check_every_sample(source: str, data: Mapping[str, AnyArray]) -> None:
+def _from_increments(source: str, data: Mapping[str, AnyArray]) -> _Columns:
+    """Rates and specific forces, by the times that angles and velocities were summed over."""
+    stamps, found = data["timestamp_sample"], _Columns()
+    _check_every_sample(source, _INTEGRATED, data["delta_angle_dt"], stamps)
+    for sensor, field in _INCREMENTS.items():
+        seconds = np.maximum(data[f"{field}_dt"], 1) * 1e-6
+        found |= _columns(stamps, sensor, [data[f"{field}[{i}]"] / seconds for i in range(3)])
+    return found
+
+
+def _check_every_sample(source: str, name: str, integral: AnyArray, stamps: AnyArray) -> None:
     """Reject rows farther apart than the time each sample covers: the logger left out others."""
-    covered = float(np.median(data.get("gyro_integral_dt", 0)))
-    steps = np.diff(data["timestamp"].astype(float))
+    covered, steps = float(np.median(integral)), np.diff(stamps.astype(float))
     if steps.size and 0.0 < covered * tuning.APART < (step := float(np.quantile(steps, 0.05))):
         raise InputError(
-            f"{source}: each row of {_COMBINED} covers {covered / 1e3:.3g} ms, and rows are "
+            f"{source}: each row of {name} covers {covered / 1e3:.3g} ms, and rows are "
             f"{step / 1e3:.3g} ms apart, so that the noise would be too large: {_HINT}"
         )
 
