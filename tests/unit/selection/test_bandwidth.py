@@ -81,6 +81,25 @@ def test_plain_white_noise_is_not_taken_for_filtered():
         assert sensor_bandwidth(wv, (), 7.0) is None
 
 
+@pytest.mark.parametrize("run", [9, 445])
+def test_a_level_that_is_low_by_chance_does_not_make_a_low_pass(run):
+    # The coarsest level is a twentieth of the truth or less. Its small error drew all others down:
+    # low-pass noise above half the rate was chosen, its p-value zero, its standard error too.
+    x = np.random.default_rng(4320).normal(0.0, N, (446, 600))[run]
+    selection = gmwm.select(x, dt=0.1)
+    assert selection.chosen.p_value > 1e-3
+    assert selection.model.title() == "white noise"
+
+
+def test_a_bandwidth_above_half_the_rate_is_not_known():
+    """It changes nothing there, and its standard error was zero."""
+    x = np.random.default_rng(4320).normal(0.0, N, (446, 600))[445]
+    fit = gmwm.estimate.estimate(LowPassNoise(order=0.905, damping=0.2177), x, 0.1)
+    assert fit.params["lowpass_bandwidth"] > 5.0
+    assert "undetermined" in {each.code for each in fit.notices}
+    assert fit.interval()["lowpass_bandwidth"] == (0.0, np.inf)
+
+
 def test_a_moving_average_is_found_by_its_window(monkeypatch):
     wv = gmwm.wavelet_variance(filtered(np.ones(7) / 7, [1.0], 4), dt=DT)
     found = sensor_bandwidth(wv, (), 7.0)

@@ -196,9 +196,11 @@ def _sandwich(jacobian: FloatArray, covariance: FloatArray, root: FloatArray) ->
         return np.zeros((0, 0))
     weighted = root @ jacobian
     length = np.sqrt(np.sum(weighted**2, axis=0))
+    unknown = np.where(length == 0.0, tuning.SEARCH_REACH**2, 0.0)
     length[length == 0.0] = 1.0
     estimator = np.linalg.pinv(weighted / length, rcond=1e-10) @ root / length[:, None]
-    return np.asarray(estimator @ covariance @ estimator.T)
+    # A shape without effect, such as a bandwidth above half the rate, is not known at all.
+    return np.asarray(estimator @ covariance @ estimator.T + np.diag(unknown))
 
 
 def _unrestricted(

@@ -200,6 +200,7 @@ def moment_estimate(
 
 
 _BISECTIONS = 14
+_LOOSE = 100.0  # times the largest variance: the error of a level that has no weight
 
 TEXTBOOK = tuple(
     kind() for kind in sorted(CATALOGUE, key=lambda kind: not kind.is_white) if kind.is_candidate
@@ -276,24 +277,39 @@ def _kinds(extra: tuple[Process, ...]) -> tuple[Process, ...]:
 
 
 def _mixture(wv: WaveletVariance, target: FloatArray, kinds: tuple[Process, ...]) -> Reference:
+    """The mixture under weights that belong to it, from the first weights that need less allowance.
+
+    A level of few degrees of freedom that is low by chance looks well known, and under such weights
+    it pulls the whole mixture down to it. If no mixture fits, those levels are left out at first.
+    """
     design, atoms, matrix = dictionary(Scales.of(wv), kinds)
-    covariance, discrepancy = wv.covariance, 0.0
-    for _ in range(tuning.REWEIGHTINGS):
-        discrepancy = _needed(matrix, target, covariance)
-        x = _amplitudes(matrix, target, covariance, discrepancy)
-        mixture = [
-            design.at_shape(i, shape).with_amplitude(float(value))
-            for (i, shape), value in zip(atoms, x, strict=True)
-            if value > 0.0
-        ]
-        if all(process.is_line for process in mixture):
-            raise InputError(
-                f"{wv.name or 'the series'} is not noise that these processes describe (an exact "
-                "line or a pattern): check the data"
-            )
-        whole = Model(tuple(mixture))
-        covariance = wv.covariance_under(whole.psd, whole.lines())
-    return Reference(whole, covariance, matrix @ x, discrepancy)
+
+    def settled(covariance: FloatArray) -> Reference:
+        discrepancy = 0.0
+        for _ in range(tuning.REWEIGHTINGS):
+            discrepancy = _needed(matrix, target, covariance)
+            x = _amplitudes(matrix, target, covariance, discrepancy)
+            mixture = [
+                design.at_shape(i, shape).with_amplitude(float(value))
+                for (i, shape), value in zip(atoms, x, strict=True)
+                if value > 0.0
+            ]
+            if all(process.is_line for process in mixture):
+                raise InputError(
+                    f"{wv.name or 'the series'} is not noise that these processes describe (an "
+                    "exact line or a pattern): check the data"
+                )
+            whole = Model(tuple(mixture))
+            covariance = wv.covariance_under(whole.psd, whole.lines())
+        return Reference(whole, covariance, matrix @ x, discrepancy)
+
+    found, deviation = settled(wv.covariance), np.sqrt(np.diag(wv.covariance))
+    is_known = deviation < tuning.DISCREPANCY_KNOWN * target
+    if found.discrepancy == 0.0 or np.all(is_known):
+        return found
+    inflated = np.where(is_known, 1.0, _LOOSE * np.max(target) / deviation)
+    other = settled(wv.covariance * np.outer(inflated, inflated))
+    return min(found, other, key=lambda each: each.discrepancy)
 
 
 def _amplitudes(
