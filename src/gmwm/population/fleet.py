@@ -6,7 +6,7 @@ import csv
 import os
 from collections.abc import Collection, Mapping, Sequence
 from contextlib import closing, nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -265,9 +265,8 @@ class Fleet(ByName[Calibration | Notice], Printed):
             If the folder cannot be written, is in use, or holds calibrations.
         """
         with opened_store(Path(folder), self.options, resume=False) as store:
-            for unit in self.units.values():
-                store.save(unit)
-            self._conclude(store)
+            units = {path: store.save(unit) for path, unit in self.units.items()}
+            replace(self, units=units)._conclude(store)
         return Path(folder)
 
     @classmethod
@@ -385,23 +384,15 @@ def fleet(
         todo = [item for item in items if item.path not in units]
         with closing(results(task, todo, jobs=jobs, cluster=cluster, lost=task.lost)) as found:
             for item, unit in found:
-                if store is not None:
-                    store.save(unit)
-                units[item.path] = unit
+                units[item.path] = unit if store is None else store.save(unit)
                 tell(len(units), len(items), "")
         units = {item.path: units[item.path] for item in items}
+        structures = _structures(units, store, bool(task.models), jobs=jobs, cluster=cluster)
         notices = _notices(units.values())
         if store is not None:
             names = {item.name for item in items}
             if others := [each.stem for each in store.calibrations if each.stem not in names]:
                 notices.append(_of_some("left-over", others))
-        fits: dict[str, dict[str, Fit]] = {}
-        for unit in units.values():
-            for name, fit in unit.result.items() if isinstance(unit.result, Calibration) else ():
-                fits.setdefault(name, {})[unit.name] = fit
-        choice = Choice(fits, bool(task.models))
-        chosen = dict(results(choice, list(fits), jobs=jobs, cluster=cluster if fits else None))
-        structures = tuple(chosen[name] for name in fits)
         made = Fleet(units, structures, task.options, allowed, tuple(notices))
         if not made.done:
             first, *rest = made.failed.values()
@@ -410,6 +401,27 @@ def fleet(
         if store is not None:
             made._conclude(store)
     return made
+
+
+def _structures(
+    units: dict[str, Unit], store: Store | None, is_given: bool, **work: Any
+) -> tuple[Structure, ...]:
+    """The structure of every axis; units that prevent one fail, in place."""
+    while True:
+        fits: dict[str, dict[str, Fit]] = {}
+        for unit in units.values():
+            for name, fit in unit.result.items() if isinstance(unit.result, Calibration) else ():
+                fits.setdefault(name, {})[unit.name] = fit
+        if not fits:
+            return ()
+        chosen = dict(results(Choice(fits, is_given).attempt, list(fits), **work))
+        odd = {each.where: each for each in chosen.values() if isinstance(each, Notice)}
+        if not odd:
+            return tuple(each for name in fits if isinstance(each := chosen[name], Structure))
+        for path, unit in units.items():
+            if unit.name in odd:
+                unit = replace(unit, result=odd[unit.name])
+                units[path] = unit if store is None else store.save(unit)
 
 
 def _notices(units: Collection[Unit]) -> list[Notice]:

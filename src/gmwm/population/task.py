@@ -10,7 +10,7 @@ import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from inspect import signature
 from itertools import count
 from pathlib import Path
@@ -20,13 +20,12 @@ from pydantic import StringConstraints
 
 from gmwm._core import checks
 from gmwm._core.documents import Document, Positive, Text, read_json
-from gmwm._core.files import folder_to_fill, one_writer, opened, written
+from gmwm._core.files import folder_to_fill, one_writer, opened, write_text
 from gmwm._core.jobs import ENDED
-from gmwm._core.memory import OUT_OF_MEMORY
 from gmwm.calibration import SCREENING, Calibration, calibrate
 from gmwm.errors import InputError, printable
 from gmwm.issues import Notice, failure
-from gmwm.population.unit import Structure, Unit
+from gmwm.population.unit import Structure, Unit, failed
 from gmwm.process import Model, as_model
 from gmwm.readers import read
 
@@ -111,18 +110,13 @@ class Task:
         """Calibrate a unit; a failure becomes its result and costs no other unit anything."""
         try:
             return self._calibrated(item)
-        except InputError as error:
-            return _failed(item, error.code or "not-calibrated", str(error))
-        except MemoryError:
-            return _failed(item, "memory", OUT_OF_MEMORY)
         except Exception as error:
-            text = f"{type(error).__name__}: {checks.line(str(error))}"
-            return _failed(item, "unexpected", text)
+            return Unit(item.path, item.name, failed(item.name, error))
 
     def lost(self, item: Item) -> Unit:
         """The result for a recording whose worker processes end."""
         text = f"{ENDED} processes ended at it: it may need more memory than there is"
-        return _failed(item, "worker-lost", text)
+        return Unit(item.path, item.name, failure("worker-lost", item.name, text))
 
     def _calibrated(self, item: Item) -> Unit:
         from gmwm._core import __version__  # the worker's
@@ -143,10 +137,6 @@ class Task:
                 "recording-changed",
             )
         return Unit(item.path, item.name, calibration, digest)
-
-
-def _failed(item: Item, code: str, text: str) -> Unit:
-    return Unit(item.path, item.name, failure(code, item.name, text))
 
 
 def digest_of(path: str) -> str:
@@ -333,15 +323,23 @@ class Store:
             raise InputError(f"{path}: {error}: {hint}") from None
         return origin, Unit(item.path, item.name, calibration, origin.sha256)
 
-    def save(self, unit: Unit) -> None:
-        """Write the calibration of a unit; if it has none, remove that of an earlier run."""
-        if not isinstance(unit.result, Calibration):
-            self.path(unit.name).unlink(missing_ok=True)
-            return
-        origin = _Origin(printable(unit.path), unit.digest, self.options).content()
-        with written(self.path(unit.name)) as stream:
-            json.dump(unit.result.to_dict() | {"fleet": origin}, stream, indent=1, allow_nan=False)
-            stream.write("\n")
+    def save(self, unit: Unit) -> Unit:
+        """Write the calibration of a unit; if it has none, remove that of an earlier run.
+
+        Returns the unit; it fails if its calibration is none of a document.
+        """
+        if isinstance(unit.result, Calibration):
+            origin = _Origin(printable(unit.path), unit.digest, self.options).content()
+            try:
+                content = unit.result.to_dict() | {"fleet": origin}
+                text = json.dumps(content, indent=1, allow_nan=False)
+            except Exception as error:
+                unit = replace(unit, result=failed(unit.name, error))
+            else:
+                write_text(self.path(unit.name), text)
+                return unit
+        self.path(unit.name).unlink(missing_ok=True)
+        return unit
 
 
 @contextmanager

@@ -3,24 +3,25 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import isfinite
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import pyarrow as pa
 
+from gmwm._core import checks
 from gmwm._core.documents import NotNegative, OrInfinity, Text
 from gmwm._core.frozen import freeze
 from gmwm._core.jobs import one_blas_thread
+from gmwm._core.memory import OUT_OF_MEMORY
 from gmwm._core.units import si_parameter_unit
 from gmwm.calibration import Calibration, axis_numbers
 from gmwm.errors import InputError, printable
 from gmwm.estimate import Fit, estimate
 from gmwm.estimate.problem import chi_square
-from gmwm.issues import Notice
+from gmwm.issues import Notice, failure
 from gmwm.population import tuning
 from gmwm.process import GaussMarkov, Model, Process, RandomWalk, WhiteNoise
 from gmwm.selection import penalty
@@ -40,6 +41,8 @@ SCHEMA = pa.schema([(name, _TYPES.get(name, pa.string())) for name in _NAMES.spl
 codes of why a fit, a channel or a unit is not valid."""
 
 Row = dict[str, Any]
+S = TypeVar("S")
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -92,6 +95,31 @@ class Unit:
         return isinstance(self.result, Calibration) and any(
             fit.valid for fit in self.result.values()
         )
+
+
+def failed(name: str, error: Exception) -> Notice:
+    """Why a unit has no calibration: an error at its recording or its fits."""
+    if isinstance(error, InputError):
+        return failure(error.code or "not-calibrated", name, str(error))
+    if isinstance(error, MemoryError):
+        return failure("memory", name, OUT_OF_MEMORY)
+    text = f"{type(error).__name__}: {checks.line(str(error))}"
+    return failure("unexpected", name, text)
+
+
+class UnitError(Exception):
+    """One unit of a lot prevents that a structure is chosen; holds a `Notice` of it."""
+
+
+def _of_each(units: Mapping[str, S], work: Callable[[S], T]) -> dict[str, T]:
+    """Do some work for each unit; raises UnitError at the first where it fails."""
+    found = {}
+    for name, each in units.items():
+        try:
+            found[name] = work(each)
+        except Exception as error:
+            raise UnitError(failed(name, error)) from error
+    return found
 
 
 def rows_of(units: Iterable[Unit], structures: Sequence[Structure]) -> Iterator[Row]:
@@ -199,12 +227,23 @@ class Choice:
     fits: Mapping[str, Mapping[str, Fit]]
     is_given: bool
 
+    def attempt(self, channel: str) -> Structure | Notice:
+        """The structure of a channel, or which unit prevents it."""
+        try:
+            return self(channel)
+        except UnitError as error:
+            return error.args[0]
+
     @one_blas_thread()
     def __call__(self, channel: str) -> Structure:
-        """Choose the structure of a channel and fit it to every unit."""
+        """Choose the structure of a channel and fit it to every unit.
+
+        Raises UnitError if that fails for one of them.
+        """
         fits = self.fits[channel]
-        sound = {name: fit for name, fit in fits.items() if self._is_usable(fit)}
-        titles = {name: _noise(fit.model) for name, fit in sound.items()}
+        usable = _of_each(fits, self._is_usable)
+        sound = {name: fit for name, fit in fits.items() if usable[name]}
+        titles = _of_each(sound, lambda fit: _noise(fit.model))
         counts = Counter(model.title() for model in titles.values())
         usual = {model.title(): model for model in titles.values()}
         chosen, common = next(iter(counts), ""), dict(sound)
@@ -225,7 +264,7 @@ class Choice:
             counts=dict(counts.most_common()),
             own=tuple(own),
             invalid=tuple(name for name in fits if name not in {*common, *own}),
-            numbers={name: numbers_of(fit) for name, fit in used.items()},
+            numbers=_of_each(used, numbers_of),
         )
 
     def _is_usable(self, fit: Fit) -> bool:
@@ -261,27 +300,33 @@ def _noise(model: Model) -> Model:
 
 def _fitted(fits: Mapping[str, Fit], noise: Model) -> dict[str, Fit]:
     """A structure fitted to every unit that it can be fitted to, with the unit's own terms."""
-    found = {}
-    for name, fit in fits.items():
-        own = [term for term in fit.model.terms if not _is_common(term)]
-        opened = []
-        for each in own:
-            size = each.linear_parameter  # a drift has none
-            names = [size] if size is not None else each.parameters
-            opened.append(each.with_values(**dict.fromkeys(item.name for item in names)))
-        # Behind the sensor's low-pass there need be no other white noise.
-        is_white = any(term.is_white for term in fit.model.terms)
-        behind = any(term.is_band_limited for term in own) and not is_white
-        terms = (*(term for term in noise.terms if not (behind and term.is_white)), *opened)
-        with suppress(InputError):  # too short for so many parameters
-            found[name] = estimate(Model(terms), fit.wv)
-    return found
+    found = _of_each(fits, lambda fit: _with_noise(fit, noise))
+    return {name: fit for name, fit in found.items() if fit is not None}
+
+
+def _with_noise(fit: Fit, noise: Model) -> Fit | None:
+    """A unit fitted by other noise; ``None`` if it is too short for so many parameters."""
+    own = [term for term in fit.model.terms if not _is_common(term)]
+    opened = []
+    for each in own:
+        size = each.linear_parameter  # a drift has none
+        names = [size] if size is not None else each.parameters
+        opened.append(each.with_values(**dict.fromkeys(item.name for item in names)))
+    # Behind the sensor's low-pass there need be no other white noise.
+    is_white = any(term.is_white for term in fit.model.terms)
+    behind = any(term.is_band_limited for term in own) and not is_white
+    terms = (*(term for term in noise.terms if not (behind and term.is_white)), *opened)
+    try:
+        return estimate(Model(terms), fit.wv)
+    except InputError:
+        return None
 
 
 def _best(tried: Mapping[str, dict[str, Fit]]) -> tuple[str, dict[str, Fit]]:
     """The structure with the smallest sum of criteria over the units, and its fits."""
-    names = {name for own in tried.values() for name in own}
-    criteria = np.array([_criteria([own.get(name) for own in tried.values()]) for name in names])
+    names = dict.fromkeys(name for own in tried.values() for name in own)
+    candidates = {name: [own.get(name) for own in tried.values()] for name in names}
+    criteria = np.array(list(_of_each(candidates, _criteria).values()))
     excess = np.minimum(criteria - criteria.min(axis=1, keepdims=True), tuning.CONTRADICTION)
     title = list(tried)[int(np.argmin(excess.sum(axis=0)))]
     return title, tried[title]

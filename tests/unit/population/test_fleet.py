@@ -16,7 +16,7 @@ import gmwm
 from fleets import QUICK
 from gmwm import Calibration, Fleet, InputError, Model, RandomWalk, WhiteNoise
 from gmwm.issues import Notice
-from gmwm.population import LETTERS, SCHEMA, Item, Task, task as tasks
+from gmwm.population import LETTERS, SCHEMA, Item, Task, task as tasks, unit as lots
 
 READING = ("rate", "units")
 
@@ -357,6 +357,30 @@ def test_an_error_of_the_program_costs_one_unit_only(lot, monkeypatch):
         "unexpected", "memory", "not-calibrated"
     ]  # fmt: skip
     assert found[lot[0]].text == "ZeroDivisionError: of all things"
+
+
+@pytest.mark.parametrize("stage", ["numbers_of", "to_dict"])
+def test_a_unit_that_fails_beside_the_others_costs_one_unit(lot, tmp_path, monkeypatch, stage):
+    """The second stage: one structure for all units; and what is written of each."""
+    bad = gmwm.fleet(lot[:1], **QUICK)[lot[0]]["gyro_y"].wv.variance[0]
+    place = lots if stage == "numbers_of" else Calibration
+    usual = getattr(place, stage)
+
+    def failing(given):
+        if stage == "to_dict":
+            return usual(given) | ({"odd": np.nan} if given.source == "unit 0.npz" else {})
+        return 1 / 0 if given.wv.variance[0] == bad else usual(given)
+
+    monkeypatch.setattr(place, stage, failing)
+    found = gmwm.fleet(lot, folder=tmp_path / "out", **QUICK)
+    assert list(found.failed) == [lot[0], lot[3]]
+    assert found[lot[0]].code == "unexpected" and found[lot[0]] in found.notices
+    assert found.failed == gmwm.Fleet.load(tmp_path / "out").failed
+    assert {each.stem for each in (tmp_path / "out" / "calibrations").iterdir()} == {
+        "unit 1", "third"
+    }  # fmt: skip
+    assert all("unit 0" not in each.numbers for each in found.structures)
+    assert {row["device"] for row in found.rows if row["valid"]} == {"unit 1", "third"}
 
 
 def test_units_of_another_kind_are_reported(record, tmp_path):

@@ -9,7 +9,7 @@ from gmwm import GaussMarkov, RandomWalk, Sinusoid, WhiteNoise
 from gmwm.calibration import axis_numbers
 from gmwm.estimate import estimate
 from gmwm.issues import Notice
-from gmwm.population import Choice, spreads_of
+from gmwm.population import Choice, spreads_of, unit
 
 TRUTH = WhiteNoise(1.0) + GaussMarkov(2.0, 0.5)
 N, DT = 12_000, 0.01
@@ -46,6 +46,15 @@ def test_the_order_of_units_changes_nothing(lot):
     assert back.model == chosen(lot).model
     for name, own in chosen(lot).numbers.items():
         assert back.numbers[name] == own
+
+
+def test_the_unit_that_prevents_a_structure_is_named(lot, monkeypatch):
+    usual = unit.estimate
+    monkeypatch.setattr(unit, "estimate", lambda m, wv: 1 / 0 if wv is odd else usual(m, wv))
+    odd = lot["u3"].wv
+    found = Choice({"gyro_x": lot}, is_given=False).attempt("gyro_x")
+    assert (found.code, found.where) == ("unexpected", "u3")
+    assert found.text == "ZeroDivisionError: division by zero"
 
 
 def test_a_unit_that_contradicts_the_model_keeps_its_own_numbers(lot):
