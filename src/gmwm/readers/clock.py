@@ -12,15 +12,7 @@ from gmwm._core.typing import BoolArray, FloatArray, IntArray, known_of, median
 from gmwm.errors import InputError
 from gmwm.issues import Notice, notice
 from gmwm.readers import tuning
-from gmwm.readers.grid import (
-    Change,
-    Jumps,
-    Uneven,
-    find_change,
-    find_jumps,
-    find_lattice,
-    place_uneven,
-)
+from gmwm.readers.grid import Grid, Jumps, NoGrid, find_grid, find_lattice
 from gmwm.readers.names import bare
 from gmwm.readers.table import more_such
 
@@ -112,7 +104,9 @@ def timing_of(clock: Clock, expected: float | None = None) -> Timing:
     if continued is not None:
         clock = replace(clock, stamps=continued)
         last.insert(0, notice("clock-wraps"))
-    found = _grid(clock)
+    found = find_grid(clock.stamps)
+    if isinstance(found, NoGrid):
+        raise _not_even(clock, found)
     jumps = found.jumps
     if not _SHORTEST_STEP < jumps.interval < 1.0 / _SHORTEST_STEP:
         raise clock.error(None, f"steps of {jumps.interval:g} are impossible for a clock")
@@ -180,67 +174,14 @@ def _unwrapped(stamps: FloatArray, unit: float) -> FloatArray | None:
     return None
 
 
-@dataclass(frozen=True)
-class _Grid:
-    """Jumps and jitter of a clock, the change of its rate, and its uneven stamps if it has any."""
-
-    jumps: Jumps
-    jitter: float
-    change: Change | None
-    uneven: Uneven | None = None
-    is_lattice: bool = False  # whether many rows are lost from a clock that shows the interval
-
-
-def _grid(clock: Clock) -> _Grid:
-    """Where no step is shorter than half of the usual one, the jumps are those of the steps."""
-    with np.errstate(all="ignore"):  # extreme stamps end in an InputError, not in a warning
-        steps = np.diff(clock.stamps)
-        is_increasing = bool(np.all(steps > 0.0))
-        if is_increasing and (lattice := find_lattice(clock.stamps)) is not None:
-            whole = np.delete(steps, lattice.rows - 1) / lattice.interval
-            return _Grid(lattice, float(np.std(whole)), None, is_lattice=True)
-        is_even = is_increasing and not _are_in_turns(clock.stamps, steps)
-        every = 1 if is_even else tuning.ROWS_OF_ROUGH
-        change = find_change(clock.stamps[::every])
-        if change is not None:
-            before, after = change.rates
-            change = Change(change.row * every, (before * every, after * every))
-        short = np.flatnonzero(~(steps >= tuning.SHORTEST_STEP * median(steps)))
-        if is_even and (change is not None or not short.size):
-            jumps = find_jumps(clock.stamps)
-            if jumps.interval > 0.0:
-                jitter = float(np.std(np.delete(steps, jumps.rows - 1))) / jumps.interval
-                return _Grid(jumps, jitter, change)
-        uneven = place_uneven(clock.stamps)
-        if isinstance(uneven, Uneven):
-            return _Grid(uneven.jumps, uneven.jitter, change, uneven)
-    # The first step that no clock has, and how many there are.
-    wrong, what = np.flatnonzero(steps < 0.0) + 1, "goes back"
-    if not wrong.size:
-        wrong, what = np.flatnonzero(steps == 0.0) + 1, "repeats the one before"
-    if not wrong.size:
-        wrong = short[:1] + 1 if short.size else np.array([int(np.argmax(steps)) + 1])
-        usual = np.median(steps)
-        what = f"is {steps[wrong[0] - 1]:.6g} after the one before, {usual:.6g} is usual"
-    if uneven is not None and np.count_nonzero(steps < 0.0) <= 1:
+def _not_even(clock: Clock, found: NoGrid) -> InputError:
+    """The error about the first stamp that is on no grid."""
+    if not found.stamp:
         back = "the clock goes back: from here on stamps are early, or the rows are not in order"
-        raise clock.error(uneven, back, f"use the part before or after, or, {_WAY_OUT}")
-    stamp = f"time stamp {clock.stamps[wrong[0]]:.15g} {what}{more_such(wrong.size)}"
+        return clock.error(found.row, back, f"use the part before or after, or, {_WAY_OUT}")
+    stamp = f"time stamp {clock.stamps[found.row]:.15g} {found.stamp}{more_such(found.count)}"
     hint = f"sort the rows or use a part with an even clock, or, {_WAY_OUT}"
-    raise clock.error(int(wrong[0]), f"{stamp}, so that no even clock fits most of them", hint)
-
-
-def _are_in_turns(stamps: FloatArray, steps: FloatArray) -> bool:
-    """Whether short and long steps alternate, so that the usual step is not the interval."""
-    pairs = stamps[2:] - stamps[:-2]
-    usual = median(pairs)
-    if abs(2.0 * median(steps) / usual - 1.0) < tuning.UNLIKE_STEPS:
-        return False
-    short, long = median(steps[steps < 0.5 * usual]), median(steps[steps > 0.5 * usual])
-    # A long step of about twice the short one may as well be one of three samples that is lost.
-    if abs(long / short - 2.0) < tuning.OFF_GRID:
-        return False
-    return bool(np.mean(np.abs(pairs / usual - 1.0) < 0.1) > tuning.MOST_IN_TURNS)
+    return clock.error(found.row, f"{stamp}, so that no even clock fits most of them", hint)
 
 
 def _unit(clock: Clock, step: float, expected: float | None) -> tuple[float, bool]:
@@ -284,7 +225,7 @@ def without_unit(
     return InputError(text, "time-unit", hint, {"rate": rate, "column": called})
 
 
-def _check_jumps(clock: Clock, found: _Grid, seconds: float) -> None:
+def _check_jumps(clock: Clock, found: Grid, seconds: float) -> None:
     """Reject a clock whose rate changes much, or whose jumps are not lost rows."""
     jumps, n = found.jumps, clock.stamps.size
     if found.is_lattice:
@@ -325,7 +266,7 @@ def _check_jumps(clock: Clock, found: _Grid, seconds: float) -> None:
         raise clock.error(int(jumps.rows[longest]), text, hint)
 
 
-def _notices(clock: Clock, found: _Grid, seconds: float, *, is_guess: bool) -> list[Notice]:
+def _notices(clock: Clock, found: Grid, seconds: float, *, is_guess: bool) -> list[Notice]:
     """The rate and the jitter, jumps, a change of the rate, and what is uneven."""
     jumps, jitter, uneven = found.jumps, found.jitter, found.uneven
     interval = jumps.interval * seconds

@@ -74,7 +74,7 @@ def roles_of(table: Table, given: Given) -> Roles:
     time: int | None = None
     if given.time is not None and given.time is not False:
         time = find_column(table, given.time, "time")
-    stamps = [i for i, name in enumerate(names) if meaning(name).role == TIME]
+    stamps = [i for i, each in enumerate(table.meanings) if each.role == TIME]
     if isinstance(channels, Mapping):
         if not channels:
             raise InputError(f"channels names no channel: give the column of each, e.g. {_EXAMPLE}")
@@ -169,9 +169,9 @@ def _listed(table: Table, most: int = 12) -> str:
 
 
 def _named_channels(table: Table) -> dict[str, int]:
-    found, roles = dict[str, int](), [meaning(name).role for name in table.names]
+    found = dict[str, int]()
     for channel in CANONICAL:
-        indices = [i for i, role in enumerate(roles) if role == channel]
+        indices = [i for i, each in enumerate(table.meanings) if each.role == channel]
         if len(indices) > 1:
             names = " and ".join(label(table.names, i) for i in indices[:2])
             text = f"{table.source}: columns {names} may both be {channel}: choose one"
@@ -226,7 +226,7 @@ def _given_auxiliary(
     found = []
     for name, index in chosen.items():
         unit = auxiliary_unit(units.get(name, ""))
-        column = meaning(table.names[index])
+        column = table.meanings[index]
         if unit is not None:
             found.append(AuxiliaryColumn(name, index, unit.quantity, unit))
         elif (role := meaning(name).role) in AUXILIARY or (
@@ -242,12 +242,11 @@ def _found_auxiliary(
 ) -> list[AuxiliaryColumn]:
     """Columns without another use that are auxiliary by their names."""
     found: list[AuxiliaryColumn] = []
-    for index, column in enumerate(table.names):
-        role = meaning(column)
+    for index, role in enumerate(table.meanings):
         quantity = "clock" if role.role == TIME else role.role
         if index in used or quantity not in AUXILIARY:
             continue
-        name = bare(column)
+        name = bare(table.names[index])
         if name in chosen or name in {other.name for other in found}:
             name = f"{name}_{index}"
         unit = auxiliary_unit(units.get(name, role.unit or ""))
@@ -278,8 +277,8 @@ def channel_units(
     found, from_header, overruled = dict[str, str](), dict[str, str](), dict[str, str]()
     missing: dict[str, str] = {}  # one channel of each sensor stands for the others
     for channel, column in roles.channels.items():
-        in_header = meaning(table.names[column]).unit
-        sensor = _sensor(channel) or _sensor(meaning(table.names[column]).role or "")
+        in_header, role = table.meanings[column].unit, table.meanings[column].role or ""
+        sensor = _sensor(channel) or _sensor(role)
         given = units.get(channel, units.get(sensor))
         unit = given if given is not None else in_header
         if unit is None:

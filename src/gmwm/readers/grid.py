@@ -100,6 +100,83 @@ class Change:
     rates: tuple[float, float]
 
 
+@dataclass(frozen=True)
+class Uneven:
+    """Uneven stamps on an even grid: jitter, bursts, late stamps."""
+
+    jumps: Jumps
+    late: FloatArray  # (m,), how far each different stamp is after the grid, in sampling intervals
+    last: IntArray  # (m,), last row that has the stamp
+    burst: int  # rows that have one stamp, usually
+    jitter: float  # standard deviation of the steps without losses, in sampling intervals
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Jumps and jitter of a clock, the change of its rate, and its uneven stamps if it has any."""
+
+    jumps: Jumps
+    jitter: float
+    change: Change | None
+    uneven: Uneven | None = None
+    is_lattice: bool = False  # whether many rows are lost from a clock that shows the interval
+
+
+@dataclass(frozen=True)
+class NoGrid:
+    """Why most time stamps fit no even grid."""
+
+    row: int  # the first that does not
+    stamp: str  # what is wrong with its stamp; empty for a clock that was set back
+    count: int = 1  # of such rows
+
+
+def find_grid(stamps: FloatArray) -> Grid | NoGrid:
+    """The even grid of a clock; where no step is short, the jumps are those of the steps."""
+    with np.errstate(all="ignore"):  # extreme stamps end in an InputError, not in a warning
+        steps = np.diff(stamps)
+        is_increasing = bool(np.all(steps > 0.0))
+        if is_increasing and (lattice := find_lattice(stamps)) is not None:
+            whole = np.delete(steps, lattice.rows - 1) / lattice.interval
+            return Grid(lattice, float(np.std(whole)), None, is_lattice=True)
+        is_even = is_increasing and not _are_in_turns(stamps, steps)
+        every = 1 if is_even else tuning.ROWS_OF_ROUGH
+        change = find_change(stamps[::every])
+        if change is not None:
+            before, after = change.rates
+            change = Change(change.row * every, (before * every, after * every))
+        short = np.flatnonzero(~(steps >= tuning.SHORTEST_STEP * median(steps)))
+        if is_even and (change is not None or not short.size):
+            jumps = find_jumps(stamps)
+            if jumps.interval > 0.0:
+                jitter = float(np.std(np.delete(steps, jumps.rows - 1))) / jumps.interval
+                return Grid(jumps, jitter, change)
+        uneven = place_uneven(stamps)
+        if isinstance(uneven, Uneven):
+            return Grid(uneven.jumps, uneven.jitter, change, uneven)
+    if uneven is not None and np.count_nonzero(steps < 0.0) <= 1:
+        return NoGrid(uneven, "")
+    for wrong, what in ((steps < 0.0, "goes back"), (steps == 0.0, "repeats the one before")):
+        if np.any(wrong):
+            return NoGrid(int(np.argmax(wrong)) + 1, what, int(np.count_nonzero(wrong)))
+    row = int(short[0] if short.size else np.argmax(steps))
+    what = f"is {steps[row]:.6g} after the one before, {np.median(steps):.6g} is usual"
+    return NoGrid(row + 1, what)
+
+
+def _are_in_turns(stamps: FloatArray, steps: FloatArray) -> bool:
+    """Whether short and long steps alternate, so that the usual step is not the interval."""
+    pairs = stamps[2:] - stamps[:-2]
+    usual = median(pairs)
+    if abs(2.0 * median(steps) / usual - 1.0) < tuning.UNLIKE_STEPS:
+        return False
+    short, long = median(steps[steps < 0.5 * usual]), median(steps[steps > 0.5 * usual])
+    # A long step of about twice the short one may as well be one of three samples that is lost.
+    if abs(long / short - 2.0) < tuning.OFF_GRID:
+        return False
+    return bool(np.mean(np.abs(pairs / usual - 1.0) < 0.1) > tuning.MOST_IN_TURNS)
+
+
 def find_change(stamps: FloatArray) -> Change | None:
     """The change of the sampling rate between parts of a recording; None if there is none.
 
@@ -228,17 +305,6 @@ def _advance(stamps: FloatArray, rows: IntArray, interval: float) -> FloatArray:
     previous = np.concatenate([[0], rows[:-1]])[:, None]
     following = np.append(rows[1:], stamps.size)[:, None]
     return 1.0 + lead(after, after < following) - lead(before, before >= previous)
-
-
-@dataclass(frozen=True)
-class Uneven:
-    """Uneven stamps on an even grid: jitter, bursts, late stamps."""
-
-    jumps: Jumps
-    late: FloatArray  # (m,), how far each different stamp is after the grid, in sampling intervals
-    last: IntArray  # (m,), last row that has the stamp
-    burst: int  # rows that have one stamp, usually
-    jitter: float  # standard deviation of the steps without losses, in sampling intervals
 
 
 def place_uneven(stamps: FloatArray) -> Uneven | int | None:

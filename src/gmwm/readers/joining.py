@@ -10,7 +10,7 @@ import numpy as np
 from gmwm.errors import InputError
 from gmwm.issues import Notice, notice
 from gmwm.readers import tuning
-from gmwm.readers.names import CANONICAL, bare, meaning
+from gmwm.readers.names import CANONICAL, TIME, bare
 from gmwm.readers.recording import Channel, Recording, notices_of_gaps
 from gmwm.readers.table import Table
 
@@ -31,7 +31,7 @@ class Part:
 
 def has_sensors(table: Table) -> bool:
     """Whether a table has columns of gyros or accelerometers, or might."""
-    roles = {meaning(name).role for name in table.names}
+    roles = {each.role for each in table.meanings}
     return not roles.isdisjoint(CANONICAL) or "temperature" not in roles
 
 
@@ -50,7 +50,7 @@ def shares(
     found: list[tuple[Table, Collection[str] | None]] = []
     known = set[str]()
     for table in tables:
-        roles = {role for name in table.names if (role := meaning(name).role) in CANONICAL}
+        roles = {each.role for each in table.meanings if each.role in CANONICAL}
         roles |= {str(role).partition("_")[0] for role in roles}
         if own := [name for name in wanted if name in roles]:
             found.append((table, own))
@@ -119,7 +119,7 @@ def _cut(part: Part, start: float, stop: float) -> list[Channel]:
 def with_temperature(part: Part, table: Table) -> Part:
     """A thermometer beside the sensors, interpolated at their rate between its stamps."""
     recording, columns = part.recording, range(len(table.names))
-    time = next((i for i in columns if meaning(table.names[i]).role == "time"), None)
+    time = next((i for i in columns if table.meanings[i].role == TIME), None)
     channels: list[Channel] = []
     if time is None:
         return part
@@ -128,7 +128,7 @@ def with_temperature(part: Part, table: Table) -> Part:
     except InputError as error:
         outcome = notice("columns-unreadable", what=f"temperature ({error})")
     else:
-        stamps = arrays.pop(time) * (meaning(table.names[time]).seconds or 1.0)
+        stamps = arrays.pop(time) * (table.meanings[time].seconds or 1.0)
         order = np.argsort(stamps, kind="stable")
         grid = part.start + recording.dt * np.arange(recording.n)
         for column, own in arrays.items():

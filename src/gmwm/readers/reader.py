@@ -23,7 +23,7 @@ from gmwm.readers.columns import AuxiliaryColumn, Given, Reference, Roles, chann
 from gmwm.readers.formats.binary import BinaryTable, layout_of
 from gmwm.readers.joining import Part, has_sensors, joined, shares, with_temperature
 from gmwm.readers.missing import without_sentinels
-from gmwm.readers.names import NUMBERS_OF_SENSORS, TIME, bare, meaning, stated_seconds
+from gmwm.readers.names import NUMBERS_OF_SENSORS, TIME, bare, stated_seconds
 from gmwm.readers.recording import Channel, Recording, auxiliary_channel
 from gmwm.readers.registry import NAMES, Wanted, open_tables
 from gmwm.readers.rest import rest_notices
@@ -179,7 +179,7 @@ def recording_of(table: Table, given: Given) -> Part:
     arrays, auxiliary, unreadable = _load(table, roles)
     start, odd = 0.0, list[Notice]()
     if roles.time is not None:
-        seconds = meaning(table.names[roles.time]).seconds
+        seconds = table.meanings[roles.time].seconds
         if seconds in (None, 1.0) and clocks.is_time_of_day(arrays[roles.time]):
             arrays[roles.time] = clocks.seconds_of_day(arrays[roles.time])
             odd.append(notice("time-of-day"))
@@ -255,7 +255,7 @@ def _unknown_rate(table: Table, time: int | None, stated: float | None) -> Input
     if time is None and stated is None:
         problem = f"{table.source} has no time column and no rate was given"
         return InputError(problem, "rate", "give it in Hz, e.g. rate=100", {"rate": 100.0})
-    if time is None or stated is not None or meaning(table.names[time]).seconds is not None:
+    if time is None or stated is not None or table.meanings[time].seconds is not None:
         return None
     steps = np.diff(table.load([time])[time])
     usual = float(np.median(steps)) if steps.size else 0.0  # too few samples are reported later
@@ -264,12 +264,12 @@ def _unknown_rate(table: Table, time: int | None, stated: float | None) -> Input
 
 def _contradicted(table: Table, rate: float) -> list[Notice]:
     """Say that stamps which are not used have another rate (Hz) than the given one."""
-    found = {i: meaning(name) for i, name in enumerate(table.names)}
-    index = next((i for i, each in found.items() if each.role == TIME and each.seconds), None)
+    stamped = (i for i, each in enumerate(table.meanings) if each.role == TIME and each.seconds)
+    index = next(stamped, None)
     if index is not None:
         with suppress(InputError, ZeroDivisionError):
             stamps = np.sort(known_of(load_columns(table, [index])[index]))
-            unit = found[index].seconds or 1.0
+            unit = table.meanings[index].seconds or 1.0
             own = 1.0 / (clocks.usual_step(stamps) * unit)
             mean = (stamps.size - 1) / (float(stamps[-1] - stamps[0]) * unit)
             if not (clocks.agree(rate, own) and clocks.agree(rate, mean)):
@@ -323,7 +323,7 @@ def _timing(
             found[1:] &= (values[1:] == values[:-1]) | both
         return found
 
-    found, column = meaning(table.names[time]), table.column(time)
+    found, column = table.meanings[time], table.column(time)
     unit = (found.seconds, found.stated)
     timing = clocks.timing_of(
         Clock(table.source, column, arrays[time], *unit, table.where, same), stated

@@ -7,6 +7,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import cached_property
 from importlib import import_module
 from types import ModuleType
 
@@ -18,6 +19,7 @@ from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.issues import Notice, notice
 from gmwm.readers import tuning
+from gmwm.readers.names import Meaning, meaning
 
 LARGEST = 1e150  # magnitudes from here on are rejected like infinities: their squares overflow
 Columns = dict[int, FloatArray]  # index of a column -> its values, NaN where a sample is missing
@@ -38,6 +40,11 @@ class Table(ABC):
     stamps: str = ""  # what messages call the time stamps, where they are no column of the file
     imu: str = ""  # of a log of several IMUs, the one whose sensors these are
     origin: str = "the names of the columns"  # what says the units, for messages
+
+    @cached_property
+    def meanings(self) -> tuple[Meaning, ...]:
+        """What the name of each column says."""
+        return tuple(map(meaning, self.names))
 
     @abstractmethod
     def segments(self, columns: Sequence[int], rows: int) -> Iterator[Columns]:

@@ -50,7 +50,7 @@ class FrameTable(Table):
         import pyarrow as pa
 
         kind = self.types[column]
-        is_stamp = pa.types.is_integer(kind) and meaning(self.names[column]).role == TIME
+        is_stamp = pa.types.is_integer(kind) and self.meanings[column].role == TIME
         if not (is_stamp or _is_time(kind)):
             with np.errstate(invalid="ignore"):  # half floats may hold NaN that signal
                 numbers: FloatArray = values.cast(pa.float64(), safe=False).to_numpy() + 0.0
