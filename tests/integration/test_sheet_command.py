@@ -30,7 +30,7 @@ def test_from_a_sheet_to_kalibr_and_back(run, sheet, tmp_path):
     assert "record an hour" in (tmp_path / "imu.yaml").read_text()
     numbers = gmwm.datasheet(sheet).numbers()
     assert written["gyroscope_random_walk"] == pytest.approx(numbers["gyro"].K, rel=1e-5)
-    assert f"{numbers['gyro'].K:.2e} rad/s^2" in printed
+    assert f"{numbers['gyro'].K:.2e} rad/s^2" in "".join(printed.splitlines()[:5])  # comes first
     code, printed, _ = run("sheet", "sheet.yaml", "--imu", "imu.yaml")
     assert code == 0
     judged = gmwm.datasheet(sheet).judged({"gyro": numbers["gyro"]})["gyro"]
@@ -61,3 +61,14 @@ def test_list_and_what_is_missing(run):
     code, _, said = run("sheet", printed.split()[0], "--unit-spread", "0.5")
     assert code == 2
     assert "give a factor of 1 or more" in said
+
+
+def test_a_sheet_without_slow_noise_tells_its_white_noise(run, tmp_path):
+    (tmp_path / "white.yaml").write_text("gyro: {noise_density: 0.005 deg/s/sqrt(Hz)}")
+    code, printed, _ = run("sheet", "white.yaml")
+    assert code == 0
+    assert "gyro: N 0.212 to 0.3 deg/sqrt(h) or 6.17e-05 to 8.73e-05 rad/s" in printed
+    assert "leaves K open" in printed
+    code, _, said = run("sheet", "white.yaml", "-o", "numbers.json")
+    assert (code, "leaves K open" in said) == (2, True)
+    assert not (tmp_path / "numbers.json").exists()

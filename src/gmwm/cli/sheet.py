@@ -59,7 +59,7 @@ def sheet(
     Write lowest_deviation in place of B where the sheet calls the lowest point of the Allan plot
     bias instability: many do. All keys: docs/data-sheets.md.
     Two numbers leave much open: N and K are found for every kind of error model that agrees with
-    them, and the last table holds what covers them all. An hour of recording tells more.
+    them; printed first is what covers them all. An hour of recording tells more.
 
     \b
     Examples:
@@ -71,21 +71,26 @@ def sheet(
     from gmwm.datasheet import datasheet, sheets
 
     if listed:
-        lines = (wrapped(datasheet(name).document, f"{name:<10} ", 11) for name in sheets())
-        click.echo("\n".join(line for each in lines for line in each))
+        for name in sheets():
+            each = datasheet(name)
+            about = f"{each.document}{'; N only' if each.leaves_K_open else ''}"
+            click.echo("\n".join(wrapped(about, f"{name:<11} ", 12)))
         return
     if source is None:
         raise InputError("gmwm sheet needs a YAML file or a sensor (sensors: gmwm sheet --list)")
     found = datasheet(source)
+    if found.leaves_K_open and not (output or report or imu or as_json):
+        click.echo(found.text(units, form, horizon))
+        return
     numbers = found.numbers(form, horizon, **how)
     if output is not None:
         numbers.save(output)
-    answer = _for_filter(numbers, how["unit_spread"])
+    answer = _for_filter(found.name, numbers, how["unit_spread"])
     if report is not None:
         from gmwm.report import write_sheet_report
 
         write_sheet_report(found, report, numbers, answer)
-    parts = [found.text(units, form, horizon), answer]
+    parts = [answer, found.text(units, form, horizon)]
     if imu is not None:
         parts.append(
             _judged(found.judged(_in_use(imu, how["rate"]), horizon, how["unit_spread"]), imu)
@@ -93,15 +98,16 @@ def sheet(
     print_result(numbers, report, output, text="\n\n".join(parts), as_json=as_json)
 
 
-def _for_filter(numbers: FilterNumbers, unit_spread: float) -> str:
+def _for_filter(name: str, numbers: FilterNumbers, unit_spread: float) -> str:
     """N, K and the start bias of each sensor in SI by key, and how consistent they are."""
     from gmwm._core.units import SI_UNIT
     from gmwm.filter_numbers import shown_unit
     from gmwm.report import filter_key
 
     title = (
-        f"For your filter, outages up to {numbers.horizon:g} s: covers all of them, in units up to "
-        f"{unit_spread:g} times as noisy (keys of OpenVINS, Kalibr)"
+        f"{name}, for your filter (keys of Kalibr, OpenVINS): covers all models that agree with "
+        f"the sheet, units up to {unit_spread:g} times as noisy, outages up to "
+        f"{numbers.horizon:g} s"
     )
     lines = wrapped(title)
     for quantity, each in numbers.items():
@@ -122,7 +128,7 @@ def _for_filter(numbers: FilterNumbers, unit_spread: float) -> str:
     warnings = [n for each in numbers.values() for n in each.notices if n.severity == "warning"]
     lines += bullets(dict.fromkeys(map(str, warnings)))
     lines += wrapped(f"NEES at most {', '.join(worst)} (1: consistent, below: cautious)")
-    return "\n".join([*lines, "", *wrapped("An hour of recording tells more: gmwm calibrate")])
+    return "\n".join([*lines, *wrapped("An hour of recording tells more: gmwm calibrate")])
 
 
 def _in_use(imu: Path, rate: float) -> Any:

@@ -87,6 +87,11 @@ class Datasheet(InUnits):
         """N, B and K of each sensor or channel as far as they are stated, SI."""
         return {sensor: self.of(sensor, None) for sensor in self.entries}
 
+    @property
+    def leaves_K_open(self) -> bool:
+        """Whether no slow noise is stated of any sensor, so that there are no `numbers`."""
+        return not any("K" in v or lowest_deviation(v) for v in self.entries.values())
+
     def of(self, channel: str, quantity: str | None) -> dict[str, float]:
         """N, B and K of a channel as far as they are stated, SI."""
         values = self.entries.get(channel, self.entries.get(quantity or "", {}))
@@ -131,9 +136,15 @@ class Datasheet(InUnits):
         values = {
             k: v if k in _SHARED else unit_spread * v for k, v in self.entries[sensor].items()
         }
+        white = _white(values)
+        if not white:
+            raise InputError(
+                f"{where}: no white noise is stated: give N, noise_density, or rms_noise and "
+                "bandwidth"
+            )
         return {
             f"{sensor}_{label}{way}": model
-            for way, N in _white(where, values).items()
+            for way, N in white.items()
             for label, model in agreeing(where, values, N).items()
         }
 
@@ -178,7 +189,7 @@ class Datasheet(InUnits):
                 continue
             sd = values.get("turn_on_bias", 0.0)
             axes = [*bound(models, form, horizon, bias_sd=sd, shared=True).values()]
-            N = next(iter(_white(sensor, values).values()))
+            N = next(iter(_white(values).values()))
             found[sensor] = _of_all(axes, _unlikely(sensor.partition("_")[0], values, N))
         if not found:
             raise reasons[0]
@@ -261,27 +272,36 @@ class Datasheet(InUnits):
     def text(self, units: str = "field", form: str = "N+K", horizon: float = HORIZON) -> str:
         """Of each kind of model that agrees with the sheet, N and K that a filter needs."""
         about = f"{self.name} ({self.document})" if self.document else self.name
-        what = "typical values of a data sheet. Models that agree with it, and N and K of a filter"
-        title = f"{about}: {what} for each, for outages up to {horizon:g} s:"
+        kinds = "Models that agree with it, and N and K that a filter needs for each"
+        title = f"{about}: typical values of a data sheet. {kinds}, outages up to {horizon:g} s:"
+        if self.leaves_K_open:
+            title = f"{about}: typical values of a data sheet"
         parts = ["\n".join(wrapped(title))]
         if self.temperature:
             said = f"stated for {self.temperature}: add what the bias changes with temperature"
             parts.append("\n".join(wrapped(said)))
-        for sensor in self.entries:
+        for sensor, values in self.entries.items():
+            quantity = sensor.partition("_")[0]
             try:
                 models = self.models(sensor)
             except InputError as error:
-                parts.append("\n".join(wrapped(str(error), indent=2)))
+                white = [*_white(values).values()]
+                stated = (
+                    f"{_ends(white, scale)} {unit}"
+                    for unit, scale in (shown_unit("N", quantity, u) for u in ("field", "si"))
+                )
+                known = f"{sensor}: N {' or '.join(stated)}" if white else ""
+                parts.append("\n".join(filter(None, (known, *wrapped(str(error), indent=2)))))
                 continue
-            kinds: dict[str, list[AxisFilterNumbers]] = {}
+            by_kind: dict[str, list[AxisFilterNumbers]] = {}
             for label, model in models.items():
                 found = bound(model, form, horizon)
                 for kind in (_kind(label), "all"):
-                    kinds.setdefault(kind, []).append(found)
-            kinds["all"] = kinds.pop("all")
-            known = [shown_unit(key, sensor.partition("_")[0], units) for key in "NK"]
+                    by_kind.setdefault(kind, []).append(found)
+            by_kind["all"] = by_kind.pop("all")
+            known = [shown_unit(key, quantity, units) for key in "NK"]
             rows = []
-            for kind, same in kinds.items():
+            for kind, same in by_kind.items():
                 values = zip([[e.N for e in same], [e.K for e in same]], known, strict=True)
                 rows.append((kind, *(_ends(each, scale) for each, (_, scale) in values)))
             heads = (
@@ -323,8 +343,8 @@ def _ends(values: Sequence[float], scale: float) -> str:
     return " to ".join(dict.fromkeys(brief(scale * end(values), 3) for end in (min, max)))
 
 
-def _white(where: str, values: Mapping[str, float]) -> dict[str, float]:
-    """N by the way in which the sheet may mean it, u/sqrt(Hz)."""
+def _white(values: Mapping[str, float]) -> dict[str, float]:
+    """N by the way in which the sheet may mean it, u/sqrt(Hz); empty if none is stated."""
     if "N" in values:
         return {"": values["N"]}
     if "noise_density" in values:
@@ -334,6 +354,4 @@ def _white(where: str, values: Mapping[str, float]) -> dict[str, float]:
         density = values["rms_noise"] / np.sqrt(values["bandwidth"])
         least = _PER_DENSITY * density / np.sqrt(_FIRST_ORDER)
         return {"": least, " (sharp band)": _PER_DENSITY * density}
-    raise InputError(
-        f"{where}: no white noise is stated: give N, noise_density, or rms_noise and bandwidth"
-    )
+    return {}

@@ -39,6 +39,6 @@ def write_sheet_report(
         "sheet.html",
         sheet=sheet,
         pictures=pictures,
-        text=f"{text}\n\n{answer or numbers.text()}",
+        text=f"{answer or numbers.text()}\n\n{text}",
         provenance=origin(known, "page of", None),
     )
