@@ -1,7 +1,7 @@
 """Numbers for filters in the files that other programs read.
 
-A consumer is one class in `gmwm.export.programs`, listed once in `TARGETS`, and described in
-docs/export.md. The class declares its keys once: they write the file and read it back.
+A consumer is an entry of programs.toml, with a template of its file, and described in
+docs/export.md. Its keys stand once: they write the file and read it back.
 """
 
 import sys

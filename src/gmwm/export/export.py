@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import os
+import tomllib
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
@@ -13,30 +15,32 @@ from gmwm._core import checks
 from gmwm._core.files import content_of, writable_file
 from gmwm.calibration import Calibration
 from gmwm.errors import InputError
-from gmwm.export.keys import Keys, Pair, entries
-from gmwm.export.programs.filters import (
-    Basalt,
-    Gazebo,
-    Glim,
-    GnssInsSim,
-    Gtsam,
-    GtsamCpp,
-    KfGins,
-    Matlab,
-    PyIns,
-    Ros,
-)
-from gmwm.export.programs.keyed import KEYED
-from gmwm.export.programs.state_space import StateSpaceFile
-from gmwm.export.target import Target
+from gmwm.export.keys import MemoryKeys, Pair, WalkKeys, entries
+from gmwm.export.state_space import StateSpaceFile
+from gmwm.export.target import ImuFile, JsonFile, Target
 from gmwm.filter_numbers import FilterNumbers
 from gmwm.process import Model
 
-_FILTERS = (Gtsam, GtsamCpp, Ros, Matlab, StateSpaceFile)
-_OTHERS = (Gazebo, PyIns, GnssInsSim, KfGins, Basalt, Glim)
+_KINDS = {"json": JsonFile, "state-space": StateSpaceFile}
+
+
+def _target(name: str, content: dict[str, Any]) -> Target:
+    """A consumer as programs.toml describes it."""
+    kind = _KINDS.get(content.pop("kind", ""), ImuFile)
+    for given, keys in (("walk_keys", WalkKeys), ("memory_keys", MemoryKeys)):
+        if given in content:
+            content["keys"] = keys(**_fixed(content.pop(given)))
+    return kind(name, **{"file_name": f"{name}.yaml", **_fixed(content)})
+
+
+def _fixed(content: dict[str, Any]) -> dict[str, Any]:
+    return {key: tuple(each) if isinstance(each, list) else each for key, each in content.items()}
+
+
+_PROGRAMS = tomllib.loads(Path(__file__).with_name("programs.toml").read_text(encoding="utf-8"))
 
 TARGETS: Mapping[str, Target] = MappingProxyType(
-    {each.name: each() for each in (*KEYED, *_FILTERS, *_OTHERS)}
+    {name: _target(name, content) for name, content in _PROGRAMS.items()}
 )
 """Every consumer by name."""
 
@@ -101,7 +105,7 @@ def read_numbers(
     Raises InputError if the file cannot be read, has no known keys, or its numbers need a rate.
     """
     values = entries(content_of(path).decode("utf-8-sig", errors="replace"))
-    layouts: dict[Keys, None] = {each.keys: None for each in TARGETS.values() if each.keys}
+    layouts = {each.keys: None for each in TARGETS.values() if each.keys}
     keys = next((each for each in layouts if any(name in values for name in each.names)), None)
     if keys is None:
         known = "; ".join(", ".join(each.names[:2]) for each in layouts)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -54,6 +54,11 @@ class Axis:
     upper: frozenset[str] = frozenset()
     notices: tuple[Notice, ...] = ()
     covers: str = ""
+
+    @property
+    def start_sd(self) -> float:
+        """Of the bias at the start with the Gauss-Markov process, u."""
+        return float(np.hypot(self.sigma, self.initial_sd))
 
     def moved(self, tau: float) -> Axis:
         """With a Gauss-Markov process of another correlation time that bounds its own.
@@ -116,6 +121,13 @@ class Triad:
     def rate(self) -> float:
         return self.axes[0].rate
 
+    @property
+    def known_rate(self) -> float:
+        """Hz; raises InputError if it is not known."""
+        if not self.rate > 0.0:
+            raise InputError(NO_RATE)
+        return self.rate
+
     def xyz(self) -> tuple[Axis, ...]:
         """Axes x, y, z; one that was not calibrated has the largest numbers of the others."""
         ends = [axis.name[-1:].lower() for axis in self.axes]
@@ -134,9 +146,10 @@ class Triad:
             for letter in LETTERS
         )
 
-    def listed(self, value: Callable[[Axis], float]) -> str:
-        """A value of each axis as a list of Python, YAML or JSON."""
-        return f"[{', '.join(f'{value(axis):.6e}' for axis in self.xyz())}]"
+    def listed(self, name: str, unit: float = 1.0, power: int = 1) -> str:
+        """A number of each axis, or its square, in a unit: a list of Python, YAML or JSON."""
+        values = (getattr(axis, name) ** power / unit for axis in self.xyz())
+        return f"[{', '.join(f'{value:.6e}' for value in values)}]"
 
 
 @dataclass(frozen=True)

@@ -15,15 +15,11 @@ import numpy as np
 
 from gmwm._core import checks
 from gmwm._core.typing import FloatArray
-from gmwm._core.units import factor
 from gmwm.errors import InputError
 from gmwm.process import GaussMarkov, Model, WhiteNoise
 
 Pair = tuple[float, float]
 """N and K."""
-
-ARW, DEG_H = factor("deg/sqrt(h)", "rad/sqrt(s)"), factor("deg/h", "rad/s")
-"""SI units in deg/sqrt(h) and deg/h."""
 
 
 @dataclass(frozen=True)

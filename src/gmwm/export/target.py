@@ -7,7 +7,9 @@ import os
 import textwrap
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar
+from dataclasses import dataclass
+from functools import cache, partial
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -17,8 +19,11 @@ from gmwm._core.units import SI_UNIT
 from gmwm.calibration import Calibration
 from gmwm.errors import InputError
 from gmwm.export.imu import ImuNumbers, imu_of, numbers_for
-from gmwm.export.keys import Keys
+from gmwm.export.keys import MemoryKeys, WalkKeys
 from gmwm.filter_numbers import FORMS, usable
+
+if TYPE_CHECKING:
+    from jinja2 import Template
 
 WIDTH = 72
 """Columns of a line of comment, 80 with the marks of the languages around it."""
@@ -27,6 +32,13 @@ MOST = 6
 """Lines of comment in a file."""
 
 _LONGEST = 500  # characters of one remark or name
+
+_UNITS = {
+    ("gyro", "N"): "rad/s/sqrt(Hz)",
+    ("gyro", "K"): "rad/s^2/sqrt(Hz)",
+    ("accel", "N"): "m/s^2/sqrt(Hz)",
+    ("accel", "K"): "m/s^3/sqrt(Hz)",
+}
 
 _HOW = {
     "bound": "the smallest that are never overconfident for the error models",
@@ -149,38 +161,25 @@ def purpose(imu: ImuNumbers) -> list[str]:
     return texts
 
 
+@dataclass(frozen=True)
 class Target(ABC):
-    """A file that some program reads; a subclass sets the class attributes.
+    """A file that some program reads; programs.toml says what the attributes are.
 
     name: As users write it.
-    title: The program.
-    file: The file, or the place in it, where the numbers go.
-    convention: What the values are, in N, K, sigma, tau and the rate f of the samples.
-    source: Where the program's own source, or its manual, defines that.
-    form: The form of the numbers that it holds.
-    caution: What to know before use, in a line of the file.
-    warnings: More of it, for the explanation.
-    file_name: How `gmwm calibrate` calls the file; by default name.yaml.
-    to_copy: Title by which reports offer the text to copy; empty where they do not.
     keys: By which the numbers are read back; None if they cannot be.
     """
 
-    name: ClassVar[str]
-    title: ClassVar[str]
-    file: ClassVar[str]
-    convention: ClassVar[str]
-    source: ClassVar[str]
-    form: ClassVar[str] = "N+K"
-    caution: ClassVar[str] = ""
-    warnings: ClassVar[tuple[str, ...]] = ()
-    file_name: ClassVar[str] = ""
-    to_copy: ClassVar[str] = ""
-    keys: ClassVar[Keys | None] = None
-
-    def __init_subclass__(cls) -> None:
-        super().__init_subclass__()
-        if "name" in vars(cls) and not cls.file_name:
-            cls.file_name = f"{cls.name}.yaml"
+    name: str
+    title: str
+    file: str
+    convention: str
+    source: str
+    form: str = "N+K"
+    caution: str = ""
+    warnings: tuple[str, ...] = ()
+    file_name: str = ""
+    to_copy: str = ""
+    keys: WalkKeys | MemoryKeys | None = None
 
     @abstractmethod
     def export(self, given: Sequence[Any], horizon: float | None, form: str | None) -> str:
@@ -209,28 +208,54 @@ class Target(ABC):
         return text
 
 
+@dataclass(frozen=True)
 class ImuFile(Target):
-    """Numbers of gyros and accelerometers, below comments that say what they are.
+    """Numbers of gyros and accelerometers, below comments that say what they are."""
 
-    shared: Whether the axes of a sensor have one value.
-    one_tau: Whether all axes have one correlation time.
-    mark: What a comment begins with.
-    head: Lines that must stand first.
-    """
+    shared: bool = False
+    one_tau: bool = False
+    mark: str = "#"
+    head: tuple[str, ...] = ()
+    line: str = "{key}: {value:.6e}  # {unit}"
+    template: str = ""
 
-    shared: ClassVar[bool] = False
-    one_tau: ClassVar[bool] = False
-    mark: ClassVar[str] = "#"
-    head: ClassVar[tuple[str, ...]] = ()
+    def body(self, imu: ImuNumbers) -> str:
+        """What stands below the comments.
 
-    @abstractmethod
-    def body(self, imu: ImuNumbers) -> Any:
-        """Lines between the comments; of files in JSON, the object."""
+        The template can use the numbers (imu, gyro, accel), the name of the topic, the ``units`` of
+        `MemoryKeys`, and the functions ``values``, a line for each of `WalkKeys`, and ``rate``.
+        """
+        text = compiled_template(self.template).render(
+            imu=imu,
+            gyro=imu.gyro,
+            accel=imu.accel,
+            topic=imu.topic or "/imu0  # set to the topic of your bag",
+            units=self.keys.units if isinstance(self.keys, MemoryKeys) else (),
+            values=partial(self._values, imu),
+            rate=partial(_rate, imu),
+        )
+        return text.rstrip("\n")
+
+    def _values(self, imu: ImuNumbers) -> str:
+        """Lines of N and K of accelerometers and gyros."""
+        keys, (gyro, accel) = self.keys, imu.triads
+        assert isinstance(keys, WalkKeys)
+        rate, lines = imu.rate if keys.needs_rate else float("nan"), list[str]()
+        triads = (gyro, gyro, accel, accel)
+        for key, letter, triad in zip(keys.names, "NKNK", triads, strict=True):
+            value = keys.written(letter, getattr(triad, letter), rate)
+            unit = _UNITS[triad.quantity, letter]
+            unit = unit.removesuffix("/sqrt(Hz)") if keys.white else unit
+            unit = f"({unit})^2" if keys.power == 2 else unit
+            if any(axis.name in imu.invalid for axis in triad.axes):
+                unit += ", do not use: not valid"
+            lines.append(self.line.format(key=key, value=value, unit=unit))
+        return "\n".join([*lines[2:], *lines[:2]])
 
     def text(self, imu: ImuNumbers) -> str:
         """The whole file."""
         lines = comment(notes(imu, self.title, self.caution), self.mark)
-        return "\n".join([*self.head, *lines, *self.body(imu)]) + "\n"
+        return "\n".join([*self.head, *lines, self.body(imu)]) + "\n"
 
     def export(self, given: Sequence[Any], horizon: float | None, form: str | None) -> str:
         return self.text(self._imu(given, horizon, form))
@@ -259,12 +284,28 @@ class ImuFile(Target):
             raise InputError(f"{self.title}: {error}", error.code) from None
 
 
+def _rate(imu: ImuNumbers) -> str:
+    """Of the IMU, Hz: with a point, since OpenCV distinguishes whole numbers from others."""
+    shown = f"{imu.rate:.9g}"
+    return shown if "." in shown or "e" in shown else f"{shown}.0"
+
+
+@cache
+def compiled_template(text: str) -> Template:
+    """A template of Jinja; importing that takes a while."""
+    from jinja2 import Environment, StrictUndefined
+
+    return Environment(undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True).from_string(
+        text.removeprefix("\n")
+    )
+
+
 class JsonFile(ImuFile):
     """A file in JSON, whose comments are an entry of their own at the end."""
 
     def text(self, imu: ImuNumbers) -> str:
         comments = notes(imu, self.title, self.caution)
-        return json_text({**self.body(imu), "comment": comments}) + "\n"
+        return json_text({**json.loads(self.body(imu)), "comment": comments}) + "\n"
 
 
 def json_text(value: Any, indent: str = "") -> str:

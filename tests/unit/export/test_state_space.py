@@ -17,7 +17,7 @@ from gmwm import (
     Sinusoid,
     WhiteNoise,
 )
-from gmwm.export.programs.state_space import channel
+from gmwm.export.state_space import channel
 from imu_numbers import RATE, numbers
 
 DT = 0.005

@@ -34,17 +34,6 @@ _KINDS = ("discrete", "continuous")
 class StateSpaceFile(Target):
     """Needs one sensor at least and holds any model; a form makes the numbers of that form."""
 
-    name, title, file = "state-space", "state space", "matrices by channel, JSON or NPZ"
-    convention = (
-        "discrete x[k+1] = F x[k] + G w[k], y[k] = H x[k] + v[k], covariances Q of w and R of v; "
-        "continuous dx/dt = F x + G w, y = H x + v, densities Q and R; start: mean x0, covariance "
-        "P0; SI units"
-    )
-    source = "the full model, nothing reduced"
-    form = "full model"
-    caution = "P0 does not include your turn-on bias: add its variance"
-    file_name = "state-space.json"
-
     def export(self, given: Sequence[Any], horizon: float | None, form: str | None) -> str:
         return self._text(self._channels(given, horizon, form), given)
 

@@ -1,1 +1,0 @@
-"""Consumers of filter numbers, a class each."""
