@@ -4,6 +4,7 @@ import gc
 import os
 import signal
 import sys
+from collections import defaultdict
 from pathlib import Path
 
 # Before numpy is imported: as many workers as cores, each with threads of its own, wait for each
@@ -35,6 +36,49 @@ gc.set_threshold(50_000, 20, 20)
 def pytest_collection_finish():
     gc.collect()
     gc.freeze()
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items):
+    """Of stacked parametrizations run cases in which every value occurs; the others are slow."""
+    functions = defaultdict(list)
+    for item in items:
+        if hasattr(item, "callspec") and not item.get_closest_marker("slow"):
+            functions[item.nodeid.partition("[")[0]].append(item)
+    for cases in functions.values():
+        for item in _beyond_covering(cases) if len(cases) > FEW else ():
+            item.add_marker(pytest.mark.slow)
+
+
+FEW = 4
+"""Combinations that are all run."""
+
+
+def _beyond_covering(cases):
+    """Cases off the diagonal of the product whose values occur in others."""
+    rows = [_values(case) for case in cases]
+    factors = [list(dict.fromkeys(column)) for column in zip(*rows, strict=True)]
+    longest = max(map(len, factors), default=1)
+    diagonal = {tuple(each[k % len(each)] for each in factors) for k in range(longest)}
+    seen = {value for row in diagonal & set(rows) for value in enumerate(row)}
+    beyond = []
+    for case, row in zip(cases, rows, strict=True):
+        if row in diagonal:
+            continue
+        if seen.issuperset(enumerate(row)):
+            beyond.append(case)
+        seen.update(enumerate(row))
+    return beyond
+
+
+def _values(case):
+    """Which value of each of its parametrizations a case has."""
+    values = []
+    for mark in case.iter_markers("parametrize"):
+        names = mark.args[0]
+        names = names.split(",") if isinstance(names, str) else names
+        values.append(tuple(id(case.callspec.params[name.strip()]) for name in names))
+    return tuple(values)
 
 
 @pytest.fixture
