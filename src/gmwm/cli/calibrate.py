@@ -25,10 +25,8 @@ from gmwm.cli.options import FILE_TO_WRITE, PATH, folder_to_write, options, read
 from gmwm.errors import InputError
 
 if TYPE_CHECKING:
-    from gmwm._core.typing import FloatArray
     from gmwm.calibration import Calibration, Stopwatch
     from gmwm.estimate import Fit
-    from gmwm.process import Model
     from gmwm.readers import Recording
 
 NONE_VALID = 1
@@ -192,44 +190,24 @@ def show(result: Calibration, files: Iterable[str] = (), *, verbose: bool = Fals
 
 
 def _model_lines(name: str, fit: Fit) -> list[str]:
-    """The terms of an axis; white noise and low-pass noise are one row."""
+    """The terms of an axis."""
     from gmwm._core.text import brief, with_error, wrapped
+    from gmwm.report import error_model
 
-    labels, terms = fit.model.term_labels(), fit.model.terms
+    names = {each.key: each.parameter.name for each in fit.model.parameters}
     rows: dict[str, list[str]] = {}
-    items = {each.key: each for each in fit.model.parameters}
-    white = [k for k, term in enumerate(terms) if term.is_white or term.is_band_limited]
-    for one in fit.estimates:
-        term, key, usual = items[one.key].term, items[one.key].parameter.name, one.usual
+    for label, one in error_model(fit):
+        usual = one.usual
         text = with_error(usual.value, usual.lower, usual.upper)
         if one.kind != "estimated":
             text = f"<= {brief(usual.upper, 3)}" if one.kind == "bound" else f"{usual.value:.4g}"
-        if key == "N" and term in white[:1] and len(white) > 1:
-            text = _total(fit, white)
-        elif term in white and key != "bandwidth" and (key != "N" or term != white[0]):
-            continue
-        row = rows.setdefault("white noise" if term in white else labels[term], [])
-        row.append(f"{key} {text} {usual.unit}".rstrip(" -"))
+        key, more = names.get(one.key, "N"), one.meaning.partition(": ")[2]
+        rows.setdefault(label, []).append(f"{key} {text} {usual.unit}".rstrip(" -"))
+        rows[label] += [] if one.key in names else [more]
     lines = [name if fit.valid else f"{name}, not valid"]
     for label, shown in rows.items():
         lines += wrapped(", ".join(shown), first=f"  {label:<19}", indent=21)
     return lines
-
-
-def _total(fit: Fit, places: Sequence[int]) -> str:
-    """N of white noise and low-pass noise together, in its data-sheet unit."""
-    import numpy as np
-
-    from gmwm._core.text import with_error
-    from gmwm._core.units import customary_unit
-
-    def density(model: Model) -> FloatArray:
-        return np.array([sum((model.terms[k].values["N"] or 0.0) ** 2 for k in places)])
-
-    value = float(density(fit.model)[0]) ** 0.5
-    value *= customary_unit("u/sqrt(Hz)", fit.wv.quantity, fit.wv.unit)[1]
-    spread = float(np.exp(0.98 * fit.logarithmic_error(density)[0]))
-    return with_error(value, value / spread, value * spread)
 
 
 def _all_notices(result: Calibration) -> list[str]:

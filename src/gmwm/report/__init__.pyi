@@ -1,4 +1,8 @@
-from .calibration import fragment as fragment, write_report as write_report
+from .calibration import (
+    error_model as error_model,
+    fragment as fragment,
+    write_report as write_report,
+)
 from .compared import write_sensor_comparison_report as write_sensor_comparison_report
 from .fleet import write_fleet_report as write_fleet_report
 from .health import verdict as verdict

@@ -160,7 +160,7 @@ def _channel(
         "why": why,
         "ambiguity": ambiguity(calibration, name),
         "stated": _stated(name, sensor, fit, sheet),
-        "rows": _error_model(fit),
+        "rows": _with_lengths(fit),
         "figure": deviation_figure(fit, sensor, filter_numbers=pair, rivals=rivals, sheet=sheet),
         "sliders": _sliders(fit, pair),
         "residuals": residual_figure(fit),
@@ -169,16 +169,15 @@ def _channel(
     }
 
 
-def _error_model(fit: Fit) -> list[tuple[Estimate, str]]:
-    """The parameters, each with the length of record that it needs.
+def error_model(fit: Fit) -> list[tuple[str, Estimate]]:
+    """The parameters, each with what its term is called.
 
     White noise is one row with what the sensor's low-pass lets through of it.
     """
-    lengths, duration = fit.needed_length(_AIM), fit.wv.n_all * fit.wv.dt
-    terms = fit.model.terms
+    terms, labels = fit.model.terms, fit.model.term_labels()
     noise = [i for i, term in enumerate(terms) if term.is_white or term.is_band_limited]
     total = _noise(fit.model)[0]
-    rows, merged = list(fit.estimates), set()
+    rows, merged = list[tuple[str, Estimate]](), set()
     if total > 0.0 and any(terms[i].is_band_limited for i in noise):
         merged = {item.key for item in fit.model.parameters if item.term in noise}
         error = 0.5 * float(fit.logarithmic_error(_noise)[0]) * total**0.5
@@ -190,9 +189,18 @@ def _error_model(fit: Fit) -> list[tuple[Estimate, str]]:
             size = f"a {shape.name} of {brief(term.values[shape.name] or 0.0, 3)} {shape.unit}"
             parts.append(f"{per_cent(share)} of its power has {size}" if noise[1:] else size)
         meaning = f"white noise: {', '.join(parts)}"
-        rows = [replace(row, key="N, bandwidth", meaning=meaning), *rows]
-        lengths[rows[0].key] = max((lengths[key] for key in merged & {*lengths}), default=np.inf)
-    return [(e, _needed(lengths.get(e.key), duration)) for e in rows if e.key not in merged]
+        rows.append(("white noise", replace(row, key="N, bandwidth", meaning=meaning)))
+    places = {item.key: item.term for item in fit.model.parameters}
+    return rows + [(labels[places[e.key]], e) for e in fit.estimates if e.key not in merged]
+
+
+def _with_lengths(fit: Fit) -> list[tuple[Estimate, str]]:
+    """The error model, each parameter with the length of record that it needs."""
+    lengths, duration = fit.needed_length(_AIM), fit.wv.n_all * fit.wv.dt
+    rows = [each for _, each in error_model(fit)]
+    merged = lengths.keys() - {each.key for each in rows}
+    longest = max((lengths[key] for key in merged), default=np.inf)
+    return [(e, _needed(longest if "," in e.key else lengths.get(e.key), duration)) for e in rows]
 
 
 def _noise(model: Model) -> FloatArray:

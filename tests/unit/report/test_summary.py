@@ -237,8 +237,9 @@ def test_white_noise_behind_a_low_pass_is_one_row(capsys):
     cal = gmwm.calibrate(rec, model)
     show(cal, verbose=True)
     text = capsys.readouterr().out
-    (row,) = re.findall(r"^  white noise +(.*)$", text, re.MULTILINE)
-    found = re.fullmatch(r"N (\S+) \+-(\S+) deg/sqrt\(h\), bandwidth (\S+) \+-\S+ Hz", row)
+    (row,) = re.findall(r"^  white noise +(.*\n +.*)$", text, re.MULTILINE)
+    share = r"\d+ % of its power has a\s+bandwidth of"
+    found = re.fullmatch(rf"N (\S+) \+-(\S+) deg/sqrt\(h\), {share} (\S+) Hz", row)
     total = np.degrees(np.hypot(2e-4, 4e-4)) * 60.0
     assert abs(float(found[1]) - total) < 3.0 * float(found[2])
     assert f"N {cal.numbers['gyro_x'].text('N')} " in row
