@@ -7,6 +7,10 @@ from gmwm.calibration.channel import (
     Stopwatch as Stopwatch,
     stage as stage,
 )
+from gmwm.calibration.curve import (
+    BiasCurve as BiasCurve,
+    curves_by_covariate as curves_by_covariate,
+)
 from gmwm.calibration.departures import (
     DEPARTURES as DEPARTURES,
     Departure as Departure,

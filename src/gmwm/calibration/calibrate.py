@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Collection, Iterable, Iterator, Sequence
-from dataclasses import replace
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import Any
 
@@ -27,6 +27,7 @@ from gmwm.calibration.channel import (
     unresolved_notice,
     with_validity,
 )
+from gmwm.calibration.covariates import Design, Wanted, designs_of, wanted
 from gmwm.calibration.screening import (
     SCREENING,
     Screened,
@@ -53,6 +54,7 @@ def calibrate(
     screening: Collection[str] = SCREENING,
     still: bool = True,
     remove_departures: bool = False,
+    covariates: Mapping[str, str] | None = None,
     jobs: int = PROCESSES,
     progress: Progress | None = None,
 ) -> Calibration:
@@ -88,6 +90,12 @@ def calibrate(
         Whether evident steps, transients at the start and slow periods are subtracted, the samples
         at which a step may be left out, and what is left is fitted again, three times at most; what
         their estimated sizes take of the noise is given back to the wavelet variances.
+    covariates : mapping, optional
+        What the bias depends on: ``{"temperature": "cubic, lag", "settling": "auto"}``. The name of
+        a channel of the recording, "time" or "settling" (at switch-on, when the recording begins)
+        -> words: "auto" (degree 1 to 3), "linear", "quadratic", "cubic" or a degree; "lag", or
+        "lag 120 s", adds its values of some time before. The curve of each channel is estimated
+        beside its noise, which gets back what that takes (`Calibration.curves`).
     jobs : int, optional
         Processes that share the work at most, by default two, -1 one per core; there are never
         more than cores or channels, and short recordings are worked on by this one alone.
@@ -101,34 +109,68 @@ def calibrate(
     Raises
     ------
     InputError
-        If no channel can be calibrated, a mapping has no model for one, or a log that is not static
-        has no stretch of ten seconds at rest.
+        If no channel can be calibrated, a mapping has no model for one, a log that is not static
+        has no stretch of ten seconds at rest, or a covariate is missing or does not change.
     """
     alone = isinstance(recording, Recording | str | os.PathLike) or is_frame(recording)
     parts: list[Any] = list(recording) if not alone and np.iterable(recording) else [recording]
     given: list[Recording] = [read(each) if is_frame(each) else each for each in parts]
+    beside = wanted(covariates)
     _check_together(given)
     size = sum(each.n * len(each.inertial) for each in given)
     others = workers.extra_workers(jobs, max(len(each.inertial) for each in given))
     on_disk = any(is_spooled(c.values) for each in given for c in each.inertial)
     is_worth = size > tuning.WORTH_PROCESSES and not on_disk  # memory for one channel at a time
     with workers.worker_pool(others if is_worth else 0, "gmwm.estimate:compile_search"):
-        return _calibrated(given, model, screening, still, remove_departures, progress)
+        work = _Work(screening, still, tuning.REMOVALS if remove_departures else 0, beside)
+        return _calibrated(given, model, work, progress)
+
+
+@dataclass(frozen=True)
+class _Work:
+    """What is done to recordings before and after a fit, see `calibrate`."""
+
+    screening: Collection[str]
+    still: bool
+    removals: int
+    covariates: tuple[Wanted, ...]
+
+    def split(self, given: Sequence[Recording]) -> list[Recording]:
+        """The stretches at rest, where they are looked for."""
+        if not (self.still and self.screening):
+            return list(given)
+        return [part for each in given for part in stretches_at_rest(each)]
+
+
+def _without_curves(
+    recordings: Sequence[Recording], covariates: tuple[Wanted, ...]
+) -> tuple[list[Recording], dict[str, Design]]:
+    """Recordings less the first curves of their channels, and the regressors of these."""
+    if not covariates:
+        return list(recordings), {}
+    designs = designs_of(recordings, covariates)
+    left = [
+        replace(
+            each,
+            channels=tuple(
+                c if c.is_auxiliary or c.name not in designs else designs[c.name].without(c, place)
+                for c in each.channels
+            ),
+        )
+        for place, each in enumerate(recordings)
+    ]
+    return left, designs
 
 
 def _calibrated(
-    given: list[Recording],
-    model: GivenModels,
-    screening: Collection[str],
-    still: bool,
-    remove_departures: bool,
-    progress: Progress | None,
+    given: list[Recording], model: GivenModels, work: _Work, progress: Progress | None
 ) -> Calibration:
     with stage("health"):
-        if still and screening:
-            given = [part for each in given for part in stretches_at_rest(each)]
-        treated = [screened(part, screening) for each in given for part in each.by_rate()]
-    tasks, skipped = _tasks(treated, model, tuning.REMOVALS if remove_departures else 0)
+        given = work.split(given)
+        parts = [part for each in given for part in each.by_rate()]
+        parts, designs = _without_curves(parts, work.covariates)
+        treated = [screened(part, work.screening) for part in parts]
+    tasks, skipped = _tasks(treated, model, work.removals, designs)
     found = _models_found(tasks, progress)
     done = {name: each for name, each in found.items() if isinstance(each, ChannelModel)}
     skipped |= {name: each for name, each in found.items() if isinstance(each, Notice)}
@@ -144,7 +186,7 @@ def _calibrated(
                 issues.append(named)
     done, advice = advise_cut(done, given[0].n * given[0].dt if len(given) == 1 else 0.0)
     issues += advice
-    done = with_validity(done, issues, still=still)
+    done = with_validity(done, issues, still=work.still)
     chosen = {name: each.fit.model for name, each in done.items()}
     offered = {} if model is not None else {task.name: task.extra for task in tasks}
     rivals = {name: each.rivals for name, each in done.items() if each.rivals}
@@ -166,12 +208,13 @@ def _calibrated(
         n=sum(each.n for each in given),
         notices=(*with_outcomes(issues, chosen, offered), *tied, *left_open),
         rivals=rivals,
+        curves={name: each.curve for name, each in done.items() if each.curve is not None},
         left_out=_left_out(given[0], treated[0].recording) if len(treated) == 1 else {},
     )
 
 
 def _tasks(
-    treated: Sequence[Screened], model: GivenModels, removals: int
+    treated: Sequence[Screened], model: GivenModels, removals: int, designs: Mapping[str, Design]
 ) -> tuple[list[ChannelTask], dict[str, Notice]]:
     """The channels that can be used in some recording, and why others are skipped."""
     recordings = [each.recording for each in treated]
@@ -192,8 +235,9 @@ def _tasks(
     tasks = []
     for name, parts in alive.items():
         extra = next((e.extra[name] for e in treated if e.extra.get(name)), ())
-        about = (sources[name], models[name], extra, name in robust, removals)
-        tasks.append(ChannelTask(name, parts, *about))
+        origin, places = zip(*sources[name], strict=True)
+        about = (origin, models[name], extra, name in robust, removals)
+        tasks.append(ChannelTask(name, parts, *about, designs.get(name), places))
     return tasks, dead
 
 
@@ -270,13 +314,13 @@ def _check_together(recordings: Sequence[Recording]) -> None:
 
 def _usable(
     treated: Sequence[Screened],
-) -> tuple[dict[str, list[Channel]], dict[str, Notice], dict[str, list[str]]]:
+) -> tuple[dict[str, list[Channel]], dict[str, Notice], dict[str, list[tuple[str, int]]]]:
     """Each channel in the recordings where it can be used, why others are skipped, and which."""
     alive: dict[str, list[Channel]] = {}
-    sources: dict[str, list[str]] = {}
+    sources: dict[str, list[tuple[str, int]]] = {}
     dead: dict[str, Notice] = {}
     interval: dict[str, float] = {}
-    for each in treated:
+    for place, each in enumerate(treated):
         for channel in each.recording.inertial:
             name = channel.name
             if (why := _reason_to_skip(channel, each.notices)) is not None:
@@ -285,7 +329,7 @@ def _usable(
             channel = replace(channel, dt=interval.setdefault(name, channel.dt))
             repeated = each.repeated.get(name)
             alive.setdefault(name, []).append(thinned(channel, repeated) if repeated else channel)
-            sources.setdefault(name, []).append(each.recording.source)
+            sources.setdefault(name, []).append((each.recording.source, place))
     return alive, {name: why for name, why in dead.items() if name not in alive}, sources
 
 

@@ -18,6 +18,7 @@ from gmwm._core.frozen import ByName, freeze
 from gmwm._core.pages import make
 from gmwm._core.tables import frame
 from gmwm._core.text import wrapped
+from gmwm.calibration.curve import BiasCurve
 from gmwm.calibration.numbers import SensorNumbers, axis_numbers
 from gmwm.errors import InputError, MissingNameError
 from gmwm.estimate import Estimate, Fit
@@ -64,11 +65,13 @@ class Calibration(ByName[Fit], Document):
     left_out : dict
         Channel name -> samples of shocks and spikes that were left out, as pairs of the first and
         the one after the last; of a single recording.
+    curves : dict
+        Channel name -> `BiasCurve` against the covariates, which the fits do not contain.
     """
 
     SCHEMA: ClassVar[str] = "gmwm.calibration"
     KEYS: ClassVar[Mapping[str, str]] = {"rate": "rate_hz", "fits": "channels"}
-    LATER: ClassVar[frozenset[str]] = frozenset({"rivals", "left_out"})
+    LATER: ClassVar[frozenset[str]] = frozenset({"rivals", "left_out", "curves"})
     SCHEMA_VERSION: ClassVar[int] = 2
 
     _held = "fits"
@@ -82,9 +85,10 @@ class Calibration(ByName[Fit], Document):
     notices: tuple[Notice, ...] = ()
     rivals: Mapping[str, tuple[Model, ...]] = field(default_factory=dict)
     left_out: Mapping[str, tuple[tuple[Index, Index], ...]] = field(default_factory=dict)
+    curves: Mapping[str, BiasCurve] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        freeze(self, "fits", "skipped", "rivals", "left_out")
+        freeze(self, "fits", "skipped", "rivals", "left_out", "curves")
 
     def __getitem__(self, name: str) -> Fit:
         if name in self.skipped and name not in self.fits:

@@ -13,6 +13,8 @@ import numpy as np
 from gmwm._core.text import brief
 from gmwm._core.units import customary_unit
 from gmwm.calibration import tuning
+from gmwm.calibration.covariates import Design
+from gmwm.calibration.curve import BiasCurve
 from gmwm.calibration.departures import Departure, departure_notices, departures, variance_without
 from gmwm.calibration.numbers import upper_limit
 from gmwm.calibration.steadiness import steadiness_notice
@@ -89,11 +91,13 @@ class ChannelModel:
 
     selection: None where the model was given.
     largest: With the largest walk that the record leaves open, if the selected model has none.
+    curve: Beside the noise, where there are covariates.
     """
 
     fit: Fit
     selection: Selection | None
     largest: Model | None = None
+    curve: BiasCurve | None = None
 
     @property
     def rivals(self) -> tuple[Model, ...]:
@@ -123,6 +127,7 @@ class ChannelTask:
     model: Fitted; None selects one.
     extra: Terms that a selected model may have.
     removals: How many times evident departures are subtracted, and the rest fitted again.
+    design: Regressors of the curve beside the noise, at the recordings' ``places``.
     """
 
     name: str
@@ -132,6 +137,8 @@ class ChannelTask:
     extra: Sequence[Process]
     robust: bool
     removals: int
+    design: Design | None = None
+    places: Sequence[int] = ()
 
     def timed_model(self) -> tuple[ChannelModel | Notice, Stopwatch]:
         """The model of the channel, or why it has none, and the time that it took."""
@@ -149,6 +156,9 @@ class ChannelTask:
             with stage("variance"):
                 both = zip(self.parts, removed, strict=True)
                 after = [variance_without(part, gone, robust=self.robust) for part, gone in both]
+                if self.design is not None:
+                    together = zip(after, self.places, strict=True)
+                    after = [self.design.beside(wv, place) for wv, place in together]
                 before = before or after
             with stage("model"):
                 found = self._fitted(after[0] if len(after) == 1 else after)
@@ -169,7 +179,8 @@ class ChannelTask:
             for source, issues in zip([*sources, *sources], notices, strict=True)
             for each in issues
         ]
-        return replace(found, fit=replace(fit, notices=(*fit.notices, *named)))
+        curve = None if self.design is None else self.design.curve(fit)
+        return replace(found, fit=replace(fit, notices=(*fit.notices, *named)), curve=curve)
 
     def _fitted(self, data: WaveletVariance | Sequence[WaveletVariance]) -> ChannelModel:
         if self.model is not None:

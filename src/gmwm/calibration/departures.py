@@ -164,6 +164,11 @@ def _known_curves(fitted: Fit, means: Means) -> FloatArray:
     for frequency, _ in fitted.model.lines():
         phase = 2.0 * np.pi * frequency * means.time
         curves.append(np.array([np.sin(phase), np.cos(phase)]))
+    beside = fitted.wv.regressors  # of the first recording, where there are several
+    if beside is not None:
+        own = beside.parts[0]
+        middles = own.block * beside.dt * (np.arange(own.blocks.size) + 0.5)
+        curves += [np.interp(means.time, middles, row)[None, :] for row in own.columns]
     return np.vstack(curves)
 
 

@@ -67,6 +67,13 @@ NO_INFORMATION = 1e-9  # share of the largest information, or variance, that rou
 NEAR = 2  # neighbours of a departure that are known with it: its time is between them
 SPANNED = 1e-6  # of the largest singular value: smaller ones are not independent
 
+# -- covariates -----------------------------------------------------------------------------------
+
+NODES, SHORTEST_NODE = 512, 8  # means of a recording that hold its covariates; samples of one
+MOST_DEGREE = 3  # chosen automatically: autopilots hold no more
+LAGS, LAG_STEPS, LONGEST_LAG = (20.0, 3000.0), 10, 0.33  # s; a slower one looks like a drift
+LEAST_RANGE = 1e-6  # of the values of a covariate: less is rounding
+
 # -- noise that changes its size ------------------------------------------------------------------
 
 FREQUENCIES = 64  # at which the floor of the spectrum is looked for

@@ -57,6 +57,11 @@ def folder_of_results(default: str) -> dict[str, Any]:
     --estimating
     --remove-departures  Subtract steps, transients at the start and slow periods that are found,
         and calibrate what is left.
+    --temperature  Estimate the curve of each channel against the temperature channel, beside its
+        noise.
+    --degree N  Of that curve, 1 to 6; by default 1 to 3 is chosen.
+    --covariate NAME=WORDS  The same for another channel, 'time' or 'settling' at switch-on, such as
+        'temperature=cubic,lag' or 'settling=300 s'; repeat.
     --export NAME  Also write the file of this program into the folder; see gmwm export --list.
     --datasheet
     --jobs N  Processes at most; short recordings take one.
@@ -68,12 +73,16 @@ def folder_of_results(default: str) -> dict[str, Any]:
     """,
     output=folder_of_results("gmwm-out"),
     export={"name": "target"},
+    covariate={"name": "covariates", "multiple": True},
     jobs={"default": 2},
 )
 def calibrate(
     files: Sequence[Path],
     output: Path,
     models: dict[str, Any],
+    temperature: bool,
+    degree: int | None,
+    covariates: Sequence[str],
     target: str | None,
     datasheet: Path | None,
     verbose: bool,
@@ -102,6 +111,7 @@ def calibrate(
       gmwm calibrate static.csv --rate 100 --gyro-unit deg/s --accel-unit g -o out
       gmwm calibrate a.csv b.csv --rate 100 --gyro-unit deg/s --accel-unit g
       gmwm calibrate static.bag --export kalibr -o out
+      gmwm calibrate chamber.csv --temperature -o out
     """
     _start_workers(files, given["jobs"], memory)
     from gmwm._core.memory import limited
@@ -109,6 +119,7 @@ def calibrate(
     from gmwm.datasheet import read_datasheet
 
     work = {name: given.pop(name) for name in ("screening", "still", "remove_departures", "jobs")}
+    work["covariates"] = _covariates(temperature, degree, covariates)
     if target is not None:
         from gmwm._core import checks
         from gmwm.export import TARGETS
@@ -140,6 +151,19 @@ def calibrate(
     if timings:
         _show_timings(watch, work["jobs"])
     exit_unless(any(fit.valid for fit in result.values()), "channel")
+
+
+def _covariates(
+    temperature: bool, degree: int | None, others: Sequence[str]
+) -> dict[str, str] | None:
+    """Covariates as `gmwm.calibrate` takes them; None without any."""
+    found = {}
+    for text in others:
+        name, _, words = text.partition("=")
+        found[name.strip()] = words or "auto"
+    if temperature or degree is not None:
+        found.setdefault("temperature", "auto" if degree is None else f"{degree}")
+    return found or None
 
 
 def exit_unless(valid: bool, what: str) -> None:

@@ -27,6 +27,7 @@ from gmwm.readers import Channel, Recording
 from gmwm.report.budget import navigation
 from gmwm.report.figure import (
     Spans,
+    curve_figure,
     density_figure,
     deviation_figure,
     overview_figure,
@@ -145,7 +146,7 @@ def _of_samples(fit: Fit, channel: Channel | None, spans: Spans) -> dict[str, An
 def _channel(
     name: str, calibration: Calibration, numbers: Certified, sheet: Datasheet | None
 ) -> dict[str, Any]:
-    fit = calibration[name]
+    fit, curve = calibration[name], calibration.curves.get(name)
     own = numbers.axes.get(name)
     pair = (own.N, own.K) if own is not None else None
     is_valid, why = trust(name, fit, calibration)
@@ -164,6 +165,8 @@ def _channel(
         "figure": deviation_figure(fit, sensor, filter_numbers=pair, rivals=rivals, sheet=sheet),
         "sliders": _sliders(fit, pair),
         "residuals": residual_figure(fit),
+        "curve": None if curve is None else curve_figure(fit, curve),
+        "coefficients": [] if curve is None else curve.estimates,
         "left_out": sum(stop - start for start, stop in calibration.left_out.get(name, ())),
         "fitness": _fitness(fit),
     }

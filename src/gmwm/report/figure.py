@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from gmwm._core.typing import FloatArray
-from gmwm.calibration import AxisNumbers, Calibration
+from gmwm.calibration import AxisNumbers, BiasCurve, Calibration
 from gmwm.datasheet import Datasheet
 from gmwm.diagnosis import spectrum
 from gmwm.estimate import Fit
@@ -254,6 +254,23 @@ def series_figure(fitted: Fit, channel: Channel, spans: Spans) -> Figure:
         "shapes": [mark | ends for ends in out],
     }
     return _figure(traces, layout, units=units)
+
+
+def curve_figure(fitted: Fit, curve: BiasCurve) -> Figure | None:
+    """A curve with its 95 % band, less its value at the centre; None without a covariate."""
+    one = curve.main
+    if one is None:
+        return None
+    factor = units_of("u", fitted.wv)[1]
+    x, value, error = curve.band()
+    value = factor * (value - curve(one.centre))
+    ends = (value - factor * error, value + factor * error)
+    band = [_line(x, each, "95 % band", "#8a8a8a", "solid", 0.0) for each in ends]
+    band[1] |= {"fill": "tonexty", "fillcolor": "rgba(130,130,130,0.28)"}
+    units = _units("curve", "u", fitted)
+    axes = {"xaxis": _linear(f"{one.name} [{one.unit}]"), "yaxis": _linear(units[0][0])}
+    traces = [*band, _line(x, value, "curve", SUM_COLOUR, "solid", 2.0)]
+    return _figure(traces, {"height": 260, **axes}, units=units)
 
 
 def growth_figure(known: ErrorBudget, unknown: ErrorBudget, of: str, quantity: str) -> Figure:

@@ -16,6 +16,7 @@ from gmwm.report.summary import (
     KEYS,
     actions,
     covers,
+    curve_lines,
     filter_key,
     filter_values,
     intervals,
@@ -37,6 +38,7 @@ def first_screen(
     return {
         "state": verdict(calibration)["state"],
         "verdict": verdict_line(calibration),
+        "curves": curve_lines(calibration),
         "horizon": f"{SHOWN:g} s",
         "sensors": sensor_tables(calibration, sheet),
         "skipped": calibration.skipped,

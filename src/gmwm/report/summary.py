@@ -9,7 +9,7 @@ import numpy as np
 
 from gmwm._core.text import WIDTH, brief, wrapped
 from gmwm._core.units import si_parameter_unit
-from gmwm.calibration import Calibration, SensorNumbers
+from gmwm.calibration import Calibration, SensorNumbers, curves_by_covariate
 from gmwm.datasheet import UNITS
 from gmwm.errors import InputError
 from gmwm.estimate import Fit, JointFit
@@ -62,6 +62,7 @@ def summary_text(calibration: Calibration, files: Iterable[str] = ()) -> str:
         Lines about the files that were written.
     """
     first, last, texts = wrapped(verdict_line(calibration)), list(files), actions(calibration)
+    first += [line for text in curve_lines(calibration) for line in wrapped(text, indent=2)]
     values, covered = _filter(calibration)
     for many in range(len(covered), -1, -1):  # rather every axis than what explains the numbers
         numbers = [*values, *(line for part in covered[:many] for line in part)]
@@ -112,6 +113,15 @@ def verdict_line(calibration: Calibration) -> str:
     if is_short(calibration.values(), SHOWN) and "No axis" not in texts[0]:
         texts.append(f"Too short for {SHOWN:g} s outages: use N alone")
     return ". ".join([f"{name}{more}: {size}", *texts, ""]).rstrip()
+
+
+def curve_lines(calibration: Calibration) -> list[str]:
+    """What was removed beside the noise: the change of each channel over its covariate."""
+    return [
+        f"Removed beside the noise, change over {what} (+-: 95 %): "
+        f"{', '.join(each.sentence() for each in curves)}"
+        for what, curves in curves_by_covariate(calibration.curves).items()
+    ]
 
 
 def _subtracted(calibration: Calibration) -> str:

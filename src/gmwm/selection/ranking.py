@@ -26,8 +26,9 @@ from gmwm.estimate.moments import (
     search,
 )
 from gmwm.estimate.problem import (
+    Coefficients,
+    Moments,
     Scales,
-    Slope,
     bias_of_detrending,
     chi_square,
     gls_slope,
@@ -168,24 +169,31 @@ class Candidate:
         return float(chi2.sf(self.chi_square, self.dof)) if self.dof > 0 else float("nan")
 
 
-def rank(wv: WaveletVariance, choices: Choices) -> tuple[list[Candidate], Slope | None]:
+def rank(wv: WaveletVariance, choices: Choices) -> tuple[list[Candidate], Coefficients | None]:
     """All candidates, best first, and a slope that an unresolved walk explains as well as a ramp.
 
-    wv: Of one recording, or pooled of several; a drift is sought in one recording only.
+    wv: Of one recording, or pooled of several; a drift is sought in one recording only, and not
+        beside a curve.
     """
-    reference = dictionary_fit(wv, wv.variance, choices.given)
+    target, reference = wv.variance, dictionary_fit(wv, wv.variance, choices.given)
+    for _ in range(tuning.RAMP_ROUNDS if wv.regressors is not None else 0):
+        target = Moments.of(wv, reference.mixture).under(reference.mixture).target
+        reference = dictionary_fit(wv, target, choices.given)
     allowed = reference.discrepancy
-    common = _CommonWeights.of(wv.variance, reference, allowed)
+    common = _CommonWeights.of(target, reference, allowed)
     plain = _candidates(wv, common, choices)
     plain.sort(key=lambda item: item[0].criterion)
     flicker = _flicker(wv, common, choices)
     try:
-        slope = None if isinstance(wv, PooledVariance) else _slope_under(plain[0], wv)
+        is_one = not isinstance(wv, PooledVariance) and wv.regressors is None
+        slope = _slope_under(plain[0], wv) if is_one else None
     except InputError:  # samples missing all over leave none to be seen
         slope = None
     if slope is None:
         if choices.has_ramp:
-            raise InputError("a ramp needs one recording without gaps all over: leave R out")
+            raise InputError(
+                "a ramp needs one recording without gaps all over and no covariates: leave R out"
+            )
         found, rival = ([candidate for candidate, _ in each] for each in (plain, flicker))
         return _with_rival(found, rival), None
     without = slope.value**2 / slope.variance
@@ -214,7 +222,7 @@ def _with_rival(ranking: list[Candidate], flicker: Sequence[Candidate]) -> list[
     return sorted((*ranking, *rivals), key=rank_key)
 
 
-def _slope_under(item: tuple[Candidate, Point], wv: WaveletVariance) -> Slope:
+def _slope_under(item: tuple[Candidate, Point], wv: WaveletVariance) -> Coefficients:
     """Generalized least-squares slope under the noise of a candidate."""
     candidate, point = item
     design = Design(candidate.model, Scales.of(wv))
@@ -222,8 +230,8 @@ def _slope_under(item: tuple[Candidate, Point], wv: WaveletVariance) -> Slope:
 
 
 def _drift_free(
-    wv: WaveletVariance, slope: Slope, choices: Choices
-) -> tuple[FloatArray, Reference, Slope]:
+    wv: WaveletVariance, slope: Coefficients, choices: Choices
+) -> tuple[FloatArray, Reference, Coefficients]:
     """Wavelet variances without the drift, the mixture fitted to them, the slope under it.
 
     Noise fitted with the drift in it makes the slope look too uncertain, so the slope is estimated

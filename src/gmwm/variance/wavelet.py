@@ -33,6 +33,7 @@ from gmwm.variance.covariance.haar import haar_covariance, line_covariance, mean
 from gmwm.variance.gaps import GapEffects
 from gmwm.variance.levels import pilot_psd
 from gmwm.variance.periodogram import Periodogram
+from gmwm.variance.regressors import Regressors
 
 if TYPE_CHECKING:
     import pandas
@@ -88,9 +89,11 @@ class WaveletVariance(Printed, Document):
     spectrum : Periodogram or None
         Of the samples, for ``covariance``; ``None`` where no run holds most of them, for robust
         estimates, streams and several recordings.
+    regressors : Regressors or None
+        Of a curve that is estimated beside the noise.
     """
 
-    LATER = frozenset({"spectrum"})
+    LATER = frozenset({"spectrum", "regressors"})
 
     tau: Array
     variance: Array
@@ -110,6 +113,7 @@ class WaveletVariance(Printed, Document):
     fourth_cumulant: Annotated[NotNegative, Le(tuning.LARGEST_VARIANCE**2)] = 0.0
     data_covariance: Array | None = None
     spectrum: Periodogram | None = None
+    regressors: Regressors | None = None
 
     @property
     def n_all(self) -> int:
@@ -412,6 +416,8 @@ class PooledVariance(WaveletVariance):
         pooled["data_covariance"] = (
             _combined(covariances, shares) if len(covariances) == len(parts) else None
         )
+        curves = [part.regressors for part in parts if part.regressors is not None]
+        own["regressors"] = Regressors.pooled(curves, shares, longest.tau) if curves else None
         return cls(
             **{**own, **pooled, "fourth_cumulant": 0.0, "spectrum": None}, parts=tuple(parts)
         )

@@ -15,7 +15,7 @@ from gmwm.estimate import tuning
 from gmwm.estimate.moments.design import Design
 from gmwm.estimate.moments.profile import Point, Profile, search
 from gmwm.estimate.moments.weights import Weights
-from gmwm.estimate.problem import Moments, Slope, drift_key, in_model_order, weight_root
+from gmwm.estimate.problem import Coefficients, Moments, drift_key, in_model_order, weight_root
 from gmwm.estimate.result import (
     Comparison,
     Estimates,
@@ -33,7 +33,7 @@ from gmwm.variance import WaveletVariance
 class Converged:
     """The minimum of a fit, without the series: it is cached with that and must not keep it.
 
-    slope: Drift removed from the wavelet variances.
+    found: Coefficients of the ramp or the curve removed from the wavelet variances.
     covariance: (J, J), of the moments, with the discrepancy, u^4.
     statistical: (J, J), the same without it.
     point: The minimum under ``covariance``.
@@ -42,7 +42,7 @@ class Converged:
     """
 
     design: Design
-    slope: Slope | None
+    found: Coefficients | None
     covariance: FloatArray
     statistical: FloatArray
     point: Point
@@ -51,7 +51,7 @@ class Converged:
 
     def moments(self, wv: WaveletVariance) -> Moments:
         """The moments that were fitted."""
-        return replace(Moments.of(wv, self.design.model, self.design.scales), slope=self.slope)
+        return replace(Moments.of(wv, self.design.model, self.design.scales), found=self.found)
 
 
 def conclude_moments(
@@ -67,7 +67,8 @@ def conclude_moments(
     """
     design, point, moments = end.design, end.point, end.moments(wv)
     target, implied = moments.target, design.implied(point.x, point.shapes)
-    slope, variances = moments.slope, moments.slope_variances(design.unit_terms(point.shapes))
+    slope = None if wv.regressors is not None else moments.found
+    own = moments.coefficient_covariances(design.unit_terms(point.shapes))
     absent = [i for i in design.linear if design.amplitudes(point.x)[i] == 0.0]
     jacobian, curves = _jacobian(end, moments)
     processes = design.fitted_processes(point.x, point.shapes)
@@ -77,9 +78,9 @@ def conclude_moments(
         limit = upper_amplitude(design.coordinates, processes, i, (*estimate, 0.0), wv, absent)
         limit = float(max(limit, 0.0))
         limits[i] = limit ** (1.0 / design.terms[i].linear.power)
-        if variances is not None and slope is not None and np.isfinite(limit):
-            more = tuning.MEAN_OF_LIMIT * limit * float(variances[i])
-            slope = replace(slope, variance=slope.variance + more)
+        if own is not None and slope is not None and np.isfinite(limit):
+            more = tuning.MEAN_OF_LIMIT * limit * own[i]
+            slope = Coefficients(slope.values, slope.covariance + more)
     notices = limit_notices(design, point)
     if target.size < design.n_free:
         values = {"levels": target.size, "parameters": design.n_free}
@@ -89,7 +90,7 @@ def conclude_moments(
         processes=processes,
         covariance=_sandwich(jacobian, end.covariance, weight_root(end.covariance)),
         absent=limits,
-        slope=None if variances is None else slope,
+        slope=None if own is None else slope,
         method=method,
         weights="model",
         discrepancy=end.discrepancy,

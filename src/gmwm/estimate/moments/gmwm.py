@@ -216,7 +216,7 @@ class GMWM:
                 continue
             nested = self._cached(Model(left), wv)
             if nested.discrepancy < found.discrepancy:
-                target = replace(problem.moments, slope=nested.slope).target
+                target = replace(problem.moments, found=nested.found).target
                 point = problem.search(target, nested.covariance)
                 found = replace(nested, design=problem.design, point=point)
         return found
@@ -344,7 +344,7 @@ def _iterate(problem: _Problem, relaxed: FloatArray, level: Discrepancy) -> Conv
             )
             if converged and not changed:
                 return Converged(
-                    design, moments.slope, covariance, statistical, point, curve, level.value
+                    design, moments.found, covariance, statistical, point, curve, level.value
                 )
         elif rounds > 1:
             ratio = float(step @ before) / max(float(before @ before), 1e-300)
@@ -375,5 +375,5 @@ def _under_reference(problem: _Problem, level: Discrepancy) -> Converged:
         ):
             break
     return Converged(
-        design, moments.slope, covariance, statistical, point, reference.curve, level.value
+        design, moments.found, covariance, statistical, point, reference.curve, level.value
     )

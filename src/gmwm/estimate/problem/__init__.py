@@ -36,8 +36,13 @@ from gmwm.estimate.problem.ramp import (
     Slope as Slope,
     bias_of_detrending as bias_of_detrending,
     detrended_covariance as detrended_covariance,
-    difference_covariance as difference_covariance,
     gls_slope as gls_slope,
     ols_slope as ols_slope,
     slope_p_value as slope_p_value,
+)
+from gmwm.estimate.problem.regressors import (
+    Coefficients as Coefficients,
+    CurveRegression as CurveRegression,
+    difference_covariance as difference_covariance,
+    pilot as pilot,
 )

@@ -24,14 +24,8 @@ from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.estimate import tuning
 from gmwm.estimate.problem.parameters import drift_key
-from gmwm.estimate.problem.ramp import (
-    Slope,
-    bias_of_detrending,
-    detrended_covariance,
-    gls_slope,
-    ols_slope,
-    slope_variances,
-)
+from gmwm.estimate.problem.ramp import RampRegression, Slope, ols_slope
+from gmwm.estimate.problem.regressors import Coefficients, CurveRegression, Regression
 from gmwm.process import PSD, Model, Process, Shape
 from gmwm.variance import WaveletVariance, pilot_psd, wavelet_variance
 
@@ -157,22 +151,33 @@ def is_plain(process: Process) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class Moments:
-    """The moments of a series, given what is known of its ramp.
+    """The moments of a series, given what is known of its ramp or curve.
 
-    slope: Drift removed from the wavelet variances, ``None`` where the model has no ramp.
-    slope_is_free: Whether it is estimated (rather than given).
+    found: Coefficients of the ramp, or of the curve beside the noise, removed from the wavelet
+        variances; ``None`` where there is neither.
+    is_free: Whether they are estimated (rather than given).
     """
 
     wv: WaveletVariance
-    slope: Slope | None
-    slope_is_free: bool
+    found: Coefficients | None
+    is_free: bool
     scales: Scales
 
     @classmethod
     def of(cls, wv: WaveletVariance, model: Model, scales: Scales | None = None) -> Moments:
-        """Moments before a first fit, with a least-squares slope where the model has a ramp."""
+        """Moments before a first fit, with a least-squares slope where the model has a ramp.
+
+        Raises InputError if it has one beside a curve.
+        """
         scales = scales or Scales.of(wv)
         ramp = next((term for term in model.terms if term.is_drift), None)
+        if wv.regressors is not None:
+            if ramp is not None:
+                raise InputError(
+                    "a rate ramp beside a curve: leave R out, and make time a covariate"
+                )
+            size = wv.regressors.removed.size
+            return cls(wv, Coefficients(np.zeros(size), np.zeros((size, size))), True, scales)
         if ramp is None:
             return cls(wv, None, False, scales)
         if not ramp.is_open:
@@ -180,45 +185,48 @@ class Moments:
         return cls(wv, ols_slope(wv), True, scales)
 
     @property
+    def regression(self) -> Regression:
+        """The regressors beside the noise."""
+        curve = self.wv.regressors
+        return RampRegression(self.wv) if curve is None else CurveRegression(self.wv, curve)
+
+    @property
     def detrended(self) -> FloatArray:
         """Wavelet variances without the drift, u^2, (J,): less than those of the noise."""
-        return self.wv.variance if self.slope is None else self.wv.detrended(self.slope.value)
+        if self.found is None:
+            return self.wv.variance
+        return self.regression.detrended(self.found.values)
 
     @property
     def taken(self) -> FloatArray:
-        """What the estimated slope takes of the variances of the noise, u^2, (J,)."""
-        if self.slope is None:
+        """What the estimated coefficients take of the variances of the noise, u^2, (J,)."""
+        if self.found is None:
             return np.zeros_like(self.wv.variance)
-        return bias_of_detrending(self.wv, self.slope)
+        return self.regression.taken(self.found.covariance)
 
     @property
     def target(self) -> FloatArray:
-        """Wavelet variances of the noise alone, u^2, (J,): what the slope takes is added."""
+        """Wavelet variances of the noise alone, u^2, (J,): what was taken is added."""
         return self.detrended + self.taken
 
-    def slope_variances(self, terms: Sequence[Process]) -> FloatArray | None:
-        """What each term adds to the variance of the estimated slope; None where none is."""
-        if self.slope is None or not self.slope_is_free:
+    def coefficient_covariances(self, terms: Sequence[Process]) -> FloatArray | None:
+        """Covariance that each term gives the coefficients; None where none are estimated."""
+        if self.found is None or not self.is_free:
             return None
         psds = [self.scales.spectrum(Model((term,))) for term in terms]
-        return slope_variances(self.wv, self.slope, psds)
+        return self.regression.covariances(self.found, psds)
 
     def lost(self, terms: Sequence[Process]) -> FloatArray | None:
-        """What the estimated slope takes of each term, u^2, (J, terms); None where none is."""
-        variances = self.slope_variances(terms)
-        return None if variances is None else np.outer(self.wv.drift_response**2, variances)
+        """What the estimated coefficients take of each term, u^2, (J, terms); None without any."""
+        found = self.coefficient_covariances(terms)
+        return None if found is None else self.regression.taken(found).T
 
     def under(self, noise: Model, part: float = 1.0) -> Moments:
-        """The moments with the slope moved by ``part`` of the way to its estimate under a noise."""
-        if self.slope is None or not self.slope_is_free or not _has_power(noise):
+        """The moments with the coefficients moved by ``part`` of the way to those under a noise."""
+        if self.found is None or not self.is_free or not _has_power(noise):
             return self
-        new, old = gls_slope(self.wv, self.scales.spectrum(noise)), self.slope
-        moved = Slope(
-            (1.0 - part) * old.value + part * new.value,
-            (1.0 - part) * old.variance + part * new.variance,
-            new.weights,
-        )
-        return replace(self, slope=moved)
+        new = self.regression.estimated(self.scales.spectrum(noise))
+        return replace(self, found=self.found.towards(new, part))
 
     def covariance(self, noise: Model) -> FloatArray:
         """Covariance of `target` that a noise implies, u^4, (J, J)."""
@@ -227,9 +235,8 @@ class Moments:
             return wv.covariance
         psd = self.scales.spectrum(noise)
         covariance = wv.covariance_under(psd, noise.lines())
-        if self.slope_is_free and self.slope is not None:
-            means = wv.mean_covariance_under(psd)
-            covariance = detrended_covariance(covariance, means, wv.drift_response, self.slope)
+        if self.is_free and self.found is not None:
+            covariance = self.regression.covariance(covariance, psd, self.found)
         if drift := noise.drift_rate():  # beside noise, one that stays in the data
             means = wv.mean_covariance_under(psd)
             # Below the levels where they are known, means are those of the slope seen there.
@@ -281,6 +288,8 @@ class FittedMoments:
         if drift is not None:
             slope = Slope(model.drift_rate(), slope_error**2)
             moments = Moments(wv, slope, drift in keys, scales)
+        elif wv.regressors is not None:
+            moments = Moments.of(wv, model, scales).under(model)
         if not noise:  # straight lines of the Allan plot may leave a ramp alone
             nothing = np.zeros_like(wv.tau)
             return cls(scales, moments.target, nothing, wv.covariance, discrepancy, nothing)

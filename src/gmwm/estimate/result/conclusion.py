@@ -14,8 +14,8 @@ from gmwm._core.typing import FloatArray
 from gmwm._core.units import customary_unit
 from gmwm.estimate import tuning
 from gmwm.estimate.problem import (
+    Coefficients,
     Coordinates,
-    Slope,
     chi_square,
     drift_key,
     in_model_order,
@@ -47,7 +47,7 @@ class Estimates:
     processes: Sequence[Process]
     covariance: FloatArray
     absent: Mapping[int, float]
-    slope: Slope | None
+    slope: Coefficients | None
     method: str
     weights: str = ""
     discrepancy: float = 0.0

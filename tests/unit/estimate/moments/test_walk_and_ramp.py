@@ -40,10 +40,10 @@ def test_terms_share_the_variance_of_the_slope():
     wv = gmwm.wavelet_variance(series(0), DT)
     terms = [WhiteNoise(N), RandomWalk(K)]
     moments = Moments.of(wv, MODEL).under(terms[0] + terms[1])
-    shares = moments.slope_variances(terms)
-    assert np.sum(shares) == pytest.approx(moments.slope.variance, rel=1e-9)
-    larger = Moments.of(wv, MODEL).under(terms[0] + RandomWalk(1.001 * K)).slope.variance
-    slope = (larger / moments.slope.variance - 1.0) / (1.001**2 - 1.0)
+    shares = moments.coefficient_covariances(terms)
+    assert np.sum(shares) == pytest.approx(moments.found.variance, rel=1e-9)
+    larger = Moments.of(wv, MODEL).under(terms[0] + RandomWalk(1.001 * K)).found.variance
+    slope = (larger / moments.found.variance - 1.0) / (1.001**2 - 1.0)
     assert slope == pytest.approx(shares[1] / np.sum(shares), rel=1e-2)
 
 

@@ -1,0 +1,253 @@
+"""Covariates of a recording, and the curves that are removed before its noise is fitted.
+
+A first curve is that of the largest likelihood under white noise beside a random walk; with it the
+degree and time constants are chosen, by the criterion of a selection. What is left is calibrated
+with the regressors beside the noise, which correct the curve.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import product
+
+import numpy as np
+
+from gmwm._core import checks
+from gmwm._core.typing import FloatArray
+from gmwm.calibration import tuning
+from gmwm.calibration.curve import MOST_POWER, BiasCurve, Covariate, Regressor
+from gmwm.errors import InputError
+from gmwm.estimate import Fit
+from gmwm.estimate.problem import pilot
+from gmwm.readers import Channel, Recording, block_means
+from gmwm.selection import penalty
+from gmwm.variance import RegressorPart, Regressors, WaveletVariance
+
+_DEGREES = {"linear": 1, "quadratic": 2, "cubic": 3, "quartic": 4}
+_FORM = 'covariates={"temperature": "cubic, lag", "settling": "auto"}'
+_TIME = re.compile(r"(\d+\.?\d*) *s")
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What a curve may depend on one covariate by.
+
+    degrees: To choose from; (0,) for "settling".
+    constants: Time constants of a lag or of settling, s; None to choose, empty for none.
+    """
+
+    name: str
+    degrees: tuple[int, ...]
+    constants: tuple[float, ...] | None = ()
+
+    @classmethod
+    def of(cls, name: str, text: str) -> Wanted:
+        """Parse words such as "cubic, lag 120 s"."""
+        words = [word.strip() for word in str(text).lower().split(",")]
+        degrees, constants = None, () if name != "settling" else None
+        for word in words:
+            time = _TIME.search(word)
+            if name != "settling" and word in _DEGREES:
+                degrees = (_DEGREES[word],)
+            elif name != "settling" and word.isdigit() and 1 <= int(word) <= MOST_POWER:
+                degrees = (int(word),)
+            elif word == "auto":
+                degrees = None
+            elif word.startswith("lag") == (name != "settling") and (time or word == "lag"):
+                constants = (float(time[1]),) if time else None
+            else:
+                raise InputError(
+                    f"covariates: {name!r}: {checks.shown(text)}: write auto, linear, quadratic, "
+                    f"cubic or a degree up to {MOST_POWER}, and lag, as in {_FORM}"
+                )
+        if name == "settling":
+            degrees = (0,)
+        return cls(name, degrees or tuple(range(1, tuning.MOST_DEGREE + 1)), constants)
+
+    def choices(self, length: float) -> Iterable[tuple[Regressor, ...]]:
+        """Regressors to choose from, for records of a length, s."""
+        kind = "settling" if self.name == "settling" else "lag"
+        times: Sequence[float] = self.constants or ()
+        if self.constants is None:
+            times = np.geomspace(*tuning.LAGS, tuning.LAG_STEPS).tolist()
+            times = [each for each in times if each < length * tuning.LONGEST_LAG]
+        covariate = "" if kind == "settling" else self.name
+        for degree, constant in product(self.degrees, times or (0.0,)):
+            powers = [Regressor("power", covariate, k + 1) for k in range(degree)]
+            extra = [Regressor(kind, covariate, 0, constant)] if constant else []
+            yield (*powers, *extra)
+
+
+def wanted(covariates: Mapping[str, str] | None) -> tuple[Wanted, ...]:
+    """Covariates as users write them.
+
+    Raises InputError if there are none, or one cannot be read.
+    """
+    if covariates is None:
+        return ()
+    if not isinstance(covariates, Mapping) or not covariates:
+        raise InputError(f"covariates = {checks.shown(covariates)}: give words by name, as {_FORM}")
+    return tuple(Wanted.of(str(name), text) for name, text in covariates.items())
+
+
+@dataclass(frozen=True, eq=False)
+class Nodes:
+    """A recording's covariates at equally spaced times.
+
+    time: (M,), s from its first sample.
+    start: s of that since the recording began.
+    rows: Name -> (M,).
+    """
+
+    time: FloatArray
+    start: float
+    rows: Mapping[str, FloatArray]
+
+    @classmethod
+    def of(cls, recording: Recording, names: Sequence[str]) -> Nodes:
+        """Means of parts of a recording, interpolated where samples are missing."""
+        parts = min(tuning.NODES, recording.n // tuning.SHORTEST_NODE)
+        step = recording.duration / max(parts, 1)
+        time, rows = step * (np.arange(parts) + 0.5), {}
+        for name in names:
+            channel = _channel_of(recording, name)
+            own = np.arange(recording.n) * recording.dt if channel is None else channel.values
+            dt = recording.dt if channel is None else channel.dt
+            size = max(int(own.size // max(parts, 1)), 1)
+            means = block_means([own], size, 0.0)[:, 0]
+            there = np.flatnonzero(~np.isnan(means))
+            if there.size < 2:
+                raise InputError(f"{recording.source or 'the recording'}: {name} has no values")
+            rows[name] = np.interp(time, (there + 0.5) * size * dt, means[there])
+        begun = [each.values["start"] for each in recording.notices if each.code == "part"]
+        return cls(time, float(sum(begun)), rows)
+
+    def columns(self, one: Regressor, scale: Mapping[str, Covariate]) -> FloatArray:
+        """A regressor, (M,)."""
+        if one.kind == "settling":
+            return np.exp(-(self.time + self.start) / one.constant)
+        own, x = scale[one.covariate], self.rows[one.covariate]
+        if one.kind == "power":
+            return np.asarray(((x - own.centre) / own.half) ** one.power)
+        keep = float(np.exp(-(self.time[1] - self.time[0]) / one.constant))
+        late = x.copy()
+        for k in range(1, x.size):  # exact for a line between nodes but for its end
+            late[k] = keep * late[k - 1] + (1.0 - keep) * 0.5 * (x[k] + x[k - 1])
+        return np.asarray((late - x) / own.half)
+
+
+def _channel_of(recording: Recording, name: str) -> Channel | None:
+    """The channel of a covariate: by its name, or the only one of that quantity; None for time."""
+    if name in recording:
+        return recording[name]
+    of_kind = [each for each in recording.channels if each.quantity == name]
+    if len(of_kind) == 1 or (of_kind and name == "temperature"):
+        return of_kind[0]
+    if name == "time":
+        return None
+    known = ", ".join(each.name for each in recording.channels if each.is_auxiliary) or "none"
+    raise InputError(
+        f"{recording.source or 'the recording'} has no channel {name!r} as a covariate: it has "
+        f"{known}; name its column with the unit, such as temperature [degC]"
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Design:
+    """Regressors of a channel, and the first curve, which is removed from its samples.
+
+    columns: Of each recording, (p, M), at its nodes.
+    """
+
+    name: str
+    covariates: tuple[Covariate, ...]
+    regressors: tuple[Regressor, ...]
+    nodes: tuple[Nodes, ...]
+    columns: tuple[FloatArray, ...]
+    removed: FloatArray
+    offset: float
+
+    def without(self, channel: Channel, place: int) -> Channel:
+        """A channel of a recording less the first curve."""
+        curve, time = self.removed @ self.columns[place], self.nodes[place].time
+        values = np.array(channel.values, dtype=float)
+        values -= np.interp(channel.dt * np.arange(values.size), time, curve)
+        return replace(channel, values=values)
+
+    def beside(self, wv: WaveletVariance, place: int) -> WaveletVariance:
+        """The wavelet variance of such a channel with the regressors."""
+        middles = wv.block * wv.dt * (np.arange(wv.blocks.size) + 0.5)
+        rows = [np.interp(middles, self.nodes[place].time, row) for row in self.columns[place]]
+        return replace(wv, regressors=Regressors.of(wv, rows, self.removed))
+
+    def curve(self, fit: Fit) -> BiasCurve:
+        return BiasCurve.of(fit, self.covariates, self.regressors, self.offset)
+
+
+def designs_of(recordings: Sequence[Recording], given: Sequence[Wanted]) -> dict[str, Design]:
+    """The design of each channel, chosen over all recordings that have it.
+
+    Raises InputError if a covariate is missing or does not change.
+    """
+    names = [each.name for each in given if each.name != "settling"]
+    nodes = tuple(Nodes.of(each, names) for each in recordings)
+    scales = tuple(_scale(recordings[0], nodes, name) for name in names)
+    found = {}
+    for name in dict.fromkeys(c.name for each in recordings for c in each.inertial):
+        if not recordings[0].get(name, recordings[-1].get(name)).is_constant:
+            found[name] = _design(name, recordings, given, nodes, scales)
+    return found
+
+
+def _scale(recording: Recording, nodes: Sequence[Nodes], name: str) -> Covariate:
+    channel, rows = _channel_of(recording, name), [each.rows[name] for each in nodes]
+    low, high = float(min(map(np.min, rows))), float(max(map(np.max, rows)))
+    unit = "s" if channel is None else channel.unit or "unit"
+    if not high - low > tuning.LEAST_RANGE * max(abs(high), abs(low)):
+        raise InputError(
+            f"{name} does not change ({low:.4g} {unit}), so no curve can be estimated: leave it "
+            "out, or record while it changes"
+        )
+    return Covariate(name, unit, 0.5 * (low + high), 0.5 * (high - low), low, high)
+
+
+def _design(
+    name: str,
+    recordings: Sequence[Recording],
+    given: Sequence[Wanted],
+    nodes: tuple[Nodes, ...],
+    scales: tuple[Covariate, ...],
+) -> Design:
+    places = [place for place, each in enumerate(recordings) if name in each]
+    known = {each.name: each for each in scales}
+    channels = {place: recordings[place][name] for place in places}
+    means = {}
+    for place, channel in channels.items():
+        size = max(channel.n // nodes[place].time.size, 1)
+        means[place] = block_means([channel.values], size)[: nodes[place].time.size, 0]
+    count = sum(channel.n for channel in channels.values())
+    length = max(each.duration for each in recordings)
+    best: tuple[float, tuple[Regressor, ...], FloatArray] | None = None
+    for parts in product(*(each.choices(length) for each in given)):
+        chosen = tuple(one for part in parts for one in part)
+        rows = {
+            place: np.array([nodes[place].columns(one, known) for one in chosen])
+            for place in places
+        }
+        own = tuple(
+            RegressorPart(means[k], rows[k], max(channels[k].n // means[k].size, 1), np.ones(1))
+            for k in places
+        )
+        regressors = Regressors(own, np.zeros(len(chosen)), np.ones(1), channels[places[0]].dt)
+        found, likelihood = pilot(regressors)
+        cost = len(chosen) + sum(one.constant > 0.0 for one in chosen)
+        criterion = penalty(count) * cost - 2.0 * likelihood
+        if best is None or criterion < best[0]:
+            best = criterion, chosen, found.values
+    assert best is not None
+    _, chosen, removed = best
+    columns = tuple(np.array([each.columns(one, known) for one in chosen]) for each in nodes)
+    left = [np.nanmean(means[k] - removed @ columns[k]) for k in places]
+    return Design(name, scales, chosen, nodes, columns, removed, float(np.mean(left)))

@@ -1,0 +1,255 @@
+"""The curve of a channel against covariates, such as the temperature, beside its noise."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Annotated, ClassVar, Literal
+
+import numpy as np
+from annotated_types import Ge, Le
+
+from gmwm._core import checks
+from gmwm._core.distributions import student
+from gmwm._core.documents import Array, Document, NotNegative, Positive, Text, check_covariance
+from gmwm._core.tables import plain_table
+from gmwm._core.text import Printed, brief, readable, with_error
+from gmwm._core.typing import FloatArray
+from gmwm._core.units import factor
+from gmwm.errors import InputError
+from gmwm.estimate.result import CurveCoefficients, Fit, satterthwaite_dof
+
+MOST_POWER = 6
+
+_POINTS = 101  # of a curve in tables and figures
+
+
+@dataclass(frozen=True)
+class Covariate:
+    """What a curve depends on, over the range of its recording.
+
+    centre, half: Of ``u = (x - centre) / half``, which lies between about -1 and 1.
+    low, high: Range of x, beyond which the curve is unknown.
+    """
+
+    name: Text
+    unit: Text
+    centre: float
+    half: Positive
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class Regressor:
+    """One regressor.
+
+    kind: "power": u^power; "lag": (x of some time before, a first-order low-pass of it, less x) /
+        half; "settling": exp(-t / constant) at the time t since the recording began.
+    constant: Time constant, s.
+    """
+
+    kind: Literal["power", "lag", "settling"]
+    covariate: Text = ""
+    power: Annotated[int, Ge(0), Le(MOST_POWER)] = 0
+    constant: NotNegative = 0.0
+
+    @property
+    def title(self) -> str:
+        if self.kind == "power":
+            return self.covariate + (f"^{self.power}" if self.power > 1 else "")
+        return " ".join(filter(None, [self.covariate, self.kind, f"{brief(self.constant, 3)} s"]))
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class BiasCurve(Document, Printed):
+    """A deterministic curve beside the noise of a channel.
+
+    ``curve(temperature)`` is what to subtract at a steady temperature, in SI units.
+
+    Attributes
+    ----------
+    name, quantity, unit : str
+        Of the channel.
+    covariates : tuple of Covariate
+    regressors : tuple of Regressor
+    values : (p,) ndarray
+        Coefficients of the regressors, u.
+    covariance : (p, p) ndarray
+        Of these, u^2, under the fitted noise.
+    spread : (k, p p) ndarray
+        Errors of ``covariance`` by the errors of the noise: degrees of freedom of intervals.
+    offset : float
+        Mean of the channel less the curve, u. The turn-on bias is part of it.
+    """
+
+    SCHEMA: ClassVar[str] = "gmwm.bias-curve"
+
+    name: Text
+    quantity: Text | None
+    unit: Text
+    covariates: tuple[Covariate, ...]
+    regressors: tuple[Regressor, ...]
+    values: Array
+    covariance: Array
+    spread: Array
+    offset: float
+
+    @classmethod
+    def of(
+        cls,
+        fit: Fit,
+        covariates: tuple[Covariate, ...],
+        regressors: tuple[Regressor, ...],
+        offset: float,
+    ) -> BiasCurve:
+        """That of a fit beside these regressors."""
+        found, wv = CurveCoefficients.of(fit), fit.wv
+        numbers = (found.values, found.covariance, found.spread)
+        return cls(wv.name, wv.quantity, wv.unit, covariates, regressors, *numbers, offset)
+
+    @property
+    def main(self) -> Covariate | None:
+        """The covariate of powers; None for settling alone."""
+        powers = {each.covariate for each in self.regressors if each.kind == "power"}
+        return next((each for each in self.covariates if each.name in powers), None)
+
+    def contrast(self, x: FloatArray, of: str = "") -> FloatArray:
+        """Regressors at steady values of a covariate, the others at their centres, (k, p).
+
+        Raises InputError for values outside the range of the recording, or an unknown covariate.
+        """
+        one = self._covariate(of)
+        x = np.atleast_1d(np.asarray(x, dtype=float))
+        margin = 1e-9 * (one.high - one.low)
+        if not np.all((x >= one.low - margin) & (x <= one.high + margin)):
+            raise InputError(
+                f"the curve of {self.name} is known from {one.low:.4g} to {one.high:.4g} "
+                f"{one.unit}: give values in this range, or record a wider one"
+            )
+        u = (x - one.centre) / one.half
+        columns = [
+            u**each.power if (each.kind, each.covariate) == ("power", one.name) else 0.0 * u
+            for each in self.regressors
+        ]
+        return np.stack(columns, axis=1)
+
+    def _covariate(self, name: str = "") -> Covariate:
+        found = next((each for each in self.covariates if each.name == name), self.main)
+        if found is None or name not in ("", found.name):
+            known = ", ".join(each.name for each in self.covariates) or "time alone"
+            raise InputError(f"the curve of {self.name} depends on {known}, not on {name!r}")
+        return found
+
+    def __call__(self, x: FloatArray | float, of: str = "") -> FloatArray:
+        """The curve at steady values of a covariate, in u; see `contrast`."""
+        found = self.offset + self.contrast(np.asarray(x), of) @ self.values
+        return np.asarray(found).reshape(np.shape(x))
+
+    def errors(self, contrast: FloatArray, level: float = 0.95) -> FloatArray:
+        """Half the interval of ``contrast @ values``, u, (k,)."""
+        level = checks.share("level", level, 0.95)
+        variance = np.einsum("ki,ij,kj->k", contrast, self.covariance, contrast)
+        dof = satterthwaite_dof(contrast, self.covariance, self.spread)
+        return np.asarray(student.ppf(0.5 + 0.5 * level, dof) * np.sqrt(np.maximum(variance, 0.0)))
+
+    def band(
+        self, x: FloatArray | None = None, level: float = 0.95, of: str = ""
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Values of a covariate, the curve there, and half its interval.
+
+        The interval is that of the difference from the curve at the covariate's centre: the level
+        itself is the bias, which is another one each time that the sensor is switched on.
+        """
+        one = self._covariate(of)
+        at = np.linspace(one.low, one.high, _POINTS) if x is None else np.asarray(x, dtype=float)
+        contrast = self.contrast(at, of)
+        return at, self.offset + contrast @ self.values, self.errors(contrast, level)
+
+    def polynomial(self, reference: float | None = None) -> FloatArray:
+        """Coefficients of the powers of (x - reference), the constant first, u per unit^k.
+
+        By default about the covariate's centre.
+        """
+        one = self._covariate()
+        powers = np.zeros(MOST_POWER + 1)
+        powers[0] = self.offset
+        for each, value in zip(self.regressors, self.values, strict=True):
+            if each.kind == "power" and each.covariate == one.name:
+                powers[each.power] += value / one.half**each.power
+        shift = np.array([(one.centre if reference is None else reference) - one.centre, 1.0])
+        found = np.polynomial.Polynomial(powers)(np.polynomial.Polynomial(shift)).coef
+        return np.pad(found, (0, powers.size - found.size))[: max(self.degree, 0) + 1]
+
+    @property
+    def degree(self) -> int:
+        """Of the polynomial; 0 if there is none."""
+        return max((each.power for each in self.regressors), default=0)
+
+    def span(self) -> tuple[float, float]:
+        """Change over the range of the covariate, u, and half its interval."""
+        one = self._covariate()
+        low, high = self.contrast(np.array([one.low, one.high]))
+        return float((high - low) @ self.values), float(self.errors((high - low)[None, :])[0])
+
+    @property
+    def estimates(self) -> list[tuple[str, float, float, str]]:
+        """Name, value, half its 95 % interval and unit of each coefficient, in SI.
+
+        Those of powers are per power of the unit of the covariate, about its centre.
+        """
+        known = {each.name: each for each in self.covariates}
+        half, rows = self.errors(np.eye(self.values.size)), []
+        for each, value, error in zip(self.regressors, self.values, half, strict=True):
+            one, power = known.get(each.covariate), each.power or 1
+            scale = 1.0 if one is None else one.half**-power
+            per = "" if one is None else f"/{one.unit}" + (f"^{power}" if power > 1 else "")
+            rows.append((each.title, float(value) * scale, float(error) * scale, self.unit + per))
+        return rows
+
+    def __repr__(self) -> str:
+        return f"<BiasCurve of {self.name}: {', '.join(each.title for each in self.regressors)}>"
+
+    def __str__(self) -> str:
+        rows = [
+            [title, f"{value:.4g}", f"+-{error:.2g}", unit]
+            for title, value, error, unit in self.estimates
+        ]
+        ranges = (
+            f"{each.name} from {each.low:.4g} to {each.high:.4g} {each.unit}, about "
+            f"{each.centre:.4g} {each.unit}"
+            for each in self.covariates
+        )
+        table = plain_table(("regressor", "estimate", "95 %", "unit"), rows)
+        return "\n".join([f"{self.name}: {'; '.join(ranges) or 'settling'}", table])
+
+    def sentence(self) -> str:
+        """The change over the range, or of settling alone its size, in words."""
+        change, error = float(self.values[0]), float(self.errors(np.eye(self.values.size))[0])
+        if self.main is not None:
+            change, error = self.span()
+        unit = readable(change, self.unit).partition(" ")[2]
+        scale = 1.0 if unit == self.unit else 1.0 / factor(unit, self.unit)
+        ends = (scale * (change - error), scale * (change + error))
+        return f"{self.name} {with_error(scale * change, *ends)} {unit}"
+
+    def check_content(self) -> None:
+        size = len(self.regressors)
+        if self.values.shape != (size,) or self.spread.size % (size * size or 1):
+            raise ValueError("coefficients are not those of the regressors")
+        check_covariance(self.covariance.tolist(), size)
+        known = {each.name for each in self.covariates}
+        if not {each.covariate for each in self.regressors if each.covariate} <= known:
+            raise ValueError("a regressor has no covariate")
+
+
+def curves_by_covariate(curves: Mapping[str, BiasCurve]) -> dict[str, list[BiasCurve]]:
+    """Curves by what they depend on and over which range, in words."""
+    found: dict[str, list[BiasCurve]] = {}
+    for each in curves.values():
+        one = each.main
+        name = (
+            "settling" if one is None else f"{one.name} {one.low:.3g} to {one.high:.3g} {one.unit}"
+        )
+        found.setdefault(name, []).append(each)
+    return found

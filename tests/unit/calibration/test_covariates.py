@@ -1,0 +1,158 @@
+"""Curves against covariates, estimated beside the noise."""
+
+import numpy as np
+import pytest
+
+import gmwm
+from gmwm import RandomWalk, WhiteNoise
+from marks import slow
+
+N, K, SIZE, DT = 1e-3, 5e-5, 2048, 0.5
+CUBIC = np.array([0.02, 0.008, 0.006])
+MODEL = WhiteNoise() + RandomWalk()
+
+
+def warm_up(size=SIZE):
+    return 25.0 + 40.0 * (1.0 - np.exp(-4.0 * np.arange(size) / size))
+
+
+def cubic(temperature):
+    u = (np.asarray(temperature) - 45.0) / 20.0
+    return CUBIC @ np.array([u, u**2, u**3])
+
+
+def recording(seed=1, temperature=None, more=0.0, size=SIZE):
+    temperature = warm_up(size) if temperature is None else temperature
+    x = (WhiteNoise(N) + RandomWalk(K)).simulate(size, DT, seed)
+    arrays = {"gyro_x": 0.3 + x + cubic(temperature) + more, "temperature": temperature}
+    return gmwm.Recording.from_arrays(arrays, 1.0 / DT, {"gyro": "rad/s", "temperature": "degC"})
+
+
+def calibrated(rec, words="cubic", **others):
+    others = {"model": MODEL, "jobs": 1} | others
+    return gmwm.calibrate(rec, covariates={"temperature": words}, **others)
+
+
+@pytest.fixture(scope="module")
+def result():
+    return calibrated(recording())
+
+
+def off(curve, at):
+    """Errors of a curve against its centre, and half their intervals."""
+    _, value, error = curve.band(at)
+    true = cubic(at) - cubic(curve.main.centre)
+    return value - curve(curve.main.centre) - true, error
+
+
+def test_a_curve_is_found_with_its_noise(result):
+    curve, fit = result.curves["gyro_x"], result["gyro_x"]
+    at = np.linspace(curve.main.low, curve.main.high, 12)
+    difference, error = off(curve, at)
+    assert np.all(np.abs(difference) < 2.0 * error)
+    assert np.max(error) < 0.2 * np.ptp(cubic(at))
+    low, high = fit.interval(0.999)["K"]
+    assert low <= K <= high
+    assert fit.valid
+
+
+def test_a_polynomial_about_any_temperature_is_the_curve(result):
+    curve = result.curves["gyro_x"]
+    at = np.linspace(curve.main.low, curve.main.high, 5)
+    for reference in (None, 25.0, 0.0):
+        origin = curve.main.centre if reference is None else reference
+        powers = curve.polynomial(reference)
+        assert powers.size == 4
+        np.testing.assert_allclose(np.polyval(powers[::-1], at - origin), curve(at), rtol=1e-9)
+
+
+def test_a_curve_is_not_extrapolated(result):
+    curve = result.curves["gyro_x"]
+    with pytest.raises(gmwm.InputError, match=r"known from 25\.\d+ to 64\.\d+ degC"):
+        curve(70.0)
+
+
+def test_a_curve_comes_back_from_its_file(result, tmp_path):
+    again = gmwm.load(result.save(tmp_path / "cal.json"))
+    curve, before = again.curves["gyro_x"], result.curves["gyro_x"]
+    for one, other in zip(curve.band(), before.band(), strict=True):
+        np.testing.assert_allclose(one, other, rtol=1e-12)
+    assert str(curve) == str(before)
+
+
+def test_the_degree_is_chosen():
+    line = 0.01 * (warm_up() - 45.0) / 20.0 - cubic(warm_up())
+    assert calibrated(recording(2, more=line), "auto").curves["gyro_x"].degree == 1
+    assert calibrated(recording(2), "auto").curves["gyro_x"].degree == 3
+
+
+def test_hysteresis_and_settling_are_regressors():
+    temperature = 45.0 - 20.0 * np.cos(4.0 * np.pi * np.arange(SIZE) / SIZE)
+    late, keep = temperature.copy(), np.exp(-DT / 60.0)
+    for k in range(1, SIZE):
+        late[k] = keep * late[k - 1] + (1.0 - keep) * temperature[k]
+    settling = 0.02 * np.exp(-DT * np.arange(SIZE) / 40.0)
+    more = 0.02 * (late - temperature) / 20.0 + settling
+    rec = recording(3, temperature, more)
+    cal = gmwm.calibrate(
+        rec, MODEL, covariates={"temperature": "cubic, lag", "settling": "40 s"}, jobs=1
+    )
+    curve = cal.curves["gyro_x"]
+    by_kind = {each.kind: k for k, each in enumerate(curve.regressors)}
+    lag = by_kind["lag"]
+    assert 30.0 < curve.regressors[lag].constant < 120.0
+    error = curve.errors(np.eye(curve.values.size))
+    assert curve.values[lag] == pytest.approx(0.02, rel=0.4)
+    assert abs(curve.values[by_kind["settling"]] - 0.02) < 2.0 * error[by_kind["settling"]]
+    assert cal["gyro_x"].valid
+
+
+def test_without_covariates_nothing_changes(result):
+    assert gmwm.calibrate(recording(), MODEL, jobs=1).curves == {}
+
+
+def test_soaks_have_one_curve():
+    """Each recording has a level of its own; together they see the whole range."""
+    spans = [(25.0, 45.0), (40.0, 65.0)]
+    parts = [
+        recording(seed, np.linspace(*span, SIZE), more=0.1 * seed)
+        for seed, span in enumerate(spans)
+    ]
+    curve = calibrated(parts).curves["gyro_x"]
+    assert (curve.main.low, curve.main.high) == pytest.approx((25.0, 65.0), abs=0.1)
+    difference, error = off(curve, np.linspace(curve.main.low, curve.main.high, 8))
+    assert np.all(np.abs(difference) < 2.0 * error)
+
+
+@pytest.mark.parametrize(
+    ("covariates", "said"),
+    [
+        ({}, "give words by name"),
+        ({"temperature": "round"}, "write auto, linear"),
+        ({"pressure": "linear"}, "no channel 'pressure' as a covariate: it has temperature"),
+        ({"settling": "cubic"}, "write auto, linear"),
+    ],
+)
+def test_what_cannot_be_a_covariate_is_said(covariates, said):
+    with pytest.raises(gmwm.InputError, match=said):
+        gmwm.calibrate(recording(), MODEL, covariates=covariates, jobs=1)
+
+
+def test_a_constant_temperature_is_no_covariate():
+    with pytest.raises(gmwm.InputError, match="temperature does not change"):
+        calibrated(recording(temperature=np.full(SIZE, 30.0)))
+
+
+@slow
+def test_intervals_of_a_warm_up_cover_and_the_walk_is_whole():
+    """Least squares covers a quarter of the curve, and leaves three quarters of K^2."""
+    held, square = [], []
+    for seed in range(60):
+        cal = calibrated(recording([9, seed]), screening=())
+        curve = cal.curves["gyro_x"]
+        difference, error = off(curve, np.linspace(curve.main.low, curve.main.high, 8))
+        held.append(np.mean(np.abs(difference) <= error))
+        square.append((cal["gyro_x"].params["K"] / K) ** 2)
+    # Points of a curve are nearly one draw: a binomial of 60 at 0.93, three deviations.
+    assert np.mean(held) > 0.93 - 3.0 * np.sqrt(0.93 * 0.07 / 60)
+    assert abs(np.mean(square) - 1.0) < 3.0 * np.std(square) / np.sqrt(60) + 0.05
