@@ -49,7 +49,7 @@ def test_a_ramp_is_the_regressor_time(seed):
     # The walk makes nearly all of the variance of the slope, in proportion to K^2.
     assert dof[0] == pytest.approx(0.5 * (fit.params["K"] / fit.stderr["K"]) ** 2, rel=0.05)
     assert fit.dof == ramp.dof
-    assert fit.chi_square == pytest.approx(ramp.chi_square, rel=0.05)
+    assert fit.chi_square == pytest.approx(ramp.chi_square, abs=0.3)
 
 
 def test_what_a_curve_takes_is_given_back():
