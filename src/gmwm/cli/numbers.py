@@ -296,9 +296,10 @@ def export(
 ) -> None:
     """Write numbers for a filter as the program wants them.
 
-    FILE is a calibration.json, or numbers that gmwm bound or gmwm reduce saved. Several files make
-    one IMU, such as gyros and accelerometers of different rates. The numbers of a calibration are
-    the smallest that are not overconfident for its error models; --explain has the details.
+    FILE is a calibration.json, numbers that gmwm bound or gmwm reduce saved, or a motion.json, then
+    for updates every 0.1 s and outages up to --horizon, by default 1 s. Several files make one IMU,
+    such as gyros and accelerometers of different rates. The numbers of a calibration are the
+    smallest that are not overconfident for its error models; --explain has the details.
 
     Exit status: 0 if the numbers were written, 1 if an axis is not valid (nothing is written), 2 if
     the input cannot be used.

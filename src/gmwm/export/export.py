@@ -19,6 +19,7 @@ from gmwm.export.keys import MemoryKeys, Pair, WalkKeys, entries
 from gmwm.export.state_space import StateSpaceFile
 from gmwm.export.target import ImuFile, JsonFile, Target
 from gmwm.filter_numbers import FilterNumbers
+from gmwm.motion import InMotion
 from gmwm.process import Model
 
 _KINDS = {"json": JsonFile, "state-space": StateSpaceFile}
@@ -44,12 +45,14 @@ TARGETS: Mapping[str, Target] = MappingProxyType(
 )
 """Every consumer by name."""
 
+Source = Calibration | FilterNumbers | InMotion
+
 _RATES = ("update_rate", "IMU.Frequency")
 """Keys of the rate of the IMU in files."""
 
 
 def export(
-    numbers: Calibration | FilterNumbers | Sequence[Calibration | FilterNumbers],
+    numbers: Source | Sequence[Source],
     target: str,
     *,
     horizon: float | None = None,
@@ -60,14 +63,15 @@ def export(
 
     Parameters
     ----------
-    numbers : Calibration, FilterNumbers, or a sequence of them
+    numbers : Calibration, FilterNumbers, InMotion, or a sequence of them
         Of a calibration, those of `gmwm.bound` are written; those of `gmwm.reduce` if it has a
-        random walk and the program has no place for one. Several together make one IMU, such as
+        random walk and the program has no place for one. Of noise in motion, `InMotion.numbers`
+        from 0.1 s to the horizon, the largest of all IMUs. Several together make one IMU, such as
         gyros and accelerometers of different rates.
     target : str
         Name of the program: "kalibr", "gtsam", ...
     horizon : float, optional
-        Longest outage that the numbers are for, s; 60 s by default.
+        Longest outage that the numbers are for, s; 60 s by default, 1 s in motion.
     form : str, optional
         Of the numbers, "N+K" or "N+GM"; each program holds one. For "state-space", which holds the
         full model, also another: see `gmwm.bound`.
@@ -86,8 +90,7 @@ def export(
         cannot be written.
     """
     chosen = TARGETS[checks.choice("target", target, tuple(TARGETS))]
-    alone = isinstance(numbers, Calibration | FilterNumbers) or not isinstance(numbers, Sequence)
-    given: list[Any] = [numbers] if alone else list(numbers)
+    given: list[Any] = list(numbers) if isinstance(numbers, Sequence) else [numbers]
     if path is None:
         return chosen.export(given, horizon, form)
     return chosen.save(writable_file(path), given, horizon, form)

@@ -16,8 +16,9 @@ from gmwm._core.units import field_units
 from gmwm.calibration import Calibration, fast_density
 from gmwm.errors import InputError
 from gmwm.estimate import Fit
-from gmwm.filter_numbers import HORIZON, AxisFilterNumbers, FilterNumbers, usable
+from gmwm.filter_numbers import HORIZON, AxisFilterNumbers, FilterNumbers, Predicted, usable
 from gmwm.issues import Notice, cause
+from gmwm.motion import HORIZON as MOTION_HORIZON, INTERVAL, InMotion, between
 from gmwm.process import Model, Process
 
 SENSORS = {"gyro": "gyroscope", "accel": "accelerometer"}
@@ -157,7 +158,7 @@ class ImuNumbers:
     """Gyros and accelerometers, and the purpose of the numbers.
 
     horizon: Time without aiding, s.
-    method: {"bound", "reduce", "given"}.
+    method: {"bound", "reduce", "given", "motion"}.
     sources: One line about each recording.
     invalid: Axes that are not valid -> why.
     reserved: Axes from which departures were subtracted.
@@ -207,10 +208,12 @@ def numbers_of(
     """
     if isinstance(given, Calibration):
         return usable(given, form, HORIZON if horizon is None else horizon, tau=tau)
+    if isinstance(given, InMotion):
+        given = in_motion(given, MOTION_HORIZON if horizon is None else horizon)
     if not isinstance(given, FilterNumbers):
         raise InputError(
-            f"{checks.shown(given)} has no numbers to export: give a calibration, or a "
-            "result of gmwm.bound or gmwm.reduce"
+            f"{checks.shown(given)} has no numbers to export: give a calibration, noise in motion, "
+            "or a result of gmwm.bound or gmwm.reduce"
         )
     if given.form != form:
         raise InputError(
@@ -223,6 +226,22 @@ def numbers_of(
             "calibration"
         )
     return given
+
+
+def in_motion(found: InMotion, horizon: float) -> FilterNumbers:
+    """The largest N and K of all IMUs for updates every 0.1 s, or every horizon if it is less."""
+    axes = {}
+    for name, model in found.numbers(min(INTERVAL, horizon), horizon).items():
+        tau, variance = found.envelope(name)
+        true = float(between(tau, variance, np.array([horizon]))[0])
+        nees = true / float(2.0 * model.haar_variance(np.array([horizon]), tau[0])[0])
+        predicted = (Predicted(horizon, nees, float(1.0 / np.sqrt(nees))),)
+        quantity = name.partition("_")[0]
+        axes[name] = AxisFilterNumbers(
+            "N+K", model, horizon, 0.0, "motion", predicted, quantity=quantity
+        )
+    source = f"{len(found.imus)} IMUs in motion"
+    return FilterNumbers(axes, source, 1.0 / tau[0], sum(found.durations))
 
 
 def not_valid(given: Iterable[Any]) -> dict[str, Notice]:

@@ -44,6 +44,7 @@ _HOW = {
     "bound": "the smallest that are never overconfident for the error models",
     "reduce": "by gmwm.reduce, consistent on average, since no N+GM bounds a random walk",
     "given": "given, not from a recording",
+    "motion": "with them errors in motion grow at most as predicted from 0.1 s on",
 }
 
 
@@ -79,7 +80,7 @@ def notes(imu: ImuNumbers, title: str, caution: str) -> list[str]:
     title: Of the program.
     caution: A line about it; may be empty.
     """
-    how = " (reduce)" if imu.method == "reduce" else ""
+    how = f" ({imu.method})" if imu.method in ("reduce", "motion") else ""
     purpose = f"{imu.form} for outages up to {imu.horizon:g} s{how}"
     upper = [f"{t.quantity} {k}" for t in imu.triads for k in ("N", "K", "sigma") if t.is_upper(k)]
     slow = [triad.slowest for triad in imu.triads]

@@ -24,8 +24,8 @@ if TYPE_CHECKING:
 FORMS = ("N+K", "N+GM", "N+K+GM", "N+2GM")
 """White noise with a random walk, with one or two Gauss-Markov processes, or with both."""
 
-METHODS = ("bound", "reduce", "given")
-"""Where numbers come from: `bound`, `reduce`, or the user."""
+METHODS = ("bound", "reduce", "given", "motion")
+"""Where numbers come from: `bound`, `reduce`, the user, or curves in motion."""
 
 UNITS = ("field", "si")
 """Data-sheet units (IEEE Std 952 / 1554), or SI."""
@@ -87,7 +87,7 @@ class AxisFilterNumbers(Document, InUnits):
     initial_sd : float
         Standard deviation at the start of the walk or, in forms without one, of a constant that
         the Gauss-Markov processes are added to; u.
-    method : {"bound", "reduce", "given"}
+    method : {"bound", "reduce", "given", "motion"}
     predicted : tuple of Predicted
         At the horizon and at ten times the horizon.
     notices : tuple of Notice

@@ -296,6 +296,7 @@ def _notices(curves: Sequence[MotionCurve], imus: int) -> list[Notice]:
     if imus == 2:
         return [notice("motion-two-imus")]
     found = [notice("motion-common", values={"imus": imus})]
+    found += [notice("motion-neighbours")] * (imus == 3)
     unseen = [each for each in curves if np.any(each.variance <= 0.0)]
     if unseen:
         times = [each.tau[each.variance <= 0.0].min() for each in unseen]

@@ -16,11 +16,13 @@ from gmwm._core.tables import frame, plain_table
 from gmwm._core.text import Printed, brief, bullets, per_cent
 from gmwm._core.typing import FloatArray
 from gmwm._core.units import SI_UNIT, factor
-from gmwm.errors import MissingNameError
+from gmwm.errors import InputError, MissingNameError
 from gmwm.issues import Notice, worst_first
 from gmwm.motion import tuning
 from gmwm.motion.clocks import Clock
+from gmwm.motion.envelope import BOUNDED, FILTER, between, dominating
 from gmwm.motion.mapping import Mounting
+from gmwm.process import Model
 
 if TYPE_CHECKING:
     import pandas
@@ -139,6 +141,85 @@ class InMotion(Document, Printed):
             f"no curve of {imu!r}, {channel!r}: name one of {', '.join(self.imus)}, and of {known}"
         )
 
+    def envelope(
+        self, channel: str, imu: str | None = None, *, upper: bool = False
+    ) -> tuple[FloatArray, FloatArray]:
+        """Averaging times (s), and the largest Allan variance of a channel (u^2), of which none is
+        below the one at rest.
+
+        Parameters
+        ----------
+        channel : str
+        imu : str, optional
+            By default the largest of all IMUs.
+        upper : bool, optional
+            Whether the upper ends of the 95 % intervals count.
+
+        Raises
+        ------
+        MissingNameError
+            If there is no such curve.
+        """
+        own = [self.curve(each, channel) for each in ([imu] if imu else self.imus)]
+        seen = [c.upper if upper else np.where(c.variance > 0.0, c.variance, c.upper) for c in own]
+        at_rest = [np.nan_to_num(c.static) for c in own]
+        return own[0].tau, np.max([*seen, *at_rest], axis=0)
+
+    def model(self, imu: str, channel: str) -> Model:
+        """The smallest bounded angle, white noise and walk that are nowhere below a curve.
+
+        A sum of these fits no curve within its intervals: vibration has lines of its own. This one
+        is never below, on average some 10 % above in deviation, and simulates or feeds `reduce`.
+
+        Raises MissingNameError if there is no such curve.
+        """
+        tau, variance = self.envelope(channel, imu)
+        return dominating(tau, variance, BOUNDED, tau[0])
+
+    def numbers(
+        self,
+        interval: float = tuning.INTERVAL,
+        horizon: float = tuning.HORIZON,
+        *,
+        imu: str | None = None,
+        upper: bool = False,
+    ) -> dict[str, Model]:
+        """N and K for a filter in motion, by channel.
+
+        The smallest with which the error that a filter expects after any time t between the two
+        limits is at least the measured one: N^2/t + K^2 t/3 is nowhere below the Allan variance at
+        t, which is that of the mean rate over t less the one over the t before. Bounded angles
+        need an N that falls with the interval.
+
+        Parameters
+        ----------
+        interval : float, optional
+            Shortest time between updates of the filter, s.
+        horizon : float, optional
+            Longest time without updates, s.
+        imu, upper : optional
+            As of `envelope`.
+
+        Raises
+        ------
+        InputError
+            If the times are not within those of the curves.
+        MissingNameError
+            If there is no such IMU.
+        """
+        found = {}
+        for channel in dict.fromkeys(each.channel for each in self.curves):
+            tau, variance = self.envelope(channel, imu, upper=upper)
+            if not tau[0] <= interval <= horizon <= tau[-1]:
+                raise InputError(
+                    f"from {interval:g} s to {horizon:g} s: these flights show {tau[0]:.2g} s to "
+                    f"{tau[-1]:.2g} s in motion; give times between, or longer flights"
+                )
+            inside = tau[(tau > interval) & (tau < horizon)]
+            times = np.array(sorted({interval, *inside, horizon}))
+            found[channel] = dominating(times, between(tau, variance, times), FILTER, tau[0])
+        return found
+
     @property
     def sensors(self) -> tuple[str, ...]:
         """Gyro, and accel where all IMUs have one."""
@@ -205,10 +286,11 @@ class InMotion(Document, Printed):
     def __str__(self) -> str:
         what = "both IMUs together" if len(self.imus) == 2 else "each IMU"
         size = f"{len(self.durations)} flight{'s' * (len(self.durations) > 1)}"
-        lines = [f"Allan deviation of {what} in motion: {size}, {sum(self.durations):.4g} s", ""]
+        lines = [f"Allan deviation of {what} in motion: {size}, {sum(self.durations):.4g} s"]
         lines += self._stand().splitlines() if self.clocks else []
         for sensor in self.sensors:
             lines += self._table(sensor).splitlines()
+        lines += self._for_filters().splitlines()
         return "\n".join([*lines, "", *bullets(worst_first(self.notices))])
 
     def _stand(self) -> str:
@@ -250,10 +332,9 @@ class InMotion(Document, Printed):
         return plain_table(heads, rows)
 
     def _table(self, sensor: str) -> str:
-        """Root mean square deviations over the axes at some averaging times, and the factor.
+        """Root mean square deviations over the axes at some averaging times.
 
-        Below them the typical 95 % interval of one axis, and the range of the deviation over pairs
-        of other IMUs, in all curves, as a share of it.
+        Below them the typical 95 % interval of one axis, and the factor to those at rest.
         """
         own = [each for each in self.curves if each.quantity == sensor]
         tau, (unit, scale) = own[0].tau, _shown(sensor)
@@ -264,17 +345,25 @@ class InMotion(Document, Printed):
             rows.append((imu, *_texts(mean, scale, chosen)))
         reach = np.nanmedian([np.sqrt(np.maximum(c.upper, 0.0)) / c.deviation for c in own], 0)
         rows.append(("95 %", *(f"x/{reach[k]:.2f}" for k in chosen)))
-        ratios = np.array([c.pairs / np.where(c.variance > 0.0, c.variance, np.nan) for c in own])
-        if ratios.shape[1] > 1:
-            ends = (np.nanmin(ratios, axis=(0, 1)), np.nanmax(ratios, axis=(0, 1)))
-            low, high = (np.sqrt(np.maximum(end, 0.0)) for end in ends)
-            rows.append(("by pair", *(f"{low[k]:.1f}-{high[k]:.1f}" for k in chosen)))
-        rest = np.mean([c.static for c in own], axis=0)
-        if np.any(np.isfinite(rest)):
+        if np.any(np.isfinite([c.static for c in own])):
             times = self.factor(sensor)
-            rows.append(("at rest", *_texts(rest, scale, chosen)))
-            rows.append(("times", *(brief(times[k]) for k in chosen)))
+            rows.append(("over rest", *(brief(times[k]) for k in chosen)))
         return plain_table((f"{sensor}, {unit}", *(f"{tau[k]:.2g} s" for k in chosen)), rows)
+
+    def _for_filters(self) -> str:
+        """N and K, SI, the largest of all axes and IMUs, for some intervals of updates."""
+        rows = []
+        for interval, horizon in tuning.USES:
+            if self.curves[0].tau[-1] >= horizon:
+                found = self.numbers(interval, horizon)
+                own = [[m.params for name, m in found.items() if name.startswith(sensor)]
+                       for sensor in self.sensors]  # fmt: skip
+                largest = [
+                    f"{max(p[key] or 0.0 for p in each):.2g}" for each in own for key in "NK"
+                ]
+                rows.append((f"updates {interval:g} s, outages {horizon:g} s", *largest))
+        heads = [f"{sensor} {key}" for sensor in self.sensors for key in "NK"]
+        return plain_table(("for filters, SI", *heads), rows) if rows else ""
 
     def factor(self, sensor: str) -> FloatArray:
         """(J,) Median over IMUs and axes of the deviation in motion over that at rest."""

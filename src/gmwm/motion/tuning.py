@@ -37,4 +37,7 @@ BESIDE_LOST = 0.1  # s: samples beside a lost packet are up to 24 deg/s off in a
 # Robust deviations of a mean over 0.1 s that make it an event, and the largest share of events: in
 # 14 flights three instants are.
 FAR_OUT, MOST_EVENTS = 10.0, 0.01
+LEAST_WALK = 0.01  # share of the variance at the horizon that the walk of a filter has at least
+INTERVAL, HORIZON = 0.1, 1.0  # s: keyframes of visual and scans of lidar odometry, and their losses
+USES = ((0.1, 1.0), (1.0, 2.0))  # intervals and horizons that are printed; fixes come once a second
 LEVEL_OVER = 2.0  # s, whose mean stands for what is left out

@@ -109,7 +109,8 @@ def test_rest_gives_the_static_allan_variance():
     found = gmwm.motion(at_rest, static=static)
     curve = found.curve("imu 1", "accel_z")
     assert curve.factor[1:] == pytest.approx(np.ones(len(curve.tau) - 1), rel=0.02)
-    assert {n.code for n in found.notices} == {"motion-at-rest", "motion-common"}
+    codes = {"motion-at-rest", "motion-common", "motion-neighbours"}
+    assert {n.code for n in found.notices} == codes
     assert found.clocks == () == found.mountings
 
 

@@ -1,0 +1,102 @@
+"""Numbers for filters from curves in motion."""
+
+import numpy as np
+import pytest
+
+import gmwm
+from gmwm import QuantizationNoise, RandomWalk, WhiteNoise
+from gmwm.motion import InMotion, MotionCurve
+
+DT = 0.008
+TAU = DT * 2.0 ** np.arange(10)  # up to 4.1 s
+AXES = [f"{sensor}_{axis}" for sensor in ("gyro", "accel") for axis in "xyz"]
+
+
+def in_motion(variances, static=None):
+    """A result of four IMUs of 60 s with given Allan variances of all axes, one each."""
+    four = np.ones((3, TAU.size))
+    rest = np.full(TAU.size, np.nan) if static is None else static
+    curves = tuple(
+        MotionCurve(f"imu {k}", name, name.partition("_")[0], TAU, each, 0.9 * each, 1.2 * each,
+                    each * four, 2.0 * each * four, np.ones(TAU.size), rest)
+        for k, each in enumerate(variances, start=1)
+        for name in AXES
+    )  # fmt: skip
+    labels = tuple(f"imu {k}" for k in range(1, len(variances) + 1))
+    return InMotion(labels, (60.0,), curves, (), ())
+
+
+def allan(model, tau=TAU):
+    return 2.0 * model.haar_variance(np.asarray(tau, dtype=float), DT)
+
+
+def test_a_sum_of_the_three_terms_is_found():
+    truth = QuantizationNoise(2e-4) + WhiteNoise(1e-4) + RandomWalk(1e-3)
+    model = in_motion([allan(truth)]).model("imu 1", "gyro_x")
+    assert model.params == pytest.approx(truth.params, rel=1e-6)
+
+
+@pytest.mark.parametrize("interval", [0.01, 0.1, 0.5])
+def test_bounded_angles_need_an_n_that_falls_with_the_interval(interval):
+    """N^2/t is 3 Q^2/t^2 at the interval; the walk has a hundredth at the end."""
+    found = in_motion([allan(QuantizationNoise(2e-4))]).numbers(interval, 2.0)["gyro_z"]
+    assert found.params["N"] == pytest.approx(2e-4 * np.sqrt(3.0 / interval), rel=0.01)
+    assert found.params["K"] ** 2 * 2.0 / 3.0 == pytest.approx(3.0 * (2e-4 / 2.0) ** 2 / 100.0)
+
+
+def test_errors_grow_at_most_as_predicted():
+    """Of every IMU and axis, at all times between the limits."""
+    rng = np.random.default_rng(4)
+    variances = allan(QuantizationNoise(1e-3) + WhiteNoise(1e-3)) * rng.uniform(0.5, 2.0, (4, 10))
+    found = in_motion(variances)
+    used, ends = slice(4, 8), (TAU[4], TAU[7])
+    second, all_imus = found.numbers(*ends, imu="imu 2"), found.numbers(*ends)
+    assert set(second) == set(all_imus) == set(AXES)
+    ratio = allan(second["accel_x"])[used] / variances[1, used]
+    assert ratio.min() == pytest.approx(1.0)  # it touches the curve
+    ratio = allan(all_imus["accel_x"])[used] / variances[:, used]
+    assert ratio.min() == pytest.approx(1.0)
+    above = found.numbers(*ends, upper=True)["accel_x"].params
+    assert above["N"] == pytest.approx(np.sqrt(1.2) * all_imus["accel_x"].params["N"])
+    model = found.model("imu 3", "gyro_y")
+    assert np.all(allan(model) >= variances[2] * (1.0 - 1e-9))
+
+
+def test_what_is_known_at_rest_counts_where_motion_shows_less():
+    static = allan(WhiteNoise(1e-3))
+    found = in_motion([0.5 * static], static).numbers()["gyro_x"]
+    assert found.params["N"] == pytest.approx(1e-3, rel=0.01)
+
+
+def test_times_beyond_the_curves_are_rejected():
+    found = in_motion([allan(WhiteNoise(1e-3))])
+    with pytest.raises(gmwm.InputError, match=r"these flights show 0.008 s to 4.1 s in motion"):
+        found.numbers(0.1, 60.0)
+    with pytest.raises(gmwm.InputError, match="give times between"):
+        found.numbers(1.0, 0.5)
+
+
+def test_export_writes_the_numbers():
+    truth = QuantizationNoise(2e-3) + WhiteNoise(1e-3)
+    found = in_motion([allan(truth), 4.0 * allan(truth)])
+    numbers = found.numbers(0.1, 2.0)
+    text = gmwm.export(found, "kalibr", horizon=2.0)
+    assert f"gyroscope_noise_density: {numbers['gyro_x'].params['N']:.6e}" in text
+    assert "N+K for outages up to 2 s (motion)" in text
+    by_axis = gmwm.export(found, "gtsam")
+    # White noise is at most as large as the numbers say, at the horizon it has a NEES below 1.
+    assert "NEES at 1 s: gyro 0." in by_axis
+    with pytest.raises(gmwm.InputError, match="these flights show"):
+        gmwm.export(found, "kalibr", horizon=60.0)
+
+
+def test_summary_has_the_numbers_and_few_lines():
+    rest = allan(WhiteNoise(1e-4))
+    found = in_motion([allan(QuantizationNoise(1e-3) + WhiteNoise(1e-3))] * 4, rest)
+    lines = str(found).splitlines()
+    rows = [line.split() for line in lines if line.startswith("updates")]
+    numbers = found.numbers(0.1, 1.0)["gyro_x"].params
+    assert rows[0] == ["updates", "0.1", "s,", "outages", "1", "s",
+                       *2 * [f"{numbers[key]:.2g}" for key in "NK"]]  # fmt: skip
+    assert rows[1][:6] == ["updates", "1", "s,", "outages", "2", "s"]
+    assert len(lines) <= 24
