@@ -74,6 +74,7 @@ from .variance import (
     Deviations as Deviations,
     Modwt as Modwt,
     StreamingVariance as StreamingVariance,
+    WaveletCovariance as WaveletCovariance,
     WaveletVariance as WaveletVariance,
     curve as curve,
     deviations as deviations,
@@ -81,6 +82,7 @@ from .variance import (
     imodwt as imodwt,
     modwt as modwt,
     read_curves as read_curves,
+    wavelet_covariance as wavelet_covariance,
     wavelet_variance as wavelet_variance,
 )
 

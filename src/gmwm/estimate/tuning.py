@@ -136,3 +136,12 @@ REGION_SIGMA = 3.5  # standard errors between two levels of a region: 100 of whi
 HEIGHT_TOLERANCE = 0.01  # ... and of their heights, as far as a curve is drawn and read
 WRONG_SLOPE = 0.25  # difference of slopes half way from one kind of noise to the next
 LINES_SIGMA = 3.0  # standard errors below which a misfit of the lines is chance
+
+# -- what channels share --------------------------------------------------------------------------
+
+SAME_SHAPE = 0.7  # log of the ratio below which correlation times of channels are one: a factor 2
+SHARED_ROUNDS, KEPT_ROUNDS = 6, 3  # of weights, with correlation times and without
+SHARED_STEP = 0.5  # longest step of the log of a correlation time
+SAME_SAMPLES = 1.0 - 1e-6  # correlation at all levels
+CONE_STEPS = 200
+CONE_GAP = 1e-4  # of the weighted sum of squares to its minimum

@@ -2,6 +2,10 @@
 
 from gmwm.variance.allan_family import Deviations as Deviations, deviations as deviations
 from gmwm.variance.covariance.haar import haar_covariance as haar_covariance
+from gmwm.variance.cross import (
+    WaveletCovariance as WaveletCovariance,
+    wavelet_covariance as wavelet_covariance,
+)
 from gmwm.variance.curve import Curve as Curve, curve as curve
 from gmwm.variance.curve_files import read_curves as read_curves
 from gmwm.variance.gaps import Runs as Runs

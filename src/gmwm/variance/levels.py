@@ -154,6 +154,8 @@ def level_changes(values: FloatArray, runs: Runs) -> BoolArray:
 
     values: (n,), NaN where samples are missing.
     """
+    if runs.is_complete:
+        return np.zeros(0, dtype=bool)
     m = dyadic_levels(runs.longest)
     counts = np.array([window_count(runs.edges, 2.0 * each) for each in m])
     m = m[: max(int(np.sum(np.cumprod(counts >= 2.0 * tuning.PILOT_WINDOWS * m))), 1)]
@@ -203,13 +205,15 @@ class Levels:
     apart: BoolArray
 
     @classmethod
-    def of(cls, values: FloatArray, runs: Runs, wavelet: str) -> Levels:
-        """The levels of a series about its mean."""
-        apart = np.zeros(len(runs.starts) - 1, dtype=bool)
+    def of(
+        cls, values: FloatArray, runs: Runs, wavelet: str, apart: BoolArray | None = None
+    ) -> Levels:
+        """The levels of a series about its mean; gaps apart are found unless they are given."""
         if wavelet != "haar":
             number = known_wavelet(wavelet).levels(runs.longest)
-            return cls(values, runs, dyadic_levels(2**number), wavelet, apart)
-        if apart.size:
+            together = np.zeros(len(runs.starts) - 1, dtype=bool)
+            return cls(values, runs, dyadic_levels(2**number), wavelet, together)
+        if apart is None:
             apart = level_changes(values, runs)
         found = cls(values, runs, dyadic_levels(runs.n), wavelet, apart)
         exist = int(np.sum(np.cumprod(found.counts > 0.0)))
