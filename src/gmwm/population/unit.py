@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from math import isfinite
 from typing import Any, TypeVar
 
@@ -210,10 +211,11 @@ class Structure:
     def __post_init__(self) -> None:
         freeze(self, "counts", "numbers")
 
-    @property
+    @cached_property
     def usable(self) -> dict[str, Mapping[str, Number]]:
         """The numbers of units with a valid model."""
-        return {name: own for name, own in self.numbers.items() if name not in self.invalid}
+        invalid = {*self.invalid}
+        return {name: own for name, own in self.numbers.items() if name not in invalid}
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,7 @@ from gmwm.population import (
     CONFIDENCE,
     CONTENT,
     LETTERS,
+    PASS,
     Fleet,
     Spread,
     in_words,
@@ -29,6 +30,7 @@ _TITLES = {"N": "N, random walk", "B": "B, bias instability", "K": "K, rate rand
 _MARKS = {"pass": "good", "FAIL": "bad", "?": "care", "none": "bad"}
 _MOSTLY = 0.5  # of the variance between units, which longer recordings would make less
 _WIDE = 0.05  # spread from which that is worth it
+_MOST_ROWS = 300  # of a table on the page: 3,000 units would take a browser 20 s
 
 
 @page_of(Fleet)
@@ -58,7 +60,7 @@ def write_fleet_report(fleet: Fleet, path: str | os.PathLike[str]) -> Path:
         ),
         farthest=outlier_distance,
         limits=_limits(fleet),
-        troubled=_troubled(fleet),
+        troubled=_troubled(fleet)[:_MOST_ROWS],
         provenance=origin(options, "report of", None),
     )
 
@@ -130,25 +132,37 @@ def _row(spread: Spread) -> dict[str, Any]:
 
 
 def _limits(fleet: Fleet) -> dict[str, Any]:
-    """The grid of verdicts: axes, and a row a unit."""
+    """The grid of verdicts: axes, a row a unit, and how many of a large lot have none.
+
+    Units of a large lot that pass come last.
+    """
     axes = list(dict.fromkeys(axis for row in fleet.grid.values() for axis in row))
     rows = []
     for name, row in fleet.grid.items():
         words = [in_words(row[axis]) if axis in row else "" for axis in axes]
         rows.append((name, [(word, _MARKS.get(word.partition(" ")[0], "")) for word in words]))
-    return {"axes": axes, "rows": rows}
+    if (more := max(len(rows) - _MOST_ROWS, 0)) > 0:
+        rows.sort(key=lambda row: {word for word, _ in row[1]} <= {PASS, ""})
+    return {"axes": axes, "rows": rows[:_MOST_ROWS], "more": more}
 
 
-def _troubled(fleet: Fleet) -> list[tuple[str, str, str]]:
-    """Units without a calibration, and axes without a valid model, with the reasons."""
+def _troubled(fleet: Fleet) -> list[tuple[list[str], str, str]]:
+    """Units without a calibration, and axes without a valid model, by reason."""
     names = {path: unit.name for path, unit in fleet.units.items()}
-    rows = [(names[path], "all", why.text) for path, why in fleet.failed.items()]
+    axes: dict[tuple[str, str], list[str]] = {}
+    for path, why in fleet.failed.items():
+        axes[names[path], why.text] = ["all"]
     for path, calibration in fleet.done.items():
+        found = {channel: why.text for channel, why in calibration.skipped.items()}
         for channel, fit in calibration.items():
             texts = [str(notice) for notice in fit.notices if notice.severity == "bad"]
-            rows += [(names[path], channel, "; ".join(texts))] if texts else []
-        rows += [(names[path], name, why.text) for name, why in calibration.skipped.items()]
-    return rows
+            found |= {channel: "; ".join(texts)} if texts else {}
+        for channel, text in found.items():
+            axes.setdefault((names[path], text), []).append(channel)
+    units: dict[tuple[str, str], list[str]] = {}
+    for (name, text), channels in axes.items():
+        units.setdefault((", ".join(channels), text), []).append(name)
+    return [(own, *key) for key, own in units.items()]
 
 
 def _in_words(value: object) -> str:

@@ -23,6 +23,7 @@ _DODGE = 0.05  # decades between the first and the last recording at a level
 _SURE = 0.1  # relative error of a ratio that counts for the limits of its axis
 _FARTHEST = 3.0  # a limit beyond so many times the largest value is not drawn
 _ROW = 34.0
+_NAMED = 3  # points of a row that stand apart and have their names beside them
 
 
 @dataclass(frozen=True)
@@ -147,7 +148,7 @@ def strip(spreads: Sequence[Spread]) -> dict[str, Any]:
     place = Scale(np.log(low) - margin, np.log(high) + margin, 60.0, 388.0)
     rows = []
     for i, (each, limit) in enumerate(zip(spreads, limits, strict=True)):
-        apart = {outlier.device for outlier in each.outliers}
+        apart = [outlier.device for outlier in each.outliers]  # farthest first
         # Rows of points that touch are spread a little, the same way each time.
         offsets = 0.5 * _ROW * ((np.arange(each.n) * 0.618034) % 1.0 - 0.5)
         y = np.round(8.0 + (i + 0.5) * _ROW + offsets, 1)
@@ -157,7 +158,9 @@ def strip(spreads: Sequence[Spread]) -> dict[str, Any]:
                 "channel": each.channel,
                 "y": 8.0 + (i + 0.5) * _ROW,
                 "dots": "".join(f"M{x} {y}h0" for x, y, name in points if name not in apart),
-                "apart": [point for point in points if point[2] in apart],
+                "apart": [
+                    (*point, point[2] in apart[:_NAMED]) for point in points if point[2] in apart
+                ],
                 "median": float(place(np.log(each.median * scale))),
                 "limit": float(place(np.log(limit))) if limit in drawn else None,
             }

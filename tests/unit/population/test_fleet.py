@@ -16,7 +16,7 @@ import gmwm
 from fleets import QUICK
 from gmwm import Calibration, Fleet, InputError, Model, RandomWalk, WhiteNoise
 from gmwm.issues import Notice
-from gmwm.population import LETTERS, SCHEMA, Item, Task, task as tasks, unit as lots
+from gmwm.population import LETTERS, SCHEMA, Item, Task, Unit, task as tasks, unit as lots
 
 READING = ("rate", "units")
 
@@ -381,6 +381,36 @@ def test_a_unit_that_fails_beside_the_others_costs_one_unit(lot, tmp_path, monke
     }  # fmt: skip
     assert all("unit 0" not in each.numbers for each in found.structures)
     assert {row["device"] for row in found.rows if row["valid"]} == {"unit 1", "third"}
+
+
+def test_a_page_of_thousands_of_units_stays_small_and_names_the_ones_to_look_at(outputs, tmp_path):
+    _, small = outputs
+    first = next(iter(small.done.values()))
+    names = [f"unit {i:04d}" for i in range(3000)]
+    units = {name: Unit(name, name, first) for name in names}
+    structures = [
+        replace(
+            each,
+            invalid=(),
+            numbers={
+                name: {
+                    letter: replace(number, upper=(1.0 if i % 100 else 9.0) * number.upper)
+                    for letter, number in each.numbers["unit 0"].items()
+                }
+                for i, name in enumerate(names)
+            },
+        )
+        for each in small.structures
+    ]
+    limits = {"gyro": {"N": 2.0 * structures[0].numbers[names[1]]["N"].upper}}
+    lot = Fleet(units, tuple(structures), {}, limits)
+    page = lot.report(tmp_path / "page.html").read_text()
+    assert len(page) < 2e6
+    assert len(page.split("<tr>")) < 500
+    # The 30 whose interval contains the limit come before the ones that pass.
+    assert all(f">{name}</th>" in page for name in names[::100])
+    assert "2700 more units" in page
+    assert len(lot.rows) == 3000 * 3 * len(first)
 
 
 def test_units_of_another_kind_are_reported(record, tmp_path):
