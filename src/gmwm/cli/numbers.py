@@ -310,10 +310,11 @@ def export(
       gmwm export gyro.json accel.json --to px4
       gmwm export --list
     """
-    from gmwm.export import TARGETS, not_valid, refusal
+    from gmwm.export import CURVES, TARGETS, not_valid, refusal
 
     if listed:
         rows = [(t.name, t.title, t.form, t.file_name) for t in TARGETS.values()]
+        rows += [(name, each.title, "curve", each.file_name) for name, each in CURVES.items()]
         click.echo(plain_table(("name", "program", "form", "file"), rows))
         return
     if not files or target is None:
@@ -322,12 +323,13 @@ def export(
     from gmwm import export as written, load
     from gmwm._core import checks
 
-    checks.choice("--to", target, tuple(TARGETS))
+    checks.choice("--to", target, (*TARGETS, *CURVES))
     given = [load(file) for file in files]
     for each in (n for one in given for n in getattr(one, "notices", ()) if n.code == "other-run"):
         click.echo(f"gmwm: {each}", err=True)
     if explain:
-        click.echo(TARGETS[target].explain(given, horizon, form), nl=False)
+        about = CURVES[target].about() if target in CURVES else ""
+        click.echo(about or TARGETS[target].explain(given, horizon, form), nl=False)
         return
     found = not_valid(given)
     if found and not force:

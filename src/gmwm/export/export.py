@@ -12,9 +12,10 @@ from typing import Any
 import numpy as np
 
 from gmwm._core import checks
-from gmwm._core.files import content_of, writable_file
+from gmwm._core.files import content_of, writable_file, write_text
 from gmwm.calibration import Calibration
 from gmwm.errors import InputError
+from gmwm.export.curves import CURVES
 from gmwm.export.keys import MemoryKeys, Pair, WalkKeys, entries
 from gmwm.export.state_space import StateSpaceFile
 from gmwm.export.target import ImuFile, JsonFile, Target
@@ -61,6 +62,8 @@ def export(
 ) -> str:
     """Numbers for a small filter in the form that a program reads; see `TARGETS`.
 
+    Or, for names of `CURVES` such as "px4-tc", the curves of the bias against the temperature.
+
     Parameters
     ----------
     numbers : Calibration, FilterNumbers, InMotion, or a sequence of them
@@ -89,8 +92,14 @@ def export(
         If the program is not known, a sensor is missing, the numbers do not fit, or the file
         cannot be written.
     """
-    chosen = TARGETS[checks.choice("target", target, tuple(TARGETS))]
+    checks.choice("target", target, (*TARGETS, *CURVES))
     given: list[Any] = list(numbers) if isinstance(numbers, Sequence) else [numbers]
+    if target in CURVES:
+        text = CURVES[target].text(given)
+        if path is not None:
+            write_text(writable_file(path), text)
+        return text
+    chosen = TARGETS[target]
     if path is None:
         return chosen.export(given, horizon, form)
     return chosen.save(writable_file(path), given, horizon, form)
