@@ -10,6 +10,12 @@ def slow(*values, **named):
     return pytest.param(*values, marks=pytest.mark.slow, **named)
 
 
+def every(step, cases):
+    """Cases of which one in so many is always run and the others are slow."""
+    return [case if k % step == 0 else slow(*case if isinstance(case, tuple) else (case,))
+            for k, case in enumerate(cases)]  # fmt: skip
+
+
 EXAMPLES = [process for kind in CATALOGUE for process in kind.examples()]
 FIRST = [
     (slow if i else pytest.param)(process, id=repr(process))

@@ -9,6 +9,7 @@ from scipy.stats import binom
 import gmwm
 from gmwm import ARMA, QuantizationNoise, RandomWalk, Resonance, Sinusoid, WhiteNoise
 from gmwm.diagnosis.tuning import FALSE_ALARM
+from marks import every
 
 NOISES = SMOOTH | {
     "valley": RandomWalk(0.1) + QuantizationNoise(0.01),
@@ -38,7 +39,7 @@ def test_frequency_and_damping(record, frequency, damping, sigma, background):
     assert not health.lines("gyro_z")
 
 
-@pytest.mark.parametrize("name", NOISES)
+@pytest.mark.parametrize("name", every(3, NOISES))
 def test_smooth_spectra_have_none(record, name):
     runs = 12
     count = sum(

@@ -23,6 +23,7 @@ from gmwm import (
 from gmwm.errors import InputError
 from gmwm.estimate import Fit
 from gmwm.process import as_model
+from marks import slow
 
 ALL = QuantizationNoise() + WhiteNoise() + BiasInstability() + RandomWalk() + RateRamp()
 SEEDS = range(50)
@@ -55,7 +56,7 @@ def drifting():
 
 @pytest.mark.parametrize(
     "truth",
-    [QuantizationNoise(0.4), WhiteNoise(0.2), BiasInstability(0.3), RandomWalk(0.02)],
+    [slow(QuantizationNoise(0.4)), WhiteNoise(0.2), BiasInstability(0.3), slow(RandomWalk(0.02))],
     ids=repr,
 )
 def test_one_process_alone_shows_one_region_and_its_parameter(truth):
@@ -75,7 +76,9 @@ def test_a_ramp_alone_is_exact_and_signed(slope):
     assert fit.regions[0].coefficient > 0.0
 
 
-@pytest.mark.parametrize("model", [WhiteNoise(), RandomWalk(), BiasInstability()], ids=repr)
+@pytest.mark.parametrize(
+    "model", [WhiteNoise(), slow(RandomWalk()), slow(BiasInstability())], ids=repr
+)
 def test_the_right_model_is_seldom_said_to_miss_the_data(model):
     (key,) = as_model(model).params
     found = fits(as_model(model).with_params({key: 0.1}), model, 6000)

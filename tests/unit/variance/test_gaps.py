@@ -358,7 +358,7 @@ def test_likelihood_and_moments_agree_on_a_gappy_series():
         assert moments.stderr[key] == pytest.approx(error, rel=0.4)
 
 
-@pytest.mark.parametrize("lost", ["0.1 %", "1 %", "30 shocks", "100 shocks"])
+@pytest.mark.parametrize("lost", ["0.1 %", slow("1 %"), slow("30 shocks"), "100 shocks"])
 @pytest.mark.parametrize("seed", [1, *map(slow, range(2, 21))])
 def test_a_few_missing_samples_make_no_ramp(lost, seed):
     """One hour at 100 Hz; with as few as these 18 of 20 records were given a ramp."""

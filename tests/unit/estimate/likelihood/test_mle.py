@@ -194,7 +194,7 @@ def test_an_amplitude_of_zero_has_an_upper_bound(method):
     ("K", "method", "runs"),
     [
         (1.5e-3, "mle", 12),
-        (6e-3, "mle", 12),
+        slow(6e-3, "mle", 12),
         slow(1.5e-3, "em", 10),
     ],
 )
@@ -455,7 +455,7 @@ def test_it_is_never_below_any_grid_point(model):
 @pytest.mark.parametrize(
     ("kept", "method"),
     [(lambda k: k % 2 == 1, "mle"), slow(lambda k: k % 2 == 1, "em"),
-     (lambda k: k * 7 % 10 < 4, "mle"), (lambda k: k * 7 % 10 < 4, "em")],
+     slow(lambda k: k * 7 % 10 < 4, "mle"), (lambda k: k * 7 % 10 < 4, "em")],
 )  # fmt: skip
 def test_gaps_may_be_anywhere(method, kept):
     truth = WhiteNoise(0.2) + GaussMarkov(0.5, 20.0)

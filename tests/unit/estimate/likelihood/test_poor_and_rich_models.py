@@ -66,8 +66,8 @@ def test_models_without_white_noise_are_found_again(truth):
     ("method", "model"),
     [
         *((method, WhiteNoise() + GaussMarkov()) for method in OF_SAMPLES),
-        ("mle", 2 * GaussMarkov()),
-        ("whittle", WhiteNoise() + 2 * GaussMarkov()),
+        slow("mle", 2 * GaussMarkov()),
+        slow("whittle", WhiteNoise() + 2 * GaussMarkov()),
         slow("em", WhiteNoise() + 2 * GaussMarkov()),
         slow("em", 2 * GaussMarkov()),
     ],

@@ -23,18 +23,18 @@ from gmwm.process import as_model
 from marks import slow
 
 MODELS = [
-    (WhiteNoise(0.8) + GaussMarkov(0.5, 125.0) + RateRamp(0.001), 6000, 1.0),
-    (WhiteNoise(0.2) + GaussMarkov(0.5, 20.0), 10_007, 1.0),
+    slow(WhiteNoise(0.8) + GaussMarkov(0.5, 125.0) + RateRamp(0.001), 6000, 1.0),
+    slow(WhiteNoise(0.2) + GaussMarkov(0.5, 20.0), 10_007, 1.0),
     (WhiteNoise(0.2) + GaussMarkov(0.5, 0.2), 8193, 0.01),
     (WhiteNoise(0.2) + RandomWalk(0.01) + RateRamp(-2e-3), 8193, 1.0),
-    (QuantizationNoise(0.4) + WhiteNoise(0.2) + GaussMarkov(0.5, 20.0), 9999, 1.0),
+    slow(QuantizationNoise(0.4) + WhiteNoise(0.2) + GaussMarkov(0.5, 20.0), 9999, 1.0),
     (QuantizationNoise(0.004) + WhiteNoise(0.02) + RandomWalk(0.02), 8192, 0.01),
     (AR([1.2, -0.6], 2.0) + WhiteNoise(1.0), 3001, 1.0),
-    (GaussMarkov(1.0, 2.0) + GaussMarkov(0.7, 50.0) + GaussMarkov(0.5, 1000.0), 40_000, 1.0),
+    slow(GaussMarkov(1.0, 2.0) + GaussMarkov(0.7, 50.0) + GaussMarkov(0.5, 1000.0), 40_000, 1.0),
     (WhiteNoise(0.2) + Resonance(0.5, 0.05, 0.1), 8191, 1.0),
     (as_model(ARMA([0.9], [-0.5], 1.0)), 5003, 1.0),
     (as_model(MA([-0.9], 1.0)), 4097, 1.0),
-    (as_model(ARIMA(0, 1, [0.5], 1e-3)), 5001, 1.0),
+    slow(as_model(ARIMA(0, 1, [0.5], 1e-3)), 5001, 1.0),
     (as_model(QuantizationNoise(0.3)), 3001, 1.0),
     (as_model(WhiteNoise(2.0)), 1009, 0.01),
 ]

@@ -5,6 +5,7 @@ import pytest
 
 import gmwm
 from gmwm import GMWM, GaussMarkov, InputError, RandomWalk, RateRamp, WhiteNoise
+from marks import slow
 
 TRUTH = WhiteNoise(0.2) + RandomWalk(0.02) + RateRamp(0.003)
 SEEDS = range(20)
@@ -14,7 +15,7 @@ def series(seed, truth=TRUTH, n=6000):
     return truth.simulate(n, 1.0, np.random.default_rng([44, seed]))
 
 
-@pytest.mark.parametrize("weights", ["data", "model"])
+@pytest.mark.parametrize("weights", ["data", slow("model")])
 def test_a_ramp_in_the_moments_is_estimated_with_its_error(weights):
     """Of 20 intervals of 95 % fewer than 16 hold the truth once in 400 times."""
     method = GMWM(weights=weights, drift="moments")

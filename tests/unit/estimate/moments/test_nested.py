@@ -8,6 +8,7 @@ import pytest
 
 import gmwm
 from gmwm import GaussMarkov, RandomWalk, WhiteNoise
+from marks import slow
 from places import SHARED
 
 CURVES = SHARED / "reference" / "smac_curves.json"
@@ -33,7 +34,7 @@ def stored(axis):
     return octaves(record["axes"][axis]["wavelet_variance"], record["rate"])
 
 
-@pytest.mark.parametrize("source", ["Gyro. X", "Gyro. Y", *range(4)])
+@pytest.mark.parametrize("source", ["Gyro. X", slow("Gyro. Y"), 0, *map(slow, (1, 2, 3))])
 @pytest.mark.filterwarnings("ignore::gmwm.errors.FitWarning")
 def test_a_further_term_does_not_spoil_the_fit(source):
     wv = stored(source) if isinstance(source, str) else made(source)
@@ -63,7 +64,7 @@ def bent(seed):
     return octaves(np.exp2(np.cumsum(slopes)), 100.0)
 
 
-@pytest.mark.parametrize("seed", [6005, 6023, 7059])
+@pytest.mark.parametrize("seed", [6005, slow(6023), slow(7059)])
 @pytest.mark.filterwarnings("ignore::gmwm.errors.FitWarning")
 def test_a_further_term_needs_no_larger_discrepancy(seed):
     nested, larger = (

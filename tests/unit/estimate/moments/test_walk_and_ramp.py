@@ -19,7 +19,7 @@ def series(seed):
     return white + np.cumsum(rng.normal(0.0, K * np.sqrt(DT), SIZE)) + R * DT * np.arange(SIZE)
 
 
-@pytest.mark.parametrize("seed", [1, slow(2), 8])
+@pytest.mark.parametrize("seed", [1, slow(2), slow(8)])
 def test_K_is_that_of_the_exact_likelihood(seed):
     """It used to stay near zero where the slope is certain only because the walk is small."""
     x = series(seed)
@@ -47,6 +47,7 @@ def test_terms_share_the_variance_of_the_slope():
     assert slope == pytest.approx(shares[1] / np.sum(shares), rel=1e-2)
 
 
+@pytest.mark.slow
 def test_a_slope_is_less_certain_where_a_walk_may_be_there():
     """A slope hides half the walk: where that comes out as zero, R was off in four of six."""
     held = []

@@ -42,11 +42,11 @@ def series():
 
 def test_a_known_process_by_simulation_agrees_with_its_closed_form(series):
     closed = gmwm.fit(TRUTH.opened(), series, dt=1.0)
-    simulated = gmwm.fit(TRUTH.opened(), series, dt=1.0, method=SimulatedMoments(replications=16))
+    simulated = gmwm.fit(TRUTH.opened(), series, dt=1.0, method=SimulatedMoments(replications=4))
     assert simulated.valid, simulated.message
     for key, error in closed.stderr.items():
-        # The simulated series are so many more: their own error is a quarter of the data's.
-        assert simulated.params[key] == pytest.approx(closed.params[key], abs=3.0 * error / 4.0)
+        # The simulated series are so many more: their own error is half that of the data.
+        assert simulated.params[key] == pytest.approx(closed.params[key], abs=3.0 * error / 2.0)
     assert "simulated moments" in str(simulated)
 
 
@@ -85,14 +85,14 @@ def test_the_same_seed_gives_the_same_estimates(series):
 def test_noise_rounded_as_coarsely_as_it_is_large():
     """White noise alone is off by the variance of rounding; the simulation is not."""
     errors, naive = [], []
-    for seed in range(5):
+    for seed in range(2):
         x = RoundedNoise(sigma=0.7, lsb=1.0).simulate(8192, 1.0, seed)
         fit = gmwm.fit(RoundedNoise(lsb=1.0), x, dt=1.0, method=SimulatedMoments(replications=4))
         assert fit.valid, fit.message
         errors.append((fit.params["sigma"] - 0.7) / fit.stderr["sigma"])
         white = gmwm.fit(WhiteNoise(), x, dt=1.0)
         naive.append((white.params["N"] - 0.7) / white.stderr["N"])
-    assert np.mean(np.square(errors)) < 4.1  # chi-square of 5 over 5, at 0.001
+    assert np.mean(np.square(errors)) < 6.9  # chi-square of 2 over 2, at 0.001
     assert np.min(naive) > 5.0
 
 
@@ -101,7 +101,7 @@ def test_a_bias_held_in_blocks():
     fits = [
         gmwm.fit(truth.opened(), truth.simulate(16_384, 1.0, seed), dt=1.0,
 method=SimulatedMoments(replications=4))
-        for seed in (1, 2)
+        for seed in (1,)
     ]  # fmt: skip
     for fit in fits:
         for key, value in truth.params.items():
@@ -165,6 +165,7 @@ def test_likelihoods_refuse_what_has_no_spectrum(series):
         BlockBias(1.0, 8.0).psd(np.ones(1), 1.0)
 
 
+@pytest.mark.slow
 def test_two_parameters_of_one_number_are_said_not_to_be_told_apart(series):
     """Rounded white noise is white: its variance alone gives no step."""
     x = RoundedNoise(sigma=0.7, lsb=1.0).simulate(8192, 1.0, 1)
