@@ -53,8 +53,6 @@ REPEATED_WAY, REPEATS = 5.0, 3
 # Scatter of an IMU at rest, over where the vehicle stood at the start, and the length looked at, s:
 # engines and roads shake it far more.
 ZERO_VELOCITY = (2.0, 1.0)
-# Standard deviations (and m/s^2 of acceleration) beyond which positions step; fixes on both sides.
-STEP, STEP_STAYS = (10.0, 5.0), 10
 LEAP_SECONDS = 18.0  # s, by which GPS time is ahead of UTC since 2017
 
 # -- own logs: alignment --------------------------------------------------------------------------
@@ -97,17 +95,15 @@ FINE_HEADING = math.radians(0.5)  # of the estimated one: the data and not the s
 DIAGNOSED = 3600.0  # s from the start in which faults are looked for, by tens of runs
 MOST_FAULTS = 4  # at once: with more, nothing can be known
 ROUNDS, SETTLED_GAIN = 6, 0.05  # Gauss-Newton steps; the gain in log-likelihood that ends them
-# Shares of LARGEST_OFFSET and times LARGEST_ARM from which more of a time offset may be behind it;
-# the correlation of the two above which the motion hardly distinguishes them.
-FAR_OFFSET, FAR_ARM, ALIKE = 0.9, 2.0, 0.95
+# Shares of LARGEST_OFFSET and times LARGEST_ARM from which more of a time offset may be behind it.
+FAR_OFFSET, FAR_ARM = 0.9, 2.0
 AMBIGUOUS = 3.0  # of log-likelihood, within which two faults explain a log equally well
 MOST_OUTLIERS = 0.1  # fraction of the fixes, above which the filter and not the fixes is wrong
 # m, 1 sigma of a start whose fix is an outlier: farther ones count as outliers too, and more would
 # make the filter allow for products of errors.
 ANYWHERE = 100.0
 SEEN = 5.0  # standard errors of a constant error that is found at the level of the tests
-# Constant errors that a motion must show, or it is reported not to: larger ones are rare.
-UNSEEN = {"s": 0.5, "m": 3.0, "deg": math.radians(10.0)}
+UNSEEN = 3.0  # m of a lever arm that a motion must show, or it is reported not to
 
 # -- own logs: comparisons on a log ---------------------------------------------------------------
 

@@ -171,28 +171,16 @@ def changed(replay: Replay, errors: FloatArray, is_smooth: bool = False) -> Repl
     return replay.turned_by(float(heading)) if heading else replay
 
 
-def constant_errors(
-    base: Replay, known: Collection[str] = ()
-) -> tuple[list[tuple[Fault, ...]], dict[str, float]]:
-    """Stamps, antenna, heading, and the first two together, but for the known ones.
-
-    Returns also the standard error of each from this motion, whether it is there or not.
-    """
-    none = np.zeros(_CODES.size)
+def constant_errors(base: Replay, known: Collection[str] = ()) -> list[tuple[Fault, ...]]:
+    """Stamps, antenna, heading, and the first two together, but for the known ones."""
+    none, found = np.zeros(_CODES.size), []
     columns = _columns(base, partial(changed, base), none, none == 0.0)
-    found, errors = [], dict[str, float]()
     for codes in _TOGETHER:
         own = np.isin(_CODES, codes)
-        _, covariance, gain = gauss_newton(base, columns[:, own], none[own], own)
-        # Of stamps and antenna the errors of both together: one could be taken for the other.
-        sd = np.sqrt(np.diag(covariance))
-        errors |= zip(_NAMES[own].tolist(), sd.tolist(), strict=True)
-        if len(codes) > 1:
-            errors |= {"alike": float(abs(covariance[0, 1]) / (sd[0] * sd[1]))}
-            errors |= {"forward per second": float(abs(covariance[0, 1]) / sd[0] ** 2)}
+        gain = gauss_newton(base, columns[:, own], none[own], own)[2]
         if gain > cost(1) and not any(code in known for code in codes):
             found.append(fitted(base, base, codes))
-    return found, errors
+    return found
 
 
 def fitted(
@@ -279,17 +267,15 @@ class Faults:
     found: Each given the ones before it; empty if there is none.
     explained: Whether the innovations agree with the filter that allows for the faults.
     replay: The log with the faults allowed for.
-    resolution: Constant error -> its standard error from this motion, s, m, rad.
     """
 
     found: tuple[Fault, ...]
     explained: bool
     replay: Replay
-    resolution: dict[str, float]
 
     @classmethod
     def of(cls, whole: Replay, measured: Measured | None = None, *, search: bool = True) -> Faults:
-        """Look for faults; without a search only for the ones that this motion can show.
+        """Look for faults, if there is to be a ``search``.
 
         measured: The log as it was, to be aligned anew without a time offset at its limit, or leap
             seconds where the filter is lost: the start is as wrong as the stamps.
@@ -297,7 +283,7 @@ class Faults:
         span = tuning.LARGEST_OFFSET + tuning.OFFSET_MARGIN, tuning.DIAGNOSED
         base = whole.within(*span)
         if not search:
-            return cls((), not contradicted(base), base, constant_errors(base)[1])
+            return cls((), not contradicted(base), base)
         near = cls._near(base)
         if measured is None or not (near._is_far or (base.is_lost and not near.explained)):
             return near
@@ -321,23 +307,13 @@ class Faults:
         values = [(name, size) for each in self.found for name, size in each.values.items()]
         return any(abs(size) > largest.get(name, np.inf) for name, size in values)
 
-    @property
-    def alike(self) -> str:
-        """The two errors that this motion hardly distinguishes; empty if it does."""
-        if self.resolution["alike"] < tuning.ALIKE:
-            return ""
-        way = self.resolution["forward per second"]
-        return f"a time offset of 1 s from a lever arm of {way:.3g} m forward"
-
     @classmethod
     def _near(cls, base: Replay) -> Faults:
         """Faults one after the other, each the most probable, while they are beyond chance."""
         here, found = base, list[Fault]()
-        resolution: dict[str, float] = {}
         while len(found) < tuning.MOST_FAULTS:
             known = {each.code for each in found}
-            tried, resolution = constant_errors(here, known)
-            tried += [(each,) for each in outliers(here)]
+            tried = [*constant_errors(here, known), *((each,) for each in outliers(here))]
             if contradicted(here, tuning.SUSPECTED) and here.is_lost:  # these are costly
                 tried += [(each,) for each in wrong_signs(here)]
                 if "heading" not in known:
@@ -347,14 +323,16 @@ class Faults:
                 break
             found += best
             here = best[0].replay
-        return cls(tuple(found), not contradicted(here), here, resolution)
+        return cls(tuple(found), not contradicted(here), here)
 
     def _with_offset(self, offset: float) -> Faults:
         """The offset as the first fault, then these."""
         near = [each for each in self.found if each.code == "time-offset"]
-        name = "time offset"
+        name, own, none = "time offset", _CODES == "time-offset", np.zeros(_CODES.size)
         values = {name: offset + sum(each.values[name] for each in near)}
-        error = near[0].errors if near else {name: self.resolution[name]}
+        columns = _columns(self.replay, partial(changed, self.replay), none, own)
+        variance = gauss_newton(self.replay, columns, none[own], own)[1].item()
+        error = near[0].errors if near else {name: float(np.sqrt(variance))}
         first = Fault("time-offset", "", self.replay, np.inf, cost(1), values, error)
         return replace(self, found=(first, *(each for each in self.found if each not in near)))
 
@@ -419,7 +397,7 @@ def _arm_words(fault: Fault) -> dict[str, Any]:
     values, errors = fault.values, fault.errors
     parts = ", ".join(f"{values[name]:.2f} m {name} ({errors[name]:.1g})" for name in values)
     # A part that the motion does not show stays as it was: an estimate of it is mostly error.
-    unseen = [name for name in values if tuning.SEEN * errors[name] > tuning.UNSEEN["m"]]
+    unseen = [name for name in values if tuning.SEEN * errors[name] > tuning.UNSEEN]
     known = [0.0 if name in unseen else values[name] for name in values]
     arm = np.asarray(fault.replay.aiding.lever_arm) - list(values.values()) + known
     hint = f"give the lever arm {','.join(f'{each:.2f}' for each in arm)}, or measure it"
@@ -429,27 +407,3 @@ def _arm_words(fault: Fault) -> dict[str, Any]:
     if len(unseen) == len(values):
         hint = "measure it: this motion does not show any of its parts well enough"
     return {"parts": parts, "hint": hint}
-
-
-_MOTION = {
-    "time offset": ("a time offset of the fixes", "s", 1.0),
-    "forward": ("a lever arm forward", "m", 1.0),
-    "right": ("a lever arm to the right", "m", 1.0),
-    "down": ("a lever arm down", "m", 1.0),
-    "heading": ("a wrong initial heading", "deg", float(np.degrees(1.0))),
-}
-
-
-def resolution_notice(faults: Faults) -> Notice:
-    """The smallest constant errors that this motion shows, and the ones that it does not show."""
-    seen, unseen = [], []
-    for name, (what, unit, factor) in _MOTION.items():
-        least = tuning.SEEN * faults.resolution[name]
-        if least > tuning.UNSEEN[unit]:
-            unseen.append(what)
-        else:
-            seen.append(f"{what} of {least * factor:.2g} {unit}")
-    shown = "from here on: " + "; ".join(seen) if seen else "no constant error"
-    missing = "; it would not show " + ", ".join(unseen) if unseen else ""
-    missing += f"; it hardly distinguishes {faults.alike}" if faults.alike else ""
-    return notice("resolution", values=dict(faults.resolution), shown=shown, missing=missing)

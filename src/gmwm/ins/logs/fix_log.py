@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
 
 from gmwm._core.files import existing_file, opened
 from gmwm._core.typing import BoolArray, FloatArray
@@ -276,45 +275,6 @@ def _repeated(time: FloatArray, position: FloatArray) -> BoolArray:
     moved = (way > tuning.REPEATED_WAY) & (time[last] - time[first] <= tuning.CHORD)
     held = again[np.minimum(first + 1, time.size - 1)]
     return again & (np.count_nonzero(moved & held) >= tuning.REPEATS)
-
-
-def step_notices(aiding: Aiding, start: float) -> list[Notice]:
-    """A step of the positions that the motion around it does not explain, and that stays.
-
-    Heights above the ellipsoid and the sea, or another base station, make one.
-    """
-    position, velocity = aiding.of("position"), aiding.of("velocity")
-    stays = tuning.STEP_STAYS
-    if position is None or position.time.size < 2 * stays:
-        return []
-    time, sd = position.time, position.sd
-    step, way = np.diff(time)[:, None], ned_difference(position.value[1:], position.value[:-1])
-    if is_known := velocity is not None and np.array_equal(velocity.time, time):
-        assert velocity is not None
-        speed = 0.5 * (velocity.value[1:] + velocity.value[:-1])
-    else:
-        near = np.arange(step.size)[:, None] + np.delete(np.arange(-3, 4), 3)
-        speed = np.median((way / step)[np.clip(near, 0, step.size - 1)], axis=1)
-        sd = sd + np.array([np.inf, np.inf, 0.0])  # a turn is no step; heights alone are looked at
-    off = way - speed * step
-    # What the motion leaves, by medians of some fixes on both sides, which outliers do not move.
-    left = np.cumsum(np.vstack([np.zeros(3), off]), axis=0)
-    levels = np.median(sliding_window_view(left, stays, axis=0), axis=-1)
-    size, inside = levels[stays:] - levels[:-stays], slice(stays - 1, step.size - stays + 1)
-    sigmas, by = tuning.STEP
-    limit = (sigmas * np.hypot(sd[1:], sd[:-1]) + by * step**2)[inside]
-    is_step = (np.abs(off[inside]) > limit) & (np.abs(size) > limit) & (size * off[inside] > 0.0)
-    is_step &= step[inside] <= tuning.CHORD
-    found = np.flatnonzero(np.any(is_step, axis=1))
-    if not found.size:
-        return []
-    first = int(found[0])
-    # Guessed velocities move the levels by more than the noise of two fixes.
-    size = np.where(is_step, size if is_known else off[inside], 0.0)
-    steps = dict(zip(_NED, size[first].tolist(), strict=True))
-    moved = " and ".join(f"{each:.3g} m {axis}" for axis, each in steps.items() if each)
-    values = {**steps, "count": int(found.size), "time": float(time[first + stays] + start)}
-    return [notice("fixes-step", "position", values, moved=moved)]
 
 
 # -- axes and units -------------------------------------------------------------------------------

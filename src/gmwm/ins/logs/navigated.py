@@ -21,7 +21,7 @@ from gmwm.ins import tuning
 from gmwm.ins.filter import KINDS, Solution
 from gmwm.ins.geometry import ned_difference
 from gmwm.ins.logs.alignment import Alignment, align
-from gmwm.ins.logs.faults import LEVEL, Faults, fault_notice, resolution_notice
+from gmwm.ins.logs.faults import LEVEL, Faults, fault_notice
 from gmwm.ins.logs.measured import Measured
 from gmwm.ins.logs.reference import ReferenceErrors
 from gmwm.ins.logs.replay import Replay, innovation_sizes
@@ -102,7 +102,7 @@ class Navigated:
 
     @cached_property
     def faults(self) -> Faults:
-        """Faults of the log, by tens of runs of the filter, or five if nothing contradicts it."""
+        """Faults of the log, by tens of runs of the filter."""
         replay = Replay.of(self.measured, self.alignment)
         return Faults.of(replay, self.measured, search=not self._bad_inputs)
 
@@ -229,8 +229,6 @@ class Navigated:
             if is_explained
             else ". That does not explain all: something else is wrong too."
         )
-        if self.faults.alike and first.code in ("time-offset", "lever-arm"):
-            text += f" This motion hardly distinguishes {self.faults.alike}: measure the lever arm."
         values = {**first.values, "explained": is_explained, "faults": len(faults)}
         severity = worst_first(faults)[0].severity
         return replace(first, severity=severity, text=text, values=values, hint="", source="")
@@ -247,13 +245,7 @@ class Navigated:
         verdict, hint = self.verdict.text, self.verdict.hint
         for sentence in (*self.accuracy, f"{verdict} ({hint})" if hint else verdict):
             lines += ["", *wrapped(sentence)]
-        lines += ["", *wrapped(self.resolution.sentence)]
         return "\n".join(lines)
-
-    @property
-    def resolution(self) -> Notice:
-        """The smallest constant errors of the log that this motion shows."""
-        return resolution_notice(self.faults)
 
     @property
     def notices(self) -> tuple[Notice, ...]:
@@ -304,7 +296,6 @@ class Navigated:
             "title": self.measured.title,
             "verdict": self.verdict.to_dict(),
             "faults": [each.to_dict() for each in self.fault_notices],
-            "resolution": self.resolution.to_dict(),
             "notices": [each.to_dict() for each in self.notices],
             "innovations": {
                 kind: {

@@ -71,24 +71,6 @@ def test_a_sensor_at_the_end_of_its_range_is_named_and_nothing_else(log, tmp_pat
     assert not found.fault_notices
 
 
-@pytest.mark.parametrize("velocity", [True, False])
-def test_a_step_of_the_height_is_dated_and_its_hint_mends_it(log, tmp_path, velocity):
-    """The heights were outliers, or sensors worse than their models."""
-    position, *others = log.aiding.fixes
-    later = position.time > 0.5 * DURATION
-    stepped = position.value + np.outer(later, [0.0, 0.0, 45.0])
-    fixes = (replace(position, value=stepped), *others)[: 1 + velocity]
-    write(tmp_path, log, fixes)
-    verdict = navigated(tmp_path).verdict
-    assert verdict.code == "fixes-step"
-    assert verdict.values["time"] == pytest.approx(position.time[later][0])
-    assert verdict.values["down"] == pytest.approx(-45.0, abs=3.0)
-    assert verdict.values["north"] == verdict.values["east"] == 0.0
-    stepped[position.time >= verdict.values["time"] - 1e-6, 2] += verdict.values["down"]
-    write(tmp_path, log, (replace(position, value=stepped), *others)[: 1 + velocity])
-    assert navigated(tmp_path).verdict.code == "consistent"
-
-
 @pytest.mark.parametrize("times", [2, 5])
 def test_fixes_that_are_written_again_are_left_out(log, tmp_path, times):
     """They were fixes with late stamps."""

@@ -9,7 +9,6 @@ from emulated_logs import emulated_log
 from gmwm.ins import Measured, Navigated, Straight, emulate, gnss, perform
 from gmwm.ins.filter import InitialSd
 from gmwm.ins.logs import Fault, Faults, Replay, fault_notice
-from gmwm.ins.logs.faults import resolution_notice
 from gmwm.study.demo import LEVER_ARM, sensors
 from marks import slow
 
@@ -85,7 +84,6 @@ def test_circles_at_constant_speed_do_not_tell_stamps_from_a_lever_arm():
     faults = found(201, "stamps", vehicle="loiter").faults
     (fault,) = faults.found
     assert fault.code in {"time-offset", "lever-arm"}
-    assert faults.resolution["time offset"] > 0.03
 
 
 def test_stamps_that_are_late_in_a_start_in_motion():
@@ -107,9 +105,6 @@ def test_stamps_that_are_farther_off_than_one_search_reaches(vehicle):
     (fault,) = navigated.fault_notices
     assert within(fault, "time offset", 2.2) < 0.03
     assert navigated.faults.explained
-    hardly = "hardly distinguishes a time offset of 1 s from a lever arm of 2"
-    assert (hardly in navigated.verdict.text) is (vehicle == "loiter")
-    assert (hardly in navigated.resolution.text) is (vehicle == "loiter")
 
 
 @pytest.mark.parametrize("by", [-0.15, 0.15])
@@ -280,7 +275,7 @@ def test_other_faults_do_not_pass_as_one_that_explains_all(fault):
 
 
 def test_straight_flight_at_constant_speed_shows_no_lever_arm():
-    """It moves the track as a whole; nothing is found, and that it would not be is reported."""
+    """It moves the track as a whole."""
     truth = perform([Straight(200.0)], start=(0.8, 0.1, 500.0), heading=0.4, speed=20.0, dt=0.05)
     rng = np.random.default_rng(3)
     models = sensors()
@@ -293,10 +288,6 @@ def test_straight_flight_at_constant_speed_shows_no_lever_arm():
     )
     assert not faults.found
     assert faults.explained
-    notice = resolution_notice(faults)
-    assert notice.values["forward"] > 1.0
-    assert notice.values["time offset"] > 0.05
-    assert "would not show" in notice.text
 
 
 def test_the_fix_that_a_filter_starts_from_may_be_an_outlier():
