@@ -9,12 +9,13 @@ import re
 import shutil
 import stat
 import tempfile
+import tomllib
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from functools import cache
 from io import BufferedReader
 from pathlib import Path
-from typing import TextIO
+from typing import Any, TextIO
 
 from gmwm.errors import InputError
 
@@ -119,6 +120,14 @@ def of_other_runs(path: Path, names: Iterable[str]) -> list[str]:
             marks = mark.findall(stream.read())
             found += [name] if marks and own not in marks else []
     return found
+
+
+def toml_beside(module: str) -> dict[str, Any]:
+    """Content of the TOML file beside a module, of its name: what the package itself knows.
+
+    module: Its ``__file__``.
+    """
+    return tomllib.loads(Path(module).with_suffix(".toml").read_text(encoding="utf-8"))
 
 
 def existing_file(path: str | os.PathLike[str]) -> Path:

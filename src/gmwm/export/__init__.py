@@ -1,6 +1,6 @@
 """Numbers for filters in the files that other programs read.
 
-A consumer is an entry of programs.toml, with a template of its file, and described in
+A consumer is an entry of export.toml, with a template of its file, and described in
 docs/export.md. Its keys stand once: they write the file and read it back.
 """
 

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import os
-import tomllib
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
 from gmwm._core import checks
-from gmwm._core.files import content_of, writable_file, write_text
+from gmwm._core.files import content_of, toml_beside, writable_file, write_text
 from gmwm.calibration import Calibration
 from gmwm.errors import InputError
 from gmwm.export.curves import CURVES
@@ -27,7 +25,7 @@ _KINDS = {"json": JsonFile, "state-space": StateSpaceFile}
 
 
 def _target(name: str, content: dict[str, Any]) -> Target:
-    """A consumer as programs.toml describes it."""
+    """A consumer as export.toml describes it."""
     kind = _KINDS.get(content.pop("kind", ""), ImuFile)
     for given, keys in (("walk_keys", WalkKeys), ("memory_keys", MemoryKeys)):
         if given in content:
@@ -39,10 +37,8 @@ def _fixed(content: dict[str, Any]) -> dict[str, Any]:
     return {key: tuple(each) if isinstance(each, list) else each for key, each in content.items()}
 
 
-_PROGRAMS = tomllib.loads(Path(__file__).with_name("programs.toml").read_text(encoding="utf-8"))
-
 TARGETS: Mapping[str, Target] = MappingProxyType(
-    {name: _target(name, content) for name, content in _PROGRAMS.items()}
+    {name: _target(name, content) for name, content in toml_beside(__file__).items()}
 )
 """Every consumer by name."""
 

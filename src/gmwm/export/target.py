@@ -164,7 +164,7 @@ def purpose(imu: ImuNumbers) -> list[str]:
 
 @dataclass(frozen=True)
 class Target(ABC):
-    """A file that some program reads; programs.toml says what the attributes are.
+    """A file that some program reads; export.toml says what the attributes are.
 
     name: As users write it.
     keys: By which the numbers are read back; None if they cannot be.

@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
+from gmwm._core.files import toml_beside
 from gmwm._core.units import auxiliary_unit, quantity_of, seconds_in
 from gmwm.errors import InputError
 
@@ -20,74 +21,25 @@ AXES = ("x", "y", "z")
 CANONICAL = tuple(f"{sensor}_{axis}" for sensor in ("gyro", "accel") for axis in AXES)
 TIME = "time"  # role of a column of time stamps
 
-_SENSOR_WORDS = {
-    word: sensor
-    for sensor, words in {
-        "gyro": "gyro gyr gyroscope omega angularvelocity angularrate angvel angrate "
-        "rotationrate rotrate turnrate rate wrss",
-        "accel": "accel acc accelerometer acceleration linearacceleration linacc linaccel "
-        "specificforce specforce arss",
-    }.items()
-    for word in words.split()
-}
-# These mean a sensor only where nothing stands before them.
-_SENSOR_LETTERS = dict.fromkeys(("g", "w", "wb"), "gyro") | dict.fromkeys(("a", "f", "fb"), "accel")
-
-# Columns that say which of several sensors a row is of.
-NUMBERS_OF_SENSORS = frozenset(
-    {"id", "i", "inst", "instance"}
-    | {f"{what}{end}" for what in ("imu", "sensor", "device", "unit") for end in ("", "id", "_id")}
+_WORDS = toml_beside(__file__)
+_TIME_WORDS, _BEFORE_TIME, NUMBERS_OF_SENSORS = (
+    frozenset(_WORDS[key].split()) for key in ("time", "before_time", "numbers")
 )
-_TIME_WORDS = frozenset({"t", "ts", "time", "timestamp", "stamp", "tow"})
-# Columns about a sensor, or about a temperature or a voltage, other than its samples.
-_NO_SAMPLES = frozenset(
-    {"bias", "offset", "std", "sigma", "var", "cov", "err", "error", "ref", "reference"}
-    | {"cmd", "desired", "setpoint", "delta"}
+_NO_SAMPLES, _NO_SENSOR, _NO_AUXILIARY = (
+    frozenset(_WORDS[key].split()) for key in ("no_samples", "no_sensor", "no_auxiliary")
 )
-_OTHER_MEANINGS = _NO_SAMPLES | {
-    "covariance",
-    "true",
-    "truth",
-    "temp",
-    "temperature",
-    "mag",
-    "free",
-}
-_OTHER_AUXILIARY = _NO_SAMPLES | _TIME_WORDS | {"limit", "alarm", "flag", "status", "valid"}
+_OTHER_MEANINGS = _NO_SAMPLES | _NO_SENSOR
+_OTHER_AUXILIARY = _NO_SAMPLES | _TIME_WORDS | _NO_AUXILIARY
 
-_AUXILIARY_WORDS = dict.fromkeys(
-    ("temp", "temperature", "temperatures", "thermometer"), "temperature"
-) | dict.fromkeys(("voltage", "volt", "volts", "vbat", "vdd", "vcc"), "voltage")
 
-_UNIT_WORDS = {
-    word: unit
-    for unit, words in {
-        "rad/s": "rps rads radps radsec radpersec radpers",
-        "deg/s": "dps degs degps degsec degpersec degpers",
-        "deg/h": "dph degh degph deghr degperhr degperh",
-        "mdeg/s": "mdps mdegs mdegps",
-        "m/s^2": "mss ms2 mps2 mpss mpers2 msec2",
-    }.items()
-    for word in words.split()
-} | {"g": "g", "mg": "mg", "ug": "ug"}
+def _by_word(key: str) -> dict[str, str]:
+    return {word: meant for meant, words in _WORDS[key].items() for word in words.split()}
 
-_BEFORE_TIME = frozenset(
-    {"header", "field", "imu", "sensor", "sample", "sampling", "system", "sys", "unix", "utc"}
-    | {"gps", "gnss", "ros", "elapsed", "relative", "boot", "device", "local", "date", "datetime"}
-    | {"iso"}
-)
-_SECONDS = {
-    word: seconds
-    for seconds, words in {
-        1.0: "s sec secs second seconds",
-        1e-3: "ms msec msecs millis millisecond milliseconds",
-        1e-6: "us usec usecs micros microsecond microseconds",
-        1e-9: "ns nsec nsecs nanos nanosec nanosecs nanosecond nanoseconds",
-    }.items()
-    for word in words.split()
-}
-# After a word for time only: alone they are fields of a calendar, and t_min may be a minimum.
-_LONG_SECONDS = {"minutes": 60.0, "hours": 3600.0, "days": 86400.0}
+
+_SENSOR_WORDS, _SENSOR_LETTERS = _by_word("sensor"), _by_word("sensor_letter")
+_AUXILIARY_WORDS, _UNIT_WORDS = _by_word("auxiliary"), _by_word("unit")
+_SECONDS = {word: float(seconds) for word, seconds in _by_word("seconds").items()}
+_LONG_SECONDS = {word: float(seconds) for word, seconds in _by_word("long_seconds").items()}
 
 _BRACKETS = re.compile(r"\s*[\[(]([^\[\]()]*)[\])]\s*$")
 _CAMEL_HUMP = re.compile(r"(?<=[a-z0-9])(?=[A-Z])")
