@@ -106,3 +106,17 @@ def test_command_rejects_increments_that_the_logger_thinned(run, samples, tmp_pa
     code, _, error = run("motion", write_ulog(tmp_path / "flight.ulg", *topics))
     assert code == 2
     assert "each row of vehicle_imu covers 5 ms, and rows are 500 ms apart" in error
+
+
+def test_command_gives_numbers_of_a_class(run, files):
+    """And exports them."""
+    code, out, error = run("motion", *files, "--at", "low", "-o", "low.json")
+    assert (code, error) == (0, "")
+    assert "for filters, SI" in out
+    code, out, error = run("export", "low.json", "--to", "kalibr")
+    assert (code, error) == (0, "")
+    assert "N+K for outages up to 1 s (motion)" in out
+    code, _, error = run("motion", *files, "--at", "rest")
+    assert (code, error) == (2, "gmwm: no class 'rest': there are low, middle, high\n")
+    code, _, error = run("motion", *files, "--limits", "3,x")
+    assert (code, error) == (2, "gmwm: --limits 3,x: write two levels, e.g. 1,4\n")

@@ -9,7 +9,14 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from gmwm.cli.console import print_result, progress_bar
-from gmwm.cli.options import FILE_TO_WRITE, PATH, arguments_of_read, options, read_recording
+from gmwm.cli.options import (
+    FILE_TO_WRITE,
+    PATH,
+    arguments_of_read,
+    numbers,
+    options,
+    read_recording,
+)
 from gmwm.errors import InputError
 
 if TYPE_CHECKING:
@@ -23,6 +30,9 @@ if TYPE_CHECKING:
     --static FILE  Calibration of a recording at rest, of one of the IMUs or of their kind.
     --imus N  Number of IMUs: the files are those of one flight, then those of the next, each in one
         order. By default all files are of one flight.
+    --limits A,B  Vibration in m/s^2 (rms, 20 to 60 Hz) between the classes low, middle and high,
+        such as idle, hover and manoeuvres; by default each has a third of the time.
+    --at CLASS  Result at low, middle or high vibration, or at rest.
     --logs  Each file is a log of one flight with all IMUs; a single file is one anyway.
     -o --output JSON  File to save the result in.
     --plot PNG  Picture of the Allan deviations, a panel a channel.
@@ -33,11 +43,14 @@ if TYPE_CHECKING:
     """,
     output=FILE_TO_WRITE,
     plot=FILE_TO_WRITE,
+    at={"type": click.Choice(["low", "middle", "high", "rest"])},
 )
 def motion(
     files: Sequence[Path],
     static: Path | None,
     imus: int | None,
+    limits: str | None,
+    at: str | None,
     logs: bool,
     output: Path | None,
     plot: Path | None,
@@ -66,6 +79,7 @@ def motion(
     count = imus or len(files)
     if len(files) % count:
         raise InputError(f"{len(files)} files are no flights of {count} IMUs: give all of each")
+    levels = None if limits is None else numbers("--limits", limits, "two levels, e.g. 1,4", 2)
     at_rest = None if static is None else Calibration.load(static)
     flights: list[Any]
     if logs or len(files) == 1:
@@ -74,7 +88,8 @@ def motion(
         recordings = [read_recording(file, **reading) for file in files]
         flights = [recordings[k : k + count] for k in range(0, len(files), count)]
     with progress_bar("motion", "flights", quiet=quiet) as bar:
-        found = run(flights, static=at_rest, progress=bar)
+        found = run(flights, static=at_rest, limits=levels, progress=bar)
+    found = found if at is None else found.at(at)
     if output is not None:
         found.save(output)
     if plot is not None:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.ndimage import uniform_filter1d
+from scipy.signal import butter, sosfiltfilt
 
 from gmwm._core.documents import Array, Document, Text
 from gmwm._core.frozen import freeze
@@ -168,6 +169,17 @@ def far_out(differences: Sequence[FloatArray], dt: float) -> BoolArray:
         here = np.repeat(np.any(np.abs(level) > tuning.FAR_OUT * spread, axis=1), size)
         away[: here.size] |= here
     return away if away.mean() <= tuning.MOST_EVENTS else np.zeros_like(away)
+
+
+def vibration_of(forces: FloatArray, dt: float) -> FloatArray:
+    """(n,) rms over a second of what is from 20 to 60 Hz, m/s^2; NaN where it is not seen."""
+    low, high = tuning.VIBRATION
+    if 2.2 * low * dt > 1.0:
+        return np.full(len(forces), np.nan)
+    kind, ends = ("bandpass", (low, high)) if 2.2 * high * dt < 1.0 else ("highpass", low)
+    band = sosfiltfilt(butter(4, ends, kind, fs=1.0 / dt, output="sos"), forces, axis=0)
+    mean = uniform_filter1d(np.sum(band**2, axis=1), max(1, round(tuning.VIBRATION_OVER / dt)))
+    return np.sqrt(np.maximum(mean, np.finfo(float).tiny))
 
 
 def bridged(difference: FloatArray, used: BoolArray, dt: float) -> FloatArray:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -17,9 +18,18 @@ from gmwm.estimate import Fit
 from gmwm.issues import Notice, notice
 from gmwm.motion import tuning
 from gmwm.motion.clocks import Clock, join, means
-from gmwm.motion.curves import Curves, curves_of
-from gmwm.motion.mapping import Mounting, Signals, arms_of, bridged, far_out, map_onto, rotation_to
-from gmwm.motion.result import InMotion, MotionCurve, static_variance
+from gmwm.motion.curves import Curves, Flight, curves_of
+from gmwm.motion.mapping import (
+    Mounting,
+    Signals,
+    arms_of,
+    bridged,
+    far_out,
+    map_onto,
+    rotation_to,
+    vibration_of,
+)
+from gmwm.motion.result import InMotion, MotionCurve, VibrationClass, static_variance
 from gmwm.readers import Recording, require_recording
 
 _AXES = "xyz"
@@ -39,6 +49,12 @@ class _Imu:
     samples: Mapping[str, FloatArray]
     lost: BoolArray
 
+    @cached_property
+    def vibration(self) -> FloatArray:
+        """(n,) m/s^2 rms; NaN without accelerometers."""
+        forces = self.samples.get("accel")
+        return np.full(len(self.lost), np.nan) if forces is None else vibration_of(forces, self.dt)
+
     @property
     def time(self) -> FloatArray:
         return np.asarray(np.arange(len(self.samples["gyro"])) * self.dt, dtype=float)
@@ -48,6 +64,7 @@ def motion(
     sources: Sequence[Any] | Mapping[str, Recording],
     *,
     static: Mapping[str, Any] | None = None,
+    limits: Sequence[float] | None = None,
     progress: Progress | None = None,
 ) -> InMotion:
     """Measure the noise of IMUs in motion, from three or more on one rigid body.
@@ -64,6 +81,10 @@ def motion(
         mapping name the IMUs.
     static : Calibration, or mapping of str to each, optional
         At rest: of the kind of sensor, or by the name of the IMU.
+    limits : (float, float), optional
+        Vibration (accelerometer from 20 to 60 Hz, rms over a second, m/s^2) between the classes
+        low, middle and high, such as idle, hover and manoeuvres; by default each has a third of
+        the time.
     progress : callable, optional
         Called as ``progress(done, total, flight)``.
 
@@ -85,7 +106,7 @@ def motion(
     labels = tuple(imu.label for imu in flights[0])
     clocks: list[Clock] = []
     mountings: list[Mounting] = []
-    differences: dict[tuple[str, str], list[list[FloatArray]]] = {}
+    differences: dict[tuple[str, str], list[Flight]] = {}
     events: dict[int, int] = {}
     for number, imus in enumerate(flights, start=1):
         if progress is not None:
@@ -102,19 +123,14 @@ def motion(
             events[number] = max(events.get(number, 0), count)
             for sensor, own in found.items():
                 differences.setdefault((labels[k], sensor), []).append(own)
-    longest = min(max(len(each[0]) for each in own) for own in differences.values())
-    curves = []
-    for label in labels:
-        own_static = static.get(label, static) if static is not None else None
-        for sensor in flights[0][0].samples:
-            found_curves = curves_of(differences[label, sensor], flights[0][0].dt, longest)
-            curves += _by_axis(label, sensor, found_curves, own_static)
+    curves = _curves(differences, flights[0][0].dt, static)
+    classes = _classes(differences, flights[0][0].dt, static, limits)
     if count := sum(events.values()):
         notices.append(notice("motion-events", values={"events": count}))
     notices += _notices(curves, len(labels))
     durations = tuple(float(imus[0].time[-1]) for imus in flights)
     return InMotion(
-        labels, durations, tuple(curves), tuple(clocks), tuple(mountings), tuple(notices)
+        labels, durations, curves, tuple(clocks), tuple(mountings), tuple(notices), classes
     )
 
 
@@ -190,7 +206,7 @@ def _joined(flight: int, first: _Imu, imu: _Imu) -> Clock | None:
 
 def _of_target(
     flight: int, imus: Sequence[_Imu], k: int, clocks: Sequence[Clock]
-) -> tuple[dict[str, list[FloatArray]], list[Mounting], int]:
+) -> tuple[dict[str, Flight], list[Mounting], int]:
     """By sensor, differences of one IMU and each other, their mountings, and how many events.
 
     At rest its own samples are in place of differences.
@@ -200,10 +216,10 @@ def _of_target(
     target, others = imus[k], [imu for j, imu in enumerate(imus) if j != k]
     if not clocks:
         whole = {s: v - v.mean(axis=0) for s, v in target.samples.items()}
-        return {s: [v for _ in others] for s, v in whole.items()}, [], 0
+        return {s: Flight([v] * len(others), target.vibration) for s, v in whole.items()}, [], 0
     own, inside, good = _instants(target, others, imus[0].label, clocks)
     size = max(1, round(tuning.MEAN_OVER / target.dt))
-    found: dict[str, list[FloatArray]] = {}
+    found: dict[str, Flight] = {}
     mountings, events = [], 0
     turns: list[FloatArray] = []
     arms: list[FloatArray | None] = [None] * len(others)
@@ -227,7 +243,8 @@ def _of_target(
             good = good & ~away
             events += int(np.count_nonzero(np.diff(away, prepend=False) & away))
             mapped, parameters, errors = map_onto(wanted, signals, good, target.dt)
-        found[sensor] = [bridged(each, good, target.dt) for each in mapped]
+        own_differences = [bridged(each, good, target.dt) for each in mapped]
+        found[sensor] = Flight(own_differences, target.vibration[inside])
         for imu, turn, value, error in zip(others, turns, parameters, errors, strict=True):
             rotation = Rotation.from_matrix(turn).as_rotvec()
             mountings.append(
@@ -267,6 +284,48 @@ def _instants(
     return [at[inside] for at in own], inside, good[inside]
 
 
+def _curves(
+    differences: Mapping[tuple[str, str], Sequence[Flight]],
+    dt: float,
+    static: Mapping[str, Any] | None,
+    within: tuple[float, float] | None = None,
+) -> tuple[MotionCurve, ...]:
+    """Of each IMU and sensor, at instants of any vibration, or of one within limits."""
+    longest = min(max(len(each.vibration) for each in own) for own in differences.values())
+    found = []
+    for (label, sensor), own in differences.items():
+        if within is not None:
+            own = [each.within(*within) for each in own]
+        at_rest = static.get(label, static) if static is not None else None
+        found += _by_axis(label, sensor, curves_of(own, dt, longest), at_rest)
+    return tuple(found)
+
+
+def _classes(
+    differences: Mapping[tuple[str, str], Sequence[Flight]],
+    dt: float,
+    static: Mapping[str, Any] | None,
+    limits: Sequence[float] | None,
+) -> tuple[VibrationClass, ...]:
+    """Low, middle and high vibration; none where it is not seen, or some IMU has too little."""
+    levels = [np.concatenate([each.vibration for each in own]) for own in differences.values()]
+    every = np.concatenate(levels)
+    if np.any(np.isnan(every)):
+        return ()
+    given = np.quantile(every, [1 / 3, 2 / 3]) if limits is None else np.asarray(limits)
+    if given.shape != (2,) or not 0.0 < given[0] < given[1]:
+        raise InputError(f"limits = {checks.shown(limits)}: give two rising levels in m/s^2")
+    ends = np.array([0.0, *given, np.inf])
+    found = []
+    for name, low, high in zip(tuning.CLASSES, ends[:-1], ends[1:], strict=True):
+        shares = [np.mean((own >= low) & (own < high)) for own in levels]
+        if min(shares) * min(map(len, levels)) * dt > tuning.SHORTEST_CLASS:
+            own = _curves(differences, dt, static, (float(low), float(high)))
+            span = np.clip([low, high], every.min(), every.max()).tolist()
+            found.append(VibrationClass(name, *span, share=float(np.mean(shares)), curves=own))
+    return tuple(found)
+
+
 def _by_axis(
     label: str, sensor: str, curves: Curves, static: Mapping[str, Fit] | None
 ) -> list[MotionCurve]:
@@ -286,6 +345,8 @@ def _by_axis(
                 differences=curves.differences[:, axis],
                 agree=curves.agree[axis],
                 static=static_variance(static, channel, curves.tau),
+                exponent=curves.exponent,
+                exponent_error=curves.exponent_error,
             )
         )
     return found

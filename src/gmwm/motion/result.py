@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
@@ -66,6 +66,9 @@ class MotionCurve(Document):
         p-value of the equality of what pairs of others give; NaN with fewer than four IMUs.
     static : (J,) ndarray
         Allan variance at rest, u^2, NaN where it is not known.
+    exponent, exponent_error : (J,) ndarray
+        Power of the vibration to which deviations are proportional, of the three axes together,
+        and half of its 95 % interval; NaN where it is not known.
     """
 
     imu: Text
@@ -79,9 +82,11 @@ class MotionCurve(Document):
     differences: Array
     agree: Array
     static: Array
+    exponent: Array
+    exponent_error: Array
 
     def __post_init__(self) -> None:
-        freeze(self, "tau", "variance", "lower", "upper", "pairs", "differences", "agree", "static")
+        freeze(self, *(each.name for each in fields(self) if each.type == "Array"))
 
     @property
     def deviation(self) -> FloatArray:
@@ -101,6 +106,27 @@ class MotionCurve(Document):
         return np.asarray(self.deviation / np.sqrt(self.static))
 
 
+@dataclass(frozen=True)
+class VibrationClass(Document):
+    """Curves of the time in which the vibration is within limits.
+
+    Attributes
+    ----------
+    name : {"low", "middle", "high"}
+    low, high : float
+        Limits of the vibration: accelerometer from 20 to 60 Hz, rms over a second, m/s^2.
+    share : float
+        Of the time, mean over the IMUs.
+    curves : tuple of MotionCurve
+    """
+
+    name: Text
+    low: float
+    high: float
+    share: float
+    curves: tuple[MotionCurve, ...]
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class InMotion(Document, Printed):
     """Noise of IMUs in motion.
@@ -117,6 +143,8 @@ class InMotion(Document, Printed):
     mountings : tuple of Mounting
         Of each flight, target, other IMU and sensor.
     notices : tuple of Notice
+    classes : tuple of VibrationClass
+        Of low, middle and high vibration, where it is seen; see `at`.
     """
 
     SCHEMA: ClassVar[str] = "gmwm.in_motion"
@@ -127,6 +155,33 @@ class InMotion(Document, Printed):
     clocks: tuple[Clock, ...]
     mountings: tuple[Mounting, ...]
     notices: tuple[Notice, ...] = ()
+    classes: tuple[VibrationClass, ...] = ()
+
+    def at(self, name: str) -> InMotion:
+        """The result at low, middle or high vibration, or at rest.
+
+        Parameters
+        ----------
+        name : {"low", "middle", "high", "rest"}
+
+        Raises
+        ------
+        MissingNameError
+            If there is no such class, or nothing is known at rest.
+        """
+        by_name = {each.name: each.curves for each in self.classes}
+        if self._is_known_at_rest:
+            by_name["rest"] = tuple(
+                replace(each, variance=each.static, lower=each.static, upper=each.static)
+                for each in self.curves
+            )
+        if name not in by_name:
+            raise MissingNameError(f"no class {name!r}: there are {', '.join(by_name) or 'none'}")
+        return replace(self, curves=by_name[name], classes=())
+
+    @property
+    def _is_known_at_rest(self) -> bool:
+        return all(np.all(np.isfinite(each.static)) for each in self.curves)
 
     def curve(self, imu: str, channel: str) -> MotionCurve:
         """The curve of a channel of an IMU.
@@ -290,7 +345,7 @@ class InMotion(Document, Printed):
         lines += self._stand().splitlines() if self.clocks else []
         for sensor in self.sensors:
             lines += self._table(sensor).splitlines()
-        lines += self._for_filters().splitlines()
+        lines += [*self._vibration(), *self._for_filters().splitlines()]
         return "\n".join([*lines, "", *bullets(worst_first(self.notices))])
 
     def _stand(self) -> str:
@@ -350,18 +405,33 @@ class InMotion(Document, Printed):
             rows.append(("over rest", *(brief(times[k]) for k in chosen)))
         return plain_table((f"{sensor}, {unit}", *(f"{tau[k]:.2g} s" for k in chosen)), rows)
 
+    def _vibration(self) -> list[str]:
+        """How deviations depend on vibration, and the limits of its classes, on one line."""
+        if not self.classes:
+            return []
+        levels = [self.classes[0].low, *(each.high for each in self.classes)]
+        k = int(np.argmin(np.abs(np.log(self.curves[0].tau / tuning.INTERVAL))))
+        parts = []
+        for sensor in self.sensors:
+            own = [each for each in self.curves if each.quantity == sensor]
+            power, error = (float(np.median([getattr(each, name)[k] for each in own]))
+                            for name in ("exponent", "exponent_error"))  # fmt: skip
+            parts.append(f"{sensor} {power:.2f} +-{error:.2f}")
+        limits = "-".join(f"{each:.2g}" for each in levels)
+        return [f"noise ~ vibration^p, p: {', '.join(parts)}; {limits} m/s^2"]
+
     def _for_filters(self) -> str:
         """N and K, SI, the largest of all axes and IMUs, for some intervals of updates."""
         rows = []
-        for interval, horizon in tuning.USES:
-            if self.curves[0].tau[-1] >= horizon:
-                found = self.numbers(interval, horizon)
-                own = [[m.params for name, m in found.items() if name.startswith(sensor)]
-                       for sensor in self.sensors]  # fmt: skip
-                largest = [
-                    f"{max(p[key] or 0.0 for p in each):.2g}" for each in own for key in "NK"
-                ]
-                rows.append((f"updates {interval:g} s, outages {horizon:g} s", *largest))
+        known = [(self, "", use) for use in tuning.USES if self.curves[0].tau[-1] >= use[1]]
+        if known and self._is_known_at_rest:
+            known.append((self.at("rest"), " at rest", tuning.USES[0]))
+        for result, where, (interval, horizon) in known:
+            found = result.numbers(interval, horizon)
+            own = [[m.params for name, m in found.items() if name.startswith(sensor)]
+                   for sensor in self.sensors]  # fmt: skip
+            largest = (f"{max(p[key] or 0.0 for p in each):.2g}" for each in own for key in "NK")
+            rows.append((f"updates {interval:g} s, outages {horizon:g} s{where}", *largest))
         heads = [f"{sensor} {key}" for sensor in self.sensors for key in "NK"]
         return plain_table(("for filters, SI", *heads), rows) if rows else ""
 

@@ -29,6 +29,7 @@ WINDOWS = 10  # averaging times that a flight needs to hold
 # Averaging times, and s, of a block whose means are taken as independent: vibration comes and goes
 # with the motion.
 BLOCK_LEVELS, BLOCK_LEAST = 4.0, 1.0
+FEWEST_BLOCKS = 20  # that show how a deviation depends on vibration
 FEWEST_FLIGHTS = 5  # from so many on, flights are the unit, of which blocks are not independent
 SHOWN_AT = (0.008, 0.03, 0.13, 0.5, 1.0, 2.0, 4.0)  # s, averaging times that are printed
 CONTRADICT = 1e-4  # p-value of one curve and octave; a result has some 200 of them
@@ -40,4 +41,8 @@ FAR_OUT, MOST_EVENTS = 10.0, 0.01
 LEAST_WALK = 0.01  # share of the variance at the horizon that the walk of a filter has at least
 INTERVAL, HORIZON = 0.1, 1.0  # s: keyframes of visual and scans of lidar odometry, and their losses
 USES = ((0.1, 1.0), (1.0, 2.0))  # intervals and horizons that are printed; fixes come once a second
+# Hz: vibration of rotors and engines that IMUs of 100 Hz and more see; s, over which it is rms.
+VIBRATION, VIBRATION_OVER = (20.0, 60.0), 1.0
+SHORTEST_CLASS = 5.0  # s
+CLASSES = ("low", "middle", "high")  # of vibration, by default a third of the time each
 LEVEL_OVER = 2.0  # s, whose mean stands for what is left out

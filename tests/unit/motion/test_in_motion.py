@@ -114,6 +114,35 @@ def test_rest_gives_the_static_allan_variance():
     assert found.clocks == () == found.mountings
 
 
+def test_noise_that_follows_the_vibration():
+    """White noise whose size varies by three: the exponent is one, classes have their own sizes."""
+    rng, rate, n = np.random.default_rng(17), 100.0, 12_000
+    level = np.exp(0.6 * np.sin(np.arange(n) * 2.0 * np.pi / (40.0 * rate)))
+    noise = SIZE * level[:, None] * rng.normal(size=(3, n, 6))
+    at_rest = [recording(own + np.array([0.0] * 5 + [9.8]), rate) for own in noise]
+    found = gmwm.motion(at_rest)
+    for curve in found.curves:
+        # At means over a second of a level that changes in ten.
+        error = curve.exponent_error[:5]
+        assert np.all(error < 0.25)
+        assert np.all(np.abs(curve.exponent[:5] - 1.0) < 1.7 * error + 0.05)
+    limits = np.quantile(level, [1 / 3, 2 / 3])
+    for k, each in enumerate(found.classes):
+        own = level[np.searchsorted(limits, level) == k]
+        assert each.share == pytest.approx(1 / 3, abs=0.01)
+        curve = found.at(each.name).curve("imu 1", "gyro_y")
+        truth = SIZE[1] ** 2 * np.mean(own**2)
+        assert curve.variance[0] == pytest.approx(truth, rel=0.05)
+        assert curve.lower[0] < curve.variance[0] < curve.upper[0]
+    given = gmwm.motion(at_rest, limits=(0.018, 0.04)).classes
+    assert [each.name for each in given] == ["low", "middle", "high"]
+    assert given[0].share < 1 / 3 < given[0].share + given[1].share
+    with pytest.raises(gmwm.InputError, match="give two rising levels"):
+        gmwm.motion(at_rest, limits=(2.0, 1.0))
+    with pytest.raises(gmwm.MissingNameError, match="no class 'rest': there are low, middle, high"):
+        found.at("rest")
+
+
 def test_neighbours_that_share_an_error_are_reported():
     rng = np.random.default_rng(8)
     errors = white(rng, 4)

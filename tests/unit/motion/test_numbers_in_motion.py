@@ -18,7 +18,8 @@ def in_motion(variances, static=None):
     rest = np.full(TAU.size, np.nan) if static is None else static
     curves = tuple(
         MotionCurve(f"imu {k}", name, name.partition("_")[0], TAU, each, 0.9 * each, 1.2 * each,
-                    each * four, 2.0 * each * four, np.ones(TAU.size), rest)
+                    each * four, 2.0 * each * four, np.ones(TAU.size), rest,
+                    four[0], 0.1 * four[0])
         for k, each in enumerate(variances, start=1)
         for name in AXES
     )  # fmt: skip
@@ -99,4 +100,6 @@ def test_summary_has_the_numbers_and_few_lines():
     assert rows[0] == ["updates", "0.1", "s,", "outages", "1", "s",
                        *2 * [f"{numbers[key]:.2g}" for key in "NK"]]  # fmt: skip
     assert rows[1][:6] == ["updates", "1", "s,", "outages", "2", "s"]
-    assert len(lines) <= 24
+    assert rows[2][6:8] == ["at", "rest"]
+    assert len(lines) <= 25
+    assert found.at("rest").curve("imu 1", "gyro_x").variance == pytest.approx(rest)
