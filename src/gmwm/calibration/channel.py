@@ -179,7 +179,14 @@ class ChannelTask:
             for source, issues in zip([*sources, *sources], notices, strict=True)
             for each in issues
         ]
-        curve = None if self.design is None else self.design.curve(fit)
+        curve = None
+        if self.design is not None:
+            one = next(iter(self.design.covariates), None)
+            growth = self.design.scaling(self.parts, self.places)
+            curve = replace(self.design.curve(fit), scaling=growth)
+            if growth is not None and one is not None:
+                said = growth.notice(one.name, one.unit, one.low, one.high)
+                named += [said] if said is not None else []
         return replace(found, fit=replace(fit, notices=(*fit.notices, *named)), curve=curve)
 
     def _fitted(self, data: WaveletVariance | Sequence[WaveletVariance]) -> ChannelModel:

@@ -18,6 +18,7 @@ from gmwm._core import checks
 from gmwm._core.typing import FloatArray
 from gmwm.calibration import tuning
 from gmwm.calibration.curve import MOST_POWER, BiasCurve, Covariate, Regressor
+from gmwm.calibration.scaling import Scaling, scaling
 from gmwm.errors import InputError
 from gmwm.estimate import Fit
 from gmwm.estimate.problem import pilot
@@ -184,6 +185,14 @@ class Design:
 
     def curve(self, fit: Fit) -> BiasCurve:
         return BiasCurve.of(fit, self.covariates, self.regressors, self.offset)
+
+    def scaling(self, channels: Sequence[Channel], places: Sequence[int]) -> Scaling | None:
+        """How the fast noise of such channels depends on the first covariate."""
+        if not self.covariates:
+            return None
+        name, nodes = self.covariates[0].name, [self.nodes[place] for place in places]
+        pairs = zip(channels, nodes, strict=True)
+        return scaling([(channel, own.time, own.rows[name]) for channel, own in pairs])
 
 
 def designs_of(recordings: Sequence[Recording], given: Sequence[Wanted]) -> dict[str, Design]:

@@ -16,6 +16,7 @@ from gmwm._core.tables import plain_table
 from gmwm._core.text import Printed, brief, readable, with_error
 from gmwm._core.typing import FloatArray
 from gmwm._core.units import factor
+from gmwm.calibration.scaling import Scaling
 from gmwm.errors import InputError
 from gmwm.estimate.result import CurveCoefficients, Fit, satterthwaite_dof
 
@@ -81,6 +82,8 @@ class BiasCurve(Document, Printed):
         Errors of ``covariance`` by the errors of the noise: degrees of freedom of intervals.
     offset : float
         Mean of the channel less the curve, u. The turn-on bias is part of it.
+    scaling : Scaling or None
+        How the fast noise depends on the first covariate.
     """
 
     SCHEMA: ClassVar[str] = "gmwm.bias-curve"
@@ -94,6 +97,7 @@ class BiasCurve(Document, Printed):
     covariance: Array
     spread: Array
     offset: float
+    scaling: Scaling | None = None
 
     @classmethod
     def of(

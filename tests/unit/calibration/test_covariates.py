@@ -5,7 +5,6 @@ import pytest
 
 import gmwm
 from gmwm import RandomWalk, WhiteNoise
-from marks import slow
 
 N, K, SIZE, DT = 1e-3, 5e-5, 2048, 0.5
 CUBIC = np.array([0.02, 0.008, 0.006])
@@ -143,7 +142,7 @@ def test_a_constant_temperature_is_no_covariate():
         calibrated(recording(temperature=np.full(SIZE, 30.0)))
 
 
-@slow
+@pytest.mark.slow
 def test_intervals_of_a_warm_up_cover_and_the_walk_is_whole():
     """Least squares covers a quarter of the curve, and leaves three quarters of K^2."""
     held, square = [], []

@@ -1,0 +1,105 @@
+"""Fast noise that grows with a covariate, such as the temperature.
+
+The model of a calibration is an average over the record. Where the variances of its parts follow
+their mean covariate, ``log s = gamma x``, the deviation at each value of it is known too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from gmwm._core.distributions import student
+from gmwm._core.documents import NotNegative, Probability
+from gmwm._core.text import per_cent
+from gmwm._core.typing import FloatArray
+from gmwm.calibration import tuning
+from gmwm.issues import Notice, Severity, notice
+from gmwm.readers import Channel, block_means
+
+_ROUNDS = 20
+_SETTLED = 1e-9
+
+
+@dataclass(frozen=True)
+class Scaling:
+    """How the deviation of the fast noise depends on a covariate.
+
+    gamma: Of ``exp(gamma x)``, per unit of the covariate.
+    error: Half its 95 % interval.
+    p_value: Of the score test of ``gamma = 0``.
+    """
+
+    gamma: float
+    error: NotNegative
+    p_value: Probability
+
+    def notice(self, name: str, unit: str, low: float, high: float) -> Notice | None:
+        """Say that the noise grows, where that is clear."""
+        if not self.p_value < tuning.FALSE_ALARM:
+            return None
+        ratio = float(np.exp(self.gamma * (high - low)))
+        apart = max(ratio, 1.0 / ratio) > (1.0 + tuning.UNSTEADY) ** 2
+        severity: Severity = "warning" if apart else "note"
+        values = {"gamma": self.gamma, "error": self.error, "p_value": self.p_value}
+        words = {
+            "change": "grows" if self.gamma > 0.0 else "falls",
+            "per": f"{per_cent(abs(self.gamma))} (+-{per_cent(self.error)}) per {unit}",
+            "times": f"{ratio:.3g}",
+            "ends": f"{low:.3g} to {high:.3g} {unit}",
+        }
+        return notice(
+            "noise-scales", "", values | {"ratio": ratio}, severity=severity, name=name, **words
+        )
+
+
+def scaling(parts: Sequence[tuple[Channel, FloatArray, FloatArray]]) -> Scaling | None:
+    """Regress mean squares of parts of recordings on their covariate, by a quasi-likelihood.
+
+    The variances are in proportion to ``exp(2 gamma x)`` and scatter about it in proportion to it
+    (gamma regression; McCullagh & Nelder 1989, *Generalized Linear Models*, ch. 8); the scatter is
+    estimated, so that neither tails nor colour of the noise matter.
+
+    parts: Of each recording the channel, times (s) and values there of the covariate.
+    Returns: None where too few parts exist or the covariate does not change.
+    """
+    rows = [_mean_squares(*each) for each in parts]
+    square, x = (np.concatenate([row[k] for row in rows]) for k in (0, 1))
+    known = ~np.isnan(square + x) & (square > 0.0)
+    square, x = square[known], x[known]
+    if x.size < tuning.FEWEST_SCALED or not np.ptp(x) > 0.0:
+        return None
+    centred, free = x - np.mean(x), x.size - 2
+    total = float(centred @ centred)
+    relative = square / np.mean(square) - 1.0
+    spread = float(np.sum((relative - centred * (centred @ relative) / total) ** 2)) / free
+    score = abs(float(centred @ relative)) / np.sqrt(spread * total)
+    level, slope = float(np.log(np.mean(square))), 0.0
+    for _ in range(_ROUNDS):
+        off = square / np.exp(level + slope * centred) - 1.0
+        step = float(centred @ off) / total
+        level, slope = level + float(np.mean(off)), slope + step
+        if abs(step) < _SETTLED * (abs(slope) + _SETTLED):
+            break
+    dispersion = float(np.sum(off**2)) / free
+    error = float(student.ppf(0.975, free)) * np.sqrt(dispersion / total)
+    chance = float(2.0 * student.sf(score, free))
+    return Scaling(0.5 * slope, float(0.5 * error), chance)
+
+
+def _mean_squares(
+    channel: Channel, time: FloatArray, covariate: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Mean squares of differences of short means in parts of a channel, and the covariate there."""
+    short = max(round(tuning.FAST / channel.dt), 1)
+    means = block_means([channel.values], short)[:, 0] if short > 1 else channel.values
+    step = np.diff(means)[::2]  # of different samples
+    count = min(tuning.SCALED_PARTS, step.size // tuning.STEPS_OF_PART)
+    if count < 1:
+        return np.zeros(0), np.zeros(0)
+    size = step.size // count
+    square = block_means([step**2], size, 0.5)[:count, 0]
+    middles = channel.dt * short * 2.0 * size * (np.arange(count) + 0.5)
+    return square, np.interp(middles, time, covariate)
