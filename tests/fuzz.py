@@ -239,7 +239,6 @@ rate: 10 Hz
 truth: {gyro: {N: 140 deg/h/sqrt(Hz), GM: [[113 deg/h, 2000 s]]}, accel: {N: 200 ug/sqrt(Hz), K: 1e-6}}
 filters:
   right: truth
-  small: {reduce: N+K, of: truth}
   own:
     gyro: {N: 0.001, bias: 1 deg/h}
     accel: {N: 0.002, bias: 1 mg}

@@ -533,7 +533,7 @@ trajectory: car
 duration: 60 s
 rate: 20 Hz
 truth: {gyro: {N: 140 deg/h/sqrt(Hz), GM: [[113 deg/h, 2000 s]]}, accel: {N: 200 ug/sqrt(Hz), K: 1e-6}}
-filters: {right: truth, small: {reduce: N+K, of: truth}}
+filters: {right: truth, small: {gyro: {N: 140 deg/h/sqrt(Hz)}, accel: {N: 200 ug/sqrt(Hz)}}}
 outages: [[20, 10], [40 s, 10 s]]
 gnss: {interval: 1, position_sd: [2, 2, 4], velocity_sd: 0.1, lever_arm: [1, 0, 0]}
 initial_sd: {tilt: 0.1 deg, heading: 1 deg}
@@ -574,7 +574,6 @@ def ins_() -> Cases:
     yield "compared", partial(command, *log, *models, "--outages", 30, *out)
     yield "study", _validation
     yield "covariance", _analysis
-    yield "reduce", lambda: _reduction(ins.reduce(_study().truth, "N+K", (10.0,)))
     for form in ("car", "helicopter", "loiter"):
         yield f"trajectory_{form}", lambda form=form: _study(trajectory=form).scenario.trajectory
     path = ins.car_drive(duration=20.0)
@@ -583,11 +582,6 @@ def ins_() -> Cases:
     yield "preintegrate", lambda: ins.preintegrate(ins.emulate(path), _study().truth)
     arm_of = {"lever_arm": (1.0, 0.0, 0.0), "imu": ins.emulate(path)}
     yield "gnss", partial(ins.gnss, path, velocity_sd=0.1, **arm_of)
-
-
-def _reduction(found: Any) -> Any:
-    models = {k: [each.to_dict() for each in m.terms] for k, m in found.models.models.items()}
-    return [found.form, models, found.inflation, found.errors, found.notices]
 
 
 @part

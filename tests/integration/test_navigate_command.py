@@ -182,7 +182,6 @@ BAD = {
     "filter: blank name": ({"filters": {" ": "truth"}}, "cannot be a name"),
     "filter: control": ({"filters": {"a\tb": "truth"}}, "cannot be a name"),
     "filter: endless name": ({"filters": {"a" * 41: "truth"}}, "cannot be a name"),
-    "filter: reduced form": ({"filters": {"a": {"reduce": "N+X"}}}, "reduce: 'N+X': write N+K"),
     "filter: reduced key": ({"filters": {"a": {"reduce": "N+K", "to": 1}}}, "'to' is unknown"),
     "filter: flicker": (
         {"filters": {"a": {"gyro": {"B": "1 deg/h"}, "accel": {"N": 1}}}},

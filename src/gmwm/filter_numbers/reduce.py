@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from scipy.optimize import minimize_scalar
+from scipy.optimize import minimize, minimize_scalar
 
 from gmwm._core import checks
 from gmwm._core.typing import FloatArray, Progress
@@ -36,12 +36,14 @@ from gmwm.filter_numbers.bound import (
 from gmwm.filter_numbers.propagation import Chain, ChainErrors
 from gmwm.filter_numbers.result import FORMS, AxisFilterNumbers, FilterNumbers, Predicted
 from gmwm.filter_numbers.spectra import Problem, RequiredSpectrum, with_correlation_times
-from gmwm.ins.covariance import smallest_score
 from gmwm.issues import Notice, notice
 from gmwm.process import GaussMarkov, Model, RandomWalk, WhiteNoise
 
 _TIMES = {"N+K": (), "N+GM": (1.0,), "N+K+GM": (1.0,), "N+2GM": (0.1, 3.0)}
 """Correlation times at the start of the search, over the longest outage."""
+_STEPS = 60
+_SLOPE_STEP = 1e-4  # of the logarithms of factors, for slopes by differences
+_FARTHEST = 12.0  # logarithm of a factor, beyond which numbers have no meaning any more
 
 
 @per_axis
@@ -97,8 +99,7 @@ def reduce(
     small as it does one that is too large. The squared logarithm of the NEES at each of them is
     added, so that one outage cannot make up for another. The expectation is exact for the truth
     given, in the filter of `gmwm.filter_numbers.Chain`; of a heading it is that of the angle gained
-    since the last fix too, as `gmwm.certify` judges both. `gmwm.ins.reduce` does it in a whole
-    navigation filter on a trajectory, by the same search.
+    since the last fix too, as `gmwm.certify` judges both.
     """
     form = checks.choice("form", str(form).replace(" ", ""), FORMS)
     tau = given_tau(form, tau)
@@ -201,7 +202,7 @@ class _Search:
             read = max(2.0 * longest * axis.model.haar_variance(at, axis.dt)[0] for axis in group)
             factor = float(np.sqrt(read / start.white_density()))
             starts.append(np.where(np.array(names) == "N", np.log(factor), 0.0))
-        least, logs = smallest_score(score, starts)
+        least, logs = _smallest_score(score, starts)
         return least, scaled(logs), sd
 
     def _start(
@@ -321,3 +322,23 @@ def _filled(
 def _limit(fit: Fit, letter: str) -> float:
     """`upper_limit`, which takes a fit of its own."""
     return upper_limit(fit, letter)
+
+
+def _smallest_score(
+    score: Callable[[FloatArray], float], starts: Sequence[FloatArray]
+) -> tuple[float, FloatArray]:
+    """The least score, and the logarithms of factors there.
+
+    score: Of logarithms of factors on the numbers at the start of the search. To it comes a little
+        of their squares, so that a factor which does not matter stays at one.
+    starts: Where the search begins.
+    """
+
+    def cost(logs: FloatArray) -> float:
+        # Finite beyond the farthest, too, where a line search may try: it takes differences.
+        return score(np.clip(logs, -_FARTHEST, _FARTHEST)) + tuning.INERTIA * float(logs @ logs)
+
+    options = {"eps": _SLOPE_STEP, "gtol": tuning.SLOPE, "maxiter": _STEPS}
+    found = [minimize(cost, logs, method="BFGS", options=options) for logs in starts]
+    best = min(found, key=lambda each: float(each.fun))
+    return float(best.fun), np.clip(best.x, -_FARTHEST, _FARTHEST)

@@ -83,7 +83,9 @@ ENVELOPE = 1.02  # Times the largest density found, for the gaps between the poi
 
 # Times the NEES of a heading above which that of its gain counts: rounding does not choose:
 HIDDEN = 1.001
-SETTLING = 120.0  # s of aiding before an outage, as between the outages of `gmwm.ins.reduce`
+SLOPE = 3e-3  # of the score over the logarithm of a factor, at which the search for factors ends
+INERTIA = 1e-3  # score of a factor's squared logarithm: factors without effect stay at 1
+SETTLING = 120.0  # s of aiding before an outage, as between the outages of a loiter
 FIX_INTERVAL = 1.0  # s between fixes, as of GNSS
 # Fix of the last integral: 1 m of position (over gravity for the tilt of a gyro), or 0.01 rad:
 FIX_SD = {"gyro": 1.0 / 9.80665, "accel": 1.0, "": 0.01}

@@ -14,7 +14,7 @@ Conventions, everywhere in this subpackage:
 A trajectory (`helicopter_mapping`, `perform`, `Trajectory.read`) gives error-free increments
 (`emulate`); errors are drawn from `SensorModels` or taken from a recording (`Recorded`); `navigate`
 filters them with `Aiding`; `monte_carlo` does so many times for several filters, `Validation` says
-what came out. `covariance_analysis` needs no runs, and `reduce` finds the best small model;
+what came out. `covariance_analysis` needs no runs;
 `preintegrate` has the covariance of increments between keyframes for a factor graph. Real data are
 read by `read_imu` and `read_fixes` (`Measured`); `Navigated` aligns and filters them.
 

@@ -1,9 +1,8 @@
-from .covariance.analysis import Analysis as Analysis, covariance_analysis as covariance_analysis
-from .covariance.reduction import (
+from .covariance.analysis import (
     AIDINGS as AIDINGS,
-    Reduction as Reduction,
+    Analysis as Analysis,
+    covariance_analysis as covariance_analysis,
     loiter_with_outages as loiter_with_outages,
-    reduce as reduce,
 )
 from .filter.aiding import (
     Aiding as Aiding,

@@ -25,9 +25,6 @@ BOOTSTRAP_DRAWS = 4000  # for intervals of 95 %: 100 draws lie beyond each end
 BIAS_WINDOW = 60.0  # s of averages that show a recording's slow errors: an outage of a minute
 SETTLING = 120.0  # s before the first outage and between them, for the filter to settle
 WHITE_AT = 1.0  # s, where white noise is read off an Allan plot, as data sheets do
-SHORTEST_PEAK = 0.189  # s, where a peak is read off at the earliest: a correlation time of 0.1 s
-SLOPE = 3e-3  # of the score over the logarithm of a factor, at which the search for factors ends
-INERTIA = 1e-3  # score of a factor's squared logarithm: factors without effect stay at 1
 # rad, true attitude errors (1 sigma) at the end of an outage, beyond which covariance analysis
 # warns. 40 simulated runs of a loiter with the true model: NEES of the nine navigation errors 0.94
 # to 1.20 up to 4.1 and 22 deg, 2.1 at 10 and 45 deg.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any, ClassVar
@@ -10,26 +11,35 @@ from typing import Any, ClassVar
 import numpy as np
 from scipy.linalg import block_diag, eigh
 
+from gmwm._core import checks
 from gmwm._core.typing import BoolArray, FloatArray, IntArray
+from gmwm.errors import InputError
 from gmwm.ins import tuning
 from gmwm.ins.covariance.joint_kernels import JointFilter, KeptCovariances, Track, run_jointly
 from gmwm.ins.filter import (
     IS_RELATIVE,
     KINDS,
     NAVIGATION,
+    Aiding,
     Events,
     Filter,
     Keyframe,
     Kinematics,
+    Outage,
     Outputs,
     SensorStates,
+    gnss,
     new_keyframe,
     observe_since,
+    odometry,
+    poses,
     unmodified,
+    wheels,
 )
 from gmwm.ins.geometry import matrix_from_rpy
 from gmwm.ins.imu import Imu, SensorModels, emulate
 from gmwm.ins.simulation import Scenario, place_of
+from gmwm.ins.trajectory import Trajectory, car_drive, fixed_wing_loiter
 from gmwm.issues import Notice, notice
 
 
@@ -257,3 +267,68 @@ def _joint(believed: SensorStates, truth: SensorStates) -> SensorStates:
             **both,
         ),
     )
+
+
+# -- the loiter that numbers are judged on ---------------------------------------------------------
+
+_WHEELS_EVERY = 0.1  # s, or the nearest multiple of the sampling interval
+
+
+def _wheels(truth: Trajectory, _: float) -> Aiding:
+    """With keyframes that measure nothing, from which the way in an outage counts."""
+    interval = max(round(_WHEELS_EVERY / truth.dt), 1) * truth.dt
+    return wheels(truth, interval) + odometry(truth, interval).unused()
+
+
+AIDINGS: dict[str, Callable[[Trajectory, float], Aiding]] = {
+    "gnss": lambda truth, _: gnss(truth),
+    "pose": poses,
+    "odometry": odometry,
+    "wheels": _wheels,
+}
+"""What aids the filter of `loiter_with_outages`, given the trajectory and an interval, s."""
+
+
+def loiter_with_outages(
+    lengths: Sequence[float],
+    dt: float = 0.01,
+    trajectory: Trajectory | None = None,
+    aiding: str = "gnss",
+    keyframe: float = 1.0,
+) -> Scenario:
+    """A loiter with one GNSS position a second of 1 m (vertical 1.5 m), and outages.
+
+    Raises InputError if a length is not positive or not a multiple of ``dt``, or the trajectory
+    is too short.
+
+    Parameters
+    ----------
+    lengths : sequence of float
+        Of the outages, s, with two minutes before each.
+    dt : float, optional
+        Sampling interval of the IMU of the loiter, s.
+    trajectory : Trajectory, optional
+        Another motion than a loiter of a fixed-wing aircraft, or a car's drive with wheels.
+    aiding : {"gnss", "pose", "odometry", "wheels"}, optional
+        Absolute poses (5 cm, 0.2 deg) or relative ones (1 cm, 1 mrad) at keyframes, or wheel
+        odometry (5 cm/s; 10 cm/s aside and down) ten times a second, in place of GNSS.
+    keyframe : float, optional
+        Interval of the keyframes, s.
+    """
+    aids = AIDINGS[checks.choice("aiding", aiding, tuple(AIDINGS))]
+    outages, start = list[Outage](), tuning.SETTLING
+    for length in lengths:
+        outages.append(Outage(start, checks.positive("outage length", length)))
+        # Ends at a fix: those of one second.
+        start = float(np.ceil(start + length + tuning.SETTLING))
+    end = outages[-1].end if outages else 0.0
+    if trajectory is None:
+        make = car_drive if aiding == "wheels" else fixed_wing_loiter
+        trajectory = make(duration=max(start, 2.0 * tuning.SETTLING), dt=dt)
+    elif trajectory.duration < end:
+        raise InputError(
+            f"trajectory: it has {trajectory.duration:g} s, and outages of these lengths two "
+            f"minutes apart need {end:g} s: give a longer one, or fewer outages"
+        )
+    aided = aids(trajectory, keyframe)
+    return Scenario(trajectory, aided, tuple(outages), interval=tuning.SETTLING)

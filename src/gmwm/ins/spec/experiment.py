@@ -14,16 +14,13 @@ from pydantic import BeforeValidator, Discriminator, Field, StrictInt, Tag
 from gmwm._core import checks
 from gmwm.errors import InputError
 from gmwm.ins import tuning
-from gmwm.ins.covariance import reduce
 from gmwm.ins.filter import Aiding, InitialSd, Outage, SensorStates, gnss
 from gmwm.ins.imu import Recorded, SensorModels, emulate
 from gmwm.ins.simulation import ErrorSource, Experiment, Scenario, Simulated
 from gmwm.ins.spec.fields import (
     RECORDINGS,
-    REDUCED,
     FileName,
     Meters,
-    Models,
     OfFile,
     OfTerms,
     PositiveHertz,
@@ -81,13 +78,6 @@ class RecordingsSpec(ReadingSpec):
     ]
 
 
-class ReducedSpec(Spec):
-    """The best small model of a form, for the outages of the experiment."""
-
-    reduce: Annotated[Literal["N+K", "N+GM"], written("N+K or N+GM")]
-    of: Models = "truth"
-
-
 class GnssSpec(Spec):
     """Fixes; what is left out is as usual in `gmwm.ins.gnss`."""
 
@@ -134,7 +124,7 @@ _Truth = Annotated[
     written("a calibration.json, models or recordings"),
 ]
 _Filter = Annotated[
-    OfFile | Annotated[ReducedSpec, Tag(REDUCED)] | OfTerms,
+    OfFile | OfTerms,
     Discriminator(form_of),
     written("a calibration.json, models, truth, or a file of gmwm bound or reduce"),
 ]
@@ -172,9 +162,9 @@ def experiment_from(content: Mapping[str, Any], folder: Path = Path()) -> Experi
     spec = ExperimentSpec.parse(content)
     trajectory = _trajectory(spec, folder)
     scenario = _scenario(spec, trajectory)
-    source, about = _source(spec.truth, trajectory, folder), _about_outages(spec, scenario)
+    source = _source(spec.truth, trajectory, folder)
     filters = {
-        name: _models(f"filters, {name}", each, source, about, folder)
+        name: _models(f"filters, {name}", each, source, trajectory.dt, folder)
         for name, each in spec.filters.items()
     }
     truth = source.models if isinstance(source, Simulated) else None
@@ -236,18 +226,6 @@ def _aiding(spec: GnssSpec, trajectory: Trajectory) -> Aiding:
     return gnss(trajectory, **spec.given, imu=emulate(trajectory) if any(spec.lever_arm) else None)
 
 
-def _about_outages(spec: ExperimentSpec, scenario: Scenario) -> Scenario:
-    """The outages of a scenario and two minutes before the first, which a reduced model is for."""
-    outages, whole = scenario.outages, scenario.trajectory
-    if not outages:
-        return scenario
-    start = round(int(max(outages[0].start - tuning.SETTLING, 0.0)) / whole.dt) * whole.dt
-    part = whole.segment(start, outages[-1].end)
-    moved = tuple(Outage(outage.start - start, outage.duration) for outage in outages)
-    aiding = _aiding(spec.gnss, part)
-    return Scenario(part, aiding, moved, scenario.initial_sd, interval=tuning.SETTLING)
-
-
 def _source(given: _Truth, trajectory: Trajectory, folder: Path) -> Recorded | Simulated:
     """Models or recordings that errors come from."""
     if not isinstance(given, RecordingsSpec):
@@ -263,20 +241,16 @@ def _source(given: _Truth, trajectory: Trajectory, folder: Path) -> Recorded | S
 
 
 def _models(
-    where: str, given: _Filter, source: ErrorSource, scenario: Scenario, folder: Path
+    where: str, given: _Filter, source: ErrorSource, dt: float, folder: Path
 ) -> SensorModels:
-    """Models of a filter, written at ``where``; the scenario is that of reduced models."""
-    reduced, dt = isinstance(given, ReducedSpec), scenario.trajectory.dt
-    origin = given.of if isinstance(given, ReducedSpec) else given
-    if origin != "truth":
-        models = read_models(where, origin, folder)
+    """Models of a filter, written at ``where``."""
+    if given != "truth":
+        models = read_models(where, given, folder)
     elif isinstance(source, Simulated):
         models = source.models
-    elif reduced:
-        raise InputError(f"{where}: name the model to reduce, as in of: calibration.json")
     else:
         raise InputError(f"{where}: real errors have no true model: give a calibration")
-    if isinstance(source, Recorded) and not reduced:
+    if isinstance(source, Recorded):
         # A random walk does not start at zero in the middle of a recording.
         walks = {
             axis: source.bias_sd[axis]
@@ -285,9 +259,6 @@ def _models(
         }
         models = replace(models, bias_sd={**models.bias_sd, **walks})
     try:
-        if isinstance(given, ReducedSpec):
-            about = scenario if scenario.outages else None
-            models = reduce(models, given.reduce, scenario=about, dt=dt).models
         SensorStates.of(models, dt, 1)
     except InputError as error:
         raise InputError(f"{where}, {error}") from None

@@ -44,7 +44,7 @@ from gmwm.process import (
     WhiteNoise,
 )
 
-FILE, RECORDINGS, MODELS, REDUCED = TAGS = ("<file>", "<recordings>", "<models>", "<reduced>")
+FILE, RECORDINGS, MODELS = TAGS = ("<file>", "<recordings>", "<models>")
 """Forms that one key may have; pydantic puts them into the place of an error."""
 
 _LEAST, _LARGEST = 1e-60, 1e60  # SI: beyond, powers overflow or vanish
@@ -272,7 +272,7 @@ def form_of(given: Any) -> str | None:
         return FILE
     if not isinstance(given, Mapping):
         return None
-    return RECORDINGS if "recordings" in given else REDUCED if "reduce" in given else MODELS
+    return RECORDINGS if "recordings" in given else MODELS
 
 
 OfFile = Annotated[FileName, Tag(FILE)]

@@ -1,15 +1,14 @@
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
 from gmwm.errors import InputError
-from gmwm.ins import Scenario, SensorModels, experiment_from
+from gmwm.ins import experiment_from
 from gmwm.ins.imu import AXES
 from gmwm.ins.logs import LogSpec
-from gmwm.ins.spec import experiment, read_document
+from gmwm.ins.spec import read_document
 from gmwm.ins.spec.experiment import ExperimentSpec
 from gmwm.process import RandomWalk
 from places import REPOSITORY
@@ -69,36 +68,6 @@ def test_outages_may_touch_and_end_with_the_trajectory() -> None:
     assert [o.end for o in found.scenario.outages] == [15.0, 20.0, 30.0]
 
 
-def test_a_filter_may_be_a_reduction_of_the_truth() -> None:
-    truth = {"gyro": {"N": 1e-3, "GM": [[1e-4, 50]]}, "accel": {"N": 1e-2, "GM": [[1e-3, 20]]}}
-    filters = {"A": "truth", "small": {"reduce": "N+K"}}
-    found = experiment_from(LEAST | {"truth": truth, "filters": filters, "outages": [[18, 10]]})
-    for axis in AXES:
-        terms = found.filters["small"].models[axis].terms
-        assert [type(term).__name__ for term in terms] == ["WhiteNoise", "RandomWalk"]
-
-
-def test_a_reduction_is_judged_on_the_motion_of_the_study(monkeypatch: pytest.MonkeyPatch) -> None:
-    asked: list[Scenario] = []
-
-    def reduced(full: SensorModels, form: str, scenario: Scenario, dt: float) -> SimpleNamespace:
-        asked.append(scenario)
-        return SimpleNamespace(models=full)
-
-    monkeypatch.setattr(experiment, "reduce", reduced)
-    truth = {"gyro": {"N": 1e-3}, "accel": {"N": 1e-2}}
-    content = LEAST | {"truth": truth, "filters": {"small": {"reduce": "N+K"}}, "duration": 200}
-    outages = [[140.5, 10], [170, 20]]
-    whole = experiment_from(content | {"outages": outages}).scenario
-    (judged,) = asked
-    assert [(each.start, each.duration) for each in judged.outages] == [(120.5, 10), (150, 20)]
-    dt = whole.trajectory.dt
-    first = round(20.0 / dt)
-    np.testing.assert_array_equal(judged.trajectory.lla[0], whole.trajectory.lla[first])
-    assert judged.trajectory.duration == pytest.approx(170.0)
-    assert judged.aiding.fixes[0].sd[0].tolist() == whole.aiding.fixes[0].sd[0].tolist()
-
-
 def test_a_random_walk_in_real_errors_starts_anywhere(tmp_path: Path) -> None:
     rng = np.random.default_rng(4)
     rows = rng.standard_normal((1300, 6)) + np.sin(np.arange(1300) / 200.0)[:, None]
@@ -115,8 +84,6 @@ def test_a_random_walk_in_real_errors_starts_anywhere(tmp_path: Path) -> None:
     assert walks.bias_sd["gyro_x"] > 0.0
     assert walks.bias_sd["accel_x"] == 0.0
     assert found.filters["told"].bias_sd["gyro_x"] == 0.5
-    with pytest.raises(InputError, match="name the model to reduce"):
-        experiment_from(LEAST | {"truth": truth, "filters": {"A": {"reduce": "N+K"}}}, tmp_path)
 
 
 def test_a_document(tmp_path: Path) -> None:
