@@ -188,7 +188,7 @@ class Navigated:
         if self.solution.diverged_at is not None:
             return notice("diverged", values={"time": self.solution.diverged_at})
         if self.fits:
-            return notice("consistent")
+            return self._consistent
         if largest > tuning.LOST:
             stuck, up = (
                 [each for each in self.measured.notices if each.code == code]
@@ -220,6 +220,18 @@ class Navigated:
             words |= {"variant": "innovations", "hint": "", "severity": "bad"}
             code = "outliers"
         return notice(code, values=sizes, **words)
+
+    @property
+    def _consistent(self) -> Notice:
+        """The verdict where the innovations agree: what a reference says, if there is one."""
+        if self.against is None:
+            return notice("consistent")
+        source, sizes = self.against.source, self.against.disagreeing
+        if not sizes:
+            return notice("consistent", source, variant="reference")
+        worse = max(sizes.values()) > 1.0
+        words, severity = {"errors": self.against.in_words}, "bad" if worse else "note"
+        return notice("errors-contradict", source, sizes, severity=severity, **words)
 
     def _fault_verdict(self, faults: tuple[Notice, ...]) -> Notice:
         first, is_explained = faults[0], self.faults.explained
@@ -265,7 +277,7 @@ class Navigated:
             sentences.append(f"The filter diverged at {at:.10g} s and was stopped")
         elif self.solution.time.size:
             sd = self.solution.sd[-1]
-            is_right = self.fits or self.verdict.severity == "note"
+            is_right = self.verdict.severity in ("good", "note")
             caveat = "" if is_right else " (if its model were right, which it is not)"
             sentences.append(
                 f"Predicted accuracy at the end, 1 sigma{caveat}: horizontal "

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -12,8 +12,9 @@ from scipy.interpolate import CubicSpline
 from gmwm._core.text import brief
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
+from gmwm.ins import tuning
 from gmwm.ins.filter import Solution
-from gmwm.ins.simulation import GROUPS, normalised
+from gmwm.ins.simulation import GROUPS, Ratio, serial_ratio
 from gmwm.ins.trajectory import Trajectory, read_log, unwrapped_angles, unwrapped_longitudes
 
 _JUDGED = ("position", "velocity", "attitude")
@@ -77,11 +78,30 @@ class ReferenceErrors:
     error: FloatArray
     covariance: FloatArray
 
-    def nees(self, group: str) -> float:
-        """Mean normalised error squared per degree of freedom of a group of errors."""
+    def nees(self, group: str) -> Ratio:
+        """Mean normalised error squared per degree of freedom of a group of errors.
+
+        Its band allows for errors that are correlated from one epoch to the next.
+        """
         own = GROUPS[group]
-        squares = normalised(self.error[:, own], self.covariance[:, own, own])[0]
-        return float(np.mean(squares)) / (own.stop - own.start)
+        root = np.linalg.cholesky(self.covariance[:, own, own])
+        return serial_ratio(np.linalg.solve(root, self.error[:, own, None])[..., 0])
+
+    @property
+    def disagreeing(self) -> dict[str, float]:
+        """Errors that contradict the filter's covariance -> how many times as large they are."""
+        found = {name: self.nees(name) for name in _JUDGED}
+        level = tuning.CONTRADICTED / len(found)
+        return {k: float(np.sqrt(each.value)) for k, each in found.items() if each.p_value <= level}
+
+    @property
+    def in_words(self) -> str:
+        """Whether the errors agree with the filter's covariance."""
+        sizes = self.disagreeing
+        if not sizes:
+            return "the errors agree with the filter's covariance"
+        shown = (f"those of {name} are {brief(size)} times" for name, size in sizes.items())
+        return f"the errors do not agree with the filter's covariance: {', '.join(shown)} as large"
 
     def rms(self, *errors: int) -> tuple[float, float]:
         """Root mean square of some of the nine errors together, and as the filter predicted it."""
@@ -103,10 +123,14 @@ class ReferenceErrors:
         ):
             actual, predicted = (brief(scale * value) for value in self.rms(*errors))
             parts.append(f"{name} {actual} {unit} ({predicted})")
-        judged = ", ".join(f"{name} {self.nees(name):.3g}" for name in _JUDGED)
+        judged = ", ".join(
+            f"{name} {each.value:.3g} ({each.lower:.2g} .. {each.upper:.2g})"
+            for name, each in ((name, self.nees(name)) for name in _JUDGED)
+        )
         return (
             f"Against {self.source}, {len(self.error):,} epochs, RMS (predicted): "
-            f"{', '.join(parts)}; NEES per degree of freedom, 1 if consistent: {judged}"
+            f"{', '.join(parts)}; NEES per degree of freedom (95 % band if consistent): {judged}; "
+            f"{self.in_words}"
         )
 
     def to_dict(self) -> dict[str, Any]:
@@ -116,5 +140,5 @@ class ReferenceErrors:
             "epochs": len(self.error),
             "rms": {name: self.rms(*range(9)[GROUPS[name]])[0] for name in _JUDGED},
             "predicted": {name: self.rms(*range(9)[GROUPS[name]])[1] for name in _JUDGED},
-            "nees": {name: self.nees(name) for name in _JUDGED},
+            "nees": {name: asdict(self.nees(name)) for name in _JUDGED},
         }

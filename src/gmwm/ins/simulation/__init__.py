@@ -6,6 +6,7 @@ from gmwm.ins.simulation.consistency import (
     Ratio as Ratio,
     chi_square_ratio as chi_square_ratio,
     mean_ratio as mean_ratio,
+    serial_ratio as serial_ratio,
 )
 from gmwm.ins.simulation.filter_errors import (
     GROUPS as GROUPS,

@@ -197,6 +197,25 @@ def mean_ratio(values: FloatArray) -> Ratio:
     return Ratio(mean, max(1.0 - width, 0.0), 1.0 + width, p_value)
 
 
+def serial_ratio(standard: FloatArray) -> Ratio:
+    """Mean square of uncorrelated errors of one run in their standard deviations, (K, d).
+
+    Squares of Gaussian errors are correlated in time as the squares of the errors' correlations
+    are, which leave so many degrees of freedom. They are taken about zero, so that an error that
+    stays counts once, relative to its size, so that a wrong size is seen, and up to the first lag
+    without any (Geyer 1992, *Stat. Sci.* 7, 473-483).
+    """
+    count, size = standard.shape
+    power = np.abs(np.fft.rfft(standard, 2 * count, axis=0)) ** 2
+    correlation = np.fft.irfft(power, axis=0)[:count]
+    correlation /= np.maximum(correlation[0], np.finfo(float).tiny)
+    until = np.logical_and.accumulate(correlation > 0.0, axis=0)
+    share = 1.0 - np.arange(count) / count
+    times = 2.0 * np.sum((until * correlation**2).T / share, axis=1) - 1.0
+    dof = size**2 * count / float(np.sum(times))
+    return _ratio(dof * float(np.mean(standard**2)), dof)
+
+
 def coverage_of(standard: FloatArray, single: bool) -> tuple[Coverage, ...]:
     """Coverage of standardised errors (R, K, d).
 

@@ -121,11 +121,19 @@ def test_a_reference_shows_the_errors_of_the_solution(tmp_path):
     # A spline through 2 Hz of a car's track; straight roads end in turns within half a second.
     np.testing.assert_allclose(against.error[:, :3], expected[:, :3], atol=0.02)
     np.testing.assert_allclose(against.error[:, 8], expected[:, 8], atol=2e-3)
-    assert against.nees("position") < 2.5
+    nees = against.nees("position")
+    assert nees.within and 0.2 < nees.lower < 1.0 < nees.upper < 3.0
+    assert not against.disagreeing
+    assert found.verdict.code == "consistent"
+    assert "errors against reference.csv agree" in found.verdict.text
     assert found.to_dict()["reference"]["epochs"] == len(expected)
     assert "Against reference.csv, " in " ".join(str(found).split())
     reference(tmp_path, truth, start=START + 0.3)  # late stamps are errors of metres
-    assert filtered(tmp_path, reference="reference.csv").against.nees("position") > 10.0
+    late = filtered(tmp_path, reference="reference.csv")
+    assert late.against.nees("position").value > 10.0
+    assert (late.verdict.code, late.verdict.severity) == ("errors-contradict", "bad")
+    assert late.verdict.values["position"] == late.against.nees("position").value ** 0.5
+    assert "which it is not" in late.accuracy[0]
     reference(tmp_path, truth, start=0.0)
     with pytest.raises(InputError, match="bring both to one clock"):
         filtered(tmp_path, reference="reference.csv")

@@ -9,15 +9,35 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
+from scipy.signal import lfilter
 from scipy.stats import binom, chi2, multivariate_normal, norm
 from statsmodels.stats.proportion import proportion_confint
 
 from gmwm.ins import Consistency, FilterErrors, at_epoch, innovation_test, over_time
-from gmwm.ins.simulation import GROUPS, chi_square_ratio, mean_ratio
+from gmwm.ins.simulation import GROUPS, chi_square_ratio, mean_ratio, serial_ratio
 from gmwm.ins.simulation.consistency import LEVELS, coverage_of
 from marks import slow
 
 SIZES = {name: part.stop - part.start for name, part in GROUPS.items()} | {"sensors": 6}
+
+
+@pytest.mark.parametrize("memory", [0.0, 0.8, 0.95])
+def test_one_run_is_judged_by_the_epochs_that_its_correlation_leaves(memory):
+    rng, within, seen, runs = np.random.default_rng(5), 0, 0, 300
+    for _ in range(runs):
+        errors = rng.standard_normal((500, 3))
+        errors[1:] *= np.sqrt(1.0 - memory**2)
+        errors = lfilter([1.0], [1.0, -memory], errors, axis=0)
+        within += serial_ratio(errors).within
+        seen += serial_ratio(1.5 * errors).p_value < 1e-3
+    assert binom.ppf(1e-4, runs, 0.94) <= within <= binom.ppf(1.0 - 1e-4, runs, 0.96)
+    assert seen > 0.9 * runs
+
+
+def test_an_error_that_stays_counts_once():
+    found = serial_ratio(np.full((200, 3), 1.2))
+    assert found.value == pytest.approx(1.44)
+    assert (found.lower, found.upper) == pytest.approx(chi2.ppf([0.025, 0.975], 3) / 3)
 
 
 def covariances(rng, size):
