@@ -35,6 +35,7 @@ from gmwm.calibration.screening import (
     stretches_at_rest,
     with_outcomes,
 )
+from gmwm.calibration.sharing import sharing_notices
 from gmwm.diagnosis import first_in_common, thinned
 from gmwm.errors import InputError
 from gmwm.issues import Notice, notice
@@ -200,13 +201,17 @@ def _calibrated(
         for name, each in done.items()
         if each.largest is not None
     ]
+    shared: list[Notice] = []
+    for one in treated if work.screening else ():
+        about = one.recording.source if len(treated) > 1 else ""
+        shared += [replace(n, source=about) for n in sharing_notices(one, chosen)]
     return Calibration(
         fits={name: each.fit for name, each in done.items()},
         skipped=skipped,
         source=source,
         rate=given[0].rate,
         n=sum(each.n for each in given),
-        notices=(*with_outcomes(issues, chosen, offered), *tied, *left_open),
+        notices=(*with_outcomes(issues, chosen, offered), *tied, *left_open, *shared),
         rivals=rivals,
         curves={name: each.curve for name, each in done.items() if each.curve is not None},
         left_out=_left_out(given[0], treated[0].recording) if len(treated) == 1 else {},

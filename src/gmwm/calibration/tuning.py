@@ -87,3 +87,10 @@ FEWEST_FREEDOM = 3.0  # degrees of freedom of a part for which Bartlett's test h
 FALSE_ALARM = 1e-3  # chance of a notice for a channel of stationary Gaussian noise
 UNSTEADY = 0.1  # deviation of all above the quiet quarter: as much as a valid fit may miss
 HARMFUL_UNSTEADY = 2.0  # loudest over quietest part; real recordings have 1.6 to 2.1
+
+# -- what channels share --------------------------------------------------------------------------
+
+SLOW = 1.0  # s, shortest correlation time of slow errors
+BLOCKS_OF_SLOW = 8  # blocks of that time, whose means are compared
+SHARED_LEVEL = 0.01  # of the tests of all pairs of a recording (Bonferroni)
+SHARED_LISTED = 3  # pairs that are named

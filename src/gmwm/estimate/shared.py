@@ -145,14 +145,15 @@ def fit_shared(
         whitened = solve_triangular(root, np.column_stack([columns, goal]), lower=True)
         design = whitened[:, :-1]
         information = design.T @ design
-        x, response = cone_least_squares(information, design.T @ whitened[:, -1], len(parts), p)
+        x = cone_least_squares(information, design.T @ whitened[:, -1], len(parts), p)
         kept = len(parts) * first.size
         found = x[:kept].reshape(len(parts), -1) * scales / sizes[:, None]
         matrices[:, first, second] = matrices[:, second, first] = found
         if turn:
             step = np.clip(x[kept:], -tuning.SHARED_STEP, tuning.SHARED_STEP)
             parts = _moved(parts, moving, step)
-    spread = (response @ information @ response)[:kept, :kept]
+    # Without the bounds of the cones, near which it is too large: with them it is too small.
+    spread = np.linalg.pinv(information, rcond=1e-13, hermitian=True)[:kept, :kept]
     sized = (scales / sizes[:, None]).ravel()
     return SharedFit(data.names, tuple(parts), matrices, spread * np.outer(sized, sized))
 
@@ -179,7 +180,7 @@ def _moved(
 
 def cone_least_squares(
     information: FloatArray, target: FloatArray, count: int, size: int
-) -> tuple[FloatArray, FloatArray]:
+) -> FloatArray:
     """Minimize x' H x / 2 - t' x where parts of x are positive semidefinite matrices.
 
     By Newton's method with a logarithmic barrier (Boyd & Vandenberghe 2004, *Convex Optimization*,
@@ -188,7 +189,6 @@ def cone_least_squares(
     information, target: H and t, in units of the order of one matrix element.
     count, size: x begins with the elements a <= b of so many matrices, of so many rows; what
         follows is free.
-    Returns: x, and its derivative by t.
     """
     first, second = np.triu_indices(size)
     pairs, ends = first.size, count * first.size
@@ -209,8 +209,8 @@ def cone_least_squares(
             turned[at, at] = moved[first, second]
         gradient = turned.T @ (information @ x - target)
         gradient[:ends] -= weight * np.tile(identity, count)
-        response = np.linalg.inv(turned.T @ information @ turned + weight * barrier)
-        step = -response @ gradient
+        curvature = turned.T @ information @ turned + weight * barrier
+        step = -np.linalg.solve(curvature, gradient)
         change = np.einsum("kp,abp->kab", step[:ends].reshape(-1, pairs), spread)
         worst = float(np.min(np.linalg.eigvalsh(change)))
         x = x + min(1.0, -0.95 / min(worst, -1e-300)) * (turned @ step)
@@ -218,4 +218,4 @@ def cone_least_squares(
             if weight * count * size < tuning.CONE_GAP:
                 break
             weight *= 0.1
-    return x, turned @ response @ turned.T
+    return x

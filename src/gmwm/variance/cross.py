@@ -162,7 +162,7 @@ def wavelet_covariance(channels: Sequence[Channel], *, block: int = 1) -> Wavele
     alike = [replace(c, values=np.where(gone, np.nan, c.values)) for c in alike]
     found = [checked_samples(channel) for channel in alike]
     runs: Runs = found[0][1]
-    units = [float(np.nanstd(np.diff(each.values))) for each in alike]
+    units = [float(np.nanstd(each.values)) for each in alike]
     series = [
         (channel.values - mean) / unit
         for channel, (_, _, mean), unit in zip(alike, found, units, strict=True)

@@ -154,7 +154,7 @@ def level_changes(values: FloatArray, runs: Runs) -> BoolArray:
 
     values: (n,), NaN where samples are missing.
     """
-    if runs.is_complete:
+    if len(runs.starts) < 2:
         return np.zeros(0, dtype=bool)
     m = dyadic_levels(runs.longest)
     counts = np.array([window_count(runs.edges, 2.0 * each) for each in m])

@@ -13,7 +13,7 @@ def test_the_minimum_over_cones_meets_its_conditions():
     rng = np.random.default_rng(1)
     root = rng.normal(size=(20, 13))
     information, target = root.T @ root, rng.normal(size=13) * 30.0
-    x, _ = cone_least_squares(information, target, 2, 3)
+    x = cone_least_squares(information, target, 2, 3)
     slope = (information @ x - target)[:12].reshape(2, 6)
     first, second = np.triu_indices(3)
     for own, gradient in zip(x[:12].reshape(2, 6), slope, strict=True):
@@ -31,9 +31,8 @@ def test_without_active_cones_it_is_least_squares():
     root = rng.normal(size=(200, 3))
     information = root.T @ root
     inside = np.array([2.0, 0.5, 1.0])
-    x, response = cone_least_squares(information, information @ inside, 1, 2)
-    np.testing.assert_allclose(x, inside, atol=1e-5)
-    np.testing.assert_allclose(response, np.linalg.inv(information), rtol=1e-3, atol=1e-6)
+    found = cone_least_squares(information, information @ inside, 1, 2)
+    np.testing.assert_allclose(found, inside, atol=1e-5)
 
 
 PARTS = (WhiteNoise(1.0), GaussMarkov(1.0, 40.0), RandomWalk(1.0))

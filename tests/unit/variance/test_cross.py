@@ -63,6 +63,14 @@ def test_estimates_have_the_mean_and_covariance_that_they_are_said_to_have(gaps)
     assert np.mean(ratio) == pytest.approx(1.0, abs=0.15)
 
 
+def test_samples_missing_at_the_ends_shorten_the_record():
+    own = channels(np.random.default_rng(6), 600)
+    inside = wavelet_covariance([Channel(c.name, c.values[50:550], c.dt) for c in own])
+    own[0].values[:50] = own[1].values[550:] = np.nan
+    found = wavelet_covariance(own)
+    np.testing.assert_allclose(found.values, inside.values[: found.tau.size], rtol=1e-9)
+
+
 def test_levels_of_block_means_are_those_of_the_samples_at_their_averaging_times():
     own = channels(np.random.default_rng(4), 40_000, matrices=MATRICES * [[[1]], [[100]]])
     fine, coarse = wavelet_covariance(own), wavelet_covariance(own, block=4)

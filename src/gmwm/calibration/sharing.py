@@ -1,0 +1,114 @@
+"""Slow errors that channels share: their correlation, and a test that there is none.
+
+The slow part of the wavelet covariances of two channels is fitted by r (nu_j^a nu_j^b)^(1/2), with
+the slow terms' wavelet variances of both models, by generalized least squares. Its weights are the
+covariance of wavelet covariances of independent channels with these models, so that the estimate
+has the least variance v where there is no sharing, and is tested as a correlation coefficient of
+1/v degrees of freedom.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+
+from gmwm._core.distributions import student
+from gmwm._core.typing import FloatArray
+from gmwm.calibration import tuning
+from gmwm.calibration.screening import Screened
+from gmwm.errors import InputError
+from gmwm.issues import Notice, notice
+from gmwm.process import Model, Process
+from gmwm.variance import WaveletCovariance, wavelet_covariance
+
+
+@dataclass(frozen=True)
+class Sharing:
+    """Correlation of the slow errors of two channels.
+
+    correlation: Estimate; by chance it may exceed 1.
+    dof: Degrees of freedom of its test.
+    p_value: Of the test that they share nothing, two-sided.
+    """
+
+    first: str
+    second: str
+    correlation: float
+    dof: float
+    p_value: float
+
+
+def is_slow(term: Process) -> bool:
+    """Whether a term is random and slower than `tuning.SLOW`."""
+    is_long = term.is_exponential and term.tau >= tuning.SLOW  # type: ignore[attr-defined]
+    return term.is_walk or term.is_flicker or is_long
+
+
+def sharing(models: Mapping[str, Model], data: WaveletCovariance) -> list[Sharing]:
+    """Sharing of each pair of channels whose models have slow terms.
+
+    Pairs of less than two degrees of freedom are left out.
+    """
+    slow: dict[int, FloatArray] = {}
+    for place, name in enumerate(data.names):
+        terms = [term for term in models[name].terms if is_slow(term)]
+        if terms:
+            slow[place] = Model(tuple(terms)).haar_variance(data.tau, data.dt)
+    form = data.form([models[name].psd for name in data.names])
+    found = []
+    for a, b in combinations(slow, 2):
+        grown = np.sqrt((1.0 + data.change[:, a]) * (1.0 + data.change[:, b]))
+        shape = np.sqrt(slow[a] * slow[b])
+        weighted = np.linalg.solve(form[a, b] * np.outer(grown, grown), shape)
+        dof = float(weighted @ shape)
+        if dof < 2.0:
+            continue
+        estimate = float(weighted @ data.values[:, a, b]) / dof
+        bounded = min(abs(estimate), 1.0 - 1e-9)
+        statistic = bounded * np.sqrt((dof - 1.0) / (1.0 - bounded**2))
+        p_value = float(2.0 * student.sf(statistic, dof - 1.0))
+        found.append(Sharing(data.names[a], data.names[b], estimate, dof, p_value))
+    return found
+
+
+SHARED = "shared-errors"
+"""Code of the notice that channels share slow errors."""
+
+
+def sharing_notices(one: Screened, models: Mapping[str, Model]) -> list[Notice]:
+    """Name the channels of a recording that share slow errors, the most correlated first.
+
+    Each pair is tested at `tuning.SHARED_LEVEL` divided by the number of pairs.
+    """
+    recording = one.recording
+    channels = [
+        c
+        for c in recording.inertial
+        if c.name in models and (c.n, c.dt) == (recording.n, recording.dt)
+        if c.name not in one.robust and c.name not in one.repeated
+        if all(term.has_spectrum() for term in models[c.name].terms)
+    ]
+    block = max(int(tuning.SLOW / tuning.BLOCKS_OF_SLOW / recording.dt), 1)
+    try:
+        found = sharing(models, wavelet_covariance(channels, block=block))
+    except InputError:  # fewer than two channels, or no run in which all have samples
+        return []
+    level = tuning.SHARED_LEVEL
+    pairs = [each for each in found if each.p_value * len(found) < level]
+    if not pairs:
+        return []
+    pairs.sort(key=lambda each: -abs(each.correlation))
+    largest = pairs[0]
+    listed = ", ".join(
+        f"{each.first} and {each.second} ({each.correlation:.2f})"
+        for each in pairs[: tuning.SHARED_LISTED]
+    )
+    more = len(pairs) - tuning.SHARED_LISTED
+    names = {"first": largest.first, "second": largest.second, "level": level}
+    sizes = {"correlation": largest.correlation, "p_value": largest.p_value}
+    values = {**names, **sizes, "pairs": len(pairs), "tested": len(found)}
+    others = f" and {more} more pair{'s' * (more > 1)}" if more > 0 else ""
+    return [notice(SHARED, "", values, listed=listed + others)]
