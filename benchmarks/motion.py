@@ -11,7 +11,7 @@ differenced white noise, random walk), and prints the ratio of the variances to 
 coverage of 95 % intervals, and the errors of clocks and lever arms in standard errors. `sessions`
 prints in-motion over static Allan deviation by session. `predict` takes the numbers from every
 second flight of a session, and prints on the others, and the other way round, the NEES of the
-difference of two IMUs.
+difference of two IMUs, also with the shares of time that classes of vibration have in each flight.
 """
 
 from __future__ import annotations
@@ -120,38 +120,61 @@ def sessions(folder: Path, args: argparse.Namespace) -> None:
             found.save(args.save / f"flights {name}.json")
 
 
+def by_class(first, found, imu: str, channel: str) -> np.ndarray:
+    """Variances of the classes of vibration of some flights, in the shares of another one."""
+    shares = {each.name: each.share for each in found.classes}
+    own = [(first.at(each.name).curve(imu, channel).variance, shares.get(each.name, 0.0))
+           for each in first.classes]  # fmt: skip
+    return sum(share * variance for variance, share in own) / sum(share for _, share in own)
+
+
+def ratios(first, found, sensor: str, a: int, b: int) -> list[float]:
+    """Mean over octaves and axes of the measured over each predicted variance of a difference."""
+    rows = []
+    for channel in (f"{sensor}_{axis}" for axis in "xyz"):
+        names = [f"imu {k + 1}" for k in (a, b)]
+        two, curve = [first.curve(name, channel) for name in names], found.curve(names[0], channel)
+        J = min(len(two[0].tau), len(curve.tau))
+        tau = curve.tau[:J]
+        used = (tau >= 0.06) & (tau < 5.0)
+        measured = curve.differences[b - 1, :J]
+        own = sum(np.maximum(each.variance, each.static)[:J] for each in two)
+        classes = sum(np.maximum(by_class(first, found, name, channel), each.static)[:J]
+                      for name, each in zip(names, two, strict=True))  # fmt: skip
+        static = sum(each.static[:J] for each in two)
+        bounds = sum(2.0 * first.numbers(imu=name)[channel].haar_variance(tau, DT)
+                     for name in names)  # fmt: skip
+        inside = (tau >= 0.1) & (tau <= 1.1)
+        rows.append([np.mean((measured / each)[used]) for each in (own, classes, static)]
+                    + [np.max((measured / bounds)[inside])])  # fmt: skip
+    motion, classes, rest, bound = np.mean(rows, axis=0)
+    return [motion, classes, rest, rest / 100.0, bound]
+
+
 def predict(folder: Path, args: argparse.Namespace) -> None:
-    """Mean over octaves and axes of the measured over the predicted variance of differences."""
     static = gmwm.load(args.static)
     ranges = {}
-    print("NEES of the difference of two IMUs, in motion; static; ten times the static deviation")
+    print("NEES of the difference of two IMUs: in motion; by class of vibration; static; ten times "
+          "that deviation; and the largest from 0.1 to 1 s of numbers that bound")  # fmt: skip
     for (name, numbers), half in product(SESSIONS.items(), (0, 1)):
         first = gmwm.motion([flight(folder, n) for n in numbers[half::2]], static=static)
+        limits = [each.high for each in first.classes[:-1]]
         for number in numbers[1 - half :: 2]:
-            found = gmwm.motion(flight(folder, number))
+            found = gmwm.motion(flight(folder, number), limits=limits)
             for sensor in ("gyro", "accel"):
                 texts = []
                 for a, b in combinations(range(4), 2):
-                    own, rest = [], []
-                    for channel in (f"{sensor}_{axis}" for axis in "xyz"):
-                        two = [first.curve(f"imu {k + 1}", channel) for k in (a, b)]
-                        curve = found.curve(f"imu {a + 1}", channel)
-                        J = min(len(two[0].tau), len(curve.tau))
-                        used = (curve.tau[:J] >= 0.06) & (curve.tau[:J] < 5.0)
-                        measured = curve.differences[b - 1, :J][used]
-                        both = sum(np.maximum(each.variance, each.static)[:J] for each in two)
-                        own.append(measured / both[used])
-                        rest.append(measured / (two[0].static + two[1].static)[:J][used])
-                    nees = np.mean(own), np.mean(rest), np.mean(rest) / 100.0
-                    texts.append(f"{a + 1}-{b + 1} {nees[0]:.2f};{nees[1]:.0f};{nees[2]:.2f}")
+                    nees = ratios(first, found, sensor, a, b)
+                    texts.append(f"{a + 1}-{b + 1} {';'.join(f'{each:.3g}' for each in nees)}")
                     group = "1-15" if number < 16 else "17-27"
                     ranges.setdefault((group, sensor), []).append(nees)
-                print(f"{name}, flight {number}, {sensor}: {', '.join(texts)}")
+                print(f"{name}, flight {number}, {sensor}: {', '.join(texts)}", flush=True)
     for (group, sensor), values in ranges.items():
         ends = np.quantile(values, [0.0, 0.05, 0.5, 0.95, 1.0], axis=0).T
-        texts = ["least {:.2f} 5 % {:.2f} median {:.2f} 95 % {:.2f} largest {:.2f}".format(*each)
+        texts = ["{:.2f} ({:.2f} {:.2f} {:.2f} {:.2f})".format(*each[[2, 0, 1, 3, 4]])
                  for each in ends]  # fmt: skip
-        print(f"flights {group}, {sensor}, {len(values)} pairs: {'; '.join(texts)}")
+        print(f"flights {group}, {sensor}, {len(values)} pairs, median (least, 5 %, 95 %, "
+              f"largest): {'; '.join(texts)}")  # fmt: skip
 
 
 def main() -> None:

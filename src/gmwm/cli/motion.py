@@ -30,6 +30,8 @@ if TYPE_CHECKING:
     --static FILE  Calibration of a recording at rest, of one of the IMUs or of their kind.
     --imus N  Number of IMUs: the files are those of one flight, then those of the next, each in one
         order. By default all files are of one flight.
+    --reference FILE  Attitude of the body, one for each FILE of one IMU: columns time, qw, qx, qy,
+        qz (body to a fixed frame), or files of EuRoC or TUM; repeat for flights.
     --limits A,B  Vibration in m/s^2 (rms, 20 to 60 Hz) between the classes low, middle and high,
         such as idle, hover and manoeuvres; by default each has a third of the time.
     --at CLASS  Result at low, middle or high vibration, or at rest.
@@ -43,12 +45,14 @@ if TYPE_CHECKING:
     """,
     output=FILE_TO_WRITE,
     plot=FILE_TO_WRITE,
+    reference={"multiple": True},
     at={"type": click.Choice(["low", "middle", "high", "rest"])},
 )
 def motion(
     files: Sequence[Path],
     static: Path | None,
     imus: int | None,
+    reference: tuple[Path, ...],
     limits: str | None,
     at: str | None,
     logs: bool,
@@ -82,13 +86,17 @@ def motion(
     levels = None if limits is None else numbers("--limits", limits, "two levels, e.g. 1,4", 2)
     at_rest = None if static is None else Calibration.load(static)
     flights: list[Any]
-    if logs or len(files) == 1:
+    if reference:
+        flights = [read_recording(file, **reading) for file in files]
+    elif logs or len(files) == 1:
         flights = [_of_log(file, **reading) for file in files]
     else:
         recordings = [read_recording(file, **reading) for file in files]
         flights = [recordings[k : k + count] for k in range(0, len(files), count)]
     with progress_bar("motion", "flights", quiet=quiet) as bar:
-        found = run(flights, static=at_rest, limits=levels, progress=bar)
+        found = run(
+            flights, static=at_rest, limits=levels, reference=reference or None, progress=bar
+        )
     found = found if at is None else found.at(at)
     if output is not None:
         found.save(output)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -29,6 +30,7 @@ from gmwm.motion.mapping import (
     rotation_to,
     vibration_of,
 )
+from gmwm.motion.reference import rates_of, read_attitude, without_reference
 from gmwm.motion.result import InMotion, MotionCurve, VibrationClass, static_variance
 from gmwm.readers import Recording, require_recording
 
@@ -65,6 +67,7 @@ def motion(
     *,
     static: Mapping[str, Any] | None = None,
     limits: Sequence[float] | None = None,
+    reference: Any = None,
     progress: Progress | None = None,
 ) -> InMotion:
     """Measure the noise of IMUs in motion, from three or more on one rigid body.
@@ -85,14 +88,18 @@ def motion(
         Vibration (accelerometer from 20 to 60 Hz, rms over a second, m/s^2) between the classes
         low, middle and high, such as idle, hover and manoeuvres; by default each has a third of
         the time.
+    reference : path or (times, quaternions), or a sequence with one for each flight, optional
+        Attitude of the body from motion capture or a better INS: s, and (n, 4) x y z w of the
+        rotations from the body to a fixed frame, or a text file with them. Then ``sources`` is one
+        IMU, or the recording of one in each flight, and its gyros are measured.
     progress : callable, optional
         Called as ``progress(done, total, flight)``.
 
     Raises
     ------
     InputError
-        If there are fewer than two IMUs, one lacks a gyro axis, they are not on one rigid body, or
-        a clock wanders.
+        If the noise of a reference dominates at all averaging times, there are fewer than two IMUs,
+        one lacks a gyro axis, they are not on one rigid body, or a clock wanders.
 
     Notes
     -----
@@ -101,6 +108,8 @@ def motion(
     (`benchmarks/motion.py`). Errors that all IMUs have in common are not seen. A three-cornered hat
     would take mapped sensors, whose noise a mapping may filter, for targets.
     """
+    if reference is not None:
+        return _against(sources, reference, static)
     flights, filled = _flights(sources)
     notices = [notice("motion-filled", values={"samples": filled})] if filled else []
     labels = tuple(imu.label for imu in flights[0])
@@ -131,6 +140,41 @@ def motion(
     durations = tuple(float(imus[0].time[-1]) for imus in flights)
     return InMotion(
         labels, durations, curves, tuple(clocks), tuple(mountings), tuple(notices), classes
+    )
+
+
+def _against(sources: Any, references: Any, static: Mapping[str, Any] | None) -> InMotion:
+    """The gyros of one IMU against an attitude."""
+    single = isinstance(sources, Recording)
+    recordings, attitudes = ([each] if single else list(each) for each in (sources, references))
+    if not recordings or len(recordings) != len(attitudes):
+        raise InputError(
+            f"{len(recordings)} recordings and {len(attitudes)} references: give one for each"
+        )
+    clocks, mountings, own, durations, intervals, events = [], [], [], [], [], 0
+    for number, (recording, given) in enumerate(zip(recordings, attitudes, strict=True), start=1):
+        imu, _ = _imu(f"flight {number}", "imu", recording)
+        imu = replace(imu, samples={"gyro": imu.samples["gyro"]})
+        attitude = read_attitude(given) if isinstance(given, str | os.PathLike) else given
+        dt, rates, gaps = rates_of(*map(np.asarray, attitude))
+        other = _Imu("reference", dt, {"gyro": rates}, gaps)
+        clock = _joined(number, imu, other)
+        if clock is None:
+            raise InputError(f"flight {number}: neither moves, or they are not of one motion")
+        found, mounted, count = _of_target(number, [imu, other], 0, [clock])
+        clocks.append(clock)
+        mountings += mounted
+        own.append(found["gyro"])
+        durations.append(float(imu.time[-1]))
+        intervals.append(dt)
+        events += count
+    sums = curves_of(own, imu.dt, max(len(each.vibration) for each in own))
+    curves, angle = without_reference(sums, max(intervals), "the gyros")
+    notices = [notice("motion-reference", values={"angle": 1e3 * angle})]
+    notices += [notice("motion-events", values={"events": events})] if events else []
+    by_axis = _by_axis("imu", "gyro", curves, static)
+    return InMotion(
+        ("imu",), tuple(durations), tuple(by_axis), tuple(clocks), tuple(mountings), tuple(notices)
     )
 
 
@@ -321,8 +365,8 @@ def _classes(
         shares = [np.mean((own >= low) & (own < high)) for own in levels]
         if min(shares) * min(map(len, levels)) * dt > tuning.SHORTEST_CLASS:
             own = _curves(differences, dt, static, (float(low), float(high)))
-            span = np.clip([low, high], every.min(), every.max()).tolist()
-            found.append(VibrationClass(name, *span, share=float(np.mean(shares)), curves=own))
+            start, stop = np.clip([low, high], every.min(), every.max()).tolist()
+            found.append(VibrationClass(name, start, stop, float(np.mean(shares)), own))
     return tuple(found)
 
 

@@ -351,7 +351,7 @@ class InMotion(Document, Printed):
     def _stand(self) -> str:
         """Clock, rotation, scale and lever arm of each IMU against the first."""
         rows = []
-        for imu in self.imus[1:]:
+        for imu in dict.fromkeys(each.imu for each in self.clocks):
             clocks = [each for each in self.clocks if each.imu == imu]
             own = [m for m in self.mountings if (m.imu, m.target) == (imu, self.imus[0])]
             gyros = [m for m in own if m.sensor == "gyro"]
@@ -395,11 +395,11 @@ class InMotion(Document, Printed):
         tau, (unit, scale) = own[0].tau, _shown(sensor)
         chosen = sorted({int(np.argmin(np.abs(np.log(tau / t)))) for t in tuning.SHOWN_AT})
         rows = []
-        for imu in self.imus if len(self.imus) > 2 else ("both",):
+        for imu in ("both",) if len(self.imus) == 2 else self.imus:
             mean = np.mean([c.variance for c in own if imu in (c.imu, "both")], axis=0)
             rows.append((imu, *_texts(mean, scale, chosen)))
-        reach = np.nanmedian([np.sqrt(np.maximum(c.upper, 0.0)) / c.deviation for c in own], 0)
-        rows.append(("95 %", *(f"x/{reach[k]:.2f}" for k in chosen)))
+        reach = _median([np.sqrt(np.maximum(c.upper, 0.0)) / c.deviation for c in own])
+        rows.append(("95 %", *(f"x/{reach[k]:.2f}" if reach[k] > 0.0 else "-" for k in chosen)))
         if np.any(np.isfinite([c.static for c in own])):
             times = self.factor(sensor)
             rows.append(("over rest", *(brief(times[k]) for k in chosen)))
@@ -438,7 +438,16 @@ class InMotion(Document, Printed):
     def factor(self, sensor: str) -> FloatArray:
         """(J,) Median over IMUs and axes of the deviation in motion over that at rest."""
         own = [each.factor for each in self.curves if each.quantity == sensor]
-        return np.asarray(np.nanmedian(own, axis=0))
+        return _median(own)
+
+
+def _median(rows: Sequence[FloatArray]) -> FloatArray:
+    """Of each column; NaN where nothing is known."""
+    table = np.array(rows)
+    known = np.any(np.isfinite(table), axis=0)
+    found = np.full(known.shape, np.nan)
+    found[known] = np.nanmedian(table[:, known], axis=0)
+    return found
 
 
 def _off_diagonal(matrix: FloatArray) -> FloatArray:

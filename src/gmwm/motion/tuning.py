@@ -45,4 +45,5 @@ USES = ((0.1, 1.0), (1.0, 2.0))  # intervals and horizons that are printed; fixe
 VIBRATION, VIBRATION_OVER = (20.0, 60.0), 1.0
 SHORTEST_CLASS = 5.0  # s
 CLASSES = ("low", "middle", "high")  # of vibration, by default a third of the time each
+UNIT_LENGTH = 0.01  # by which lengths of quaternions may be off, as of rounding
 LEVEL_OVER = 2.0  # s, whose mean stands for what is left out
