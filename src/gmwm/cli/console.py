@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from gmwm._core.files import toml_beside
 from gmwm.errors import InputError
 
 if TYPE_CHECKING:
@@ -64,33 +65,7 @@ def progress_bar(title: str, unit: str, *, quiet: bool = False) -> Iterator[Prog
         )
 
 
-HINTS = {
-    "accel-unit-missing": "--accel-unit {unit}",
-    "channel-unknown": "--channel gyro_x=COLUMN for each channel",
-    "channels-swapped": "--channel accel_x=COLUMN for each channel",
-    "clock": "--rate {rate:.6g} --time none",
-    "damaged": "get a whole copy, or read the rest with --damaged",
-    "earlier-runs": "--resume, or -o FOLDER",
-    "gyro-unit-missing": "--gyro-unit deg/s",
-    "heading-unknown": "--heading DEG, or heading: in the file",
-    "layout": "--layout LAYOUT, one of those in the help of gmwm calibrate",
-    "memory": "--channel gyro_x=COLUMN for each of some channels, or, if there is more, "
-    "--memory GB with gmwm calibrate and health, and GMWM_MEMORY=GB before the others",
-    "missing-key": "--trajectory, --truth and --filter, or --imu, --gnss and --sensors",
-    "model-missing": "--model '{channel}=N + K', or leave it out by --channels",
-    "no-rest": "--all to take everything as static",
-    "no-stamps": "--clock log",
-    "other-runs": "-o FOLDER",
-    "output": "{first}choose another place with -o",
-    "rate": "--rate 100",
-    "rate-contradicted": "leave out the rate to use the stamps, or add --time none",
-    "runs-in-use": "-o FOLDER",
-    "sensor-absent": "record them too, or calibrate the rest alone, --channels {sensor}",
-    "time-unit": "--rate {rate:.6g}, or name the column {column}",
-    "topic": "--topic NAME",
-    "topics-apart": "--topic NAME or --clock log",
-    "unit-missing": "name the channel gyro_... or accel_... and give --gyro-unit or --accel-unit",
-}
+HINTS: dict[str, str] = toml_beside(__file__)
 
 
 Span = tuple[float, float] | None

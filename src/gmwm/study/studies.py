@@ -1,7 +1,6 @@
 """What is simulated, how it is estimated, what was published about it, and the runs.
 
-Numbers are those of Stebler, Guerrier, Skaloud & Victoria-Feser, IEEE/ION PLANS 2012, Tables II to
-IV: relative root mean square errors over 200 runs.
+Titles, sizes, notes and published numbers stand in studies.toml.
 """
 
 from __future__ import annotations
@@ -18,6 +17,7 @@ import numpy as np
 import numpy.typing as npt
 import pyarrow as pa
 
+from gmwm._core.files import toml_beside
 from gmwm._core.runs import do_runs
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
@@ -92,30 +92,31 @@ class Study:
         return float(self.truth.params[quantity.key] or 0.0) ** quantity.power
 
 
-def _published(em: float, other: float, gmwm: float, **more: float) -> dict[str, float]:
-    """Errors in the paper; those of GMWM stand beside both ways to have the ramp."""
-    return {"EM": em, "EM LS": em, "EM*": other, "eq. (9)": gmwm, "GMWM": gmwm, **more}
+_TEXTS = toml_beside(__file__)
 
 
-_NOTE_9 = (
-    "eq. (9): omega inside nu(theta), weights from the data, as in the paper's (5) and (9). GMWM "
-    "takes the slope by generalized least squares, and the weights that the model implies."
-)
+def _about(name: str) -> dict[str, Any]:
+    """What studies.toml says of a study, by fields of `Study`."""
+    found = {key: tuple(v) if isinstance(v, list) else v for key, v in _TEXTS[name].items()}
+    if "quantities" in found:
+        found["quantities"] = tuple(_quantity(**each) for each in found["quantities"])
+    return {"name": name, **found}
+
+
+def _quantity(published: Mapping[str, float] | None = None, **named: Any) -> Quantity:
+    """Published errors stand beside both ways to have the ramp, of GMWM and of EM."""
+    errors = dict(published or {})
+    if "EM" in errors:
+        errors |= {"EM LS": errors["EM"], "eq. (9)": errors["GMWM"]}
+    return Quantity(**named, published=errors)
+
+
 _LINES = {"N": (1, 4), "K": (16, 32), "R": (128, 2048)}
 _EQUATION_9 = Estimation(GMWM(weights="data", drift="moments"))
 
 TABLE_2 = Study(
-    name="table2",
-    title="Table II: white noise + random walk + rate ramp",
+    **_about("table2"),
     truth=WhiteNoise(0.2) + RandomWalk(0.02) + RateRamp(0.003),
-    n=6000,
-    dt=1.0,
-    runs=200,
-    quantities=(
-        Quantity("sigma2_WN", "N", 2, _published(1.92e-2, 1.00, 2.15e-2, AV=2.27e-2)),
-        Quantity("sigma2_RW", "K", 2, _published(2.93e-2, 0.809, 0.150, AV=1.11)),
-        Quantity("omega", "R", 1, _published(8.4e-2, 7.88e-2, 0.176, AV=0.394)),
-    ),
     methods={
         "EM": Estimation(EM(start=WhiteNoise(0.5) + RandomWalk(1e-4))),
         "EM*": Estimation(
@@ -127,34 +128,11 @@ TABLE_2 = Study(
         "eq. (9)": _EQUATION_9,
         "GMWM": Estimation(),
     },
-    notes=(
-        "EM from the paper's good start (0.25, 1e-8), run to convergence; EM* from its bad one "
-        "(25, 100), stopped at a relative gain of 1e-3: the paper does not give its tolerance, "
-        "and run to convergence EM* ends where EM does.",
-        "AV: lines over 1-4 s, 16-32 s and 128-2048 s; there is no straight part of slope +1/2, "
-        "and 16-32 s is where the slope is nearest to it. AV IRLS: the same regions, reweighted by "
-        "the covariance of the levels.",
-        _NOTE_9,
-        "The published error of EM in sigma2_RW is four times below the bound: EM run to "
-        "convergence is maximum likelihood, and GMWM ties with it.",
-        "The published error of AV in omega is four times that of lines over 128-2048 s; the "
-        "paper does not give its region.",
-    ),
 )
 
 TABLE_3 = Study(
-    name="table3",
-    title="Table III: white noise + Gauss-Markov + rate ramp",
+    **_about("table3"),
     truth=WhiteNoise(0.8) + GaussMarkov(0.5, 125.0) + RateRamp(0.001),
-    n=6000,
-    dt=1.0,
-    runs=200,
-    quantities=(
-        Quantity("beta", "tau", -1, _published(0.305, 0.933, 0.414)),
-        Quantity("sigma2_GM", "sigma", 2, _published(0.221, 12.1, 0.387)),
-        Quantity("sigma2_WN", "N", 2, _published(1.97e-2, 2.03e-2, 2.15e-2)),
-        Quantity("omega", "R", 1, _published(0.549, 1.68, 0.181)),
-    ),
     methods={
         "EM": Estimation(EM()),
         "EM*": Estimation(EM(drift="state", tolerance=1e-6)),
@@ -163,46 +141,21 @@ TABLE_3 = Study(
         "eq. (9)": _EQUATION_9,
         "GMWM": Estimation(),
     },
-    notes=(
-        "EM has the ramp beside the Gauss-Markov state; EM* has it inside, as in Stebler et al. "
-        "(2011), where the state forgets it; EM LS removes it before by ordinary least squares, "
-        "which is the paper's EM.",
-        _NOTE_9,
-        "The record holds 48 correlation times: no estimate of beta reaches the bound.",
-        "The published error of EM in omega, 0.549, is ten times that here and the bound, as it "
-        "would be with a slip of the decimal point; that of GMWM, 0.181, is three times the bound.",
-    ),
 )
 
 TABLE_4 = Study(
-    name="table4",
-    title="Table IV: three Gauss-Markov processes",
+    **_about("table4"),
     truth=(
         GaussMarkov(29.5e-6**0.5, 0.5)
         + GaussMarkov(4.5e-6**0.5, 20.0)
         + GaussMarkov(2.5e-6**0.5, 125.0)
     ),
-    n=1_000_000,
-    dt=1.0,
-    runs=200,
-    quantities=(
-        Quantity("beta_1", "tau_3", -1, {"GMWM": 8.28e-2}),
-        Quantity("sigma2_1", "sigma_3", 2, {"GMWM": 7.89e-2}),
-        Quantity("beta_2", "tau_2", -1, {"GMWM": 4.38e-2}),
-        Quantity("sigma2_2", "sigma_2", 2, {"GMWM": 3.87e-2}),
-        Quantity("beta_3", "tau_1", -1, {"GMWM": 4.53e-3}),
-        Quantity("sigma2_3", "sigma_1", 2, {"GMWM": 1.56e-3}),
-    ),
     methods={"GMWM": Estimation(), "Whittle": Estimation(Whittle())},
-    notes=("The published errors of beta_3 and sigma2_3 are below the bound.",),
 )
 
 EM_4 = replace(
     TABLE_4,
-    name="em4",
-    title="EM, Table IV: three Gauss-Markov processes",
-    n=100_000,
-    runs=20,
+    **_about("em4"),
     quantities=tuple(replace(quantity, published={}) for quantity in TABLE_4.quantities),
     methods={
         "EM": Estimation(EM()),
@@ -211,59 +164,36 @@ EM_4 = replace(
         ),
         "GMWM": Estimation(),
     },
-    notes=(
-        "EM from estimates by GMWM; EM* from variances of 1 and correlation times of 1, 3, 10 s: "
-        'the paper\'s EM "systematically diverges".',
-    ),
 )
 
 STARTS = replace(
     TABLE_4,
-    name="starts4",
-    title="Starting values, Table IV: three Gauss-Markov processes",
+    **_about("starts4"),
     methods={
         "none": Estimation(),
         **{f"all {value:g}": Estimation(GMWM(start=value)) for value in (0.1, 1.0, 10.0, 100.0)},
         "1.0 data": Estimation(GMWM(weights="data", start=1.0)),
     },
-    notes=(
-        "all X: a local search from all parameters at X; the paper's are 1.0. from grid: runs in "
-        "which it missed the minimum of the grid search, which was taken: 1 % in the paper. "
-        "1.0 data: with weights from the data.",
-    ),
 )
 
 ARMA_4 = replace(
     TABLE_4,
-    name="arma4",
-    title="ARMA(3,2) for three Gauss-Markov processes (Section IV-C)",
-    runs=20,
+    **_about("arma4"),
     methods={"ARMA": Estimation(Whittle(), arma=(3, 2)), "GMWM": Estimation()},
-    notes=(
-        "ARMA: an ARMA(3,2) is estimated by Whittle's likelihood and turned into Gauss-Markov "
-        "processes. without: runs whose ARMA is no such sum; not valid: also those where the delta "
-        "method does not hold. The paper calls both infeasible.",
-    ),
 )
 
 INDIRECT = replace(
     TABLE_2,
-    name="indirect2",
-    title="Indirect inference, Table II: white noise + random walk + rate ramp",
+    **_about("indirect2"),
     methods={
         "GMWM": Estimation(),
         "R series": Estimation(SimulatedMoments()),
         "R T": Estimation(SimulatedMoments(single=True)),
     },
-    notes=(
-        "R series: mean wavelet variances of R = 10 series as long as the data; R T: one series "
-        "ten times as long.",
-    ),
 )
 
 FIVE = Study(
-    name="five-gm",
-    title="White noise + five Gauss-Markov processes a decade apart (11 h at 100 Hz)",
+    **_about("five-gm"),
     truth=(
         WhiteNoise(0.1)
         + GaussMarkov(1.0, 0.02)
@@ -271,14 +201,6 @@ FIVE = Study(
         + GaussMarkov(1.0, 2.0)
         + GaussMarkov(1.0, 20.0)
         + GaussMarkov(1.0, 200.0)
-    ),
-    n=4_000_000,
-    dt=0.01,
-    runs=100,
-    quantities=(
-        Quantity("N", "N"),
-        *(Quantity(f"sigma_{i}", f"sigma_{i}") for i in range(1, 6)),
-        *(Quantity(f"tau_{i}", f"tau_{i}") for i in range(1, 6)),
     ),
     methods={"GMWM": Estimation(), "Whittle": Estimation(Whittle())},
 )
@@ -296,12 +218,6 @@ _WEIGHTS = {
     "robust": Estimation(robust=True),
 }
 
-_WEIGHT_NOTES = (
-    "model, diagonal, identity, data: weights of Haar wavelet variances; model is the default. "
-    "db2: the same as model and data with the Daubechies filter of four taps. robust: model "
-    "weights of robust Haar variances (efficiency 0.6).",
-)
-
 
 def _compared(study: Study, number: int, runs: int) -> Study:
     title = study.title.split(": ", 1)[1]
@@ -311,7 +227,7 @@ def _compared(study: Study, number: int, runs: int) -> Study:
         title=f"Weights and wavelets, Table {'I' * number if number < 4 else 'IV'}: {title}",
         runs=runs,
         methods=_WEIGHTS,
-        notes=_WEIGHT_NOTES,
+        notes=tuple(_TEXTS["weights"]["notes"]),
     )
 
 
