@@ -54,7 +54,9 @@ from .filter_numbers import (
 from .motion import InMotion as InMotion, motion as motion
 from .population import (
     Fleet as Fleet,
+    SensorArray as SensorArray,
     SensorComparison as SensorComparison,
+    array as array,
     compare as compare,
     fleet as fleet,
 )

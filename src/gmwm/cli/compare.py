@@ -1,4 +1,4 @@
-"""``gmwm compare`` and ``gmwm fleet``: few recordings or units side by side, or many units."""
+"""``gmwm compare``, ``gmwm fleet``, ``gmwm array``: few recordings, many units, IMUs together."""
 
 from __future__ import annotations
 
@@ -76,6 +76,50 @@ def _calibration(file: Path, reading: dict[str, Any], quiet: bool) -> Calibratio
         return Calibration.load(file)
     with progress_bar(f"calibrating {file.name}", "channels", quiet=quiet) as bar:
         return calibrate(read_recording(file, **reading), progress=bar)
+
+
+@click.command()
+@click.argument("files", metavar="IMU IMU...", nargs=-1, required=True, type=PATH)
+@options(
+    """
+    --horizon S  Length of the outages that the weights are for, in seconds.
+    -o --output JSON  File to save the result in.
+    --reading
+    --part
+    --json
+    --quiet
+    """,
+    horizon={"default": 60.0},
+    output=FILE_TO_WRITE,
+)
+def array(
+    files: Sequence[Path],
+    horizon: float,
+    output: Path | None,
+    as_json: bool,
+    quiet: bool,
+    **reading: Any,
+) -> None:
+    """Find weights for the IMUs of one board, whose sum has the least error.
+
+    IMU is the static recording of one IMU; all begin together, with aligned axes. The weights hold
+    for outages of one length: over seconds white noise decides, over minutes slow errors do, and
+    those that IMUs share do not average out. The second table compares them with the best IMU
+    alone, the mean of all, and weights 1/N^2.
+
+    \b
+    Examples:
+      gmwm array imu1.csv imu2.csv imu3.csv --horizon 60
+      gmwm array imu*.csv --rate 200 --gyro-unit deg/s --accel-unit g -o array.json
+    """
+    from gmwm.population import array as run, labelled
+
+    recordings = labelled([read_recording(file, **reading) for file in files], files)
+    with progress_bar("array", "axes", quiet=quiet) as bar:
+        found = run(recordings, horizon=horizon, progress=bar)
+    if output is not None:
+        found.save(output)
+    print_result(found, output, as_json=as_json, quiet=quiet)
 
 
 _PARTS = ("start", "stop", "screening", "still", "resume", "jobs", "cluster")

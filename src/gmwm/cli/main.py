@@ -17,7 +17,7 @@ import click
 from gmwm._core import __version__
 from gmwm._core.memory import OUT_OF_MEMORY
 from gmwm.cli.calibrate import calibrate, health
-from gmwm.cli.compare import compare, fleet
+from gmwm.cli.compare import array, compare, fleet
 from gmwm.cli.console import with_hint
 from gmwm.cli.demo import demo, reproduce
 from gmwm.cli.motion import motion
@@ -61,7 +61,7 @@ def cli(context: click.Context) -> None:
         click.echo(context.get_help())
 
 
-_COMMANDS = (calibrate, fleet, compare, demo, budget, health)
+_COMMANDS = (calibrate, fleet, compare, array, demo, budget, health)
 for _command in (*_COMMANDS, bound, reduce, certify, export, sheet, navigate, motion, reproduce):
     cli.add_command(_command)
 

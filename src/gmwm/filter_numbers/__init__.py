@@ -28,7 +28,11 @@ from gmwm.filter_numbers.certify import (
     certify as certify,
 )
 from gmwm.filter_numbers.imperfections import Imperfections as Imperfections, Motion as Motion
-from gmwm.filter_numbers.propagation import Chain as Chain, ChainErrors as ChainErrors
+from gmwm.filter_numbers.propagation import (
+    Chain as Chain,
+    ChainErrors as ChainErrors,
+    integral_rms as integral_rms,
+)
 from gmwm.filter_numbers.reduce import reduce as reduce, usable as usable
 from gmwm.filter_numbers.result import (
     FORMS as FORMS,

@@ -1,5 +1,10 @@
-"""Recordings or units of a sensor: `compare` sets few side by side, `fleet` sums up many."""
+"""Recordings or units: `compare` sets few side by side, `fleet` sums up many, `array` weighs."""
 
+from gmwm.population.array import (
+    ArrayAxis as ArrayAxis,
+    SensorArray as SensorArray,
+    array as array,
+)
 from gmwm.population.compare import compare as compare, labelled as labelled
 from gmwm.population.comparison import (
     STATES as STATES,

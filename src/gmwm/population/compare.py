@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from itertools import chain, count
 from pathlib import PurePath
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -29,6 +29,8 @@ from gmwm.selection import select
 from gmwm.variance import WaveletVariance
 
 _LONGEST_LABEL = 28  # characters
+
+Sourced = TypeVar("Sourced", Calibration, Recording)
 
 
 def compare(
@@ -140,9 +142,9 @@ def _calibration(source: Any) -> Calibration:
 
 
 def labelled(
-    calibrations: Sequence[Calibration], paths: Sequence[str | os.PathLike[str]]
-) -> dict[str, Calibration]:
-    """Calibrations by short labels.
+    calibrations: Sequence[Sourced], paths: Sequence[str | os.PathLike[str]]
+) -> dict[str, Sourced]:
+    """Calibrations or recordings by short labels.
 
     A label is the name of the recording; where recordings have one name, it is what differs between
     the paths of the files that were given (empty if there is none), or else a number.
@@ -163,7 +165,7 @@ def labelled(
                     own.pop(end)
         for place, part in zip(same, map("/".join, parts), strict=True):
             wanted[place] = printable(part[-_LONGEST_LABEL:]) or name
-    found: dict[str, Calibration] = {}
+    found: dict[str, Sourced] = {}
     for name, calibration in zip(wanted, calibrations, strict=True):
         labels = chain([name], (f"{name} ({copy})" for copy in count(2)))
         found[next(each for each in labels if each not in found)] = calibration

@@ -32,3 +32,9 @@ LIKELY = 4  # structures tried for a lot of those selected for its units, beside
 # Of the criterion, from which a unit is taken to contradict a structure: it does not outvote three
 # units that do not need a term (5 to 8 a parameter).
 CONTRADICTION = 30.0
+
+# -- array ----------------------------------------------------------------------------------------
+
+BLOCKS_OF_HORIZON = 32  # whose means are compared: faster errors are white over the horizon
+LEAST_HORIZONS = 16  # of the recordings, for a covariance over one of them
+WITH_INTERVALS = 5  # IMUs, in a table of 80 columns
