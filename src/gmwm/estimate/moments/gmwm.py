@@ -201,7 +201,7 @@ class GMWM:
         return found
 
     def _as_good_as_nested(self, found: Converged, problem: _Problem) -> Converged:
-        """The minimum under the weights of a model without one of its terms of some shape.
+        """The minimum under the weights of a model without one of its open terms.
 
         It is taken if that needs less discrepancy.
 
@@ -209,8 +209,7 @@ class GMWM:
         a large discrepancy hides the misfit of the worse ones.
         """
         terms, wv = problem.design.model.terms, problem.moments.wv
-        shaped = {term: i for i, term in enumerate(terms) if term.is_open and len(term.values) > 1}
-        for i in shaped.values():
+        for i in {term: i for i, term in enumerate(terms) if term.is_open}.values():
             left = (*terms[:i], *terms[i + 1 :])
             if all(term.is_drift or term.is_line for term in left):
                 continue
