@@ -15,7 +15,8 @@ at octaves without the first two and the last and, where nothing was removed, at
 averaging times. Printed are N and K of the sensor and of a filter for 60 s over those of the fit to
 samples, in per cent.
 
-``stored``: the -1/2 line of curves of imu_utils by sensor and axis, and what is selected.
+``stored``: the -1/2 line of curves of imu_utils, or of R's packages wv and avar, by sensor and
+axis, what is selected, and whether larger models fit worse than their parts.
 
 ``coverage``: how often 95 % intervals of fits to curves hold the truth, 20,000 samples at 20 Hz.
 """
@@ -23,7 +24,11 @@ samples, in per cent.
 from __future__ import annotations
 
 import argparse
+import itertools
 import json
+import warnings
+from collections import Counter
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -42,6 +47,8 @@ from gmwm.calibration import axis_numbers
 from gmwm.errors import InputError
 
 SLOPE, MANY, HORIZON = 0.05, 92, 60.0
+LADDER = ("N", "N + K", "N + GM", "N + GM + K", "N + GM + GM", "N + GM + GM + K")
+LADDER += ("Q + N + GM + GM + K",)
 DT, SAMPLES = 0.05, 20_000
 WHITE = WhiteNoise(1e-4)
 TRUTHS = {
@@ -129,24 +136,57 @@ def of_samples(options: argparse.Namespace) -> None:
             print(f"{name:8}{cells}", flush=True)
 
 
+def stored(file: str) -> Iterator[tuple[str, str, gmwm.Curve]]:
+    """Sensor, axis and curve of imu_utils, or of R: octaves from one or two samples on."""
+    for sensor, content in json.loads(Path(file).read_text()).items():
+        if "gyr" in content:
+            for kind, axis in itertools.product(("gyr", "acc"), "xyz"):
+                own, name = content[kind], f"{kind}_{axis}"
+                yield (
+                    sensor,
+                    name,
+                    gmwm.curve(own["tau"], own[axis], unit=own["unit_adev"], name=name),
+                )
+            continue
+        rate = content.get("rate", 1.0)
+        for name, own in content.get("axes", {"": content}).items():
+            kind = "wavelet" if "wavelet_variance" in own else "variance"
+            values = own["wavelet_variance" if kind == "wavelet" else "allan_variance"]
+            tau = 2.0 ** (np.arange(len(values)) + (kind == "variance")) / rate
+            yield (
+                sensor,
+                name,
+                gmwm.curve(tau, values, kind=kind, rate=rate, duration=content["n"] / rate),
+            )
+
+
+def worst_rise(curve: gmwm.Curve) -> float:
+    """Largest rise of the discrepancy from a model to one that has it as a part, in per cent."""
+    parts = [Counter(label.split(" + ")) for label in LADDER]
+    found = [100.0 * gmwm.fit(label, curve).discrepancy for label in LADDER]
+    return max(
+        found[large] - found[small]
+        for small, large in itertools.permutations(range(len(LADDER)), 2)
+        if parts[small] < parts[large]
+    )
+
+
 def of_stored(options: argparse.Namespace) -> None:
-    """A row for each axis of imu_utils' curves."""
-    print("sensor, axis     at  line N [SI]   N over it [%]  valid  selected")
-    for sensor, content in json.loads(Path(options.files[0]).read_text()).items():
-        for kind in ("gyr", "acc"):
-            own = content[kind]
-            for axis in "xyz":
-                curve = gmwm.curve(
-                    own["tau"], own[axis], unit=own["unit_adev"], name=f"{kind}_{axis}"
-                )
-                N, many = line(curve.tau, np.sqrt(2.0 * curve.variance))
-                fit = gmwm.select(curve).fit
-                found = axis_numbers(fit).N.value
-                print(
-                    f"{sensor:8}{kind}_{axis} {many:6} {N:12.3e} {change(found, N):>14}"
-                    f"  {fit.valid!s:5}  {fit.model!r}",
-                    flush=True,
-                )
+    """A row for each axis of stored curves."""
+    warnings.simplefilter("ignore", gmwm.FitWarning)
+    print("at: times on the -1/2 line; N: of the sensor over that of the line, %; larger: rise of")
+    print("the discrepancy from a model to a larger one, at most, % (zero: never worse)")
+    print("sensor, axis              at         N   larger  fit, and what is selected")
+    for sensor, name, curve in stored(options.files[0]):
+        N, many = line(curve.tau, np.sqrt(2.0 * curve.variance))
+        fit = gmwm.select(curve).fit
+        found, rise = axis_numbers(fit).N.value, worst_rise(curve)
+        state = "valid" if fit.valid else f"not valid ({', '.join(fit.reasons)})"
+        kinds = " + ".join(term.short_name for term in fit.model.terms)
+        print(
+            f"{sensor:19}{name:9}{many:3}{change(found, N):>10}{rise:9.2f}  {state}: {kinds}",
+            flush=True,
+        )
 
 
 def coverage(options: argparse.Namespace) -> None:

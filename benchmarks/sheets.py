@@ -5,7 +5,7 @@ For each sensor (white noise with a random walk, flicker noise, a Gauss-Markov p
 curve is first flat, within 1,440 s, over 0.664. Curves without such a place have no B to state and
 are drawn again. Printed: how often K of `gmwm.bound` of a recording of 4 h at 10 Hz lies between
 both ends that the sheet's models leave, and the NEES under the truth of a filter with the bound
-over all of them.
+over all of them, beside that of the bound on the truth itself: what the form N+K alone costs.
 
     python benchmarks/sheets.py --sensors 200 --seed 11 [--lowest]
 
@@ -79,9 +79,9 @@ def main() -> None:
         x = gmwm.simulate(truth, n=N_SAMPLES, dt=DT, seed=int(rng.integers(1 << 31)))
         found = gmwm.select(gmwm.wavelet_variance(x, dt=DT)).fit
         recorded = gmwm.bound(found.model, horizon=HORIZON, dt=DT).K
-        nees = []
-        for spread in SPREADS:
-            one = sheet.numbers(horizon=HORIZON, unit_spread=spread)["gyro"]
+        nees, known = [], gmwm.bound(truth, horizon=HORIZON)
+        own = (sheet.numbers(horizon=HORIZON, unit_spread=each)["gyro"] for each in SPREADS)
+        for one in (known, *own):
             errors = Chain.usual("gyro").worse(truth, one.model, DT, TIMES, 0.0, one.initial_sd)
             nees.append(errors.nees())
         rows.append((kind, min(ends), max(ends), recorded, nees))
@@ -90,14 +90,15 @@ def main() -> None:
     for kind in (*KINDS, "all"):
         own = [row for row in rows if kind in (row[0], "all")]
         low, high, recorded = (np.array([row[k] for row in own]) for k in (1, 2, 3))
-        for k, spread in enumerate(SPREADS):
-            held = np.mean((recorded >= low / spread) & (recorded <= spread * high))
+        for k, spread in enumerate((0.0, *SPREADS)):
+            held = np.mean((recorded >= low / (spread or 1.0)) & (recorded <= spread * high))
+            between = f"{100.0 * held:14.0f} %" if spread else f"{'truth known':>16}"
             nees = np.array([row[4][k] for row in own])
             text = ", ".join(
                 f"{time:g} s {np.median(values):.2f} ({values.max():.2f})"
                 for time, values in zip(TIMES, nees.T, strict=True)
             )
-            print(f"{kind:8} {len(own):3d} {spread:12g} {100.0 * held:14.0f} %     {text}")
+            print(f"{kind:8} {len(own):3d} {spread:12g} {between}     {text}")
 
 
 if __name__ == "__main__":
