@@ -58,7 +58,7 @@ def calibration_of(kept, name):
     return kept[name]
 
 
-@pytest.mark.parametrize("target", READABLE)
+@pytest.mark.parametrize("target", marks.every(3, READABLE))
 @pytest.mark.parametrize(
     "name",
     ["one without K", *map(marks.slow, ("slow", "accels without K", "recording"))],

@@ -20,7 +20,7 @@ from gmwm import (
 )
 from gmwm.calibration import departures
 from gmwm.cli.console import with_option
-from marks import slow
+from marks import every, slow
 
 DT = 1.0
 N = 7200
@@ -91,7 +91,7 @@ STATIONARY = {
 }
 
 
-@pytest.mark.parametrize("model", STATIONARY.values(), ids=STATIONARY)
+@pytest.mark.parametrize("model", every(2, STATIONARY.values()), ids=STATIONARY)
 def test_stationary_noise_has_departures_in_one_of_a_hundred_records_at_most(model):
     """And a fit is not valid for one in one of 200 records (`python benchmarks/departures.py`)."""
     runs = 4
@@ -119,10 +119,10 @@ def test_a_fit_is_not_valid_from_an_evidence_of_1000_on(size, is_valid):
     [
         (STEP, 0.07),
         (np.exp(-TIME / 600.0), 0.15),
-        (np.maximum(1.0 - TIME / 900.0, 0.0), 0.12),
+        slow(np.maximum(1.0 - TIME / 900.0, 0.0), 0.12),
         (np.sin(2.0 * np.pi * TIME / 1500.0 + 1.0), 0.03),
-        (np.sin(3.0 * np.pi * TIME / TIME[-1]), 0.06),
-        (np.sin(np.pi * TIME / TIME[-1]), 0.12),
+        slow(np.sin(3.0 * np.pi * TIME / TIME[-1]), 0.06),
+        slow(np.sin(np.pi * TIME / TIME[-1]), 0.12),
     ],
     ids=["step", "transient", "drift", "period", "1.5 periods", "half a period"],
 )

@@ -6,6 +6,7 @@ import pytest
 import gmwm
 from gmwm import GaussMarkov, RandomWalk, WhiteNoise
 from gmwm.calibration.channel import UNRESOLVED, unresolved_notice, with_largest_walk
+from marks import every
 
 N, RATE = 1e-4, 100.0
 
@@ -20,7 +21,7 @@ def told(calibration):
 
 
 @pytest.mark.parametrize(
-    "slow", [RandomWalk(3e-7), GaussMarkov(6e-6, 2000.0)], ids=["walk", "Gauss-Markov"]
+    "slow", every(2, [RandomWalk(3e-7), GaussMarkov(6e-6, 2000.0)]), ids=["walk", "Gauss-Markov"]
 )
 def test_slow_noise_that_is_not_seen_lies_within_the_interval_of_rivals(slow):
     truth = WhiteNoise(N) + slow

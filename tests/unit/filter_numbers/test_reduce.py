@@ -65,8 +65,9 @@ COARSE = QuantizationNoise(1e-4) + WhiteNoise(1e-5) + GaussMarkov(2e-5, 50.0)
     ("truth", "form", "time"),
     [
         *(slow(COARSE, form, time) for form in ("N+K", "N+GM") for time in (10.0, 60.0)),
-        *((COARSE, form, 1.0) for form in ("N+K", "N+GM")),
-        (TRUTHS["autoregressive"], "N+K", 1.0),
+        (COARSE, "N+K", 1.0),
+        slow(COARSE, "N+GM", 1.0),
+        slow(TRUTHS["autoregressive"], "N+K", 1.0),
         (TRUTHS["flicker"], "N+GM", 10.0),
     ],
 )
@@ -218,7 +219,7 @@ def test_less_white_noise_than_the_model_has_is_reported():
     assert not any(each.code == "less-white-noise" for each in walk.notices)
 
 
-@pytest.mark.parametrize("coarse", [50.0, 200.0, 1000.0])
+@pytest.mark.parametrize("coarse", [slow(50.0), 200.0, slow(1000.0)])
 def test_coarse_steps_of_a_heading_are_white_noise_to_one_outage(coarse):
     """An angle gained has two quantization errors: N^2 T of the filter has to be these 2 Q^2."""
     N = 1e-6
