@@ -105,6 +105,10 @@ LEAST_WALK = 0.03
 gives the slope: below, a walk changes nothing."""
 
 LARGEST_WALK = 3000.0  # the largest: above, none of a thousand records would hide it
+FAINT = 0.15
+"""Relative standard error of a random walk beside a ramp from which on its interval averages over
+all walks: it then has fewer than 22 degrees of freedom, which 128 block means show as well."""
+
 FEWEST_BLOCKS = 8  # blocks of samples from which a slope is estimated
 LARGEST_TAKEN = 0.95  # fraction of a level's variance that detrending may take
 

@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import lstsq, solve, solve_toeplitz, toeplitz
 
-from gmwm._core.distributions import norm
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.estimate import tuning
@@ -25,13 +24,9 @@ from gmwm.estimate.problem.regressors import (
     difference_covariance,
     growth,
     regressed_covariance,
-    restricted,
 )
-from gmwm.process import PSD, RandomWalk
+from gmwm.process import PSD
 from gmwm.variance import WaveletVariance
-
-_MERGED = 128  # block means of which dense matrices are made
-_WALKS = 40
 
 
 class Slope(Coefficients):
@@ -107,44 +102,6 @@ def gls_slope(wv: WaveletVariance, psd: PSD) -> Slope:
     weights = np.zeros(column.size)
     weights[first] = solved / information
     return Slope(float(weights[first] @ y), growth(wv) / information, weights)
-
-
-def slope_p_value(wv: WaveletVariance, psd: PSD) -> float:
-    """Probability of a slope as steep without a ramp, whatever walk the record does not resolve.
-
-    A random walk seen once looks like a ramp, and noise fitted to what a line leaves of it holds
-    little of it. So the two-sided p-value of the slope is taken under the noise plus a random walk,
-    and averaged over the size of the walk with the restricted likelihood of the block means, in
-    which the slope has no part (Harville 1974, *Biometrika* 61, 383-385), as weight. Its prior is
-    even in the logarithm over all sizes that matter beside the noise.
-
-    psd: Spectrum ``psd(f, dt)`` of the noise without the drift, two-sided, in u^2/Hz.
-    Returns: 1 where too few blocks exist.
-    """
-    # Few enough block means that dense matrices of them are quick.
-    merged = -(-wv.blocks.size // _MERGED)
-    whole = wv.blocks.size // merged * merged
-    blocks, block = wv.blocks[:whole].reshape(-1, merged).mean(axis=1), wv.block * merged
-    first = beside(np.flatnonzero(~np.isnan(blocks)))
-    if first.size + 1 < tuning.FEWEST_BLOCKS:
-        return 1.0
-    noise, walk = (
-        toeplitz(difference_covariance(each, wv.dt, block, blocks.size))[np.ix_(first, first)]
-        for each in (psd, RandomWalk(1.0).psd)
-    )
-    x, y = np.full((first.size, 1), block * wv.dt), blocks[first + 1] - blocks[first]
-    # K^2 of a walk that makes the slope as uncertain as the noise does.
-    unit = float(np.sum(x)) / restricted(noise, x, y)[0][0, 0]
-    walks = np.geomspace(tuning.LEAST_WALK, tuning.LARGEST_WALK, _WALKS)
-    fits = (restricted(noise + ratio * unit * walk, x, y) for ratio in walks)
-    information, score, squares, half = np.array(
-        [(fit[0][0, 0], fit[1][0], *fit[2:]) for fit in fits]
-    ).T
-    slope, likelihood = score / information, -half - 0.5 * np.log(information)
-    likelihood -= 0.5 * (squares - slope**2 * information)
-    weight = np.exp(likelihood - np.max(likelihood))
-    chance = 2.0 * norm.sf(np.abs(slope) / np.sqrt(growth(wv) / information))
-    return float(weight @ chance / np.sum(weight))
 
 
 def _existing(wv: WaveletVariance) -> NDArray[np.intp]:

@@ -20,6 +20,7 @@ from gmwm.estimate.problem import (
     drift_key,
     in_model_order,
     slope_dof,
+    walks_beside,
     weight_root,
 )
 from gmwm.estimate.result.estimate import upper_amplitude
@@ -122,6 +123,11 @@ def conclude(
     dof = float("inf")
     if slope is not None:
         dof = slope_dof(model, keys, matrix, wv.n, wv.dt)
+        faint = [i for i in model.parameters if model.terms[i.term].is_walk and i.key in upper]
+        walks = walks_beside(model, all_keys, wv) if faint and np.isfinite(dof) else None
+        if walks is not None:
+            limit = walks.quantile(tuning.UPPER_LEVEL)
+            upper |= {item.key: max(limit, float(item.value or 0.0)) for item in faint}
         keys.append(str(drift_key(model)))
         matrix = np.pad(matrix, (0, 1))
         matrix[-1, -1] = slope.variance

@@ -19,7 +19,15 @@ from gmwm._core.text import Printed, bullets, per_cent, wrapped
 from gmwm._core.typing import FloatArray
 from gmwm._core.units import shown_unit
 from gmwm.errors import InputError, MissingNameError
-from gmwm.estimate.problem import FittedMoments, Scales, drift_key, error_growth
+from gmwm.estimate import tuning
+from gmwm.estimate.problem import (
+    FittedMoments,
+    Scales,
+    Walks,
+    drift_key,
+    error_growth,
+    walks_beside,
+)
 from gmwm.estimate.result.estimate import (
     Estimate,
     Region,
@@ -182,6 +190,12 @@ class Fit(Document, Printed):
         result: Mapping[str, float] = frozen(error_growth(self.model, noise, self.wv.n, self.wv.dt))
         return result
 
+    @cached_property
+    def _walks(self) -> Walks | None:
+        """Random walks that the record leaves open beside an estimated slope."""
+        keys = {*self.keys, *self.upper_bounds}
+        return walks_beside(self.model, keys, self.wv) if np.isfinite(self.slope_dof) else None
+
     def interval(self, level: float = 0.95) -> dict[str, tuple[float, float]]:
         """Confidence intervals that stay in the parameters' ranges.
 
@@ -210,14 +224,17 @@ class Fit(Document, Printed):
             if key in self.upper_bounds:
                 result[key] = (0.0, float(self.upper_bounds[key]))
             elif key in errors:
-                result[key] = confidence_interval(
-                    item.parameter,
-                    value,
-                    errors[key],
-                    level,
-                    growth=self.error_growth.get(key, 0.0),
-                    slope_dof=self.slope_dof,
-                )
+                term, walks = self.model.terms[item.term], self._walks
+                if walks is not None and term.is_drift:
+                    ends = walks.slope_interval(value, level)
+                elif walks is not None and term.is_walk and errors[key] > tuning.FAINT * value:
+                    ends = walks.size_interval(value, level)
+                else:
+                    growth, dof = self.error_growth.get(key, 0.0), self.slope_dof
+                    ends = confidence_interval(
+                        item.parameter, value, errors[key], level, growth=growth, slope_dof=dof
+                    )
+                result[key] = ends
         return result
 
     def needed_length(self, relative_error: float = 0.1) -> dict[str, float]:

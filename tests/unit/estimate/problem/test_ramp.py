@@ -3,11 +3,13 @@
 import numpy as np
 import pytest
 from scipy.linalg import toeplitz
+from scipy.stats import norm
 
 import gmwm
 from gmwm import GaussMarkov, RandomWalk, RateRamp, WhiteNoise
 from gmwm.estimate.problem import (
     Slope,
+    Walks,
     detrended_covariance,
     gls_slope,
     slope_dof,
@@ -78,6 +80,35 @@ def test_degrees_of_freedom_are_those_of_generalised_least_squares(estimated):
     model = WhiteNoise(truth["N"]) + GaussMarkov(sigma=truth["sigma"], tau=20.0)
     found = slope_dof(model, [estimated], np.array([[error**2]]), n, 1.0)
     assert found == pytest.approx(2.0 / (gradient * error) ** 2, rel=0.03)
+
+
+@pytest.mark.parametrize("walk", [0.0, 2e-3, 2e-2])
+def test_walks_beside_a_slope_are_those_of_the_whole_series(walk):
+    """The posterior of K and of the slope, by dense matrices of all samples."""
+    n, level, rng = 120, 0.95, np.random.default_rng(7)
+    x = rng.standard_normal(n) + np.cumsum(walk * rng.standard_normal(n)) + 5e-3 * np.arange(n)
+    sums = np.minimum.outer(np.arange(n), np.arange(n)) + 1.0
+    design = np.column_stack([np.arange(n) - 0.5 * (n - 1), np.ones(n)])
+    sizes, rows = np.geomspace(1e-4, 1.0, 500), []
+    for size in sizes:
+        covariance = np.eye(n) + size**2 * sums
+        solved = np.linalg.solve(covariance, design)
+        inverse = np.linalg.inv(design.T @ solved)
+        slope, _ = found = inverse @ (solved.T @ x)
+        squares = (x - design @ found) @ np.linalg.solve(covariance, x - design @ found)
+        logs = np.linalg.slogdet(covariance)[1] - np.linalg.slogdet(inverse)[1]
+        rows.append((slope, np.sqrt(inverse[0, 0]), -0.5 * (logs + squares)))
+    slopes, errors, likelihoods = np.transpose(rows)
+    weight = np.exp(likelihoods - np.max(likelihoods)) * sizes
+    weight /= np.sum(weight)
+    walks = Walks.beside(gmwm.wavelet_variance(x, 1.0), WhiteNoise(1.0).psd)
+    for probability in (0.5, 0.95):
+        at = np.interp(probability, np.cumsum(weight) - 0.5 * weight, sizes)
+        assert walks.quantile(probability) == pytest.approx(at, rel=0.05)
+    low, high = walks.slope_interval(slopes[0], level)
+    inside = norm.cdf((high - slopes) / errors) - norm.cdf((low - slopes) / errors)
+    assert weight @ inside == pytest.approx(level, abs=0.003)
+    assert 0.5 * (low + high) == pytest.approx(slopes[0])
 
 
 def test_noise_without_slow_parts_leaves_no_slope():
