@@ -32,8 +32,8 @@ FILTERS = {
 
 @pytest.mark.parametrize(
     "name",
-    ["butterworth 1", "butterworth 4", "chebyshev 2", "mean of 5",
-     *map(slow, ("butterworth 2", "bessel 2"))],
+    ["butterworth 4", "mean of 5",
+     *map(slow, ("butterworth 1", "butterworth 2", "bessel 2", "chebyshev 2"))],
 )  # fmt: skip
 def test_a_filtered_white_noise_is_valid_and_named(name):
     # Each of these made no valid fit: "no white noise, Gauss-Markov of 7 ms".

@@ -9,6 +9,7 @@ import pytest
 
 import gmwm
 from gmwm import GaussMarkov, QuantizationNoise, RandomWalk, RateRamp, Sinusoid, WhiteNoise
+from marks import slow
 
 
 @pytest.mark.parametrize(
@@ -130,7 +131,7 @@ def test_no_random_walk_is_invented():
     ("truth", "count"),
     [
         (WhiteNoise(1.0), 0),
-        (WhiteNoise(1.0) + GaussMarkov(1.0, 50.0), 1),
+        slow(WhiteNoise(1.0) + GaussMarkov(1.0, 50.0), 1),
         (WhiteNoise(1.0) + GaussMarkov(1.0, 8.0) + GaussMarkov(1.0, 800.0), 2),
     ],
 )
@@ -184,7 +185,7 @@ def test_bias_instability_as_a_candidate():
     "truth",
     [
         WhiteNoise(1e-3) + RandomWalk(5e-6),
-        WhiteNoise(1e-3) + GaussMarkov(3e-4, 2000.0),
+        slow(WhiteNoise(1e-3) + GaussMarkov(3e-4, 2000.0)),
         WhiteNoise(1e-3) + GaussMarkov(1e-3, 10_000.0),
     ],
     ids=repr,

@@ -36,7 +36,7 @@ from gmwm.ins import (
 )
 from gmwm.ins.filter import Filter
 from gmwm.ins.geometry import matrix_from_rotation_vector, matrix_from_rpy, rpy_from_matrix
-from marks import slow
+from marks import every, slow
 
 SENSORS = SensorModels.of(
     {
@@ -142,7 +142,7 @@ KINDS = {
 }
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", every(2, KINDS))
 @pytest.mark.parametrize(
     ("duration", "dt", "outage", "runs", "seed"),
     [(300.0, 0.05, 180.0, 40, 1), slow(900.0, 0.01, 600.0, 200, 2)],

@@ -42,7 +42,7 @@ def attitude_error(found: Trajectory, true: Trajectory) -> np.ndarray:
         slow(car_drive, NORTH),
         (car_drive, DATE_LINE),
         (fixed_wing_loiter, SOUTH),
-        (fixed_wing_loiter, (0.0, 0.0, 100.0)),
+        slow(fixed_wing_loiter, (0.0, 0.0, 100.0)),
     ],
 )
 def test_a_vehicle_comes_back(
