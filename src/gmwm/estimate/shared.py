@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import solve_triangular
 
-from gmwm._core.distributions import norm
+from gmwm._core.distributions import chi2, norm
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.estimate import tuning
@@ -56,9 +56,20 @@ class SharedFit:
         return found
 
     def interval(self, level: float = 0.95) -> tuple[FloatArray, FloatArray]:
-        """Ends of the intervals of ``matrices``."""
-        reach = norm.ppf(0.5 + 0.5 * level) * self.stderr
-        return self.matrices - reach, self.matrices + reach
+        """Ends of the intervals of ``matrices``: chi-square for variances, normal for others.
+
+        The upper end of a variance is at least the normal one.
+        """
+        probability = 0.5 + 0.5 * level
+        reach = norm.ppf(probability) * self.stderr
+        low, high = self.matrices - reach, self.matrices + reach
+        place = np.arange(len(self.names))
+        own, error = self.matrices[:, place, place], self.stderr[:, place, place]
+        dof = np.maximum(2.0 * (own / error) ** 2, tuning.LEAST_SHARED_DOF)
+        low[:, place, place] = dof * own / chi2.ppf(probability, dof)
+        upper = dof * own / chi2.ppf(1.0 - probability, dof)
+        high[:, place, place] = np.maximum(high[:, place, place], upper)
+        return low, high
 
     def matrix(self, growth: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Sum of the matrices with weights, (p, p), and the covariance of its elements a <= b.
