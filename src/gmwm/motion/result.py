@@ -406,10 +406,9 @@ class InMotion(Document, Printed):
         return plain_table((f"{sensor}, {unit}", *(f"{tau[k]:.2g} s" for k in chosen)), rows)
 
     def _vibration(self) -> list[str]:
-        """How deviations depend on vibration, and the limits of its classes, on one line."""
+        """How deviations depend on vibration, and its range, on one line."""
         if not self.classes:
             return []
-        levels = [self.classes[0].low, *(each.high for each in self.classes)]
         k = int(np.argmin(np.abs(np.log(self.curves[0].tau / tuning.INTERVAL))))
         parts = []
         for sensor in self.sensors:
@@ -417,8 +416,8 @@ class InMotion(Document, Printed):
             power, error = (float(np.median([getattr(each, name)[k] for each in own]))
                             for name in ("exponent", "exponent_error"))  # fmt: skip
             parts.append(f"{sensor} {power:.2f} +-{error:.2f}")
-        limits = "-".join(f"{each:.2g}" for each in levels)
-        return [f"noise ~ vibration^p, p: {', '.join(parts)}; {limits} m/s^2"]
+        ends = f"{self.classes[0].low:.2g} to {self.classes[-1].high:.2g} m/s^2"
+        return [f"noise ~ vibration^p: {', '.join(parts)}; {ends}"]
 
     def _for_filters(self) -> str:
         """N and K, SI, the largest of all axes and IMUs, for some intervals of updates."""
