@@ -111,8 +111,9 @@ def test_command_rejects_increments_that_the_logger_thinned(run, samples, tmp_pa
 
 def test_command_gives_numbers_of_a_class(run, files):
     """And exports them."""
-    code, out, error = run("motion", *files, "--at", "low", "-o", "low.json")
+    code, out, error = run("motion", *files, "--at", "low", "-o", "low.json", "--report", "a.html")
     assert (code, error) == (0, "")
+    assert out.endswith("wrote low.json\nwrote a.html\n")
     assert "for filters, SI" in out
     code, out, error = run("export", "low.json", "--to", "kalibr")
     assert (code, error) == (0, "")

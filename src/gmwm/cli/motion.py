@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     --at CLASS  Result at low, middle or high vibration, or at rest.
     --logs  Each file is a log of one flight with all IMUs; a single file is one anyway.
     -o --output JSON  File to save the result in.
+    --report HTML  Page of the curves, the factors over rest, vibration and numbers.
     --plot PNG  Picture of the Allan deviations, a panel a channel.
     --reading
     --part
@@ -44,6 +45,7 @@ if TYPE_CHECKING:
     --quiet
     """,
     output=FILE_TO_WRITE,
+    report=FILE_TO_WRITE,
     plot=FILE_TO_WRITE,
     reference={"multiple": True},
     at={"type": click.Choice(["low", "middle", "high", "rest"])},
@@ -57,6 +59,7 @@ def motion(
     at: str | None,
     logs: bool,
     output: Path | None,
+    report: Path | None,
     plot: Path | None,
     as_json: bool,
     quiet: bool,
@@ -100,9 +103,11 @@ def motion(
     found = found if at is None else found.at(at)
     if output is not None:
         found.save(output)
+    if report is not None:
+        found.report(report)
     if plot is not None:
         _draw(found, plot)
-    print_result(found, output, plot, as_json=as_json, quiet=quiet)
+    print_result(found, output, report, plot, as_json=as_json, quiet=quiet)
 
 
 def _of_log(

@@ -139,8 +139,24 @@ def motion(
     notices += _notices(curves, len(labels))
     durations = tuple(float(imus[0].time[-1]) for imus in flights)
     return InMotion(
-        labels, durations, curves, tuple(clocks), tuple(mountings), tuple(notices), classes
+        labels,
+        durations,
+        curves,
+        tuple(clocks),
+        tuple(mountings),
+        tuple(notices),
+        classes,
+        _history(flights),
     )
+
+
+def _history(flights: Sequence[Sequence[_Imu]]) -> FloatArray:
+    """(n, 3) flight, time and vibration of the first IMU, every second."""
+    rows = []
+    for number, (imu, *_) in enumerate(flights, start=1):
+        levels = imu.vibration[:: max(1, round(tuning.VIBRATION_OVER / imu.dt))]
+        rows += [(number, tuning.VIBRATION_OVER * k, each) for k, each in enumerate(levels)]
+    return np.array(rows)
 
 
 def _against(sources: Any, references: Any, static: Mapping[str, Any] | None) -> InMotion:

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
 from gmwm import plotting
-from gmwm._core import checks
+from gmwm._core import checks, pages
 from gmwm._core.documents import Array, Document, Positive, Text
 from gmwm._core.frozen import freeze
 from gmwm._core.tables import frame, plain_table
@@ -145,6 +147,8 @@ class InMotion(Document, Printed):
     notices : tuple of Notice
     classes : tuple of VibrationClass
         Of low, middle and high vibration, where it is seen; see `at`.
+    vibration : (n, 3) ndarray
+        Number of the flight, time (s) and vibration (m/s^2 rms) of the first IMU, every second.
     """
 
     SCHEMA: ClassVar[str] = "gmwm.in_motion"
@@ -156,6 +160,10 @@ class InMotion(Document, Printed):
     mountings: tuple[Mounting, ...]
     notices: tuple[Notice, ...] = ()
     classes: tuple[VibrationClass, ...] = ()
+    vibration: Array = field(default_factory=lambda: np.zeros((0, 3)))
+
+    def __post_init__(self) -> None:
+        freeze(self, "vibration")
 
     def at(self, name: str) -> InMotion:
         """The result at low, middle or high vibration, or at rest.
@@ -170,7 +178,7 @@ class InMotion(Document, Printed):
             If there is no such class, or nothing is known at rest.
         """
         by_name = {each.name: each.curves for each in self.classes}
-        if self._is_known_at_rest:
+        if self.is_known_at_rest:
             by_name["rest"] = tuple(
                 replace(each, variance=each.static, lower=each.static, upper=each.static)
                 for each in self.curves
@@ -180,7 +188,8 @@ class InMotion(Document, Printed):
         return replace(self, curves=by_name[name], classes=())
 
     @property
-    def _is_known_at_rest(self) -> bool:
+    def is_known_at_rest(self) -> bool:
+        """Whether `at` has the noise at rest."""
         return all(np.all(np.isfinite(each.static)) for each in self.curves)
 
     def curve(self, imu: str, channel: str) -> MotionCurve:
@@ -334,6 +343,25 @@ class InMotion(Document, Printed):
         places = [k % len(own) for k in range(len(kinds))]
         return plotting.deviations(kinds, unit=unit, places=places, title=channel, ax=ax)
 
+    def report(self, path: str | os.PathLike[str]) -> Path:
+        """Write a page of curves, factors, vibration and numbers; HTML that needs no network.
+
+        Parameters
+        ----------
+        path : path-like
+
+        Returns
+        -------
+        Path
+
+        Raises
+        ------
+        InputError
+            If the file cannot be written.
+        """
+        page: Path = pages.make("page", self, path)
+        return page
+
     def __repr__(self) -> str:
         size = f"{len(self.durations)} flight{'s' * (len(self.durations) > 1)}"
         return f"<InMotion: {', '.join(self.imus)}; {size}, {sum(self.durations):.4g} s>"
@@ -423,7 +451,7 @@ class InMotion(Document, Printed):
         """N and K, SI, the largest of all axes and IMUs, for some intervals of updates."""
         rows = []
         known = [(self, "", use) for use in tuning.USES if self.curves[0].tau[-1] >= use[1]]
-        if known and self._is_known_at_rest:
+        if known and self.is_known_at_rest:
             known.append((self.at("rest"), " at rest", tuning.USES[0]))
         for result, where, (interval, horizon) in known:
             found = result.numbers(interval, horizon)

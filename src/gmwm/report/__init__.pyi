@@ -6,6 +6,7 @@ from .calibration import (
 from .compared import write_sensor_comparison_report as write_sensor_comparison_report
 from .fleet import write_fleet_report as write_fleet_report
 from .health import verdict as verdict
+from .motion import write_motion_report as write_motion_report
 from .navigation import (
     write_comparison_report as write_comparison_report,
     write_navigated_report as write_navigated_report,

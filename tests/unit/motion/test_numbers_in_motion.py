@@ -91,6 +91,25 @@ def test_export_writes_the_numbers():
         gmwm.export(found, "kalibr", horizon=60.0)
 
 
+def test_page_shows_curves_factors_and_numbers(tmp_path):
+    rest = allan(WhiteNoise(1e-4))
+    found = in_motion([allan(QuantizationNoise(1e-3) + WhiteNoise(1e-3))] * 2, rest)
+    page = found.report(tmp_path / "motion.html").read_text()
+    # A picture of each axis, and of the factor of each sensor; vibration is not known.
+    assert page.count("<svg") == 8
+    N = found.numbers()["gyro_x"].params["N"]
+    assert f"{N:.2e} SI" in page
+    assert "at rest" in page
+    assert "default-src 'none'" in page
+
+
+def test_page_without_rest_or_long_flights(tmp_path):
+    found = in_motion([allan(WhiteNoise(1e-3))])
+    page = found.report(tmp_path / "motion.html").read_text()
+    assert page.count("<svg") == 6
+    assert "Factor over rest" not in page
+
+
 def test_summary_has_the_numbers_and_few_lines():
     rest = allan(WhiteNoise(1e-4))
     found = in_motion([allan(QuantizationNoise(1e-3) + WhiteNoise(1e-3))] * 4, rest)

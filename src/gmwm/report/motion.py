@@ -1,0 +1,126 @@
+"""The page of noise in motion: curves, factors over rest, vibration, and numbers for filters."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gmwm._core.files import writable_file
+from gmwm._core.pages import page_of
+from gmwm._core.text import brief
+from gmwm._core.units import customary_unit
+from gmwm.issues import worst_first
+from gmwm.motion import HORIZON, INTERVAL, InMotion
+from gmwm.plotting import COMPONENT_COLOURS, DATA_COLOUR
+from gmwm.report.navigation import svg
+from gmwm.report.page import origin, write_page
+
+_SIZE = (4.4, 3.4)  # in, of a picture; two or three stand side by side
+
+
+@page_of(InMotion)
+def write_motion_report(found: InMotion, path: str | os.PathLike[str]) -> Path:
+    """Write noise in motion as one HTML file that needs no network.
+
+    Raises InputError if the file cannot be written.
+    """
+    path = writable_file(path)
+    channels = dict.fromkeys(each.channel for each in found.curves)
+    known = any(np.any(np.isfinite(each.static)) for each in found.curves)
+    shown = found.curves[0].tau[-1] >= HORIZON
+    return write_page(
+        path,
+        "motion.html",
+        found=found,
+        text=str(found),
+        curves={channel: _curves(found, channel) for channel in channels},
+        factors={sensor: _factor(found, sensor) for sensor in found.sensors} if known else {},
+        vibration=_vibration(found) if found.classes else "",
+        rows=list(_rows(found)) if shown else [],
+        purpose=f"updates every {INTERVAL:g} s, outages up to {HORIZON:g} s",
+        notices=worst_first(list(found.notices)),
+        provenance=origin({}, "page of", None),
+    )
+
+
+def _axes(value: str, title: str) -> tuple[Any, Any]:
+    import matplotlib.pyplot as plt
+
+    figure, ax = plt.subplots(figsize=_SIZE, layout="constrained")
+    ax.set(xlabel="averaging time [s]", ylabel=value, title=title, xscale="log", yscale="log")
+    ax.grid(True, which="major", color="#dddddd", linewidth=0.6)
+    return figure, ax
+
+
+def _curves(found: InMotion, channel: str) -> str:
+    """Deviations of a channel of each IMU with their 95 % bands, and the one at rest."""
+    quantity = channel.partition("_")[0]
+    unit, scale = customary_unit("u", quantity, "u")
+    figure, ax = _axes(f"Allan deviation [{unit}]", channel)
+    for k, imu in enumerate(found.imus):
+        each, colour = found.curve(imu, channel), COMPONENT_COLOURS[k % len(COMPONENT_COLOURS)]
+        seen = (each.variance > 0.0) & (each.lower > 0.0)
+        low, mid, high = (scale * np.sqrt(v[seen]) for v in (each.lower, each.variance, each.upper))
+        ax.fill_between(each.tau[seen], low, high, color=colour, alpha=0.25, linewidth=0.0)
+        ax.plot(each.tau[seen], mid, color=colour, marker="o", markersize=3.0, label=imu)
+        if k == 0 and np.any(np.isfinite(each.static)):
+            rest = scale * np.sqrt(each.static)
+            ax.plot(each.tau, rest, color=DATA_COLOUR, linestyle="--", label="at rest")
+    ax.legend(fontsize="small", framealpha=0.9)
+    return svg(figure)
+
+
+def _factor(found: InMotion, sensor: str) -> str:
+    """Deviation in motion over that at rest: median and range over IMUs and axes."""
+    tau = found.curves[0].tau
+    figure, ax = _axes("in motion over at rest", sensor)
+    all_curves = np.array([each.factor for each in found.curves if each.quantity == sensor])
+    known = np.any(np.isfinite(all_curves), axis=0)
+    ends = (np.nanmin(all_curves[:, known], axis=0), np.nanmax(all_curves[:, known], axis=0))
+    ax.fill_between(tau[known], *ends, color=COMPONENT_COLOURS[0], alpha=0.25, linewidth=0.0)
+    ax.plot(tau, found.factor(sensor), color=COMPONENT_COLOURS[0], marker="o", markersize=3.0)
+    ax.axhline(10.0, color=DATA_COLOUR, linestyle="--", linewidth=1.0)
+    ax.annotate("times ten", (tau[0], 10.0), (2, 3), textcoords="offset points", fontsize="small")
+    return svg(figure)
+
+
+def _vibration(found: InMotion) -> str:
+    """Vibration of the seconds of all flights, one after the other, by class."""
+    import matplotlib.pyplot as plt
+
+    flight, _, level = found.vibration.T
+    figure, ax = plt.subplots(figsize=(2.0 * _SIZE[0], _SIZE[1]), layout="constrained")
+    second = np.arange(len(level))
+    for k, each in enumerate(found.classes):
+        own = (level >= each.low) & (level <= each.high)
+        label = f"{each.name}, {each.low:.2g} to {each.high:.2g} m/s²"
+        ax.plot(second[own], level[own], ".", color=COMPONENT_COLOURS[k], label=label)
+        ax.axhline(each.high, color=DATA_COLOUR, linestyle=":", linewidth=0.8)
+    for start in np.flatnonzero(np.diff(flight)):
+        ax.axvline(start + 0.5, color=DATA_COLOUR, linewidth=0.6)
+    ax.set(xlabel="flights one after the other [s]", ylabel="vibration, 20 to 60 Hz [m/s²]")
+    ax.set_ylim(0.0, None)
+    ax.legend(fontsize="small", framealpha=0.9)
+    return svg(figure)
+
+
+def _rows(found: InMotion) -> Iterator[tuple[str, list[str]]]:
+    """Largest N and K of axes and IMUs in motion, at each class of vibration, and at rest."""
+    names = ["", *(each.name for each in found.classes), "rest"]
+    for name in names:
+        if name == "rest" and not found.is_known_at_rest:
+            continue
+        numbers = (found.at(name) if name else found).numbers()
+        cells = []
+        for sensor in found.sensors:
+            own = [model.params for key, model in numbers.items() if key.startswith(sensor)]
+            for letter, unit in (("N", "u/sqrt(Hz)"), ("K", "u/s/sqrt(Hz)")):
+                value = max(each[letter] or 0.0 for each in own)
+                field, scale = customary_unit(unit, sensor, "u")
+                cells.append(f"{value:.2e} SI, {brief(value * scale, 2)} {field}")
+        where = f"{name} vibration" if name else "all of it"
+        yield "at rest" if name == "rest" else where, cells
