@@ -10,10 +10,10 @@ of sigma sqrt(tau) at the octaves where the log slope of the curve, over an octa
 within 0.05 of -1/2. In the second column the curve is without what the model's periodic lines and
 resonances add, whose humps cross that slope by chance.
 
-``samples``: a model of the structure of each valid axis, departures removed, is fitted to the curve
-at octaves without the first two and the last and, where nothing was removed, at 92 log-spaced
-averaging times. Printed are N and K of the sensor and of a filter for 60 s over those of the fit to
-samples, in per cent.
+``samples``: a model of the structure of each axis, evident departures subtracted, is fitted to the
+curve at octaves without the first two and the last and at 92 log-spaced averaging times. Printed
+are N and K of the sensor and of a filter for 60 s over those of the fit to samples, in per cent; a
+star is before those of a fit that is marked not valid.
 
 ``stored``: the -1/2 line of curves of imu_utils, or of R's packages wv and avar, by sensor and
 axis, what is selected, and whether larger models fit worse than their parts.
@@ -29,6 +29,7 @@ import json
 import warnings
 from collections import Counter
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -93,35 +94,35 @@ def of_lines(options: argparse.Namespace) -> None:
             print(f"{calibration.source:24}{name:9}{state:10}{cells}", flush=True)
 
 
+def without(recording: gmwm.Recording, sensor: str) -> gmwm.Recording:
+    """A recording of one sensor ("" for all), less the departures that a calibration finds."""
+    there = tuple(each for each in recording.channels if each.name.startswith(sensor))
+    recording = replace(recording, channels=there)
+    return gmwm.without_departures(recording, gmwm.calibrate(recording))
+
+
 def of_samples(options: argparse.Namespace) -> None:
     """A row for each axis, of curves and of what was found of the samples."""
-    print("per cent    -1/2 line  octaves [2:-1]: sensor  filter, 60 s    92 times: the same")
-    print(
-        "axis      at       N         N       K       N       K         N       K       N       K"
-    )
+    warnings.simplefilter("ignore", gmwm.FitWarning)
+    print("per cent  octaves [2:-1]: sensor   filter, 60 s  92 times: sensor         filter, 60 s")
+    print(f"{'axis':8}" + 2 * f"  {'N':>8}{'K':>8}{'N':>8}{'K':>8}")
     for file in options.files:
         recording = gmwm.read(
             file, rate=options.rate, units={"gyro": options.gyro, "accel": options.accel}
         )
-        found = gmwm.calibrate(recording, remove_departures=True)
+        recording = without(recording, options.sensor)
         print(Path(file).name)
-        for name, fit in found.items():
-            if not fit.valid:
-                print(f"{name}: not valid")
-                continue
+        for name, fit in gmwm.calibrate(recording).items():
             wv, cells = fit.wv, ""
             known = {"rate": 1.0 / wv.dt, "duration": wv.n * wv.dt, "unit": wv.unit, "name": name}
+            x = np.asarray(recording[name].values, dtype=float)
+            times = np.geomspace(wv.dt, wv.n * wv.dt / 6.0, MANY)
+            found = gmwm.deviations(x[np.isfinite(x)], wv.dt, ["overlapping"], times)
+            tau, deviation = (getattr(found, k)["overlapping"] for k in ("tau", "deviation"))
             curves = [
                 gmwm.curve(wv.tau[2:-1], wv.variance[2:-1], kind="wavelet", **known),
+                gmwm.curve(tau, deviation, **known),
             ]
-            if not any(
-                n.values.get("removed") for n in fit.notices
-            ):  # else samples still have them
-                x = np.asarray(recording[name].values, dtype=float)
-                times = np.geomspace(wv.dt, wv.n * wv.dt / 6.0, MANY)
-                found_at = gmwm.deviations(x[np.isfinite(x)], wv.dt, ["overlapping"], times)
-                tau, own_curve = (getattr(found_at, k)["overlapping"] for k in ("tau", "deviation"))
-                curves.append(gmwm.curve(tau, own_curve, **known))
             free = fit.model.with_params(dict.fromkeys(fit.keys))
             own, bound = axis_numbers(fit), gmwm.bound(fit, horizon=HORIZON)
             for curve in curves:
@@ -131,7 +132,8 @@ def of_samples(options: argparse.Namespace) -> None:
                     cells += f"   {error}"[:36]
                     continue
                 new, filters = axis_numbers(other), gmwm.bound(other, horizon=HORIZON)
-                cells += "  " + change(new.N.value, own.N.value) + change(new.K.value, own.K.value)
+                cells += " " + (" " if other.valid else "*")
+                cells += change(new.N.value, own.N.value) + change(new.K.value, own.K.value)
                 cells += change(filters.N, bound.N) + change(filters.K, bound.K)
             print(f"{name:8}{cells}", flush=True)
 
@@ -213,6 +215,7 @@ def main() -> None:
     parser.add_argument("--rate", type=float, default=100.0)
     parser.add_argument("--gyro", default="rad/s")
     parser.add_argument("--accel", default="m/s^2")
+    parser.add_argument("--sensor", default="", help="gyro or accel; both if left out")
     parser.add_argument("--runs", type=int, default=200)
     parser.add_argument("--seed", type=int, default=21)
     options = parser.parse_args()

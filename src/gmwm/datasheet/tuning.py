@@ -22,6 +22,6 @@ UNIT_SPREAD = 1.25
 # deg/sqrt(h)) to 0.5 deg/s/sqrt(Hz), as for recordings; from seismic accelerometers (2 ng/sqrt(Hz))
 # to 10 mg/sqrt(Hz):
 DENSITIES = {"gyro": (3e-9, 8.7e-3), "accel": (2e-8, 0.1)}
-# s, averaging time at which white noise alone reaches the lowest deviation: 1 to 400 s for the
+# s, averaging time at which white noise alone reaches the lowest deviation: 0.8 to 400 s for the
 # sheets installed. The ends are a factor of 1,000 in N apart:
 CROSSINGS = (0.1, 1e5)
