@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Annotated, ClassVar, Literal
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 import numpy as np
 from annotated_types import Ge, Le
@@ -15,10 +15,13 @@ from gmwm._core.documents import Array, Document, NotNegative, Positive, Text, c
 from gmwm._core.tables import plain_table
 from gmwm._core.text import Printed, brief, readable, with_error
 from gmwm._core.typing import FloatArray
-from gmwm._core.units import factor
+from gmwm._core.units import factor, shown_unit
 from gmwm.calibration.scaling import Scaling
 from gmwm.errors import InputError
 from gmwm.estimate.result import CurveCoefficients, Fit, satterthwaite_dof
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 MOST_POWER = 6
 
@@ -236,6 +239,21 @@ class BiasCurve(Document, Printed):
         scale = 1.0 if unit == self.unit else 1.0 / factor(unit, self.unit)
         ends = (scale * (change - error), scale * (change + error))
         return f"{self.name} {with_error(scale * change, *ends)} {unit}"
+
+    def plot(self, ax: Axes | None = None, *, units: str = "field") -> Axes:
+        """The curve with its 95 % band, less its value at the centre; returns the axes."""
+        import matplotlib.pyplot as plt
+
+        one, (unit, scale) = self._covariate(), shown_unit(self.quantity, self.unit, units)
+        x, value, error = self.band()
+        value = scale * (value - self(one.centre))
+        axes = ax if ax is not None else plt.subplots()[1]
+        (line,) = axes.plot(x, value, label=self.name)
+        ends = (value - scale * error, value + scale * error)
+        axes.fill_between(x, *ends, color=line.get_color(), alpha=0.3, linewidth=0.0)
+        axes.set_xlabel(f"{one.name} [{one.unit}]")
+        axes.set_ylabel(f"bias against that at {one.centre:.3g} {one.unit} [{unit}]")
+        return axes
 
     def check_content(self) -> None:
         size = len(self.regressors)
