@@ -59,6 +59,8 @@ def folder_of_results(default: str) -> dict[str, Any]:
         and calibrate what is left.
     --temperature  Estimate the curve of each channel against the temperature channel, beside its
         noise.
+    --temperature-file FILE  The temperature by time, in seconds from the first sample, if it is not
+        in the recording.
     --degree N  Of that curve, 1 to 6; by default 1 to 3 is chosen.
     --covariate NAME=WORDS  The same for another channel, 'time' or 'settling' at switch-on, such as
         'temperature=cubic,lag' or 'settling=300 s'; repeat.
@@ -81,6 +83,7 @@ def calibrate(
     output: Path,
     models: dict[str, Any],
     temperature: bool,
+    temperature_file: Path | None,
     degree: int | None,
     covariates: Sequence[str],
     target: str | None,
@@ -119,7 +122,9 @@ def calibrate(
     from gmwm.datasheet import read_datasheet
 
     work = {name: given.pop(name) for name in ("screening", "still", "remove_departures", "jobs")}
-    work["covariates"] = _covariates(temperature, degree, covariates)
+    work["covariates"] = _covariates(
+        temperature or temperature_file is not None, degree, covariates
+    )
     if target is not None:
         from gmwm._core import checks
         from gmwm.export import TARGETS
@@ -128,7 +133,7 @@ def calibrate(
         replaceable(output / TARGETS[target].file_name)
     with folder_to_fill(output) as folder, Stopwatch().running() as watch:
         with stage("read"), limited(memory):
-            recordings = [read_recording(file, **given) for file in files]
+            recordings = _recordings(files, temperature_file, given)
         quantities = {c.name: c.quantity or "" for each in recordings for c in each.inertial}
         for name in models:
             if not any(name in (each, each.partition("_")[0], "") for each in quantities):
@@ -151,6 +156,19 @@ def calibrate(
     if timings:
         _show_timings(watch, work["jobs"])
     exit_unless(any(fit.valid for fit in result.values()), "channel")
+
+
+def _recordings(
+    files: Sequence[Path], temperature: Path | None, reading: dict[str, Any]
+) -> list[Recording]:
+    """Recordings, with the temperatures of another file where one is given."""
+    found = [read_recording(file, **reading) for file in files]
+    if temperature is None:
+        return found
+    from gmwm.readers import Wanted, open_tables, with_thermometer
+
+    table = open_tables(temperature, Wanted())[0]
+    return [with_thermometer(each, table) for each in found]
 
 
 def _covariates(

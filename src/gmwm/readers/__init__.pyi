@@ -1,3 +1,4 @@
+from .joining import with_thermometer as with_thermometer
 from .missing import Missing as Missing
 from .names import (
     AXES as AXES,

@@ -7,11 +7,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from gmwm._core.units import AuxiliaryUnit, auxiliary_unit
 from gmwm.errors import InputError
 from gmwm.issues import Notice, notice
 from gmwm.readers import tuning
 from gmwm.readers.names import CANONICAL, TIME, bare
-from gmwm.readers.recording import Channel, Recording, notices_of_gaps
+from gmwm.readers.recording import Channel, Recording, auxiliary_channel, notices_of_gaps
 from gmwm.readers.table import Table
 
 _SAMPLE = 0.5  # by which two clocks may part over a recording and count as one
@@ -118,13 +119,13 @@ def _cut(part: Part, start: float, stop: float) -> list[Channel]:
 
 def with_temperature(part: Part, table: Table) -> Part:
     """A thermometer beside the sensors, interpolated at their rate between its stamps."""
-    recording, columns = part.recording, range(len(table.names))
-    time = next((i for i in columns if table.meanings[i].role == TIME), None)
-    channels: list[Channel] = []
-    if time is None:
+    recording = part.recording
+    roles = [each.role for each in table.meanings]
+    if TIME not in roles or "temperature" not in roles:
         return part
+    time, channels = roles.index(TIME), list[Channel]()
     try:
-        arrays = table.load(columns)
+        arrays = table.load([i for i, role in enumerate(roles) if role == "temperature"] + [time])
     except InputError as error:
         outcome = notice("columns-unreadable", what=f"temperature ({error})")
     else:
@@ -133,10 +134,26 @@ def with_temperature(part: Part, table: Table) -> Part:
         grid = part.start + recording.dt * np.arange(recording.n)
         for column, own in arrays.items():
             values = np.interp(grid, stamps[order], own[order], left=np.nan, right=np.nan)
-            name = bare(table.names[column])
-            channels.append(Channel(name, values, recording.dt, "temperature", "degC"))
+            name, unit = bare(table.names[column]), table.meanings[column].unit or "degC"
+            unit_of = auxiliary_unit(unit) or AuxiliaryUnit("temperature", "degC")
+            channels.append(auxiliary_channel(name, values, recording.dt, unit_of))
         names, first = ", ".join(channel.name for channel in channels), recording.names[0]
         count = {"count": stamps.size}
         outcome = notice("temperature-interpolated", "", count, listed=names, first=first)
     wider, notices = (*recording.channels, *channels), (*recording.notices, outcome)
     return replace(part, recording=replace(recording, channels=wider, notices=notices))
+
+
+def with_thermometer(recording: Recording, table: Table) -> Recording:
+    """A recording with the temperatures of another file, whose times count from its first sample.
+
+    Raises InputError if the table has no temperatures by time, or none during the recording.
+    """
+    found = with_temperature(Part(recording), table).recording
+    added = found.channels[len(recording.channels) :]
+    if not added or all(channel.missing == channel.n for channel in added):
+        raise InputError(
+            f"{table.source}: no temperatures during the recording: give columns such as "
+            "'time [s]' and 'temperature [degC]', with times from its first sample"
+        )
+    return found

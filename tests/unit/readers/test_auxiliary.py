@@ -6,6 +6,7 @@ import pytest
 import gmwm
 from gmwm import InputError, Recording, read
 from gmwm._core.units import auxiliary_unit
+from gmwm.readers import Wanted, open_tables, with_thermometer
 from gmwm.readers.names import meaning
 
 UNITS = {"gyro": "rad/s", "accel": "m/s^2"}
@@ -156,3 +157,16 @@ def test_no_model_and_no_diagnosis_of_its_own():
     assert gmwm.health(alone).channels == {}
     with pytest.raises(InputError, match="only auxiliary channels"):
         gmwm.calibrate(alone)
+
+
+def test_temperatures_of_another_file(tmp_path):
+    rng = np.random.default_rng(4)
+    arrays = {"gyro_x": rng.normal(size=1000)}
+    recording = Recording.from_arrays(arrays, 10.0, {"gyro": "rad/s"})
+    path = tmp_path / "oven.csv"
+    path.write_text("time [min],fan,temperature [K]\n0,1,300\n1,2,310\n2,2,320\n")
+    found = with_thermometer(recording, open_tables(path, Wanted())[0])
+    np.testing.assert_allclose(found["temperature"].values, 26.85 + np.arange(1000) / 60.0)
+    path.write_text("time [min],temperature [K]\n100,300\n101,310\n102,320\n")
+    with pytest.raises(InputError, match="no temperatures during the recording"):
+        with_thermometer(recording, open_tables(path, Wanted())[0])
