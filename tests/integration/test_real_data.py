@@ -126,6 +126,7 @@ def test_peaks_of_gyro_and_accelerometer_wander_together():
 # -- what the models make of them -----------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_model_of_a_gyro_axis():
     """Its step at 2,500 s is real, and too little evidence for a single axis to be not valid."""
     fit = gmwm.calibrate(recording(1, "gyro_x"))["gyro_x"]

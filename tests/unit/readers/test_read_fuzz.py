@@ -15,7 +15,7 @@ from gmwm.readers.names import CANONICAL
 from gmwm.readers.text import csv_table
 from reading import SI
 
-CASES = 150
+CASES = 80
 
 
 def damaged(case: int) -> bytes:

@@ -62,8 +62,9 @@ RECORDINGS = {
 
 
 @pytest.fixture(scope="module", params=[
-    "six axes", "gyros alone", "no quantity", "nine axes", "twenty skipped", "several recordings",
-    *map(slow, ("one axis", "units of their own", "two rates", "long names", "thirty axes")),
+    "six axes", "no quantity", "nine axes", "several recordings",
+    *map(slow, ("gyros alone", "twenty skipped", "one axis", "units of their own", "two rates",
+                "long names", "thirty axes")),
 ])  # fmt: skip
 def calibrated(request):
     return gmwm.calibrate(RECORDINGS[request.param](), {"": WALK.opened()})

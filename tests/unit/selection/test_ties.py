@@ -215,6 +215,7 @@ class TestFlicker:
         assert chosen.model.opened() == truth.opened()
         assert not any(item.compared_only for item in chosen.ranking)
 
+    @pytest.mark.slow
     def test_the_interval_over_rivals_has_the_truth(self):
         tau, missed = np.array([60.0, 600.0]), np.zeros(2)
         true = np.sqrt(2.0 * FLICKER.haar_variance(tau, 0.01))

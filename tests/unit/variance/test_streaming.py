@@ -64,7 +64,7 @@ def assert_close_to_all_windows(found, whole):
     assert np.all(np.abs(found.mean - whole.mean) < limit * deviation)
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=10, deadline=None)
 @given(
     st.integers(8, 12_000),
     st.integers(0, 2**31),

@@ -63,7 +63,7 @@ def climbs(draw):
 
 
 @given(climbs())
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=8, deadline=None)
 def test_the_likelihood_never_falls(case):
     model, start, x = case
     fit = em(model.opened(), x, start=start, accelerate=False, max_iterations=10)

@@ -128,7 +128,7 @@ def test_a_noisy_autoregression_is_that_of_statsmodels():
     [
         (WhiteNoise(0.3) + RandomWalk(0.05), 1000),
         (WhiteNoise(0.3) + GaussMarkov(0.5, 5.0) + RateRamp(1e-3), 1000),
-        (as_model(AR([1.2, -0.6], 2.0)), 1000),
+        slow(as_model(AR([1.2, -0.6], 2.0)), 1000),
     ],
     ids=repr,
 )

@@ -8,6 +8,7 @@ from scipy.optimize import minimize_scalar
 import gmwm
 from gmwm import RandomWalk, WhiteNoise
 from gmwm.estimate.likelihood import Columns, KalmanLikelihood
+from marks import slow
 
 
 @pytest.fixture(scope="module")
@@ -30,7 +31,7 @@ def bound():
     return x, np.interp(0.95, share / share[-1], scale)
 
 
-@pytest.mark.parametrize("method", ["mle", "em"])
+@pytest.mark.parametrize("method", ["mle", slow("em")])
 def test_the_bound_is_the_quantile_of_the_profile_likelihood(bound, method):
     x, expected = bound
     fit = gmwm.fit(WhiteNoise() + RandomWalk(), x, dt=1.0, method=method)
