@@ -209,7 +209,8 @@ class GMWM:
         a large discrepancy hides the misfit of the worse ones.
         """
         terms, wv = problem.design.model.terms, problem.moments.wv
-        for i in {term: i for i, term in enumerate(terms) if term.is_open}.values():
+        noise = {term: i for i, term in enumerate(terms) if term.is_open and not term.is_drift}
+        for i in noise.values():
             left = (*terms[:i], *terms[i + 1 :])
             if all(term.is_drift or term.is_line for term in left):
                 continue

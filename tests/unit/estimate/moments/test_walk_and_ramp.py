@@ -61,3 +61,13 @@ def test_a_slope_is_less_certain_where_a_walk_may_be_there():
             held.append(low <= R <= high)
     assert len(held) >= 2
     assert np.mean(held) > 0.5
+
+
+def test_a_poor_fit_of_a_ramp_keeps_its_slope():
+    """The weights of the model without the ramp left R open, and the fit ended in an error."""
+    rng = np.random.default_rng([91001, 14])
+    x = rng.normal(0.0, N, 3_000)
+    x += np.cumsum(rng.normal(0.0, 1e-6, 3_000))
+    fit = gmwm.estimate.estimate(WhiteNoise() + RateRamp(), x, 1.0)
+    assert fit.discrepancy > 0.1
+    assert fit.stderr["R"] > 0.0
