@@ -39,6 +39,7 @@ FAULTS = {
     "outliers": "3 % outliers of 50 m",
     "mounting": "IMU turned by 90 deg about its vertical axis",
     "clock drift": "the fixes' clock 500 ppm fast",
+    "slow clock": "the IMU's clock 2.7 % slow",
     "gyro scale": "3 % too much of all gyros",
     "accel scale": "3 % too much of all accelerometers",
 }
@@ -88,11 +89,12 @@ def emulated_log(
     by = late + (0.2 if "stamps" in faults else 0.0) + (18.0 if "leap seconds" in faults else 0.0)
     step = 1.0 if "clock step" in faults else 0.0
     drift = 5e-4 if "clock drift" in faults else 0.0
+    clock = 1.027 if "slow clock" in faults else 1.0
 
     def stamped(fixes: Fixes) -> Fixes:
         time = fixes.time
         later = by + (1.0 + drift) * time + step * (time > 0.5 * duration)
-        return replace(fixes, time=later).part(later <= duration)
+        return replace(fixes, time=later).part(later <= duration / clock)
 
     position, *others = map(stamped, aiding.fixes)
     aiding = replace(aiding, fixes=(_with_outliers(position, faults, rng), *others))
@@ -102,7 +104,7 @@ def emulated_log(
         turn = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
         imu = Imu(imu.dt, imu.rotation @ turn.T, imu.velocity @ turn.T)
     gyro, accel = (1.03 if f"{kind} scale" in faults else 1.0 for kind in ("gyro", "accel"))
-    imu = Imu(imu.dt, imu.rotation * gyro, imu.velocity * accel)
+    imu = Imu(imu.dt / clock, imu.rotation * gyro / clock, imu.velocity * accel / clock)
     models = believed or truth or sensors()
     return Measured(imu, aiding, models, title=f"{vehicle}, seed {seed}"), fine
 

@@ -85,6 +85,9 @@ SUSPECTED = 0.01  # p-value below which wrong axes are looked for; a fault has t
 TRACK_STEP = 1.0  # s, of a track between whose points only noise of the IMU is expected
 LARGEST_OFFSET = 1.5  # s, of a time offset found from the innovations: with more, no fix is near
 OFFSET_MARGIN = 0.1  # s beside it, for fixes left out at both ends
+USUAL_RATE = 0.01  # error of a clock that only counts samples, 1 sigma
+# Largest error of its rate that is looked for, over 3, and s at first: a step is then 0.6 s.
+RATE_STEP, RATE_SPAN = 0.012, 50.0
 LARGEST_ARM = 5.0  # m, usual length of a lever arm that was left out, 1 sigma
 HEADINGS = 8  # directions that are tried where the filter is lost: 45 deg apart
 ROUGH_HEADING = math.radians(15.0)  # 1 sigma of each: the nearest is up to 22.5 deg off

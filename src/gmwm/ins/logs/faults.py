@@ -1,9 +1,9 @@
 """The faults that a log shows, looked for before the sensor models are blamed.
 
-Time offset, lever arm, heading, axis signs, outliers: each is a filter that allows for it, with the
-parameters under which the fixes are most probable. Constant errors are estimated by least squares
-from the innovations and their derivatives (Friedland 1969, *IEEE Trans. Autom. Control* 14,
-359-367).
+Time offset, lever arm, heading, clock rate, axis signs, outliers: each is a filter that allows for
+it, with the parameters under which the fixes are most probable. Constant errors are estimated by
+least squares from the innovations and their derivatives (Friedland 1969, *IEEE Trans. Autom.
+Control* 14, 359-367).
 """
 
 from __future__ import annotations
@@ -26,9 +26,10 @@ from gmwm.ins.logs.measured import Measured
 from gmwm.ins.logs.replay import Replay
 from gmwm.issues import Notice, notice
 
-TESTS = 13
+TESTS = 15
 """Tests of a log: size of the innovations of three kinds and of all, whiteness, time offset, lever
-arm, heading, the first two together, directions, signs of both sensors, outliers."""
+arm, heading, clock rate, the first two together, directions, rates, signs of both sensors,
+outliers."""
 
 LEVEL = tuning.CONTRADICTED / TESTS
 """Level of each test: right models are blamed with ``tuning.CONTRADICTED`` at most (Bonferroni)."""
@@ -124,6 +125,18 @@ def far_heading(base: Replay) -> tuple[Fault, ...]:
     return fitted(base, base.turned_by(angle, tuning.FINE_HEADING), ("heading",), angle)
 
 
+def far_rate(base: Replay) -> tuple[Fault, ...]:
+    """A clock whose rate is wrong by much: at the start of the log, then in more of it."""
+    rate, length = 0.0, tuning.RATE_SPAN
+    tried = np.arange(-3, 4) * tuning.RATE_STEP
+    while length < 2.0 * base.imu.n * base.imu.dt:
+        part = base.within(0.0, length)
+        each = [part.slower(rate + by) for by in tried]
+        rate += float(tried[int(np.argmax([one.log_likelihood for one in each]))])
+        tried, length = tried / 3.0, 3.0 * length
+    return fitted(base, base.slower(rate), ("clock-rate",), rate) if rate else ()
+
+
 def wrong_signs(base: Replay) -> Iterator[Fault]:
     """Axes of the gyros or of the accelerometers that point the other way.
 
@@ -148,22 +161,26 @@ def wrong_signs(base: Replay) -> Iterator[Fault]:
 _CONSTANTS = {"time offset": ("time-offset", 0.05, tuning.LARGEST_OFFSET)}
 _CONSTANTS |= dict.fromkeys(("forward", "right", "down"), ("lever-arm", 0.5, tuning.LARGEST_ARM))
 _CONSTANTS |= {"heading": ("heading", 0.01, 0.5 * np.pi)}
+_CONSTANTS |= {"clock rate": ("clock-rate", 1e-4, tuning.USUAL_RATE)}
 _NAMES = np.array(list(_CONSTANTS))
 _CODES = np.array([code for code, _, _ in _CONSTANTS.values()])
 _STEPS, _USUAL = np.array([sizes for _, *sizes in _CONSTANTS.values()], dtype=float).T
 # Stamps that are farther off leave no fix near.
 _MOST = np.where(_CODES == "time-offset", _USUAL, np.inf)
-_TOGETHER = (("time-offset",), ("lever-arm",), ("heading",), ("time-offset", "lever-arm"))
+_TOGETHER = (("time-offset",), ("lever-arm",), ("heading",), ("clock-rate",))
+_TOGETHER += (("time-offset", "lever-arm"),)
 """Errors that are tried. Along a straight track at constant speed a time offset is a lever arm, so
 that one of the two alone takes up the other; both together are right."""
 
 
 def changed(replay: Replay, errors: FloatArray, is_smooth: bool = False) -> Replay:
-    """A log without constant errors, (5,): of stamps (s), antenna (m) and heading (rad).
+    """A log without constant errors, (6,): of stamps (s), antenna (m), heading (rad) and rate.
 
     is_smooth: Allow for late stamps less exactly, but with the same noise between two fixes.
     """
-    offset, arm, heading = errors[0], errors[1:4], errors[4]
+    offset, arm, heading, rate = errors[0], errors[1:4], errors[4], errors[5]
+    if rate:
+        replay = replay.slower(float(rate))
     if offset:
         replay = replay.along(-offset) if is_smooth else replay.later(-offset)
     if np.any(arm):
@@ -172,7 +189,7 @@ def changed(replay: Replay, errors: FloatArray, is_smooth: bool = False) -> Repl
 
 
 def constant_errors(base: Replay, known: Collection[str] = ()) -> list[tuple[Fault, ...]]:
-    """Stamps, antenna, heading, and the first two together, but for the known ones."""
+    """Stamps, antenna, heading, rate, and the first two together, but for the known ones."""
     none, found = np.zeros(_CODES.size), []
     columns = _columns(base, partial(changed, base), none, none == 0.0)
     for codes in _TOGETHER:
@@ -219,7 +236,8 @@ def fitted(
     gain, errors = relative_gain(gain, here), np.zeros(_CODES.size)
     errors[own] = np.sqrt(np.diag(covariance))
     if start != 0.0:
-        theta[-1] = (theta[-1] + start + np.pi) % (2.0 * np.pi) - np.pi
+        theta[own] += start
+        theta[4] = (theta[4] + np.pi) % (2.0 * np.pi) - np.pi
     found = []
     for part in (np.equal(_CODES, code) for code in codes):
         # A part of both that chance explains has not earned it, whatever the other one gains.
@@ -318,6 +336,8 @@ class Faults:
                 tried += [(each,) for each in wrong_signs(here)]
                 if "heading" not in known:
                     tried.append(far_heading(here))
+                if "clock-rate" not in known:
+                    tried.append(far_rate(here))
             best = max(filter(None, tried), key=lambda faults: faults[0].excess, default=())
             if not best or best[0].excess <= 0.0:
                 break
@@ -377,6 +397,10 @@ def _words(fault: Fault) -> dict[str, Any]:
         late, change = ("late", "subtract it from") if offset > 0.0 else ("early", "add it to")
         error = errors["time offset"]
         return {"size": abs(offset), "late": late, "error": error, "scale": scale, "change": change}
+    if fault.code == "clock-rate":
+        rate, error = values["clock rate"], errors["clock rate"]
+        fast = "fast" if rate < 0.0 else "slow"
+        return {"share": abs(rate), "fast": fast, "error_share": error, "factor": 1.0 + rate}
     if fault.code == "heading":
         yaw = np.degrees(fault.replay.state.rpy[2]) % 360.0
         hint = f"give the heading {yaw:.1f} deg, or turn the axes to forward, right, down"

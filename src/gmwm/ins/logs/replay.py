@@ -132,6 +132,16 @@ class Replay:
         ]
         return self._with_fixes(fixes, -seconds)
 
+    def slower(self, by: float) -> Replay:
+        """A clock of the IMU that is slower by a share: samples last longer, and add up to more.
+
+        It is right at the first epoch of the record.
+        """
+        longer = 1.0 + by
+        imu = Imu(*(each * longer for each in (self.imu.dt, self.imu.rotation, self.imu.velocity)))
+        found = replace(self, imu=imu, start=self.start * longer)
+        return found.later(-by * self.start)
+
     def along(self, seconds: float) -> Replay:
         """Fixes moved along the track instead of later stamps.
 

@@ -66,6 +66,17 @@ def test_stamps_that_are_late():
     assert navigated.verdict.values["explained"]
 
 
+@pytest.mark.parametrize("vehicle", ["loiter", "helicopter", slow("car")])
+def test_a_clock_that_runs_slow(vehicle):
+    """A loiter's had late stamps, a helicopter's poor sensors, and the car's filter was lost."""
+    navigated = found(214, "slow clock", vehicle=vehicle)
+    assert codes(navigated) == ["clock-rate"]
+    assert navigated.faults.explained
+    (fault,) = navigated.fault_notices
+    assert within(fault, "clock rate", 0.027) < 1e-3
+    assert "multiply the IMU's times by 1.02" in fault.hint
+
+
 def test_leap_seconds_and_an_outlier():
     """The filter of such stamps is lost, and is aligned anew; other times stay the log's."""
     navigated = found(201, "leap seconds", "one far")
