@@ -120,42 +120,51 @@ def sessions(folder: Path, args: argparse.Namespace) -> None:
             found.save(args.save / f"flights {name}.json")
 
 
-def by_class(first, found, imu: str, channel: str) -> np.ndarray:
+def by_class(first, found, variance) -> np.ndarray:
     """Variances of the classes of vibration of some flights, in the shares of another one."""
     shares = {each.name: each.share for each in found.classes}
-    own = [(first.at(each.name).curve(imu, channel).variance, shares.get(each.name, 0.0))
-           for each in first.classes]  # fmt: skip
-    return sum(share * variance for variance, share in own) / sum(share for _, share in own)
+    own = [(variance(first.at(each.name)), shares.get(each.name, 0.0)) for each in first.classes]
+    return sum(share * each for each, share in own) / sum(share for _, share in own)
 
 
-def ratios(first, found, sensor: str, a: int, b: int) -> list[float]:
-    """Mean over octaves and axes of the measured over each predicted variance of a difference."""
-    rows = []
-    for channel in (f"{sensor}_{axis}" for axis in "xyz"):
-        names = [f"imu {k + 1}" for k in (a, b)]
-        two, curve = [first.curve(name, channel) for name in names], found.curve(names[0], channel)
-        J = min(len(two[0].tau), len(curve.tau))
-        tau = curve.tau[:J]
-        used = (tau >= 0.06) & (tau < 5.0)
-        measured = curve.differences[b - 1, :J]
-        own = sum(np.maximum(each.variance, each.static)[:J] for each in two)
-        classes = sum(np.maximum(by_class(first, found, name, channel), each.static)[:J]
-                      for name, each in zip(names, two, strict=True))  # fmt: skip
-        static = sum(each.static[:J] for each in two)
-        bounds = sum(2.0 * first.numbers(imu=name)[channel].haar_variance(tau, DT)
-                     for name in names)  # fmt: skip
-        inside = (tau >= 0.1) & (tau <= 1.1)
-        rows.append([np.mean((measured / each)[used]) for each in (own, classes, static)]
-                    + [np.max((measured / bounds)[inside])])  # fmt: skip
-    motion, classes, rest, bound = np.mean(rows, axis=0)
-    return [motion, classes, rest, rest / 100.0, bound]
+def ratios(first, found, channel: str, a: int, b: int) -> list[float]:
+    """Mean over octaves of the measured over each predicted variance of a difference."""
+    curve = found.curve(f"imu {a + 1}", channel)
+    J = min(len(first.curves[0].tau), len(curve.tau))
+    tau, measured = curve.tau[:J], curve.differences[b - 1, :J]
+
+    def both(variance) -> np.ndarray:
+        """Sum over the two IMUs, of which none is below the one at rest."""
+        own = [(variance(f"imu {k + 1}", k, other), k) for k, other in ((a, b), (b, a))]
+        static = [first.curve(f"imu {k + 1}", channel).static for _, k in own]
+        return sum(np.maximum(v, s)[:J] for (v, _), s in zip(own, static, strict=True))
+
+    def apart(result, imu, k, other) -> np.ndarray:
+        """Without what the two share: from the pairs of others that have the other one."""
+        pairs = combinations([each for each in range(4) if each != k], 2)
+        return result.curve(imu, channel).pairs[[other in pair for pair in pairs]].mean(axis=0)
+
+    def bounds(imu, *_) -> np.ndarray:
+        tau = first.curves[0].tau
+        return 2.0 * first.numbers(imu=imu)[channel].haar_variance(tau, DT)
+
+    predicted = [
+        both(lambda imu, *_: first.curve(imu, channel).variance),
+        both(lambda *which: apart(first, *which)),
+        both(lambda *which: by_class(first, found, lambda result: apart(result, *which))),
+        both(lambda imu, *_: first.curve(imu, channel).static),
+    ]
+    used, inside = (tau >= 0.06) & (tau < 5.0), (tau >= 0.1) & (tau <= 1.1)
+    plain, own, classes, rest = (float(np.mean((measured / each)[used])) for each in predicted)
+    return [plain, own, classes, rest, rest / 100.0, np.max((measured / both(bounds))[inside])]
 
 
 def predict(folder: Path, args: argparse.Namespace) -> None:
     static = gmwm.load(args.static)
     ranges = {}
-    print("NEES of the difference of two IMUs: in motion; by class of vibration; static; ten times "
-          "that deviation; and the largest from 0.1 to 1 s of numbers that bound")  # fmt: skip
+    print("NEES of the difference of two IMUs, by numbers in motion; without what the two share; "
+          "so by class of vibration; static; ten times that deviation; and the largest from 0.1 to "
+          "1 s of numbers that bound")  # fmt: skip
     for (name, numbers), half in product(SESSIONS.items(), (0, 1)):
         first = gmwm.motion([flight(folder, n) for n in numbers[half::2]], static=static)
         limits = [each.high for each in first.classes[:-1]]
@@ -164,7 +173,8 @@ def predict(folder: Path, args: argparse.Namespace) -> None:
             for sensor in ("gyro", "accel"):
                 texts = []
                 for a, b in combinations(range(4), 2):
-                    nees = ratios(first, found, sensor, a, b)
+                    nees = np.mean([ratios(first, found, f"{sensor}_{axis}", a, b)
+                                    for axis in "xyz"], axis=0)  # fmt: skip
                     texts.append(f"{a + 1}-{b + 1} {';'.join(f'{each:.3g}' for each in nees)}")
                     group = "1-15" if number < 16 else "17-27"
                     ranges.setdefault((group, sensor), []).append(nees)
