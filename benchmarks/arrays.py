@@ -13,8 +13,9 @@ how often the intervals hold the best weights. `size` prints how often independe
 found to share slow errors at 5 %, under their own models and under fitted ones. `coverage` prints
 how often 95 % intervals hold the elements of the matrices of three channels.
 
-FOLDER holds ``adis16405_1.csv.gz`` to 4, static recordings of one IMU. `recordings` prints the
-standard deviation of an error budget of independent axes over that with what they share.
+FOLDER holds ``adis16405_1.csv.gz`` to 4, static recordings of one IMU. `recordings` prints
+correlations of coefficients at 31 s, and the standard deviation of an error budget of independent
+axes over that with what they share.
 `navigate` takes the matrices from recording 1 and navigates the others at rest, with position fixes
 that end: horizontal error and NEES after outages, with what axes share and without.
 """
@@ -163,8 +164,14 @@ def recordings(args) -> None:
     print("independent / shared, 1 sigma      " + "".join(f"{t:8g} s" for t in (1, 10, 60, 300)))
     for number in (1, 2, 3, 4):
         channels = [recorded(args.folder, number)[name] for name in AXES]
-        fit = fit_shared(parts, wavelet_covariance(channels, block=BLOCK), refine=False)
-        rows = {}
+        data = wavelet_covariance(channels, block=BLOCK)
+        fit, rows = fit_shared(parts, data, refine=False), {}
+        level = int(np.argmin(np.abs(data.tau - 30.0)))
+        pairs = ("accel_x accel_y", "accel_x accel_z", "accel_y accel_z", "gyro_x accel_x",
+                 "gyro_y accel_x", "gyro_x gyro_y")  # fmt: skip
+        found = (data.correlation[level][tuple(map(AXES.index, pair.split()))] for pair in pairs)
+        listed = ", ".join(f"{p} {v:.2f}" for p, v in zip(pairs, found, strict=True))
+        print(f"recording {number}, correlation at {data.tau[level]:.0f} s: {listed}")
         for horizon in (1.0, 10.0, 60.0, 300.0):
             grown = [power(*integrated(p.state_space(0.01), 0.01, 3), round(horizon / 0.01))[1]
                      for p in parts]  # fmt: skip

@@ -110,7 +110,7 @@ def array(
     \b
     Examples:
       gmwm array imu1.csv imu2.csv imu3.csv --horizon 60
-      gmwm array imu*.csv --rate 200 --gyro-unit deg/s --accel-unit g -o array.json
+      gmwm array imu*.csv --rate 200 --gyro-unit deg/s --accel-unit g
     """
     from gmwm.population import array as run, labelled
 

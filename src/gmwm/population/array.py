@@ -13,7 +13,7 @@ from gmwm._core.distributions import chi2, norm
 from gmwm._core.documents import Array, Document, Positive, Probability, Text
 from gmwm._core.frozen import freeze
 from gmwm._core.tables import frame, plain_table
-from gmwm._core.text import Printed, brief, bullets, with_error
+from gmwm._core.text import Printed, brief, bullets
 from gmwm._core.typing import FloatArray, Progress
 from gmwm._core.units import factor
 from gmwm.diagnosis import rest_of
@@ -127,14 +127,14 @@ class SensorArray(Document, Printed):
         for each in self.axes:
             ends = zip(each.weights, each.lower, each.upper, strict=True)
             few = len(self.imus) <= tuning.WITH_INTERVALS
-            cells = [with_error(*end) if few else f"{end[0]:.2f}" for end in ends]
+            cells = [f"{w:.2f}" + f" +-{0.5 * (b - a):.2f}" * few for w, a, b in ends]
             weights.append([each.channel, *cells])
             si, unit = _UNITS[each.quantity]
             values = (np.min(each.alone), each.mean, each.inverse, each.best)
             shown = [brief(float(v) / factor(unit, si), 3) for v in values]
             gain = f"{100.0 * (each.best / each.mean - 1.0):+.1f} %"
             errors.append([each.channel, unit, *shown, gain])
-        heads = ("1 sigma", "unit", "best alone", "mean", "1/N^2", "weights", "to mean")
+        heads = ("1 sigma", "unit", "best alone", "mean", "1/N^2", "weights", "vs mean")
         lines = [
             f"Weights for outages of {self.horizon:g} s, from {self.duration:.6g} s of "
             f"{len(self.imus)} IMUs together",
