@@ -97,7 +97,7 @@ def _triads(curves: Curves) -> dict[str, tuple[list[BiasCurve], float, float]]:
             if each.degree > _CUBIC:
                 raise InputError(
                     f"the curve of {each.name} has degree {each.degree}, and the parameters hold "
-                    "a cubic: calibrate with degree 3 (--degree 3)"
+                    "a cubic: calibrate with degree 3"
                 )
         axes = [own[letter] for letter in _LETTERS]
         ranges = [each.main for each in axes if each.main is not None]
