@@ -193,6 +193,7 @@ def test_the_same_solution_with_an_outage_in_a_short_flight():
     assert ours.sd[11, 1] > 1.2 * ours.sd[5, 1]
 
 
+@pytest.mark.slow
 def test_the_same_solution_with_fixes_between_samples():
     """Both propagate to the fix; pyins from the epoch before, and with the row of that epoch."""
     parts = 4

@@ -104,6 +104,7 @@ def test_deg_per_second_for_radians_is_reported():
     assert (notice.code, notice.values["likely"]) == ("gyro-unit", "deg/s")
 
 
+@pytest.mark.slow
 def test_shock_is_left_out_and_no_more():
     raw = recording(4, "gyro_x")
     found = gmwm.health(raw)

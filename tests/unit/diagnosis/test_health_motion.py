@@ -242,6 +242,7 @@ def test_fits_of_what_was_tilted_are_not_valid(moved):
     assert [fit.valid for fit in again.values()] == [fit.valid for fit in cal.values()]
 
 
+@pytest.mark.slow
 def test_static_stretches_alone_are_valid(moved):
     cal = gmwm.calibrate(moved(np.zeros((30_000, 3))), WhiteNoise())
     assert all(fit.valid for fit in cal.values())

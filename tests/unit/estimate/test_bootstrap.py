@@ -25,6 +25,7 @@ def test_estimates_scatter_as_their_standard_errors_say(fit):
         assert (low, high) == pytest.approx(fit.interval()[key], abs=0.6 * error)
 
 
+@pytest.mark.slow
 def test_drawn_variances_give_what_simulated_series_give():
     fit = gmwm.fit(TRUTH.opened(), TRUTH.simulate(4000, 1.0, 2), dt=1.0)
     fast = gmwm.bootstrap(fit, runs=300, seed=1)

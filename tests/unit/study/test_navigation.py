@@ -92,7 +92,7 @@ def test_an_experiment_has_a_filter_for_each_calibration():
     assert real.filters["GMWM"].bias_sd["gyro_x"] > 0.0
 
 
-@pytest.mark.parametrize("figure", ["fig7", slow("fig8"), "fig9"])
+@pytest.mark.parametrize("figure", [slow("fig7"), slow("fig8"), "fig9"])
 def test_a_study_is_drawn_and_its_table_kept(tmp_path, monkeypatch, made_up, figure):
     monkeypatch.setattr(Calibrated, "of", lambda given: None)
     short = recording(WhiteNoise(1e-3) + RandomWalk(3e-4), n=100)

@@ -146,6 +146,7 @@ def short(monkeypatch):
     return done
 
 
+@pytest.mark.slow
 def test_a_rotation_goes_on_where_it_stopped(short, tmp_path):
     given = [recording(1), recording(2)]
     first = rotate("car", given, tmp_path, runs=2)

@@ -76,7 +76,15 @@ def test_unknown_method_and_no_runs(tmp_path):
         run_study(SMALL, tmp_path, runs=0)
 
 
-LONG = {"arma4", "five-gm", "weights2", "weights3"}  # long fits, or methods of another study
+LONG = {
+    "arma4",
+    "five-gm",
+    "table4",
+    "em4",
+    "weights2",
+    "weights3",
+    "weights4",
+}  # long fits, or methods of another study
 
 
 @pytest.mark.parametrize("name", [slow(name) if name in LONG else name for name in STUDIES])

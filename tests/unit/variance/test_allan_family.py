@@ -126,7 +126,7 @@ def test_times_are_rounded_sorted_and_cut_for_each_kind():
 
 @pytest.mark.parametrize(
     "process",
-    [WhiteNoise(1.0), slow(BiasInstability(1.0)), RandomWalk(1.0)],
+    [slow(WhiteNoise(1.0)), slow(BiasInstability(1.0)), RandomWalk(1.0)],
     ids=lambda process: type(process).__name__,
 )
 def test_intervals_hold_the_truth(process):
@@ -159,7 +159,7 @@ def test_an_interval_does_not_depend_on_the_other_averaging_times():
     [
         QN,
         slow(QuantizationNoise(1.0) + RandomWalk(1e-3)),
-        WhiteNoise(1.0) + Resonance(0.5, 0.05, 0.05),
+        slow(WhiteNoise(1.0) + Resonance(0.5, 0.05, 0.05)),
     ],
     ids=["quantization and white", "quantization and walk", "resonance and white"],
 )

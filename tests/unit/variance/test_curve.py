@@ -77,6 +77,7 @@ def test_other_times_hardly_change_the_fit(cut):
         slow("Q + N + K", QuantizationNoise(1e-5) + NK),
     ],
 )
+@pytest.mark.slow
 def test_intervals_hold_the_truth(name, truth):
     runs, held = 30, {key: 0 for key in truth.params}
     for run in range(runs):

@@ -31,6 +31,7 @@ def test_gaussian_noise_has_none(seed):
     assert fourth_cumulant(np.random.default_rng(seed).normal(size=N)) == 0.0
 
 
+@pytest.mark.slow
 def test_the_stated_covariance_is_the_observed_one():
     runs = 300
     found = [gmwm.wavelet_variance(laplace(seed), dt=DT) for seed in range(runs)]

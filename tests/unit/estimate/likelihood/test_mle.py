@@ -198,6 +198,7 @@ def test_an_amplitude_of_zero_has_an_upper_bound(method):
         slow(1.5e-3, "em", 10),
     ],
 )
+@pytest.mark.slow
 def test_intervals_of_a_walk_that_can_hardly_be_seen_cover_it(K, method, runs):
     rng = np.random.default_rng(22)
     truth = WhiteNoise(1.0) + RandomWalk(K)

@@ -20,6 +20,7 @@ def series(seed):
 
 
 @pytest.mark.parametrize("seed", [1, slow(2), slow(8)])
+@pytest.mark.slow
 def test_K_is_that_of_the_exact_likelihood(seed):
     """It used to stay near zero where the slope is certain only because the walk is small."""
     x = series(seed)

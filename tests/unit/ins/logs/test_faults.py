@@ -106,6 +106,7 @@ def test_stamps_that_are_late_in_a_start_in_motion():
 
 
 @pytest.mark.parametrize("vehicle", ["loiter", slow("car")])
+@pytest.mark.slow
 def test_stamps_that_are_farther_off_than_one_search_reaches(vehicle):
     """Of circles, 1.5 s and an antenna 14 m behind "explained" 2.2 s, which are the same there."""
     log, _ = emulated_log(1000, vehicle, duration=300.0, rate=10.0)
