@@ -167,11 +167,10 @@ def recordings(args) -> None:
         data = wavelet_covariance(channels, block=BLOCK)
         fit, rows = fit_shared(parts, data, refine=False), {}
         level = int(np.argmin(np.abs(data.tau - 30.0)))
-        pairs = ("accel_x accel_y", "accel_x accel_z", "accel_y accel_z", "gyro_x accel_x",
-                 "gyro_y accel_x", "gyro_x gyro_y")  # fmt: skip
-        found = (data.correlation[level][tuple(map(AXES.index, pair.split()))] for pair in pairs)
-        listed = ", ".join(f"{p} {v:.2f}" for p, v in zip(pairs, found, strict=True))
-        print(f"recording {number}, correlation at {data.tau[level]:.0f} s: {listed}")
+        found = data.correlation[level]
+        print(f"recording {number}, correlations at {data.tau[level]:.0f} s: "
+              f"accel xy {found[3, 4]:.2f}, xz {found[3, 5]:.2f}, yz {found[4, 5]:.2f}; gyro x "
+              f"and accel x {found[0, 3]:.2f}; gyro xy {found[0, 1]:.2f}")  # fmt: skip
         for horizon in (1.0, 10.0, 60.0, 300.0):
             grown = [power(*integrated(p.state_space(0.01), 0.01, 3), round(horizon / 0.01))[1]
                      for p in parts]  # fmt: skip
