@@ -174,7 +174,8 @@ class Design:
         """A channel of a recording less the first curve."""
         curve, time = self.removed @ self.columns[place], self.nodes[place].time
         values = np.array(channel.values, dtype=float)
-        values -= np.interp(channel.dt * np.arange(values.size), time, curve)
+        # A sample stands for its interval, as the nodes do.
+        values -= np.interp(channel.dt * (np.arange(values.size) + 0.5), time, curve)
         return replace(channel, values=values)
 
     def beside(self, wv: WaveletVariance, place: int) -> WaveletVariance:
