@@ -21,13 +21,13 @@ def drawn(rng, n=4096):
 
 
 def test_independent_channels_are_found_to_share_at_the_level_of_the_test():
-    """Of 3 pairs in 200 recordings 5 %, with a standard error of 0.9 % or somewhat more."""
+    """Of 3 pairs in 60 recordings 5 %, with a standard error of 1.6 % or somewhat more."""
     rng = np.random.default_rng(1)
-    found = [each for _ in range(200) for each in sharing(MODELS, wavelet_covariance(drawn(rng)))]
-    assert len(found) == 600  # accel_y has no slow errors to share
+    found = [each for _ in range(60) for each in sharing(MODELS, wavelet_covariance(drawn(rng)))]
+    assert len(found) == 180  # accel_y has no slow errors to share
     p_values = np.array([each.p_value for each in found])
-    assert np.mean(p_values < 0.05) == pytest.approx(0.05, abs=0.025)
-    assert np.mean(p_values) == pytest.approx(0.5, abs=0.05)
+    assert np.mean(p_values < 0.05) == pytest.approx(0.05, abs=0.045)
+    assert np.mean(p_values) == pytest.approx(0.5, abs=0.09)
 
 
 def test_the_correlation_of_shared_errors_is_found():

@@ -66,10 +66,10 @@ def test_removing_a_drift_from_the_moments_is_removing_it_from_the_series():
 @pytest.mark.parametrize(
     ("model", "n"),
     [
-        (gmwm.WhiteNoise(1.0), 1000),
+        slow(gmwm.WhiteNoise(1.0), 1000),
         (gmwm.RandomWalk(1.0), 1000),
         slow(gmwm.BiasInstability(1.0), 1000),
-        (gmwm.QuantizationNoise(1.0) + gmwm.WhiteNoise(0.06), 4096),
+        slow(gmwm.QuantizationNoise(1.0) + gmwm.WhiteNoise(0.06), 4096),
         slow(gmwm.QuantizationNoise(1.0) + gmwm.RandomWalk(1e-3), 4096),
         (gmwm.WhiteNoise(1.0) + gmwm.Resonance(1.0, 0.155, 0.01), 4096),
         slow(gmwm.WhiteNoise(0.2) + gmwm.RandomWalk(0.02) + gmwm.RateRamp(0.03), 6000),
