@@ -463,7 +463,7 @@ def _causes(
         row(_MODEL, first, (N, K)),
     ]
     notices = []
-    if N > tuning.OTHER_UNITS * first.N:
+    if N > tuning.OTHER_UNITS * first.N > 0.0:
         unit = SI_UNIT.get(kind, "u")
         notices.append(notice("other-units", kind, {"factor": N / first.N}, unit=unit))
     if all(axis.fit is not None for axis in group):

@@ -229,16 +229,27 @@ class InMotion(Document, Printed):
         at_rest = [np.nan_to_num(c.static) for c in own]
         return own[0].tau, np.max([*seen, *at_rest], axis=0)
 
-    def model(self, imu: str, channel: str) -> Model:
-        """The smallest bounded angle, white noise and walk that are nowhere below a curve.
+    def models(self, imu: str | None = None) -> dict[str, Model]:
+        """The smallest bounded angle, white noise and walk that are nowhere below the curves.
 
-        A sum of these fits no curve within its intervals: vibration has lines of its own. This one
-        is never below, on average some 10 % above in deviation, and simulates or feeds `reduce`.
+        By channel. A sum of these fits no curve within its intervals. This one is never below, and
+        simulates, or is the truth for `gmwm.certify` and `gmwm.reduce`.
 
-        Raises MissingNameError if there is no such curve.
+        Parameters
+        ----------
+        imu : str, optional
+            By default the largest of all IMUs.
+
+        Raises
+        ------
+        MissingNameError
+            If there is no such IMU.
         """
-        tau, variance = self.envelope(channel, imu)
-        return dominating(tau, variance, BOUNDED, tau[0])
+        found = {}
+        for channel in dict.fromkeys(each.channel for each in self.curves):
+            tau, variance = self.envelope(channel, imu)
+            found[channel] = dominating(tau, variance, BOUNDED, tau[0])
+        return found
 
     def numbers(
         self,

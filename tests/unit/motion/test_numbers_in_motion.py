@@ -9,7 +9,8 @@ from gmwm.motion import InMotion, MotionCurve
 
 DT = 0.008
 TAU = DT * 2.0 ** np.arange(10)  # up to 4.1 s
-AXES = [f"{sensor}_{axis}" for sensor in ("gyro", "accel") for axis in "xyz"]
+KINDS = ("gyro", "accel")
+AXES = [f"{kind}_{axis}" for kind in KINDS for axis in "xyz"]
 
 
 def in_motion(variances, static=None):
@@ -33,7 +34,7 @@ def allan(model, tau=TAU):
 
 def test_a_sum_of_the_three_terms_is_found():
     truth = QuantizationNoise(2e-4) + WhiteNoise(1e-4) + RandomWalk(1e-3)
-    model = in_motion([allan(truth)]).model("imu 1", "gyro_x")
+    model = in_motion([allan(truth)]).models()["gyro_x"]
     assert model.params == pytest.approx(truth.params, rel=1e-6)
 
 
@@ -59,7 +60,7 @@ def test_errors_grow_at_most_as_predicted():
     assert ratio.min() == pytest.approx(1.0)
     above = found.numbers(*ends, upper=True)["accel_x"].params
     assert above["N"] == pytest.approx(np.sqrt(1.2) * all_imus["accel_x"].params["N"])
-    model = found.model("imu 3", "gyro_y")
+    model = found.models("imu 3")["gyro_y"]
     assert np.all(allan(model) >= variances[2] * (1.0 - 1e-9))
 
 
@@ -75,6 +76,20 @@ def test_times_beyond_the_curves_are_rejected():
         found.numbers(0.1, 60.0)
     with pytest.raises(gmwm.InputError, match="give times between"):
         found.numbers(1.0, 0.5)
+
+
+def test_filters_with_these_numbers_are_certified():
+    """Of bounded angle without white noise; numbers at rest are overconfident by far."""
+    found = in_motion([allan(QuantizationNoise(1e-4))], allan(WhiteNoise(1e-6)))
+
+    def nees(numbers):
+        given = {kind: tuple(numbers[f"{kind}_x"].params[k] for k in "NK") for kind in KINDS}
+        times = {"outages": (1.0,), "keyframe": 0.1, "rate": 1.0 / DT}
+        checks = gmwm.certify(found.models(), given, **times).checks
+        return [each.nees for each in checks if each.consumer == "keyframes"]
+
+    assert max(nees(found.numbers(0.1, 1.0))) <= 1.05
+    assert min(nees(found.at("rest").numbers(0.1, 1.0))) > 100.0
 
 
 def test_export_writes_the_numbers():
