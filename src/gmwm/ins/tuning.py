@@ -50,6 +50,8 @@ REPEATED_WAY, REPEATS = 5.0, 3
 # Scatter of an IMU at rest, over where the vehicle stood at the start, and the length looked at, s:
 # engines and roads shake it far more.
 ZERO_VELOCITY = (2.0, 1.0)
+# Standard deviations (and m/s^2 of acceleration) beyond which heights step; fixes of a climb.
+STEP, CLIMB = (10.0, 5.0), 7
 LEAP_SECONDS = 18.0  # s, by which GPS time is ahead of UTC since 2017
 
 # -- own logs: alignment --------------------------------------------------------------------------

@@ -167,8 +167,7 @@ _CODES = np.array([code for code, _, _ in _CONSTANTS.values()])
 _STEPS, _USUAL = np.array([sizes for _, *sizes in _CONSTANTS.values()], dtype=float).T
 # Stamps that are farther off leave no fix near.
 _MOST = np.where(_CODES == "time-offset", _USUAL, np.inf)
-_TOGETHER = (("time-offset",), ("lever-arm",), ("heading",), ("clock-rate",))
-_TOGETHER += (("time-offset", "lever-arm"),)
+_TOGETHER = (*((code,) for code in dict.fromkeys(_CODES)), ("time-offset", "lever-arm"))
 """Errors that are tried. Along a straight track at constant speed a time offset is a lever arm, so
 that one of the two alone takes up the other; both together are right."""
 

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from scipy.ndimage import median_filter
 
 from gmwm._core.files import existing_file, opened
 from gmwm._core.typing import BoolArray, FloatArray
@@ -275,6 +276,26 @@ def _repeated(time: FloatArray, position: FloatArray) -> BoolArray:
     moved = (way > tuning.REPEATED_WAY) & (time[last] - time[first] <= tuning.CHORD)
     held = again[np.minimum(first + 1, time.size - 1)]
     return again & (np.count_nonzero(moved & held) >= tuning.REPEATS)
+
+
+def height_steps(aiding: Aiding, start: float) -> list[Notice]:
+    """Steps of the heights that stay, and that climbs before and after do not explain."""
+    position = aiding.of("position")
+    if position is None or position.time.size < tuning.CLIMB:
+        return []
+    time, height, sd = position.time, position.value[:, 2], position.sd[:, 2]
+    step, rise = np.diff(time), np.diff(height)
+    off = rise - step * median_filter(rise / step, tuning.CLIMB)
+    # An outlier comes back.
+    stays = np.convolve(off, np.ones(3), "same")
+    sigmas, by = tuning.STEP
+    limit = sigmas * np.hypot(sd[1:], sd[:-1]) + by * step**2
+    found = np.flatnonzero(np.minimum(off * np.sign(stays), np.abs(stays)) > limit)
+    found = found[step[found] <= tuning.CHORD]
+    if not found.size:
+        return []
+    values = {"up": float(off[found[0]]), "time": float(time[found[0] + 1] + start)}
+    return [notice("heights-step", "position", {**values, "count": int(found.size)})]
 
 
 # -- axes and units -------------------------------------------------------------------------------

@@ -16,7 +16,7 @@ from gmwm.ins import tuning
 from gmwm.ins.filter import Aiding, Fixes
 from gmwm.ins.imu import AXES, Imu, SensorModels
 from gmwm.ins.logs.attitude import standstills
-from gmwm.ins.logs.fix_log import read_fix_log, read_heights
+from gmwm.ins.logs.fix_log import height_steps, read_fix_log, read_heights
 from gmwm.ins.logs.imu_log import ImuLog, read_imu_log
 from gmwm.ins.logs.reference import Reference
 from gmwm.ins.spec import (
@@ -169,7 +169,7 @@ class Measured:
         if scale != "UTC" and any(n.code == "dates" for n in log.notices):
             seconds = tuning.LEAP_SECONDS
             notices.append(notice("time-scales", values={"scale": scale}, seconds=seconds))
-        notices += left_out
+        notices += [*left_out, *height_steps(aiding, log.start)]
         if spec.barometer is not None:
             aiding, set_to = _with_barometer(aiding, spec.barometer, folder, log)
             notices.append(set_to)

@@ -26,7 +26,7 @@ from gmwm.ins.logs.measured import Measured
 from gmwm.ins.logs.reference import ReferenceErrors
 from gmwm.ins.logs.replay import Replay, innovation_sizes
 from gmwm.ins.simulation import InnovationTest
-from gmwm.issues import Notice, notice, worst_first
+from gmwm.issues import Notice, Severity, notice, worst_first
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -230,8 +230,9 @@ class Navigated:
         if not sizes:
             return notice("consistent", source, variant="reference")
         worse = max(sizes.values()) > 1.0
-        words, severity = {"errors": self.against.in_words}, "bad" if worse else "note"
-        return notice("errors-contradict", source, sizes, severity=severity, **words)
+        severity: Severity = "bad" if worse else "note"
+        errors = self.against.in_words
+        return notice("errors-contradict", source, sizes, severity=severity, errors=errors)
 
     def _fault_verdict(self, faults: tuple[Notice, ...]) -> Notice:
         first, is_explained = faults[0], self.faults.explained

@@ -137,8 +137,8 @@ class Replay:
 
         It is right at the first epoch of the record.
         """
-        longer = 1.0 + by
-        imu = Imu(*(each * longer for each in (self.imu.dt, self.imu.rotation, self.imu.velocity)))
+        longer, imu = 1.0 + by, self.imu
+        imu = Imu(imu.dt * longer, imu.rotation * longer, imu.velocity * longer)
         found = replace(self, imu=imu, start=self.start * longer)
         return found.later(-by * self.start)
 

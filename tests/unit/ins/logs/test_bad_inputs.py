@@ -8,6 +8,7 @@ import pytest
 from emulated_logs import emulated_log
 from gmwm.errors import InputError
 from gmwm.ins import Measured, Navigated, read_fixes
+from gmwm.ins.logs.fix_log import height_steps
 from gmwm.study.demo import LEVER_ARM, sensors
 from marks import every
 
@@ -70,6 +71,35 @@ def test_a_sensor_at_the_end_of_its_range_is_named_and_nothing_else(log, tmp_pat
     assert found.verdict.severity == "bad"
     assert found.verdict.values["share"] == pytest.approx(0.2, abs=0.02)
     assert not found.fault_notices
+
+
+@pytest.mark.parametrize("velocity", [True, False])
+def test_a_step_of_the_height_is_dated_and_its_hint_mends_it(log, tmp_path, velocity):
+    """The heights were outliers, a lever arm, or sensors worse than their models."""
+    position, *others = log.aiding.fixes
+    later = position.time > 0.5 * DURATION
+    stepped = position.value + np.outer(later, [0.0, 0.0, 45.0])
+    fixes = (replace(position, value=stepped), *others)[: 1 + velocity]
+    write(tmp_path, log, fixes)
+    verdict = navigated(tmp_path).verdict
+    assert verdict.code == "heights-step"
+    assert verdict.values["time"] == pytest.approx(position.time[later][0])
+    assert verdict.values["up"] == pytest.approx(45.0, abs=4.0 * np.hypot(1.5, 1.5))
+    stepped[position.time >= verdict.values["time"] - 1e-6, 2] -= verdict.values["up"]
+    write(tmp_path, log, (replace(position, value=stepped), *others)[: 1 + velocity])
+    assert navigated(tmp_path).verdict.code == "consistent"
+
+
+@pytest.mark.parametrize("vehicle", ["car", "helicopter", "loiter"])
+def test_climbs_and_outliers_are_no_step_of_the_height(vehicle):
+    for seed in range(5):
+        log, _ = emulated_log(seed, vehicle, duration=300.0, rate=2.0)
+        position = log.aiding.fixes[0]
+        far = position.value.copy()
+        far[40, 2] += 60.0
+        for value in (position.value, far):
+            fixes = (replace(position, value=value),)
+            assert not height_steps(replace(log.aiding, fixes=fixes), 0.0)
 
 
 @pytest.mark.parametrize("times", [2, 5])
