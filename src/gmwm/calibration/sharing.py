@@ -3,8 +3,8 @@
 The slow part of the wavelet covariances of two channels is fitted by r (nu_j^a nu_j^b)^(1/2), with
 the slow terms' wavelet variances of both models, by generalized least squares. Its weights are the
 covariance of wavelet covariances of independent channels with these models, so that the estimate
-has the least variance v where there is no sharing, and is tested as a correlation coefficient of
-1/v degrees of freedom.
+has the least variance where there is no sharing. There it is close to normal: it is a sum over
+many products of coefficients, of either sign (``python benchmarks/arrays.py size``).
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from itertools import combinations
 
 import numpy as np
 
-from gmwm._core.distributions import student
+from gmwm._core.distributions import norm
 from gmwm._core.typing import FloatArray
 from gmwm.calibration import tuning
 from gmwm.calibration.screening import Screened
@@ -30,14 +30,14 @@ class Sharing:
     """Correlation of the slow errors of two channels.
 
     correlation: Estimate; by chance it may exceed 1.
-    dof: Degrees of freedom of its test.
+    stderr: Its standard error where nothing is shared.
     p_value: Of the test that they share nothing, two-sided.
     """
 
     first: str
     second: str
     correlation: float
-    dof: float
+    stderr: float
     p_value: float
 
 
@@ -50,7 +50,7 @@ def is_slow(term: Process) -> bool:
 def sharing(models: Mapping[str, Model], data: WaveletCovariance) -> list[Sharing]:
     """Sharing of each pair of channels whose models have slow terms.
 
-    Pairs of less than two degrees of freedom are left out.
+    Pairs whose correlation is not known to `tuning.LARGEST_ERROR` are left out.
     """
     slow: dict[int, FloatArray] = {}
     for place, name in enumerate(data.names):
@@ -63,14 +63,13 @@ def sharing(models: Mapping[str, Model], data: WaveletCovariance) -> list[Sharin
         grown = np.sqrt((1.0 + data.change[:, a]) * (1.0 + data.change[:, b]))
         shape = np.sqrt(slow[a] * slow[b])
         weighted = np.linalg.solve(form[a, b] * np.outer(grown, grown), shape)
-        dof = float(weighted @ shape)
-        if dof < 2.0:
+        information = float(weighted @ shape)
+        error = 1.0 / np.sqrt(max(information, 1e-300))
+        if error > tuning.LARGEST_ERROR:
             continue
-        estimate = float(weighted @ data.values[:, a, b]) / dof
-        bounded = min(abs(estimate), 1.0 - 1e-9)
-        statistic = bounded * np.sqrt((dof - 1.0) / (1.0 - bounded**2))
-        p_value = float(2.0 * student.sf(statistic, dof - 1.0))
-        found.append(Sharing(data.names[a], data.names[b], estimate, dof, p_value))
+        estimate = float(weighted @ data.values[:, a, b]) / information
+        p_value = 2.0 * float(norm.sf(abs(estimate) / error))
+        found.append(Sharing(data.names[a], data.names[b], estimate, error, p_value))
     return found
 
 
