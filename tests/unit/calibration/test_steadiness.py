@@ -116,6 +116,12 @@ def test_a_line_of_the_model_is_no_slow_noise():
     assert found(model, white(1) + walk(1) + line) is None
 
 
+def test_a_line_is_subtracted_from_the_block_means_whatever_its_phase():
+    line = 3e-3 * np.sin(2.0 * np.pi * TIME / 170.3 + 0.7)
+    means = Means.of(gmwm.wavelet_variance(white(1) + line, dt=1.0 / RATE), 512)
+    assert np.std(_rest(means, [1.0 / 170.3], ()).blocks) < 0.05 * np.std(means.blocks)
+
+
 def test_a_step_that_was_found_is_no_slow_noise():
     values = white(2) + walk(2, 2e-6) + 3e-4 * (TIME > 1234.0)
     known = Departure("step", (1234.0, 1230.0, 1238.0), (3e-4, 2.9e-4, 3.1e-4), 1e9, 0.5)
