@@ -75,7 +75,7 @@ def _values(case):
     """Which value of each of its parametrizations a case has."""
     values = []
     for mark in case.iter_markers("parametrize"):
-        names = mark.args[0]
+        names = mark.kwargs["argnames"] if not mark.args else mark.args[0]
         names = names.split(",") if isinstance(names, str) else names
         values.append(tuple(id(case.callspec.params[name.strip()]) for name in names))
     return tuple(values)
