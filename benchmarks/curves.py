@@ -12,8 +12,9 @@ resonances add, whose humps cross that slope by chance.
 
 ``samples``: a model of the structure of each axis, evident departures subtracted, is fitted to the
 curve at octaves without the first two and the last and at 92 log-spaced averaging times. Printed
-are N and K of the sensor and of a filter for 60 s over those of the fit to samples, in per cent; a
-star is before those of a fit that is marked not valid.
+are N and K of the sensor and of a filter for 60 s, and the error of angle or velocity that these
+predict at its end, over those of the fit to samples, in per cent; a star is before those of a fit
+that is marked not valid.
 
 ``stored``: the -1/2 line of curves of imu_utils, or of R's packages wv and avar, by sensor and
 axis, what is selected, and whether larger models fit worse than their parts.
@@ -26,6 +27,7 @@ from __future__ import annotations
 import argparse
 import itertools
 import json
+import math
 import warnings
 from collections import Counter
 from collections.abc import Iterator
@@ -46,6 +48,7 @@ from gmwm import (
 )
 from gmwm.calibration import axis_numbers
 from gmwm.errors import InputError
+from gmwm.filter_numbers import AxisFilterNumbers
 
 SLOPE, MANY, HORIZON = 0.05, 92, 60.0
 LADDER = ("N", "N + K", "N + GM", "N + GM + K", "N + GM + GM", "N + GM + GM + K")
@@ -74,7 +77,12 @@ def line(tau: np.ndarray, deviation: np.ndarray) -> tuple[float, int]:
 
 def change(value: float, other: float) -> str:
     """Per cent above another."""
-    return f"{100.0 * (value / other - 1.0):+8.1f}" if value > 0.0 < other else f"{'-':>8}"
+    return f"{100.0 * (value / other - 1.0):+9.1f}" if value > 0.0 < other else f"{'-':>9}"
+
+
+def predicted(numbers: AxisFilterNumbers) -> float:
+    """Error of angle or velocity that a filter predicts at the end of the horizon."""
+    return math.sqrt(numbers.N**2 * HORIZON + numbers.K**2 * HORIZON**3 / 3.0)
 
 
 def of_lines(options: argparse.Namespace) -> None:
@@ -104,8 +112,9 @@ def without(recording: gmwm.Recording, sensor: str) -> gmwm.Recording:
 def of_samples(options: argparse.Namespace) -> None:
     """A row for each axis, of curves and of what was found of the samples."""
     warnings.simplefilter("ignore", gmwm.FitWarning)
-    print("per cent  octaves [2:-1]: sensor   filter, 60 s  92 times: sensor         filter, 60 s")
-    print(f"{'axis':8}" + 2 * f"  {'N':>8}{'K':>8}{'N':>8}{'K':>8}")
+    heads = ("sensor N", "K", "filter N", "K", "error")
+    print("per cent: at octaves [2:-1], then at 92 times")
+    print(f"{'axis':8}" + 2 * ("  " + "".join(f"{head:>9}" for head in heads)))
     for file in options.files:
         recording = gmwm.read(
             file, rate=options.rate, units={"gyro": options.gyro, "accel": options.accel}
@@ -135,6 +144,7 @@ def of_samples(options: argparse.Namespace) -> None:
                 cells += " " + (" " if other.valid else "*")
                 cells += change(new.N.value, own.N.value) + change(new.K.value, own.K.value)
                 cells += change(filters.N, bound.N) + change(filters.K, bound.K)
+                cells += change(predicted(filters), predicted(bound))
             print(f"{name:8}{cells}", flush=True)
 
 
@@ -177,7 +187,7 @@ def of_stored(options: argparse.Namespace) -> None:
     """A row for each axis of stored curves."""
     warnings.simplefilter("ignore", gmwm.FitWarning)
     print("at: times on the -1/2 line; N: of the sensor over that of the line, %; larger: rise of")
-    print("the discrepancy from a model to a larger one, at most, % (zero: never worse)")
+    print("the discrepancy from a model to a larger one, at most, % (<= 0: never worse)")
     print("sensor, axis              at         N   larger  fit, and what is selected")
     for sensor, name, curve in stored(options.files[0]):
         N, many = line(curve.tau, np.sqrt(2.0 * curve.variance))
