@@ -15,6 +15,7 @@ from itertools import product
 import numpy as np
 
 from gmwm._core import checks
+from gmwm._core.spool import alike, release, windows
 from gmwm._core.typing import FloatArray
 from gmwm.calibration import tuning
 from gmwm.calibration.curve import MOST_POWER, BiasCurve, Covariate, Regressor
@@ -173,10 +174,14 @@ class Design:
     def without(self, channel: Channel, place: int) -> Channel:
         """A channel of a recording less the first curve."""
         curve, time = self.removed @ self.columns[place], self.nodes[place].time
-        values = np.array(channel.values, dtype=float)
-        # A sample stands for its interval, as the nodes do.
-        values -= np.interp(channel.dt * (np.arange(values.size) + 0.5), time, curve)
-        return replace(channel, values=values)
+        left = alike(channel.values, channel.n)
+        for part in windows(channel.n):
+            # A sample stands for its interval, as the nodes do.
+            middles = channel.dt * (np.arange(part.start, part.stop) + 0.5)
+            left[part] = channel.values[part] - np.interp(middles, time, curve)
+            release(channel.values)
+            release(left)
+        return replace(channel, values=left)
 
     def beside(self, wv: WaveletVariance, place: int) -> WaveletVariance:
         """The wavelet variance of such a channel with the regressors."""
@@ -206,7 +211,7 @@ def designs_of(recordings: Sequence[Recording], given: Sequence[Wanted]) -> dict
     scales = tuple(_scale(recordings[0], nodes, name) for name in names)
     found = {}
     for name in dict.fromkeys(c.name for each in recordings for c in each.inertial):
-        if not recordings[0].get(name, recordings[-1].get(name)).is_constant:
+        if not next(each[name] for each in recordings if name in each).is_constant:
             found[name] = _design(name, recordings, given, nodes, scales)
     return found
 

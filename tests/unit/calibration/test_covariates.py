@@ -1,10 +1,13 @@
 """Curves against covariates, estimated beside the noise."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import gmwm
 from gmwm import RandomWalk, WhiteNoise
+from gmwm._core.spool import Spool, is_spooled
 from gmwm.calibration.covariates import designs_of, wanted
 
 N, K, SIZE, DT = 1e-3, 5e-5, 2048, 0.5
@@ -116,6 +119,28 @@ def test_a_curve_leaves_nothing_of_a_clean_channel():
     design = designs_of([rec], wanted({"temperature": "cubic"}))["gyro_x"]
     left = design.without(rec["gyro_x"], 0).values
     assert np.std(left[8:-8]) < 1e-3 * np.std(cubic(temperature))
+
+
+def test_channels_of_two_rates_have_curves():
+    fast, slow = recording(4), recording(5, temperature=warm_up()[::2], size=SIZE // 2)
+    other = replace(slow["gyro_x"], name="gyro_y", dt=2.0 * DT)
+    rec = replace(fast, channels=(*fast.channels, other))
+    cal = calibrated(rec)
+    for curve in cal.curves.values():
+        difference, error = off(curve, np.linspace(curve.main.low, curve.main.high, 8))
+        assert np.all(np.abs(difference) < 2.0 * error)
+    assert sorted(cal.curves) == ["gyro_x", "gyro_y"]
+
+
+def test_samples_on_disk_stay_there():
+    rec = recording()
+    spool = Spool(1)
+    spool.append(rec["gyro_x"].values[:, None])
+    on_disk = replace(rec["gyro_x"], values=spool.array()[:, 0])
+    design = designs_of([rec], wanted({"temperature": "cubic"}))["gyro_x"]
+    left = design.without(on_disk, 0).values
+    assert is_spooled(left)
+    np.testing.assert_array_equal(left, design.without(rec["gyro_x"], 0).values)
 
 
 def test_without_covariates_nothing_changes(result):
