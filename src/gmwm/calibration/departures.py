@@ -123,8 +123,8 @@ class _Shape:
 def _shapes(means: Means, axes: _Axes) -> list[_Shape]:
     """All departures that are looked for, and a straight drift of the whole record.
 
-    Steps at all edges and middles of blocks; transients with a time constant of one block to a
-    third of the record; straight drifts that end after four blocks to two thirds of it; periods of
+    Steps at all edges and middles of blocks; transients with a time constant of one block to
+    the record; straight drifts that end after four blocks to two thirds of it; periods of
     twice the record to a 24th of it, since faster ones are lines.
     """
     count, length = means.blocks.size, float(means.blocks.size)
@@ -132,7 +132,7 @@ def _shapes(means: Means, axes: _Axes) -> list[_Shape]:
     at = 0.5 * np.arange(2.0, 2.0 * count - 1.0)
     constants, ends = (
         np.geomspace(low, high, round(np.log(high / low) / np.log(tuning.RATIO_OF_TIMES)) + 1)
-        for low, high in ((1.0, length / 3.0), (4.0, length * 2.0 / 3.0))
+        for low, high in ((1.0, length), (4.0, length * 2.0 / 3.0))
     )
     periods = length / np.arange(tuning.FEWEST_CYCLES, tuning.MOST_CYCLES, 0.25)
     tau, end, period = constants[:, None], ends[:, None], periods[:, None]

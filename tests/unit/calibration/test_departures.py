@@ -43,6 +43,16 @@ def recording(x, rate=1.0 / DT):
     return Recording.from_arrays({"gyro_x": x}, rate, {"gyro": "rad/s"}, source="bench.csv")
 
 
+@pytest.mark.parametrize("seed", [1, 2, slow(3)])
+def test_a_settling_slower_than_a_third_of_the_record_is_found(seed):
+    """It was a valid random walk, or a drift that ends."""
+    time = np.arange(1800.0)
+    x = np.random.default_rng([91001, seed]).standard_normal(1800) + 3.0 * np.exp(-time / 1200.0)
+    (found,) = departures(fitted(1e-4 * x))
+    assert found.kind == "transient"
+    assert found.time[1] <= 1200.0 <= found.time[2]
+
+
 @pytest.mark.parametrize(("size", "seed"), [(0.5, 1), slow(-1.0, 2), (-1.0, 1), (3.0, 3)])
 def test_a_step_is_found_with_its_size(size, seed):
     # It passes for a random walk: no test of the wavelet variances fails.

@@ -200,7 +200,9 @@ class Fit(Document, Printed):
         """Confidence intervals that stay in the parameters' ranges.
 
         See `gmwm.estimate.result.estimate.confidence_interval`. An amplitude that is not
-        significantly above zero has the interval from zero to its 95 % upper limit.
+        significantly above zero has the interval from zero to its 95 % upper limit. Beside a rate
+        ramp, those of R and of a faint K average over random walks of all sizes, see
+        `gmwm.estimate.problem.walks`.
 
         Parameters
         ----------
