@@ -77,6 +77,7 @@ def test_a_clock_that_runs_slow(vehicle):
     assert "multiply the IMU's times by 1.02" in fault.hint
 
 
+@pytest.mark.slow
 def test_leap_seconds_and_an_outlier():
     """The filter of such stamps is lost, and is aligned anew; other times stay the log's."""
     navigated = found(201, "leap seconds", "one far")
@@ -220,7 +221,7 @@ def test_an_imu_mounted_rotated():
 @pytest.mark.parametrize(
     ("kind", "signs", "shown"),
     [("gyro", (-1, -1, -1), (0, 0, -1)), slow("accel", (-1, -1, -1), (-1, -1, -1)),
-     ("accel", (1, -1, -1), (1, -1, -1))],
+     slow("accel", (1, -1, -1), (1, -1, -1))],
 )  # fmt: skip
 def test_axes_that_point_the_other_way_are_no_noise(kind, signs, shown):
     """A car on level roads shows the sign of its yaw rate alone."""
