@@ -11,6 +11,7 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
+from typing import Literal
 
 import numpy as np
 
@@ -48,7 +49,8 @@ class Wanted:
     def of(cls, name: str, text: str) -> Wanted:
         """Parse words such as "cubic, lag 120 s"."""
         words = [word.strip() for word in str(text).lower().split(",")]
-        degrees, constants = None, () if name != "settling" else None
+        degrees: tuple[int, ...] | None = None
+        constants: tuple[float, ...] | None = () if name != "settling" else None
         for word in words:
             time = _TIME.search(word)
             if name != "settling" and word in _DEGREES:
@@ -70,7 +72,7 @@ class Wanted:
 
     def choices(self, length: float) -> Iterable[tuple[Regressor, ...]]:
         """Regressors to choose from, for records of a length, s."""
-        kind = "settling" if self.name == "settling" else "lag"
+        kind: Literal["settling", "lag"] = "settling" if self.name == "settling" else "lag"
         times: Sequence[float] = self.constants or ()
         if self.constants is None:
             times = np.geomspace(*tuning.LAGS, tuning.LAG_STEPS).tolist()
@@ -112,10 +114,12 @@ class Nodes:
         """Means of parts of a recording, interpolated where samples are missing."""
         parts = min(tuning.NODES, recording.n // tuning.SHORTEST_NODE)
         step = recording.duration / max(parts, 1)
-        time, rows = step * (np.arange(parts) + 0.5), {}
+        time = np.asarray(step * (np.arange(parts) + 0.5), dtype=float)
+        rows: dict[str, FloatArray] = {}
         for name in names:
             channel = _channel_of(recording, name)
-            own = np.arange(recording.n) * recording.dt if channel is None else channel.values
+            when = recording.dt * np.arange(recording.n, dtype=float)
+            own = when if channel is None else channel.values
             dt = recording.dt if channel is None else channel.dt
             size = max(int(own.size // max(parts, 1)), 1)
             means = block_means([own], size, 0.0)[:, 0]

@@ -186,7 +186,8 @@ class BiasCurve(Document, Printed):
                 powers[each.power] += value / one.half**each.power
         shift = np.array([(one.centre if reference is None else reference) - one.centre, 1.0])
         found = np.polynomial.Polynomial(powers)(np.polynomial.Polynomial(shift)).coef
-        return np.pad(found, (0, powers.size - found.size))[: max(self.degree, 0) + 1]
+        padded = np.pad(found, (0, powers.size - found.size))[: max(self.degree, 0) + 1]
+        return np.asarray(padded, dtype=float)
 
     @property
     def degree(self) -> int:

@@ -63,8 +63,9 @@ class RegressorPart:
             # Sums over the blocks after an edge, then over the differences before a block.
             sums = np.cumsum(edges[:, :0:-1], axis=1)[:, ::-1]
             response[j] = -np.cumsum(sums, axis=1)[:, :-1]
-        for j in range(coarse[0] if coarse.size else 0):  # a smooth curve is straight there
-            products[j] = products[coarse[0]] * (steps[j] / steps[coarse[0]]) ** 2
+        first = int(coarse[0]) if coarse.size else 0
+        fine = (steps[:first] / steps[first]) ** 2  # a smooth curve is straight there
+        products[:first] = products[first] * fine[:, None, None]
         return products[..., :p], products[..., p], response
 
 

@@ -205,7 +205,8 @@ def pilot(regressors: Regressors) -> tuple[Coefficients, float]:
             restricted(white + ratio * walk, *_rows(part))
             for part, (white, walk) in zip(regressors.parts, pairs, strict=True)
         ]
-        information, score = (np.sum([fit[k] for fit in fits], axis=0) for k in (0, 1))
+        information = np.sum([fit[0] for fit in fits], axis=0)
+        score = np.sum([fit[1] for fit in fits], axis=0)
         inverse = _inverse(information)
         values = inverse @ score
         squares = sum(fit[2] for fit in fits) - float(values @ score)
