@@ -151,7 +151,13 @@ def ratios(first, found, channel: str, a: int, b: int) -> list[float]:
     predicted = [
         both(lambda imu, *_: first.curve(imu, channel).variance),
         both(lambda *which: apart(first, *which)),
-        both(lambda *which: by_class(first, found, lambda result: apart(result, *which))),
+        both(
+            lambda *which: (
+                by_class(first, found, lambda result: apart(result, *which))
+                if len(first.classes) == 3
+                else apart(first, *which)
+            )
+        ),
         both(lambda imu, *_: first.curve(imu, channel).static),
     ]
     used, inside = (tau >= 0.06) & (tau < 5.0), (tau >= 0.1) & (tau <= 1.1)
@@ -167,7 +173,8 @@ def predict(folder: Path, args: argparse.Namespace) -> None:
           "1 s of numbers that bound")  # fmt: skip
     for (name, numbers), half in product(SESSIONS.items(), (0, 1)):
         first = gmwm.motion([flight(folder, n) for n in numbers[half::2]], static=static)
-        limits = [each.high for each in first.classes[:-1]]
+        # A class of less than 5 s is none.
+        limits = [each.high for each in first.classes[:-1]] if len(first.classes) == 3 else None
         for number in numbers[1 - half :: 2]:
             found = gmwm.motion(flight(folder, number), limits=limits)
             for sensor in ("gyro", "accel"):
