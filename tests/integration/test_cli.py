@@ -123,9 +123,13 @@ def test_example_of_calibrate_works(run, tmp_path, no_pages):
     for name in ("static", "a", "b"):
         columns = {name: rng.normal(size=500) for name in names}
         write_csv(tmp_path / f"{name}.csv", columns)
+    units = {"gyro_x": "gyro_x [rad/s]", "accel_x": "accel_x [m/s^2]"}
+    columns = {"time [s]": 0.01 * np.arange(500), **{units[n]: columns[n] for n in names}}
+    columns["temp [degC]"] = np.linspace(20.0, 30.0, 500)
+    write_csv(tmp_path / "chamber.csv", columns)
     shown = CliRunner().invoke(cli.cli, ["calibrate", "--help"]).output
     lines = re.findall(r"^ +gmwm (calibrate .*)$", shown, re.MULTILINE)
-    assert len(lines) == 3
+    assert len(lines) == 4
     for line in (line for line in lines if ".csv" in line):
         code, printed, told = run(*line.split())
         assert code == 0, told
