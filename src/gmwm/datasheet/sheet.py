@@ -299,15 +299,12 @@ class Datasheet(InUnits):
                 for kind in (_kind(label), "all"):
                     by_kind.setdefault(kind, []).append(found)
             by_kind["all"] = by_kind.pop("all")
-            known = [shown_unit(key, quantity, units) for key in "NK"]
-            rows = []
-            for kind, same in by_kind.items():
-                values = zip([[e.N for e in same], [e.K for e in same]], known, strict=True)
-                rows.append((kind, *(_ends(each, scale) for each, (_, scale) in values)))
-            heads = (
-                sensor,
-                *(f"{key}, {unit}" for key, (unit, _) in zip("NK", known, strict=True)),
-            )
+            shown = {key: shown_unit(key, quantity, units) for key in "NK"}
+            rows = [
+                (kind, *(_ends([getattr(e, k) for e in same], shown[k][1]) for k in shown))
+                for kind, same in by_kind.items()
+            ]
+            heads = (sensor, *(f"{key}, {unit}" for key, (unit, _) in shown.items()))
             parts.append(plain_table(heads, rows).rstrip())
         return "\n\n".join(parts)
 

@@ -13,7 +13,7 @@ from scipy.optimize import linear_sum_assignment
 
 from gmwm._core.text import brief
 from gmwm._core.units import customary_unit, field_units
-from gmwm.estimate.problem import Slope
+from gmwm.estimate.problem import Coefficients
 from gmwm.estimate.result import Fit
 from gmwm.issues import Notice, notice
 from gmwm.process import Model, Process
@@ -50,7 +50,7 @@ def ranges(fitted: Fit, others: Sequence[Fit], level: float = 0.95) -> Ranges:
     return result
 
 
-def ramp_or_walk(fitted: Fit, slope: Slope) -> Notice:
+def ramp_or_walk(fitted: Fit, slope: Coefficients) -> Notice:
     """That a straight drift describes the slow part as well as the walk that was chosen."""
     wv = fitted.wv
     texts = []
