@@ -191,6 +191,12 @@ class GMWM:
             found = end(value)
             if found is not None and level.value == 0.0:
                 break
+        if found is not None and found.discrepancy > 0.0 and len(first) > 1:
+            # What no mixture follows is followed by the model itself: its own weights may need none.
+            level.value = 0.0
+            again = _iterate(problem, found.statistical, level) or found
+            found = min(found, again, key=lambda each: each.discrepancy)
+            level.value = found.discrepancy
         is_large = self.discrepancy is None and level.value > tuning.DISCREPANCY_LARGE
         if found is not None and is_large:
             other = end(tuning.DISCREPANCY_NOTABLE) or found
