@@ -343,7 +343,7 @@ def read_json(path: str | os.PathLike[str]) -> Any:
         return from_json(text, allow_inf_nan=False)
     except ValueError as error:
         which = checks.line(str(error))
-        raise InputError(f"{path}: is not JSON ({which}): give a file that was saved") from None
+        raise InputError(f"{path}: is not JSON ({which}): give a file that gmwm saved") from None
 
 
 def read_yaml(path: str | os.PathLike[str]) -> Any:

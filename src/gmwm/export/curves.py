@@ -14,7 +14,8 @@ import numpy as np
 from gmwm._core.files import toml_beside
 from gmwm.calibration import BiasCurve, Calibration
 from gmwm.errors import InputError
-from gmwm.export.target import comment, compiled_template, plain, wrapped
+from gmwm.export.imu import not_valid, reason
+from gmwm.export.target import comment, compiled_template, not_valid_line, plain, wrapped
 
 _LETTERS = "xyz"
 _CUBIC = 3
@@ -57,6 +58,8 @@ class CurveFile:
         sources = ", ".join(dict.fromkeys(each.source for each in given if each.source))
         lines = wrapped(plain(f"{self.title}: {sources or 'a recording'}"))
         lines += wrapped(self.convention)
+        invalid = {name: reason(each) for name, each in not_valid(given).items()}
+        lines += [not_valid_line(invalid)] if invalid else []
         if lost := sorted({r.title for c in curves.values() for r in c.regressors if r.constant}):
             lines += wrapped(f"left out, as at a steady temperature: {', '.join(lost)}")
         body = compiled_template(self.template).render(

@@ -153,7 +153,7 @@ def with_thermometer(recording: Recording, table: Table) -> Recording:
     added = found.channels[len(recording.channels) :]
     if not added or all(channel.missing == channel.n for channel in added):
         raise InputError(
-            f"{table.source}: no temperatures during the recording: give columns such as "
+            f"{table.source}: no temperature falls within the recording: give columns such as "
             "'time [s]' and 'temperature [degC]', with times from its first sample"
         )
     return found

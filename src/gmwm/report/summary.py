@@ -116,9 +116,9 @@ def verdict_line(calibration: Calibration) -> str:
 
 
 def curve_lines(calibration: Calibration) -> list[str]:
-    """What was removed beside the noise: the change of each channel over its covariate."""
+    """Curves that were subtracted: the change of each channel over its covariate."""
     return [
-        f"Removed beside the noise, change over {what} (+-: 95 %): "
+        f"Curves subtracted, change over {what} (+-: 95 %): "
         f"{', '.join(each.sentence() for each in curves)}"
         for what, curves in curves_by_covariate(calibration.curves).items()
     ]

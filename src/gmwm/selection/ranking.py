@@ -81,7 +81,7 @@ class Choices:
                     "amplitude, as in [Sinusoid(frequency=0.5)]"
                 )
         if any(all(term.is_drift for term in model.terms) for model in self.models):
-            raise InputError('the candidate R is no noise: add one, as in "N + R"')
+            raise InputError('the candidate R has no noise term: add one, as in "N + R"')
 
     def seeing(self, wv: WaveletVariance) -> Choices:
         """The choices with the sensor's low-pass, if these wavelet variances show one."""

@@ -192,7 +192,7 @@ class GMWM:
             if found is not None and level.value == 0.0:
                 break
         if found is not None and found.discrepancy > 0.0 and len(first) > 1:
-            # What no mixture follows is followed by the model itself: its own weights may need none.
+            # What no mixture follows the model itself may follow, under its own weights.
             level.value = 0.0
             again = _iterate(problem, found.statistical, level) or found
             found = min(found, again, key=lambda each: each.discrepancy)

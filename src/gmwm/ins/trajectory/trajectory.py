@@ -43,7 +43,7 @@ def unwrapped_angles(rpy: FloatArray) -> FloatArray:
         raise InputError(
             f"{('roll', 'pitch', 'yaw')[column]} turns by "
             f"{np.degrees(steps[row, column]):.0f} deg from epoch {row} to {row + 1}: give "
-            "attitudes that stay away from a pitch of +-90 deg, at a rate that follows the turns"
+            "attitudes at a higher rate, with pitch away from +-90 deg"
         )
     return result
 

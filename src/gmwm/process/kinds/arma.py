@@ -142,7 +142,7 @@ class ARIMA(Process):
     def haar_variance(self, tau: FloatArray, dt: float) -> FloatArray:
         if self.d > 1:
             raise InputError(
-                f"{self!r}: the Haar wavelet variance exists up to one integration, d = {self.d} "
+                f"{self!r}: the Haar wavelet variance exists for d = 0 and 1 only, d = {self.d} "
                 "is more"
             )
         tau = np.asarray(tau, dtype=float)
