@@ -182,7 +182,7 @@ BAD = {
     "filter: blank name": ({"filters": {" ": "truth"}}, "cannot be a name"),
     "filter: control": ({"filters": {"a\tb": "truth"}}, "cannot be a name"),
     "filter: endless name": ({"filters": {"a" * 41: "truth"}}, "cannot be a name"),
-    "filter: reduced key": ({"filters": {"a": {"reduce": "N+K", "to": 1}}}, "'to' is unknown"),
+    "filter: unknown key": ({"filters": {"a": {"reduce": "N+K"}}}, "'reduce' is unknown"),
     "filter: flicker": (
         {"filters": {"a": {"gyro": {"B": "1 deg/h"}, "accel": {"N": 1}}}},
         "filters, a, gyro_x: BiasInstability.*approximate it by Gauss-Markov",

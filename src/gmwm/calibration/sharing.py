@@ -61,13 +61,17 @@ def sharing(models: Mapping[str, Model], data: WaveletCovariance) -> list[Sharin
     found = []
     for a, b in combinations(slow, 2):
         grown = np.sqrt((1.0 + data.change[:, a]) * (1.0 + data.change[:, b]))
-        shape = np.sqrt(slow[a] * slow[b])
-        weighted = np.linalg.solve(form[a, b] * np.outer(grown, grown), shape)
-        information = float(weighted @ shape)
-        error = 1.0 / np.sqrt(max(information, 1e-300))
-        if error > tuning.LARGEST_ERROR:
+        deviation = np.sqrt(np.diag(form[a, b]))  # levels of any unit are weighed alike
+        if not np.all(deviation > 0.0):
             continue
-        estimate = float(weighted @ data.values[:, a, b]) / information
+        shape = np.sqrt(slow[a] * slow[b]) / (deviation * grown)
+        correlation = form[a, b] / np.outer(deviation, deviation)
+        weighted = np.linalg.pinv(correlation, hermitian=True) @ shape
+        information = float(weighted @ shape)
+        if information * tuning.LARGEST_ERROR**2 < 1.0:
+            continue
+        error = 1.0 / np.sqrt(information)
+        estimate = float(weighted @ (data.values[:, a, b] / (deviation * grown))) / information
         p_value = 2.0 * float(norm.sf(abs(estimate) / error))
         found.append(Sharing(data.names[a], data.names[b], estimate, error, p_value))
     return found
