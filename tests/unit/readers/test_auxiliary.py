@@ -168,5 +168,5 @@ def test_temperatures_of_another_file(tmp_path):
     found = with_thermometer(recording, open_tables(path, Wanted())[0])
     np.testing.assert_allclose(found["temperature"].values, 26.85 + np.arange(1000) / 60.0)
     path.write_text("time [min],temperature [K]\n100,300\n101,310\n102,320\n")
-    with pytest.raises(InputError, match="no temperatures during the recording"):
+    with pytest.raises(InputError, match="no temperature falls within the recording"):
         with_thermometer(recording, open_tables(path, Wanted())[0])

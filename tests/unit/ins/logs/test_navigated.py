@@ -266,7 +266,9 @@ def test_the_command_writes_the_solution_and_a_report(run, monkeypatch):
         "gyro_x: white noise N 0.3333 deg/sqrt(h); Gauss-Markov sigma 20 deg/h, tau 100 s; "
         "bias at switch-on 0.1 deg/s"
     ) in page
-    assert page.index("Predicted accuracy") < page.index("<li>levelled on 20 s at rest, from 0 s")
+    assert page.index("Predicted accuracy") < page.index(
+        "<li>initial roll and pitch from 20 s at rest, from 0 s"
+    )
 
 
 def test_the_command_without_a_file(run, no_pages):
