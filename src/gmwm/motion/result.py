@@ -208,8 +208,9 @@ class InMotion(Document, Printed):
     def envelope(
         self, channel: str, imu: str | None = None, *, upper: bool = False
     ) -> tuple[FloatArray, FloatArray]:
-        """Averaging times (s), and the largest Allan variance of a channel (u^2), of which none is
-        below the one at rest.
+        """Averaging times (s), and the largest Allan variance of a channel (u^2).
+
+        It is nowhere below the one at rest.
 
         Parameters
         ----------
