@@ -283,7 +283,7 @@ def _with_doubtful_terms(
 
     @lru_cache
     def is_needed(i: int) -> bool:
-        if not fit.goodness.describes_all:
+        if fit.goodness.is_excluded:
             return False
         reduced = without(i)
         return reduced is not None and reduced.goodness.loses_to(fit.goodness)

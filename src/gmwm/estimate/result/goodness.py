@@ -154,21 +154,28 @@ class Goodness:
         return self.largest_p < tuning.EXCLUDED_P
 
     @property
+    def missed(self) -> BoolArray:
+        """Levels that are missed as one in a hundred right models does, or `is_poor` at, (J,)."""
+        if not self.is_tested:
+            return np.zeros(self.tau.size, dtype=bool)
+        levels = max(np.count_nonzero(~np.isnan(self.allowed)), 1)
+        limit = norm.isf(-0.5 * np.expm1(np.log1p(-tuning.REDUNDANT_P) / levels))
+        poor = np.abs(self.misfit) > tuning.POOR_DEVIATION
+        poor &= np.abs(self.residual) > tuning.BEYOND_CHANCE
+        return np.asarray(poor | (np.abs(self.judged) > limit))
+
+    @property
     def misses_a_level(self) -> bool:
-        """Whether the model misses a level as one in a hundred right models does, or `is_poor`."""
-        return self.largest_p < tuning.REDUNDANT_P or self.is_poor
+        """Whether there is one of `missed`."""
+        return bool(np.any(self.missed))
 
     def loses_to(self, larger: Goodness) -> bool:
         """Whether it misses an averaging time that a larger model describes.
 
-        Both may still have an equal sum of squares over all levels.
+        Both may still have an equal sum of squares over all levels, and what both miss elsewhere
+        is no reason against the larger one unless that excludes it.
         """
-        return self.misses_a_level and larger.describes_all
-
-    @property
-    def describes_all(self) -> bool:
-        """Whether no level is missed, to one in a hundred."""
-        return self.largest_p >= tuning.REDUNDANT_P and not self.is_poor
+        return not larger.is_excluded and bool(np.any(self.missed & ~larger.missed))
 
     @property
     def sentence(self) -> str:

@@ -137,8 +137,8 @@ def test_levels_that_few_right_models_miss(p, excluded, misses):
     found = goodness([0.0] * (size - 1) + [stats.norm.isf(0.5 * one)], misfit=0.05)
     assert found.largest_p == pytest.approx(p)
     assert (found.is_excluded, found.misses_a_level) == (excluded, misses)
-    assert found.describes_all is not misses
-    right = goodness([0.0, 0.1])
+    assert found.missed.tolist() == [False] * (size - 1) + [misses]
+    right = goodness([0.1] * size)
     assert found.loses_to(right) is misses and not right.loses_to(found)
     assert not found.loses_to(found)
     notices = missed_level_notices(found)
@@ -148,6 +148,13 @@ def test_levels_that_few_right_models_miss(p, excluded, misses):
         assert notice.values["p_value"] == pytest.approx(p) and "above the model" in notice.text
         (below,) = missed_level_notices(goodness(-found.residual, misfit=0.05))
         assert "below the model" in below.text
+
+
+def test_a_level_that_both_models_miss_by_chance_decides_nothing():
+    """At 1.28 s by 3.8 errors, and N alone lies by that much lower there: K was not needed."""
+    without, both = goodness([0.0, 2.5, 0.0, 3.9]), goodness([0.0, 3.5, 0.0, 1.0])
+    assert without.loses_to(both)
+    assert not without.loses_to(goodness([0.0, 4.5, 0.0, 1.0]))  # which is excluded
 
 
 @pytest.mark.parametrize(
