@@ -257,10 +257,7 @@ def _design(
             for place in places
         }
         own = tuple(
-            RegressorPart(
-                _merged(means[k]), _merged(rows[k]), channels[k].n // _merged(means[k]).size, weight
-            )
-            for k in places
+            RegressorPart(means[k], rows[k], channels[k].n // means[k].size, weight) for k in places
         )
         regressors = Regressors(own, np.zeros(len(chosen)), np.ones(1), channels[places[0]].dt)
         found, likelihood = pilot(regressors)
@@ -273,10 +270,3 @@ def _design(
     columns = tuple(np.array([each.columns(one, known) for one in chosen]) for each in nodes)
     left = [np.nanmean(means[k] - removed @ columns[k]) for k in places]
     return Design(name, scales, chosen, nodes, columns, removed, float(np.mean(left)))
-
-
-def _merged(rows: FloatArray) -> FloatArray:
-    """Means of neighbouring nodes: few enough that many curves are tried quickly."""
-    merged = -(-rows.shape[-1] // tuning.PILOT_NODES)
-    whole = rows[..., : rows.shape[-1] // merged * merged]
-    return np.asarray(whole.reshape(*rows.shape[:-1], -1, merged).mean(axis=-1))

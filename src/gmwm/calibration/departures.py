@@ -211,13 +211,6 @@ class _Noise:
         weight = np.sum(np.log(scale)) - np.sum(np.log(np.abs(np.diag(triangle))))
         return cls(scale, basis.T, float(weight))
 
-    def without_known(self, rows: FloatArray) -> FloatArray:
-        """Rows as independent numbers of one size, without what is known."""
-        white = rows * self.scale
-        if len(self.basis):
-            white -= (white @ self.basis.T) @ self.basis
-        return white
-
 
 def _noises(axes: _Axes, known: Sequence[FloatArray]) -> list[_Noise]:
     """White noise alone, with more and more of a random walk, and a random walk alone.
@@ -286,12 +279,14 @@ def _tested(shape: _Shape, data: FloatArray, noises: Sequence[_Noise]) -> _Test:
     freedom = data.size - len(noises[0].basis)
     alone, beside, fits = [], [], []
     for noise in noises:
-        series, curves = noise.without_known(data), noise.without_known(shape.rows)
+        series, curves = data * noise.scale, shape.rows * noise.scale
+        series, known = series - noise.basis.T @ (noise.basis @ series), curves @ noise.basis.T
         total = float(series @ series)
         score = curves @ series
-        information = curves @ np.swapaxes(curves, 1, 2)
+        whole = curves @ np.swapaxes(curves, 1, 2)
+        information = whole - known @ np.swapaxes(known, 1, 2)
         # What is known explains a curve that is part of it.
-        least = tuning.NO_INFORMATION * np.max(np.trace(information, axis1=1, axis2=2))
+        least = tuning.NO_INFORMATION * np.max(np.trace(whole, axis1=1, axis2=2))
         inverse = np.linalg.inv(information + least * np.eye(information.shape[-1]))
         sizes = (inverse @ score[..., None])[..., 0]
         left = np.maximum(total - np.sum(score * sizes, axis=1), tuning.NO_INFORMATION * total)

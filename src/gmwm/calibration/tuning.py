@@ -70,7 +70,6 @@ SPANNED = 1e-6  # of the largest singular value: smaller ones are not independen
 # -- covariates -----------------------------------------------------------------------------------
 
 NODES, SHORTEST_NODE = 512, 8  # means of a recording that hold its covariates; samples of one
-PILOT_NODES = 256  # of these, by which a degree and time constants are chosen
 MOST_DEGREE = 3  # chosen automatically: autopilots hold no more
 LAGS, LAG_STEPS, LONGEST_LAG = (20.0, 3000.0), 10, 0.33  # s; a slower one looks like a drift
 SCALED_PARTS, STEPS_OF_PART = 64, 16  # of a recording, and differences of short means in one

@@ -93,7 +93,7 @@ class Regressors:
         columns: Each regressor at the middles of ``wv.blocks``.
         removed: (p,), coefficients whose curve has been subtracted from the series.
         """
-        merged = -(-wv.blocks.size // tuning.MOST_BLOCKS_WITH_GAPS)
+        merged = -(-wv.blocks.size // tuning.BLOCKS_OF_REGRESSORS)
         whole = wv.blocks.size // merged * merged
         rows = np.vstack([wv.blocks, *columns])[:, :whole]
         means = rows.reshape(len(rows), -1, merged).mean(axis=2)

@@ -59,6 +59,7 @@ LAGS_PER_OCTAVE = 12  # lags at which samples are compared, all below 24 samples
 LAGS_PER_AVERAGE = 8  # lags per averaging time at which pairs of coefficients are counted
 MOST_BLOCKS = 2048  # means of blocks from which a drift is estimated
 MOST_BLOCKS_WITH_GAPS = 512  # the same where some are missing, which needs a dense matrix of them
+BLOCKS_OF_REGRESSORS = 256  # beside which a curve is slow: a fit solves for them in each round
 
 # -- covariances by lags --------------------------------------------------------------------------
 

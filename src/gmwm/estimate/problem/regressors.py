@@ -10,7 +10,7 @@ product of the regressors' wavelet coefficients.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -21,7 +21,7 @@ from scipy.linalg import cho_factor, cho_solve, toeplitz
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.estimate import tuning
-from gmwm.process import PSD, RandomWalk, WhiteNoise
+from gmwm.process import PSD
 from gmwm.variance import RegressorPart, Regressors, WaveletVariance
 from gmwm.variance.covariance import block_density
 
@@ -170,16 +170,18 @@ class CurveRegression(Regression):
     def products(self, psd: PSD, covariance: FloatArray) -> FloatArray:
         total = np.zeros((self.wv.tau.size,) * 2)
         for part, response in zip(self.regressors.parts, self.regressors.responses, strict=True):
-            noise = response @ toeplitz(self._column(psd, part))
-            total += np.einsum("ab,jbd,kad->jk", covariance, noise, response, optimize=True)
+            seen = np.flatnonzero(np.any(response, axis=(1, 2)))
+            own = response[seen]
+            noise = covariance @ own @ toeplitz(self._column(psd, part))
+            total[np.ix_(seen, seen)] += np.tensordot(noise, own, ([1, 2], [1, 2]))
         return 0.5 * (total + total.T)
 
     def _column(self, psd: PSD, part: RegressorPart) -> FloatArray:
         return difference_covariance(psd, self.wv.dt, part.block, part.blocks.size)
 
     def _matrix(self, psd: PSD, part: RegressorPart) -> FloatArray:
-        first = _beside(part.blocks)
-        return np.asarray(toeplitz(self._column(psd, part))[np.ix_(first, first)])
+        first, matrix = _beside(part.blocks), toeplitz(self._column(psd, part))
+        return matrix if first.size == len(matrix) else matrix[np.ix_(first, first)]
 
 
 def pilot(regressors: Regressors) -> tuple[Coefficients, float]:
@@ -189,37 +191,42 @@ def pilot(regressors: Regressors) -> tuple[Coefficients, float]:
     383-385): coefficients before anything is known of the noise. The likelihood itself compares
     regressors.
     """
+    turned, noise = map(np.concatenate, zip(*_turned(regressors), strict=True))
     best, found = (-np.inf, -np.inf), Coefficients(np.zeros(0), np.zeros((0, 0)))
-    pairs = [
-        [
-            toeplitz(difference_covariance(kind.psd, 1.0, part.block, part.blocks.size))[
-                np.ix_(_beside(part.blocks), _beside(part.blocks))
-            ]
-            * float(regressors.parts[0].block) ** power
-            for kind, power in ((WhiteNoise(1.0), 1), (RandomWalk(1.0), -1))
-        ]
-        for part in regressors.parts
-    ]
     for ratio in _RATIOS:
-        fits = [
-            restricted(white + ratio * walk, *_rows(part))
-            for part, (white, walk) in zip(regressors.parts, pairs, strict=True)
-        ]
-        information = np.sum([fit[0] for fit in fits], axis=0)
-        score = np.sum([fit[1] for fit in fits], axis=0)
+        variance = noise @ [1.0, ratio]
+        products = turned.T @ (turned / variance[:, None])
+        information, score = products[:-1, :-1], products[:-1, -1]
         inverse = _inverse(information)
         values = inverse @ score
-        squares = sum(fit[2] for fit in fits) - float(values @ score)
-        size = sum(len(_beside(part.blocks)) for part in regressors.parts)
-        half = sum(fit[3] for fit in fits)
-        free = size - values.size
-        profile = -half - 0.5 * free * np.log(max(squares, np.finfo(float).tiny))
+        squares = max(float(products[-1, -1] - values @ score), np.finfo(float).tiny)
+        half, free = 0.5 * float(np.sum(np.log(variance))), variance.size - values.size
+        profile = -half - 0.5 * free * np.log(squares)
         profile -= 0.5 * float(np.linalg.slogdet(information)[1])
         if profile > best[0]:
-            plain = -half - 0.5 * size * np.log(max(squares, np.finfo(float).tiny))
-            best = (float(profile), float(plain))
+            best = (float(profile), float(-half - 0.5 * variance.size * np.log(squares)))
             found = Coefficients(values, inverse * squares / free)
     return found, best[1]
+
+
+def _turned(regressors: Regressors) -> Iterator[tuple[FloatArray, FloatArray]]:
+    """Differences of neighbouring blocks in uncorrelated directions, for each run without gaps.
+
+    White noise and a random walk correlate neighbouring differences only: their covariances are
+    tridiagonal Toeplitz matrices, which sines make diagonal.
+
+    Yields: differences of regressors and series, (D, p + 1), and variances of them by white noise
+        and by a walk, (D, 2).
+    """
+    first = float(regressors.parts[0].block)
+    for part in regressors.parts:
+        rows, place, size = np.column_stack(_rows(part)), _beside(part.blocks), part.block / first
+        for run in np.split(np.arange(place.size), np.flatnonzero(np.diff(place) > 1) + 1):
+            cosine = np.cos(np.pi * np.arange(1, run.size + 1) / (run.size + 1))
+            white, less = 2.0 - 2.0 * cosine, 1.0 / part.block**2
+            walk = (2.0 + less + (1.0 - less) * cosine) / 3.0
+            noise = np.stack([white / size, walk * size], axis=1)
+            yield fft.dst(rows[run], 1, axis=0, norm="ortho"), noise
 
 
 def restricted(
@@ -271,7 +278,7 @@ def _whitened(
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Regressors, series, and the regressors solved for the covariance."""
     x, y = _rows(part)
-    covariance = covariance + _JITTER * covariance[0, 0] * np.eye(len(covariance))
+    np.fill_diagonal(covariance, (1.0 + _JITTER) * np.diag(covariance))
     return x, y, np.asarray(cho_solve(cho_factor(covariance, lower=True), x))
 
 

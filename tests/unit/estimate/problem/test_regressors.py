@@ -111,8 +111,11 @@ def test_a_regressor_that_does_not_change_has_no_variance():
     assert found.covariance[0, 0] > 0.0
 
 
-def test_a_pilot_is_near_the_coefficients_under_the_noise():
-    wv = with_columns(NOISE.simulate(SIZE, DT, 7), CUBIC)
+@pytest.mark.parametrize("missing", [0, 100])
+def test_a_pilot_is_near_the_coefficients_under_the_noise(missing):
+    x = NOISE.simulate(SIZE, DT, 7)
+    x[700 : 700 + missing] = np.nan
+    wv = with_columns(x, CUBIC)
     exact = Moments.of(wv, as_model(NOISE)).under(as_model(NOISE)).found
     found, _ = pilot(wv.regressors)
     deviation = np.sqrt(np.diag(exact.covariance))
