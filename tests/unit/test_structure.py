@@ -117,8 +117,8 @@ def test_outsiders_import_faces_only():
 LINES = {
     "": 380, "_core": 2_310, "process": 3_220, "readers": 5_660, "plotting": 720,
     "variance": 5_060, "diagnosis": 3_340, "estimate": 8_470, "selection": 1_190,
-    "calibration": 3_050, "motion": 1_690, "datasheet": 660, "filter_numbers": 3_710, "ins": 9_780,
-    "population": 2_590, "export": 1_380, "report": 2_580, "study": 1_860, "cli": 2_360,
+    "calibration": 3_120, "motion": 1_690, "datasheet": 660, "filter_numbers": 3_710, "ins": 9_780,
+    "population": 2_590, "export": 1_390, "report": 2_610, "study": 1_860, "cli": 2_360,
 }  # fmt: skip
 """Most lines of Python of each room; only a new kind or room raises one."""
 

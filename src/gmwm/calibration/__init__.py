@@ -9,6 +9,7 @@ from gmwm.calibration.channel import (
 )
 from gmwm.calibration.curve import (
     BiasCurve as BiasCurve,
+    Covariate as Covariate,
     curves_by_covariate as curves_by_covariate,
 )
 from gmwm.calibration.departures import (

@@ -132,16 +132,8 @@ class Nodes:
 
     def columns(self, one: Regressor, scale: Mapping[str, Covariate]) -> FloatArray:
         """A regressor, (M,)."""
-        if one.kind == "settling":
-            return np.exp(-(self.time + self.start) / one.constant)
-        own, x = scale[one.covariate], self.rows[one.covariate]
-        if one.kind == "power":
-            return np.asarray(((x - own.centre) / own.half) ** one.power)
-        keep = float(np.exp(-(self.time[1] - self.time[0]) / one.constant))
-        late = x.copy()
-        for k in range(1, x.size):  # exact for a line between nodes but for its end
-            late[k] = keep * late[k - 1] + (1.0 - keep) * 0.5 * (x[k] + x[k - 1])
-        return np.asarray((late - x) / own.half)
+        name = one.covariate
+        return one.along(self.time + self.start, self.rows.get(name), scale.get(name))
 
 
 def _channel_of(recording: Recording, name: str) -> Channel | None:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 import numpy as np
+import scipy
 from annotated_types import Ge, Le
 
 from gmwm._core import checks
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
 
 MOST_POWER = 6
 
+_MARGIN = 0.02  # means of a warm-up miss 1 % of its range
 _POINTS = 101  # of a curve in tables and figures
 
 
@@ -33,7 +35,7 @@ class Covariate:
     """What a curve depends on, over the range of its recording.
 
     centre, half: Of ``u = (x - centre) / half``, which lies between about -1 and 1.
-    low, high: Range of x, beyond which the curve is unknown.
+    low, high: Range of x, in means of some samples; the curve is known `_MARGIN` of it beyond.
     """
 
     name: Text
@@ -64,6 +66,18 @@ class Regressor:
             return self.covariate + (f"^{self.power}" if self.power > 1 else "")
         return " ".join(filter(None, [self.covariate, self.kind, f"{brief(self.constant, 3)} s"]))
 
+    def along(self, time: FloatArray, x: FloatArray | None, own: Covariate | None) -> FloatArray:
+        """The regressor at even times (s, since switch-on) and values of its covariate."""
+        if x is None or own is None:
+            return np.exp(-time / self.constant)
+        if self.kind == "power":
+            return np.asarray(((x - own.centre) / own.half) ** self.power)
+        keep = float(np.exp(-(time[1] - time[0]) / self.constant))
+        # Exact for a line between the times but for its end.
+        means = (1.0 - keep) * 0.5 * (x[1:] + x[:-1])
+        late = scipy.signal.lfilter([1.0], [1.0, -keep], np.concatenate([x[:1], means]))
+        return np.asarray((late - x) / own.half)
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class BiasCurve(Document, Printed):
@@ -84,7 +98,8 @@ class BiasCurve(Document, Printed):
     spread : (k, p p) ndarray
         Errors of ``covariance`` by the errors of the noise: degrees of freedom of intervals.
     offset : float
-        Mean of the channel less the curve, u. The turn-on bias is part of it.
+        Mean of the channel less the curve, u. The turn-on bias is part of it; zero for an
+        accelerometer, where it would hold gravity.
     scaling : Scaling or None
         How the fast noise depends on the first covariate.
     """
@@ -113,6 +128,7 @@ class BiasCurve(Document, Printed):
         """That of a fit beside these regressors."""
         found, wv = CurveCoefficients.of(fit), fit.wv
         numbers = (found.values, found.covariance, found.spread)
+        offset = 0.0 if wv.quantity == "accel" else offset
         return cls(wv.name, wv.quantity, wv.unit, covariates, regressors, *numbers, offset)
 
     @property
@@ -127,19 +143,65 @@ class BiasCurve(Document, Printed):
         Raises InputError for values outside the range of the recording, or an unknown covariate.
         """
         one = self._covariate(of)
-        x = np.atleast_1d(np.asarray(x, dtype=float))
-        margin = 1e-9 * (one.high - one.low)
+        x = self._inside(np.atleast_1d(np.asarray(x, dtype=float)), one)
+        columns = [
+            each.along(x, x, one) if (each.kind, each.covariate) == ("power", one.name) else 0.0 * x
+            for each in self.regressors
+        ]
+        return np.stack(columns, axis=1)
+
+    def along(
+        self, covariates: Mapping[str, FloatArray], dt: float, start: float = 0.0
+    ) -> FloatArray:
+        """The curve against its value at the centres, along a record, u, (n,).
+
+        It is what a temperature does to the bias, with lag and settling; the level is the turn-on
+        bias of that record.
+
+        Parameters
+        ----------
+        covariates : mapping of str to (n,) ndarray
+            Values of the `covariates` at all samples.
+        dt : float
+            Sampling interval, s.
+        start : float, optional
+            Time of the first sample since switch-on, s; infinite leaves settling out.
+
+        Raises InputError for values outside the range of the recording, or a covariate missing.
+        """
+        known: dict[str, FloatArray] = {}
+        for one in self.covariates:
+            if one.name not in covariates:
+                raise InputError(f"the curve of {self.name} depends on {one.name}: give its values")
+            known[one.name] = self._inside(np.asarray(covariates[one.name], dtype=float), one)
+        n = len(next(iter(known.values()), next(iter(covariates.values()), np.zeros(0))))
+        time, by_name = start + dt * np.arange(n), {each.name: each for each in self.covariates}
+        curve = np.zeros(n)
+        for each, value in zip(self.regressors, self.values, strict=True):
+            own = known.get(each.covariate), by_name.get(each.covariate)
+            curve += value * each.along(time, *own)
+        return curve
+
+    def noise_factor(self, x: FloatArray | float) -> FloatArray:
+        """Deviation of the fast noise at values of the first covariate over that of the model.
+
+        Raises InputError outside the range of the recording, or if the growth is not known.
+        """
+        if self.scaling is None or not self.covariates:
+            raise InputError(
+                f"{self.name}: the growth of the noise is not known: calibrate a recording with a "
+                "covariate that changes, for some minutes"
+            )
+        return self.scaling.factor(self._inside(np.asarray(x, dtype=float), self.covariates[0]))
+
+    def _inside(self, x: FloatArray, one: Covariate) -> FloatArray:
+        margin = _MARGIN * (one.high - one.low)
         if not np.all((x >= one.low - margin) & (x <= one.high + margin)):
             raise InputError(
                 f"the curve of {self.name} is known from {one.low:.4g} to {one.high:.4g} "
                 f"{one.unit}: give values in this range, or record a wider one"
             )
-        u = (x - one.centre) / one.half
-        columns = [
-            u**each.power if (each.kind, each.covariate) == ("power", one.name) else 0.0 * u
-            for each in self.regressors
-        ]
-        return np.stack(columns, axis=1)
+        return x
 
     def _covariate(self, name: str = "") -> Covariate:
         found = next((each for each in self.covariates if each.name == name), self.main)

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gmwm._core.distributions import student
-from gmwm._core.documents import NotNegative, Probability
+from gmwm._core.documents import Array, NotNegative, Probability
 from gmwm._core.text import per_cent
 from gmwm._core.typing import FloatArray
 from gmwm.calibration import tuning
@@ -23,18 +23,27 @@ _ROUNDS = 20
 _SETTLED = 1e-9
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Scaling:
     """How the deviation of the fast noise depends on a covariate.
 
     gamma: Of ``exp(gamma x)``, per unit of the covariate.
     error: Half its 95 % interval.
     p_value: Of the score test of ``gamma = 0``.
+    reference: Where the noise is that of the model, the mean square of the recordings.
+    at, deviation: Covariate and deviation of parts of the recordings, over that of the model.
     """
 
     gamma: float
     error: NotNegative
     p_value: Probability
+    reference: float
+    at: Array
+    deviation: Array
+
+    def factor(self, x: FloatArray | float) -> FloatArray:
+        """Deviation at values of the covariate over that of the model."""
+        return np.asarray(np.exp(self.gamma * (np.asarray(x, dtype=float) - self.reference)))
 
     def notice(self, name: str, unit: str, low: float, high: float) -> Notice | None:
         """Say that the noise grows, where that is clear."""
@@ -86,7 +95,11 @@ def scaling(parts: Sequence[tuple[Channel, FloatArray, FloatArray]]) -> Scaling 
     dispersion = float(np.sum(off**2)) / free
     error = float(student.ppf(0.975, free)) * np.sqrt(dispersion / total)
     chance = float(2.0 * student.sf(score, free))
-    return Scaling(0.5 * slope, float(0.5 * error), chance)
+    middle = float(np.mean(x))
+    if slope != 0.0:
+        middle += float(np.log(np.mean(np.exp(slope * centred)))) / slope
+    deviation = np.sqrt(square / np.mean(square))
+    return Scaling(0.5 * slope, float(0.5 * error), chance, middle, x, deviation)
 
 
 def _mean_squares(

@@ -296,7 +296,7 @@ def write_files(
     """Write the files, all or none, then that of another program; returns the last lines."""
     from gmwm._core.text import wrapped
     from gmwm.calibration import stage
-    from gmwm.export import TARGETS, export
+    from gmwm.export import TARGETS, curve_files, export
 
     document, page, kalibr = (folder / name for name in _FILES)
     written, lines = [f"{page.name} (open this)", document.name], []
@@ -325,8 +325,11 @@ def write_files(
         with stage("exports"):
             export(result, target, path=path)
         written.append(f"{path.name} ({target})")
-    after = shlex.quote(str(document))
-    after = f"gmwm export {after} --to openvins" if has_imu else f"gmwm bound {after}"
+    given = shlex.quote(str(document))
+    after = f"gmwm export {given} --to openvins" if has_imu else f"gmwm bound {given}"
+    if curves := curve_files(result):
+        lines.append(f"curves: gmwm export {given} --to {curves[0]}")
+        lines += wrapped(f"  or --to {', '.join(curves[1:])}", indent=2)
     after = after if all(fit.valid for fit in result.values()) else f"1. above, then {after}"
     wrote = wrapped(f"wrote {', '.join(written)} in {folder}", indent=2)
     return [*wrote, *lines, f"next: {after}"]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from types import MappingProxyType
@@ -126,3 +127,13 @@ CURVES: Mapping[str, CurveFile] = MappingProxyType(
     {name: CurveFile(**content) for name, content in toml_beside(__file__).items()}
 )
 """Files of curves by name."""
+
+
+def curve_files(calibration: Calibration) -> list[str]:
+    """Names of the files that can hold the curves of a calibration."""
+    found = []
+    for name, each in CURVES.items():
+        with suppress(InputError):
+            each.text([calibration])
+            found.append(name)
+    return found

@@ -207,11 +207,13 @@ def _by_number(
 
 
 def _only(table: Table, found: dict[str, int], names: Collection[str] | None) -> dict[str, int]:
-    """The channels that the caller names, if any."""
+    """The channels that the caller names, if any; auxiliary ones are kept whether named or not."""
     if names is None:
         return found
     wanted = {names} if isinstance(names, str) else set(names)
-    for name in wanted:
+    kept = {each.role for each in table.meanings} & {*AUXILIARY}
+    kept |= {bare(table.names[i]) for i, m in enumerate(table.meanings) if m.role in AUXILIARY}
+    for name in wanted - kept:
         if name not in found and not any(name == each.partition("_")[0] for each in found):
             text = f"{table.source} has no channel {name!r}: it has {', '.join(found)}"
             raise InputError(text, "channel-unknown")

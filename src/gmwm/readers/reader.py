@@ -58,7 +58,8 @@ def read(
         ``{"gyro": "deg/s", "accel": "g"}``. Not needed where the header has them.
     channels : mapping of str to (str or int), or collection of str, optional
         Channel name -> column (name, or index counted from 0), e.g. ``{"gyro_x": "col3"}``; or
-        names alone, of those found by default, or ``"gyro"`` for all of them. Only these are read;
+        names alone, of those found by default, or ``"gyro"`` for all of them. Only these are read,
+        and the auxiliary ones (temperature, voltage, clock);
         a bag or a flight log without one of the two sensors is refused unless they are given.
         A name that begins with ``gyro`` or ``accel`` states what the column measures; for any other
         its unit does (``"temp": "T1"`` in degC or K is auxiliary). By default columns are known by

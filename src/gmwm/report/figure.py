@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from gmwm._core.typing import FloatArray
-from gmwm.calibration import AxisNumbers, BiasCurve, Calibration
+from gmwm.calibration import AxisNumbers, BiasCurve, Calibration, Covariate
 from gmwm.datasheet import Datasheet
 from gmwm.diagnosis import spectrum
 from gmwm.estimate import Fit
@@ -34,6 +34,7 @@ _GRID = "#dddddd"  # the page's style sheet gives it another shade on dark scree
 _BESIDE = 1.7  # ratio of averaging times that is left free at both ends
 _SHEET = "#9a5b00"
 _BELOW = 8.0  # how far below the curves a mark may lie that the axis is stretched for
+_PARTS = 128  # means of a recording against its temperature
 _SHARE = 100.0  # per cent: residuals beyond are drawn at the edge, with their size
 _FILTER = "#c2185b"
 _DASHES = ("dash", "dot", "dashdot", "longdash")  # of the first, second ... term of a kind
@@ -268,9 +269,42 @@ def curve_figure(fitted: Fit, curve: BiasCurve) -> Figure | None:
     band = [_line(x, each, "95 % band", "#8a8a8a", "solid", 0.0) for each in ends]
     band[1] |= {"fill": "tonexty", "fillcolor": "rgba(130,130,130,0.28)"}
     units = _units("curve", "u", fitted)
-    axes = {"xaxis": _linear(f"{one.name} [{one.unit}]"), "yaxis": _linear(units[0][0])}
     traces = [*band, _line(x, value, "curve", SUM_COLOUR, "solid", 2.0)]
-    return _figure(traces, {"height": 260, **axes}, units=units)
+    return _against(one, traces, units[0][0], units)
+
+
+def leftover_figures(fitted: Fit, curve: BiasCurve) -> list[Figure]:
+    """What the curve leaves, in means of blocks, and the size of the noise, against a covariate."""
+    one, held, found = curve.main, fitted.wv.regressors, list[Figure]()
+    if one is not None and held is not None:
+        own = [(each.covariate, each.power) for each in curve.regressors].index((one.name, 1))
+        rows = []
+        for part in held.parts:
+            left = part.blocks - (curve.values - held.removed) @ part.columns
+            both = np.stack([one.centre + one.half * part.columns[own], left - np.nanmean(left)])
+            size = -(-left.size // _PARTS)
+            rows.append(both[:, : left.size // size * size].reshape(2, -1, size).mean(axis=2))
+        x, left = np.hstack(rows)
+        units = _units("signal - curve", "u", fitted)
+        points = _points(x, units_of("u", fitted.wv)[1] * left, "means", COMPONENT_COLOURS[0], 4)
+        found.append(_against(one, [points], units[0][0], units))
+    if curve.scaling is not None and curve.covariates:
+        one, own_noise = curve.covariates[0], curve.scaling
+        x = np.linspace(one.low, one.high, 50)
+        points = _points(own_noise.at, own_noise.deviation, "parts", COMPONENT_COLOURS[0], 4)
+        line = _line(x, own_noise.factor(x), "growth", SUM_COLOUR, "solid", 2.0)
+        found.append(_against(one, [points, line], "fast noise / model"))
+    return found
+
+
+def _against(
+    one: Covariate, traces: list[Figure], title: str, units: Sequence[tuple[str, float]] = ()
+) -> Figure:
+    """A small figure against a covariate."""
+    for each in traces:
+        each["hovertemplate"] = f"%{{y:.4g}} at %{{x:.4g}} {one.unit}"
+    axes = {"xaxis": _linear(f"{one.name} [{one.unit}]"), "yaxis": _linear(title)}
+    return _figure(traces, {"height": 220, **axes}, units=units)
 
 
 def growth_figure(known: ErrorBudget, unknown: ErrorBudget, of: str, quantity: str) -> Figure:

@@ -192,3 +192,14 @@ def test_intervals_of_a_warm_up_cover_and_the_walk_is_whole():
     # Points of a curve are nearly one draw: a binomial of 60 at 0.93, three deviations.
     assert np.mean(held) > 0.93 - 3.0 * np.sqrt(0.93 * 0.07 / 60)
     assert abs(np.mean(square) - 1.0) < 3.0 * np.std(square) / np.sqrt(60) + 0.05
+
+
+def test_a_curve_along_the_record_is_what_was_added(result):
+    """At once and in parts: what it subtracts is the curve at every sample."""
+    curve, at = result.curves["gyro_x"], warm_up()
+    along = curve.along({"temperature": at}, DT)
+    np.testing.assert_allclose(along, curve(at) - curve(curve.main.centre), atol=1e-12)
+    with pytest.raises(gmwm.InputError, match="known from"):
+        curve.along({"temperature": warm_up() + 10.0}, DT)
+    with pytest.raises(gmwm.InputError, match="depends on temperature: give its values"):
+        curve.along({"voltage": at}, DT)

@@ -8,7 +8,7 @@ import pytest
 
 import gmwm
 from gmwm import RandomWalk, WhiteNoise
-from gmwm.export import CURVES
+from gmwm.export import CURVES, curve_files
 
 SIZE, DT = 1024, 1.0
 AT = np.linspace(26.0, 63.0, 7)
@@ -121,11 +121,14 @@ def test_files_say_what_they_hold(name, found):
     assert max(len(line) for line in text.splitlines()) < 150
 
 
-def test_what_autopilots_cannot_hold_is_said():
+def test_what_autopilots_cannot_hold_is_said(found):
+    assert curve_files(found) == list(CURVES)
     with pytest.raises(gmwm.InputError, match=r"degree 4.*calibrate with degree 3"):
         gmwm.export(calibration("4", "xyz"), "px4-tc")
+    single = calibration("linear", "x")
+    assert curve_files(single) == ["curve-csv", "curve-c", "curve-python"]
     with pytest.raises(gmwm.InputError, match="gyro_y has no curve"):
-        gmwm.export(calibration("linear", "x"), "ardupilot-tcal")
+        gmwm.export(single, "ardupilot-tcal")
     lagged = gmwm.export(calibration("linear, lag 60 s"), "px4-tc")
     assert "left out, as at a steady temperature: temperature lag 60 s" in lagged
 
@@ -136,3 +139,9 @@ def test_curves_need_covariates():
     plain = gmwm.calibrate(rec, WhiteNoise(), jobs=1)
     with pytest.raises(gmwm.InputError, match="needs curves of a covariate"):
         gmwm.export(plain, "curve-csv")
+
+
+def test_functions_leave_gravity_in_the_samples(found):
+    """The constant of an accelerometer was the mean of its samples."""
+    for name, curve in found.curves.items():
+        assert (curve(curve.main.centre) == 0.0) == name.startswith("accel")

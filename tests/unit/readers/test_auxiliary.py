@@ -57,6 +57,15 @@ def test_other_units(unit):
     assert auxiliary_unit(unit) is None
 
 
+def test_auxiliary_channels_can_be_named(write, columns):
+    path = write(columns, "gx,ax,die temp [K]")
+    for also in ("temperature", "die temp"):
+        recording = read(path, rate=50, units=UNITS, channels=["gyro", also])
+        assert list(recording) == ["gyro_x", "die temp"]
+    with pytest.raises(InputError, match="has no channel 'voltage'"):
+        read(path, rate=50, units=UNITS, channels=["gyro", "voltage"])
+
+
 def test_a_temperature_column_is_kept(write, columns):
     recording = read(write(columns, "gx,ax,temp [K]"), rate=50, units=UNITS)
     assert list(recording) == ["gyro_x", "accel_x", "temp"]

@@ -26,6 +26,7 @@ from gmwm.report.calibration import _needed as needed, page
 from gmwm.report.figure import (
     density_figure,
     deviation_figure,
+    leftover_figures,
     residual_figure,
     series_figure,
 )
@@ -864,3 +865,23 @@ def test_a_place_that_cannot_be_written_is_refused_before_the_work(write, tmp_pa
 )
 def test_duration(seconds, words):
     assert duration_text(seconds) == words
+
+
+def test_what_a_curve_leaves_is_drawn_against_the_temperature():
+    """Means of the noise, and its size in parts, which follow neither the curve nor its slope."""
+    n, rng = 4096, np.random.default_rng(3)
+    warm = 45.0 - 20.0 * np.cos(4.0 * np.pi * np.arange(n) / n)
+    noise = np.exp(0.02 * (warm - 45.0)) * 1e-3 * rng.standard_normal(n)
+    arrays = {"gyro_x": noise + 1e-3 * (warm - 45.0), "temperature": warm}
+    rec = gmwm.Recording.from_arrays(arrays, 10.0, {"gyro": "rad/s", "temperature": "degC"})
+    given = {"covariates": {"temperature": "linear"}, "screening": (), "jobs": 1}
+    cal = gmwm.calibrate(rec, "N", **given)
+    fit, curve = cal["gyro_x"], cal.curves["gyro_x"]
+    (means,), (parts, growth) = (each["data"] for each in leftover_figures(fit, curve))
+    per_si = np.degrees(3600.0)
+    assert abs(np.corrcoef(means["x"], means["y"])[0, 1]) < 4.0 / np.sqrt(len(means["x"]))
+    assert np.std(means["y"]) < 4e-4 * per_si
+    assert growth["y"][-1] / growth["y"][0] == pytest.approx(np.exp(0.02 * 40.0), rel=0.3)
+    off = np.array(parts["y"]) / np.interp(parts["x"], growth["x"], growth["y"]) - 1.0
+    assert np.sqrt(np.mean(off**2)) < 0.3
+    assert "plot-leftover-1-2" in page(cal)
