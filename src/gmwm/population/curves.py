@@ -18,7 +18,6 @@ from gmwm.errors import InputError
 from gmwm.estimate import Fit
 from gmwm.estimate.problem import (
     Scales,
-    bias_of_detrending,
     detrended_covariance,
     gls_slope,
     weight_root,
@@ -69,7 +68,7 @@ class Curve:
             slope = gls_slope(wv, psd)
             means = wv.mean_covariance_under(psd)
             covariance = detrended_covariance(covariance, means, wv.drift_response, slope)
-            variance = wv.detrended(slope.value) + bias_of_detrending(wv, slope)
+            variance = wv.detrended(slope.value) + slope.variance * wv.drift_response**2
         implied = share * np.sum([scales.curve(noise) for noise in noises], axis=0)
         relative = covariance / np.outer(implied, implied)
         known = (variance > 0.0) & (np.diag(relative) <= 2.0 / tuning.LEAST_DOF)

@@ -29,7 +29,6 @@ from gmwm.estimate.problem import (
     Coefficients,
     Moments,
     Scales,
-    bias_of_detrending,
     chi_square,
     gls_slope,
     slope_p_value,
@@ -238,7 +237,7 @@ def _drift_free(
     again under the mixture without it.
     """
     for _ in range(tuning.RAMP_ROUNDS):
-        target = wv.detrended(slope.value) + bias_of_detrending(wv, slope)
+        target = wv.detrended(slope.value) + slope.variance * wv.drift_response**2
         reference = dictionary_fit(wv, target, choices.given)
         slope = gls_slope(wv, reference.mixture.psd)
     return target, reference, slope

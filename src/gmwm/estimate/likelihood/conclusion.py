@@ -20,7 +20,7 @@ from gmwm.estimate.likelihood.likelihood import (
 )
 from gmwm.estimate.moments import suffices
 from gmwm.estimate.problem import Coordinates, Moments, Slope, density, difference, frequency_nodes
-from gmwm.estimate.result import Comparison, Estimates, Fit, conclude
+from gmwm.estimate.result import Estimates, Fit, agreement, conclude
 from gmwm.issues import Notice, notice
 from gmwm.process import Model, Process
 
@@ -33,10 +33,7 @@ _HALVINGS = 12
 
 @dataclass(frozen=True, eq=False)
 class Maximum:
-    """Where a log-likelihood is largest.
-
-    z: (d,).
-    """
+    """Where a log-likelihood is largest: coordinates z, (d,)."""
 
     z: FloatArray
     value: float
@@ -208,18 +205,15 @@ def conclude_likelihood(
     noise = Model(top.processes)
     covariance, target = moments.covariance(noise), moments.target
     implied = noise.wavelet_variance(wv.tau, wv.dt, wv.wavelet)
-    taken = moments.taken
-    comparison = Comparison.of(
-        target, implied, covariance, implied, len(found.present), taken=taken
-    )
+    n_free, taken = len(found.present), moments.taken
+    agrees = agreement(target, implied, covariance, implied, n_free, taken=taken)
     if series.is_bridged:
-        untested = float("nan")
-        comparison = replace(comparison, chi_square=untested, chi_square_allowed=untested)
+        agrees |= dict.fromkeys(("chi_square", "chi_square_allowed"), float("nan"))
         found = replace(found, notices=(*found.notices, notice("no-test")))
-        return conclude(found, comparison, wv, misfits=False)
-    dof = max(comparison.dof, 1)
-    agrees = suffices(0.0, target - implied, covariance, target, implied, dof, taken)
-    return conclude(found, comparison, wv, misfits=not agrees)
+        return conclude(found, agrees, wv, misfits=False)
+    dof = max(agrees["dof"], 1)
+    is_right = suffices(0.0, target - implied, covariance, target, implied, dof, taken)
+    return conclude(found, agrees, wv, misfits=not is_right)
 
 
 def redundant_term(

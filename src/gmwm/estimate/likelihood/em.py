@@ -240,9 +240,13 @@ class Iteration:
                     process = process.with_values(N=density)
                 processes.append(process)
                 continue
-            a, b, c, d = (float(m[k, k]) for m in (later, cross, e.earlier, e.first))
-            update = _walk if process.is_walk else _gauss_markov
-            processes.append(update(process, like, StateMoments(a, b, c, d, e.steps), self.dt))
+            own = tuple(float(m[k, k]) for m in (later, cross, e.earlier, e.first))
+            if not process.is_walk:
+                process = _gauss_markov(process, like, own, e.steps, self.dt)
+            elif like.values["K"] is None:
+                squares = own[0] - 2.0 * own[1] + own[2]
+                process = process.with_values(K=float(np.sqrt(squares / e.steps / self.dt)))
+            processes.append(process)
             k += 1
         if not self.in_state:
             return Stage(tuple(processes), stage.initial, drive)
@@ -305,45 +309,32 @@ class Iteration:
         return (second, e) if e.log_likelihood >= reached.log_likelihood else (first, reached)
 
 
-@dataclass(frozen=True)
-class StateMoments:
-    """Second moments of the state of one process, see `Expectation`."""
+def _gauss_markov(
+    process: Process, like: Process, moments: tuple[float, ...], steps: int, dt: float
+) -> Process:
+    """A Gauss-Markov process with the parameters of the M step that ``like`` has open.
 
-    later: float
-    cross: float
-    earlier: float
-    first: float
-    steps: int
-
-
-def _walk(process: Process, like: Process, m: StateMoments, dt: float) -> Process:
-    """A random walk with K of the M step, where ``like`` has it open."""
-    if like.values["K"] is not None:
-        return process
-    squares = m.later - 2.0 * m.cross + m.earlier
-    return process.with_values(K=float(np.sqrt(squares / m.steps / dt)))
-
-
-def _gauss_markov(process: Process, like: Process, m: StateMoments, dt: float) -> Process:
-    """A Gauss-Markov process with the parameters of the M step that ``like`` has open."""
-    n, sigma = m.steps + 1, like.values["sigma"]
+    moments: Second moments of its state: later, cross, earlier and first, see `Expectation`.
+    """
+    n, sigma = steps + 1, like.values["sigma"]
+    later, cross, earlier, first = moments
     delta = -float(np.expm1(-dt / float(process.values["tau"] or np.inf)))  # 1 - phi
     drift = Polynomial([1.0, -1.0])  # phi in terms of 1 - phi, whose digits matter
     loss = Polynomial([0.0, 2.0, -1.0])  # 1 - phi^2
-    squares = m.later - 2.0 * m.cross * drift + m.earlier * drift**2
+    squares = later - 2.0 * cross * drift + earlier * drift**2
     if like.values["tau"] is None:
-        total = squares + m.first * loss
+        total = squares + first * loss
         if sigma is None:
             condition = n * total.deriv() * loss - total * loss.deriv()
         else:
-            condition = m.steps * sigma**2 * loss.deriv() * loss
+            condition = steps * sigma**2 * loss.deriv() * loss
             condition = condition + squares.deriv() * loss - squares * loss.deriv()
 
         def log_likelihood(delta: float) -> float:
             size = float(loss(delta))
             if sigma is None:
                 return float(-0.5 * (n * np.log(total(delta)) - np.log(size)))
-            return -0.5 * (m.steps * np.log(size) + float(squares(delta)) / sigma**2 / size)
+            return -0.5 * (steps * np.log(size) + float(squares(delta)) / sigma**2 / size)
 
         # The root between 0 and 1 of highest likelihood; the present value where there is none.
         inside = [
@@ -354,7 +345,7 @@ def _gauss_markov(process: Process, like: Process, m: StateMoments, dt: float) -
         delta = max([*inside, min(delta, _FASTEST)], key=log_likelihood)
         process = process.with_values(tau=float(-dt / np.log1p(-delta)))
     if sigma is None:
-        variance = (float(squares(delta)) / float(loss(delta)) + m.first) / n
+        variance = (float(squares(delta)) / float(loss(delta)) + first) / n
         process = process.with_values(sigma=float(np.sqrt(variance)))
     return process
 

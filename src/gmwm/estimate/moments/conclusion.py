@@ -17,9 +17,9 @@ from gmwm.estimate.moments.profile import Point, Profile, search
 from gmwm.estimate.moments.weights import Weights
 from gmwm.estimate.problem import Coefficients, Moments, drift_key, in_model_order, weight_root
 from gmwm.estimate.result import (
-    Comparison,
     Estimates,
     Fit,
+    agreement,
     conclude,
     estimate_notices,
     upper_amplitude,
@@ -96,17 +96,12 @@ def conclude_moments(
         discrepancy=end.discrepancy,
         notices=notices,
     )
-    comparison = Comparison.of(
-        target,
-        implied,
-        end.covariance,
-        end.basis,
-        jacobian.shape[1],
-        end.statistical,
-        moments.taken,
+    covariance, n_free = end.covariance, jacobian.shape[1]
+    agrees = agreement(
+        target, implied, covariance, end.basis, n_free, end.statistical, moments.taken
     )
-    fit = conclude(found, comparison, wv, misfits=end.discrepancy > 0.0)
-    redundant = _redundant_terms(design, point, comparison.objective, target, end.covariance)
+    fit = conclude(found, agrees, wv, misfits=end.discrepancy > 0.0)
+    redundant = _redundant_terms(design, point, fit.objective, target, covariance)
     return _with_doubtful_terms(fit, redundant, design, processes, without)
 
 

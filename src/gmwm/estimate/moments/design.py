@@ -9,7 +9,7 @@ are regressors, see `gmwm.estimate.problem.ramp`.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import cached_property, partial
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -49,9 +49,8 @@ class Design:
         self.linear = tuple(i for i, term in enumerate(self.terms) if term.free_scale)
         self.shaped = tuple(i for i, term in enumerate(self.terms) if term.n_shapes)
         # Functions without the lookups that each step would repeat.
-        self._curve_of = [
-            scales.unit_curves(term.process) if term.free_scale else partial(self._given_curve, i)
-            for i, term in enumerate(self.terms)
+        self._unit_curves = [
+            scales.unit_curves(term.process) if term.free_scale else None for term in self.terms
         ]
         self.owners = [i for i, is_amplitude in self.coordinates.owners if not is_amplitude]
         self._own: dict[Any, Any] = {}
@@ -85,13 +84,11 @@ class Design:
 
     def curve(self, i: int, shape: Shape) -> FloatArray:
         """Wavelet variance of `at_shape`, (J,)."""
-        known = self._last.get(i)
+        known, unit_curve = self._last.get(i), self._unit_curves[i]
         if known is None or known[0] != shape:
-            known = self._last[i] = shape, self._curve_of[i](shape)
+            found = unit_curve(shape) if unit_curve else self.scales.curve(self.at_shape(i, shape))
+            known = self._last[i] = shape, found
         return known[1]
-
-    def _given_curve(self, i: int, shape: Shape) -> FloatArray:
-        return self.scales.curve(self.at_shape(i, shape))
 
     def grid(self, i: int) -> list[Shape]:
         """Starting shapes of term ``i``, with fixed parameters at their value; see `_cached`."""

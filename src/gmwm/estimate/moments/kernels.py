@@ -110,21 +110,17 @@ def projected(
 
 
 @compiled()
-def _value(z: float, lower: float, upper: float) -> float:
-    """A shape parameter at a coordinate on the real line."""
-    if math.isfinite(upper) and math.isfinite(lower):
-        return lower + (upper - lower) / (1.0 + math.exp(-z))
-    return lower + math.exp(z) if math.isfinite(lower) else z
-
-
-@compiled()
 def _shape(z: FloatArray, s: int, terms: Shaped, shapes: FloatArray) -> FloatArray:
     """The shape of shaped term ``s`` at coordinates z of all of them."""
     shape = shapes[s].copy()
     at = terms.first[s]
     for k in range(shape.size):
         if terms.free[s, k]:
-            shape[k] = _value(z[at], terms.lower[s, k], terms.upper[s, k])
+            lower, upper = terms.lower[s, k], terms.upper[s, k]
+            if math.isfinite(upper) and math.isfinite(lower):
+                shape[k] = lower + (upper - lower) / (1.0 + math.exp(-z[at]))
+            else:
+                shape[k] = lower + math.exp(z[at]) if math.isfinite(lower) else z[at]
             at += 1
     return shape
 

@@ -9,12 +9,14 @@ from gmwm.estimate.problem.information import (
     spectral_information as spectral_information,
 )
 from gmwm.estimate.problem.moments import (
+    CurveCoefficients as CurveCoefficients,
     FittedMoments as FittedMoments,
     Moments as Moments,
     Scales as Scales,
     Simulation as Simulation,
     chi_square as chi_square,
     is_plain as is_plain,
+    satterthwaite_dof as satterthwaite_dof,
     weight_root as weight_root,
 )
 from gmwm.estimate.problem.nonnegative import (
@@ -34,7 +36,6 @@ from gmwm.estimate.problem.parameters import (
 )
 from gmwm.estimate.problem.ramp import (
     Slope as Slope,
-    bias_of_detrending as bias_of_detrending,
     detrended_covariance as detrended_covariance,
     gls_slope as gls_slope,
     ols_slope as ols_slope,

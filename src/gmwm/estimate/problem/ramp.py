@@ -44,7 +44,7 @@ class RampRegression(Regression):
     wv: WaveletVariance
 
     @property
-    def gram(self) -> FloatArray:  # type: ignore[override]
+    def gram(self) -> FloatArray:
         return self.wv.drift_response[:, None, None] ** 2
 
     def detrended(self, values: FloatArray) -> FloatArray:
@@ -128,15 +128,6 @@ def _solve(column: FloatArray, first: NDArray[np.intp], right: FloatArray) -> Fl
         return np.asarray(solve(toeplitz(column)[np.ix_(first, first)], right, assume_a="pos"))
     except np.linalg.LinAlgError:
         return np.asarray(lstsq(toeplitz(column)[np.ix_(first, first)], right)[0])
-
-
-def bias_of_detrending(wv: WaveletVariance, slope: Coefficients) -> FloatArray:
-    """Loss of each expected wavelet variance by removing the estimated slope, u^2, (J,).
-
-    The covariance of the best linear unbiased estimate with any other unbiased one, such as twice
-    the mean coefficient over tau, is its own variance; hence tau^2/4 var(slope).
-    """
-    return RampRegression(wv).taken(slope.covariance)
 
 
 def detrended_covariance(

@@ -64,13 +64,14 @@ class Coefficients:
 
 
 class Regression(ABC):
-    """Regressors beside the noise of a series.
-
-    gram: (J, p, p), mean products of their wavelet coefficients.
-    """
+    """Regressors beside the noise of a series."""
 
     wv: WaveletVariance
-    gram: FloatArray
+
+    @property
+    @abstractmethod
+    def gram(self) -> FloatArray:
+        """Mean products of the regressors' wavelet coefficients, (J, p, p)."""
 
     @abstractmethod
     def detrended(self, values: FloatArray) -> FloatArray:
@@ -98,6 +99,9 @@ class Regression(ABC):
 
     def taken(self, covariance: FloatArray) -> FloatArray:
         """Loss tr(V G_j) of each expected wavelet variance by removing the curve, u^2, (..., J).
+
+        The covariance of the best linear unbiased estimate with any other unbiased one, such as
+        twice the mean coefficient over tau for a ramp, is its own variance: a loss of tau^2/4 V.
 
         covariance: (..., p, p), of the coefficients.
         """
@@ -138,7 +142,7 @@ class CurveRegression(Regression):
     regressors: Regressors
 
     @property
-    def gram(self) -> FloatArray:  # type: ignore[override]
+    def gram(self) -> FloatArray:
         return self.regressors.gram
 
     def detrended(self, values: FloatArray) -> FloatArray:
@@ -146,16 +150,21 @@ class CurveRegression(Regression):
         return self.wv.variance - 2.0 * own.cross @ values + (own.gram @ values) @ values
 
     def estimated(self, psd: PSD) -> Coefficients:
-        parts = [_whitened(part, self._matrix(psd, part)) for part in self.regressors.parts]
-        information = np.sum([x.T @ solved for x, _, solved in parts], axis=0)
+        size, solved = len(self.gram[0]), []
+        information, score = np.zeros((size, size)), np.zeros(size)
+        for part in self.regressors.parts:
+            first, (x, y) = _beside(part.blocks), _rows(part)
+            own = toeplitz(self._column(psd, part))
+            own = own if first.size == len(own) else own[np.ix_(first, first)]
+            np.fill_diagonal(own, (1.0 + _JITTER) * np.diag(own))
+            factor = cho_factor(own, lower=True)
+            whole = np.zeros((part.blocks.size - 1, x.shape[1]))  # at the places of all differences
+            whole[first] = cho_solve(factor, x)
+            information, score = information + x.T @ whole[first], score + whole[first].T @ y
+            solved.append(whole)
         covariance = _inverse(information)
-        weights = [covariance @ solved.T for _, _, solved in parts]
-        values = np.sum([own @ y for own, (_, y, _) in zip(weights, parts, strict=True)], axis=0)
-        whole = tuple(
-            _spread(own, _beside(part.blocks), part.blocks.size - 1)
-            for own, part in zip(weights, self.regressors.parts, strict=True)
-        )
-        return Coefficients(values, growth(self.wv) * covariance, whole)
+        weights = tuple(covariance @ whole.T for whole in solved)
+        return Coefficients(covariance @ score, growth(self.wv) * covariance, weights)
 
     def covariances(self, found: Coefficients, terms: Sequence[PSD]) -> FloatArray:
         parts = list(zip(self.regressors.parts, found.weights or (), strict=False))
@@ -178,10 +187,6 @@ class CurveRegression(Regression):
 
     def _column(self, psd: PSD, part: RegressorPart) -> FloatArray:
         return difference_covariance(psd, self.wv.dt, part.block, part.blocks.size)
-
-    def _matrix(self, psd: PSD, part: RegressorPart) -> FloatArray:
-        first, matrix = _beside(part.blocks), toeplitz(self._column(psd, part))
-        return matrix if first.size == len(matrix) else matrix[np.ix_(first, first)]
 
 
 def pilot(regressors: Regressors) -> tuple[Coefficients, float]:
@@ -273,15 +278,6 @@ def _rows(part: RegressorPart) -> tuple[FloatArray, FloatArray]:
     return np.diff(part.columns)[:, first].T, np.diff(part.blocks)[first]
 
 
-def _whitened(
-    part: RegressorPart, covariance: FloatArray
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Regressors, series, and the regressors solved for the covariance."""
-    x, y = _rows(part)
-    np.fill_diagonal(covariance, (1.0 + _JITTER) * np.diag(covariance))
-    return x, y, np.asarray(cho_solve(cho_factor(covariance, lower=True), x))
-
-
 def _inverse(information: FloatArray) -> FloatArray:
     """Inverse; directions without information have no variance, as nothing is fitted to them."""
     scale = np.sqrt(np.diag(information))
@@ -289,10 +285,3 @@ def _inverse(information: FloatArray) -> FloatArray:
     values, vectors = np.linalg.eigh(information / np.outer(scale, scale))
     inverse = np.where(values > _ALIKE, 1.0 / np.maximum(values, _ALIKE), 0.0)
     return np.asarray((vectors * inverse) @ vectors.T / np.outer(scale, scale))
-
-
-def _spread(weights: FloatArray, first: NDArray[np.intp], size: int) -> FloatArray:
-    """Weights at the places of all differences."""
-    whole = np.zeros((len(weights), size))
-    whole[:, first] = weights
-    return whole

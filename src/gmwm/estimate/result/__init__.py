@@ -1,12 +1,8 @@
 """What an estimation found: parameters, their uncertainty, agreement with the data."""
 
-from gmwm.estimate.result.coefficients import (
-    CurveCoefficients as CurveCoefficients,
-    satterthwaite_dof as satterthwaite_dof,
-)
 from gmwm.estimate.result.conclusion import (
-    Comparison as Comparison,
     Estimates as Estimates,
+    agreement as agreement,
     conclude as conclude,
     estimate_notices as estimate_notices,
     misfit_notices as misfit_notices,
@@ -23,10 +19,9 @@ from gmwm.estimate.result.estimate import (
     upper_amplitude as upper_amplitude,
 )
 from gmwm.estimate.result.fit import Fit as Fit, dense_curves as dense_curves, plain as plain
-from gmwm.estimate.result.goodness import Goodness as Goodness
+from gmwm.estimate.result.goodness import Goodness as Goodness, left_open as left_open
 from gmwm.estimate.result.joint import (
     JointFit as JointFit,
     between as between,
     fit_joint as fit_joint,
 )
-from gmwm.estimate.result.left_open import left_open as left_open

@@ -63,52 +63,42 @@ class Estimates:
         return [k for k, (i, _) in enumerate(owners) if i not in self.absent]
 
 
-@dataclass(frozen=True)
-class Comparison:
-    """Agreement of wavelet variances with those of a model.
+def agreement(
+    target: FloatArray,
+    implied: FloatArray,
+    covariance: FloatArray,
+    basis: FloatArray,
+    n_free: int,
+    statistical: FloatArray | None = None,
+    taken: FloatArray | float = 0.0,
+) -> dict[str, Any]:
+    """Agreement of wavelet variances with those of a model, as fields of `Fit`.
 
-    objective: Weighted sum of squares.
-    chi_square: Sum of squares on cube roots under statistical errors; NaN where it has no meaning.
-    chi_square_allowed: With the discrepancy in the errors.
-    dof: Levels less parameters.
+    covariance: Belongs to the wavelet variances ``basis``.
+    statistical: The covariance less the discrepancy, where there is one.
+    taken: As of `chi_square`.
     """
-
-    objective: float
-    chi_square: float
-    chi_square_allowed: float
-    dof: int
-
-    @classmethod
-    def of(
-        cls,
-        target: FloatArray,
-        implied: FloatArray,
-        covariance: FloatArray,
-        basis: FloatArray,
-        n_free: int,
-        statistical: FloatArray | None = None,
-        taken: FloatArray | float = 0.0,
-    ) -> Comparison:
-        """Compare under a covariance that belongs to the wavelet variances ``basis``.
-
-        ``statistical`` is the covariance less the discrepancy, where there is one; ``taken`` as of
-        `chi_square`.
-        """
-        whitened = weight_root(covariance) @ (target - implied)
-        dof = target.size - n_free
-        plain = allowed = float("nan")
-        if dof > 0 and np.all(basis > 0.0):
-            plain = allowed = chi_square(target, implied, covariance, basis, taken)[1]
-            if statistical is not None:
-                plain = chi_square(target, implied, statistical, basis, taken)[1]
-        return cls(float(whitened @ whitened), plain, allowed, dof)
+    whitened = weight_root(covariance) @ (target - implied)
+    dof = target.size - n_free
+    plain = allowed = float("nan")
+    if dof > 0 and np.all(basis > 0.0):
+        plain = allowed = chi_square(target, implied, covariance, basis, taken)[1]
+        if statistical is not None:
+            plain = chi_square(target, implied, statistical, basis, taken)[1]
+    return {
+        "objective": float(whitened @ whitened),
+        "chi_square": plain,
+        "chi_square_allowed": allowed,
+        "dof": dof,
+    }
 
 
 def conclude(
-    found: Estimates, comparison: Comparison, wv: WaveletVariance, *, misfits: bool
+    found: Estimates, agrees: Mapping[str, Any], wv: WaveletVariance, *, misfits: bool
 ) -> Fit:
     """Make the `Fit` of some estimates and judge it.
 
+    agrees: From `agreement`.
     wv: The data.
     misfits: Whether the fit fails the chi-square test.
     """
@@ -139,10 +129,7 @@ def conclude(
         keys=ordered,
         covariance=matrix,
         upper_bounds=upper,
-        objective=comparison.objective,
-        chi_square=comparison.chi_square,
-        chi_square_allowed=comparison.chi_square_allowed,
-        dof=comparison.dof,
+        **agrees,
         discrepancy=found.discrepancy,
         method=found.method,
         weights=found.weights,

@@ -35,8 +35,7 @@ from gmwm.estimate.result.estimate import (
     estimates_of,
     slope_name,
 )
-from gmwm.estimate.result.goodness import Goodness
-from gmwm.estimate.result.left_open import left_open
+from gmwm.estimate.result.goodness import Goodness, left_open
 from gmwm.issues import Notice
 from gmwm.process import Model
 from gmwm.variance import WaveletVariance

@@ -22,7 +22,7 @@ from gmwm import (
 )
 from gmwm.errors import InputError
 from gmwm.estimate.likelihood import Columns, KalmanLikelihood, stacked
-from gmwm.estimate.likelihood.em import StateMoments, _gauss_markov, expect
+from gmwm.estimate.likelihood.em import _gauss_markov, expect
 from gmwm.process import as_model
 
 
@@ -199,22 +199,19 @@ def moments(draw_phi, n, seed, spread):
     rng = np.random.default_rng(seed)
     x = as_model(AR([draw_phi], 1.0)).simulate(n, 1.0, rng)
     lagged = 0.9 * draw_phi * spread
-    return StateMoments(
-        later=np.sum(x[1:] ** 2) + (n - 1) * spread,
-        cross=np.sum(x[1:] * x[:-1]) + (n - 1) * lagged,
-        earlier=np.sum(x[:-1] ** 2) + (n - 1) * spread,
-        first=x[0] ** 2 + spread,
-        steps=n - 1,
-    )
+    later = np.sum(x[1:] ** 2) + (n - 1) * spread
+    cross = np.sum(x[1:] * x[:-1]) + (n - 1) * lagged
+    earlier = np.sum(x[:-1] ** 2) + (n - 1) * spread
+    return (later, cross, earlier, x[0] ** 2 + spread), n - 1
 
 
 def expected_log_likelihood(process, m, dt):
     """Of a Gauss-Markov process whose states are seen, up to a constant."""
     variance, phi = process.sigma**2, np.exp(-dt / process.tau)
-    later, cross, earlier, first = m.later, m.cross, m.earlier, m.first
+    (later, cross, earlier, first), steps = m
     noise = -variance * np.expm1(-2.0 * dt / process.tau)
     squares = later - 2.0 * phi * cross + phi**2 * earlier
-    return -0.5 * (np.log(variance) + first / variance + m.steps * np.log(noise) + squares / noise)
+    return -0.5 * (np.log(variance) + first / variance + steps * np.log(noise) + squares / noise)
 
 
 @pytest.mark.parametrize("like", [GaussMarkov(), GaussMarkov(sigma=2.0), GaussMarkov(tau=0.5)])
@@ -224,7 +221,7 @@ def test_the_gauss_markov_step_is_the_maximum(like, phi, n, spread):
     dt = 0.1
     m = moments(phi, n, seed=n, spread=spread)
     start = GaussMarkov(*(value or 1.0 for value in like.values.values()))
-    found = _gauss_markov(start, like, m, dt)
+    found = _gauss_markov(start, like, *m, dt)
     best = expected_log_likelihood(found, m, dt)
     free = [name for name, value in like.values.items() if value is None]
     assert all(found.values[k] == v for k, v in like.values.items() if v is not None)

@@ -12,7 +12,6 @@ from gmwm import GaussMarkov, RandomWalk, RateRamp, WhiteNoise
 from gmwm.estimate import tuning
 from gmwm.estimate.problem import (
     Slope,
-    bias_of_detrending,
     chi_square,
     density,
     difference_covariance,
@@ -93,7 +92,7 @@ def test_a_slope_needs_some_blocks(count):
 def test_what_detrending_takes_is_given_back():
     slope = Slope(0.3, 0.02)
     ramp = RateRamp(np.sqrt(0.02)).haar_variance(WV.tau, DT)
-    np.testing.assert_allclose(np.abs(bias_of_detrending(WV, slope)), ramp, rtol=1e-9)
+    np.testing.assert_allclose(slope.variance * WV.drift_response**2, ramp, rtol=1e-9)
 
 
 # -- residuals ------------------------------------------------------------------------------------
