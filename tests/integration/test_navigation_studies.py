@@ -26,7 +26,7 @@ from gmwm.ins import (
     spread,
 )
 from gmwm.ins.simulation import GROUPS
-from gmwm.ins.simulation.filter_errors import sizes
+from gmwm.ins.simulation.consistency import sizes
 
 TRUE = SensorModels.of(
     {

@@ -8,7 +8,7 @@ import pytest
 from gmwm.ins import FilterErrors, MonteCarlo, Outage, SensorModels, car_drive
 from gmwm.ins.filter.filter import Solution
 from gmwm.ins.geometry import matrix_from_rpy
-from gmwm.ins.simulation.filter_errors import GROUPS
+from gmwm.ins.simulation.consistency import GROUPS
 from gmwm.ins.simulation.validation import Validation
 from gmwm.issues import Notice
 from gmwm.process import WhiteNoise, as_model

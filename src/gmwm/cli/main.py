@@ -22,8 +22,7 @@ from gmwm.cli.console import with_hint
 from gmwm.cli.demo import demo, reproduce
 from gmwm.cli.motion import motion
 from gmwm.cli.navigate import navigate
-from gmwm.cli.numbers import bound, budget, certify, export, reduce
-from gmwm.cli.sheet import sheet
+from gmwm.cli.numbers import bound, budget, certify, export, reduce, sheet
 from gmwm.errors import InputError, printable
 
 if TYPE_CHECKING:

@@ -19,13 +19,13 @@ from gmwm._core.spool import moved, release, scaled
 from gmwm._core.text import readable
 from gmwm._core.typing import Progress, known_of
 from gmwm.diagnosis import repeats, samples, tuning
-from gmwm.diagnosis.copies import Copy, copied_rows, find_copies
 from gmwm.diagnosis.drift import drift, temperature_notices, variance
 from gmwm.diagnosis.events import event, find_events, with_single_outliers
 from gmwm.diagnosis.health import ChannelHealth, Health
 from gmwm.diagnosis.innovations import Examined, crosstalk_notices, innovations
 from gmwm.diagnosis.lines import line_notices
 from gmwm.diagnosis.motion import Motion, find_motion, runs_of
+from gmwm.diagnosis.repeats import Copy, copied_rows, find_copies
 from gmwm.diagnosis.resolution import rounding, step_size, widest_step
 from gmwm.diagnosis.resonances import peaks, resonance_notice
 from gmwm.diagnosis.still import moves, vibration

@@ -21,7 +21,7 @@ from .filter.filter import (
     Solution as Solution,
     navigate as navigate,
 )
-from .filter.mechanization import integrate as integrate
+from .filter.filter_kernels import integrate as integrate
 from .imu.increments import (
     Imu as Imu,
     Preintegration as Preintegration,
@@ -45,13 +45,11 @@ from .logs.measured import Measured as Measured
 from .logs.navigated import Navigated as Navigated
 from .simulation.consistency import (
     Consistency as Consistency,
+    FilterErrors as FilterErrors,
     at_epoch as at_epoch,
+    difference as difference,
     innovation_test as innovation_test,
     over_time as over_time,
-)
-from .simulation.filter_errors import (
-    FilterErrors as FilterErrors,
-    difference as difference,
     spread as spread,
 )
 from .simulation.trials import (

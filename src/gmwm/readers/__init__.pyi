@@ -22,12 +22,11 @@ from .registry import (
     is_text as is_text,
     open_tables as open_tables,
 )
-from .table import label as label, load_columns as load_columns
-from .text.cells import DATE as DATE, seconds_of as seconds_of
-from .text.csv_table import CsvTable as CsvTable
-from .text.lines import content_size as content_size
-from .turning import (
+from .rest import (
     block_means as block_means,
     steady_turn as steady_turn,
     turning_gravity as turning_gravity,
 )
+from .table import label as label, load_columns as load_columns
+from .text.cells import DATE as DATE, seconds_of as seconds_of
+from .text.csv_table import CsvTable as CsvTable, content_size as content_size

@@ -6,8 +6,7 @@ from gmwm.variance.cross import (
     WaveletCovariance as WaveletCovariance,
     wavelet_covariance as wavelet_covariance,
 )
-from gmwm.variance.curve import Curve as Curve, curve as curve
-from gmwm.variance.curve_files import read_curves as read_curves
+from gmwm.variance.curve import Curve as Curve, curve as curve, read_curves as read_curves
 from gmwm.variance.gaps import Runs as Runs
 from gmwm.variance.levels import pilot_psd as pilot_psd
 from gmwm.variance.modwt import Modwt as Modwt, imodwt as imodwt, modwt as modwt

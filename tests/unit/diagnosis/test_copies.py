@@ -5,7 +5,7 @@ import pytest
 
 import gmwm
 from gmwm import RandomWalk, WhiteNoise
-from gmwm.diagnosis.copies import Copy, find_copies
+from gmwm.diagnosis.repeats import Copy, find_copies
 
 RATE = 100.0
 

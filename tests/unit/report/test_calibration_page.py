@@ -21,8 +21,7 @@ from gmwm.datasheet import read_datasheet
 from gmwm.issues import Notice
 from gmwm.plotting import COMPONENT_COLOURS
 from gmwm.report import figure as figures, write_report
-from gmwm.report.budget import navigation
-from gmwm.report.calibration import _needed as needed, page
+from gmwm.report.calibration import _needed as needed, first_screen, page
 from gmwm.report.figure import (
     density_figure,
     deviation_figure,
@@ -31,9 +30,8 @@ from gmwm.report.figure import (
     series_figure,
 )
 from gmwm.report.health import health, trust
-from gmwm.report.numbers import certified
+from gmwm.report.numbers import certified, navigation
 from gmwm.report.page import duration_text, resource
-from gmwm.report.screen import first_screen
 
 VOID = {"meta", "wbr", "link", "br", "img", "input", "hr"}
 NAVIGATION = "plot-navigation"

@@ -36,18 +36,16 @@ from gmwm.estimate.problem.parameters import (
 )
 from gmwm.estimate.problem.ramp import (
     Slope as Slope,
+    Walks as Walks,
     detrended_covariance as detrended_covariance,
     gls_slope as gls_slope,
     ols_slope as ols_slope,
+    slope_p_value as slope_p_value,
+    walks_beside as walks_beside,
 )
 from gmwm.estimate.problem.regressors import (
     Coefficients as Coefficients,
     CurveRegression as CurveRegression,
     difference_covariance as difference_covariance,
     pilot as pilot,
-)
-from gmwm.estimate.problem.walks import (
-    Walks as Walks,
-    slope_p_value as slope_p_value,
-    walks_beside as walks_beside,
 )

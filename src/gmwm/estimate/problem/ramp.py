@@ -3,17 +3,26 @@
 The series is ``X beta + noise`` with one regressor, time, and beta the slope in u/s. The wavelet
 variance knows the slope only by its square, so a moment of its own gives it, see
 `gmwm.estimate.problem.regressors`. G_j is r_j^2 with r_j = tau_j / 2.
+
+A random walk seen once looks like a ramp, and noise fitted to what a line leaves of it holds little
+of it. So whether a slope is one, and its interval, are averaged over walks of all sizes that matter
+beside the noise. The weight of each is the restricted likelihood of the block means, in which the
+slope has no part (Harville 1974, *Biometrika* 61, 383-385).
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import make_interp_spline
 from scipy.linalg import lstsq, solve, solve_toeplitz, toeplitz
+from scipy.optimize import brentq
 
+from gmwm._core.distributions import norm
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.estimate import tuning
@@ -24,8 +33,9 @@ from gmwm.estimate.problem.regressors import (
     difference_covariance,
     growth,
     regressed_covariance,
+    restricted,
 )
-from gmwm.process import PSD
+from gmwm.process import PSD, Model, RandomWalk
 from gmwm.variance import WaveletVariance
 
 
@@ -141,3 +151,126 @@ def detrended_covariance(
     """
     common = np.outer(response, response) * slope.variance
     return regressed_covariance(covariance, common * means, common**2)
+
+
+_MERGED = 128  # block means of which dense matrices are made
+_WALKS = 40
+_BETWEEN = 1000  # sizes of walks at which those are interpolated
+_BEYOND = 10.0  # times the estimated K: the largest walk that is tried
+
+
+@dataclass(frozen=True, eq=False)
+class Walks:
+    """Random walks beside a noise, and the generalized least-squares slope under each.
+
+    Intervals have an even prior of K, as for other scales near zero (Gelman 2006, *Bayesian
+    Analysis* 1, 515-534).
+
+    sizes: (k,), K of each, evenly in the logarithm, u/s/sqrt(Hz).
+    slopes, variances: (k,), of the estimated slope, u/s and its square.
+    likelihoods: (k,), in logarithms, up to a constant.
+    """
+
+    sizes: FloatArray
+    slopes: FloatArray
+    variances: FloatArray
+    likelihoods: FloatArray
+
+    @classmethod
+    def beside(cls, wv: WaveletVariance, psd: PSD, largest: float = 0.0) -> Walks | None:
+        """Beside a noise of spectrum ``psd``, at least up to K = ``largest``.
+
+        Returns: ``None`` where too few blocks exist.
+        """
+        # Few enough block means that dense matrices of them are quick.
+        merged = -(-wv.blocks.size // _MERGED)
+        whole = wv.blocks.size // merged * merged
+        blocks, block = wv.blocks[:whole].reshape(-1, merged).mean(axis=1), wv.block * merged
+        first = beside(np.flatnonzero(~np.isnan(blocks)))
+        if first.size + 1 < tuning.FEWEST_BLOCKS:
+            return None
+        noise, walk = (
+            toeplitz(difference_covariance(each, wv.dt, block, blocks.size))[np.ix_(first, first)]
+            for each in (psd, RandomWalk(1.0).psd)
+        )
+        x, y = np.full((first.size, 1), block * wv.dt), blocks[first + 1] - blocks[first]
+        # K^2 of a walk that makes the slope as uncertain as the noise does.
+        unit = float(np.sum(x)) / restricted(noise, x, y)[0][0, 0]
+        most = max(tuning.LARGEST_WALK, largest**2 / unit)
+        squares = unit * np.geomspace(tuning.LEAST_WALK, most, _WALKS)
+        fits = (restricted(noise + square * walk, x, y) for square in squares)
+        information, score, left, half = np.array(
+            [(fit[0][0, 0], fit[1][0], *fit[2:]) for fit in fits]
+        ).T
+        slopes = score / information
+        likelihoods = -half - 0.5 * np.log(information) - 0.5 * (left - slopes * score)
+        return cls(np.sqrt(squares), slopes, growth(wv) / information, likelihoods)
+
+    @cached_property
+    def _averaged(self) -> FloatArray:
+        """Sizes, slopes, their standard errors and weights, between the sizes too, (4, k)."""
+        at = np.log(self.sizes)
+        between = np.linspace(at[0], at[-1], _BETWEEN)
+        rows = np.stack([self.slopes, 0.5 * np.log(self.variances), self.likelihoods], axis=1)
+        slopes, errors, likelihoods = make_interp_spline(at, rows)(between).T
+        weight = np.exp(likelihoods - np.max(likelihoods) + between)
+        weight[0] /= between[1] - between[0]  # all walks that are smaller
+        return np.stack([np.exp(between), slopes, np.exp(errors), weight / np.sum(weight)])
+
+    def quantile(self, probability: float) -> float:
+        """Of K."""
+        sizes, _, _, weight = self._averaged
+        return float(np.interp(probability, np.cumsum(weight) - 0.5 * weight, sizes))
+
+    def size_interval(self, value: float, level: float) -> tuple[float, float]:
+        """Of K, with its estimate in it."""
+        low, high = (self.quantile(0.5 + 0.5 * side * level) for side in (-1.0, 1.0))
+        return min(low, value), max(high, value)
+
+    def slope_interval(self, value: float, level: float) -> tuple[float, float]:
+        """Of the slope, to both sides of its estimate alike, u/s."""
+        _, slopes, errors, weight = self._averaged
+        away, tail = slopes - value, 1.0 - level
+
+        def excess(reach: float) -> float:
+            outside = norm.sf((reach - away) / errors) + norm.sf((reach + away) / errors)
+            return float(weight @ outside) - tail
+
+        farthest = float(np.max(np.abs(away) - norm.ppf(0.1 * tail) * errors))
+        reach = float(brentq(excess, 0.0, farthest))
+        return value - reach, value + reach
+
+
+def walks_beside(model: Model, keys: Collection[str], wv: WaveletVariance) -> Walks | None:
+    """Sizes that the random walk of a model may have beside its ramp.
+
+    model: With values.
+    keys: Of the parameters that were open.
+    Returns: ``None`` without a walk, or where the rest has slow noise too, on which K depends.
+    """
+    values = {i.term: float(i.value or 0.0) for i in model.parameters if i.key in keys}
+    sizes = [value for i, value in values.items() if model.terms[i].is_walk]
+    rest = Model(tuple(t for t in model.terms if not (t.is_drift or t.is_walk)) or model.terms)
+    depends = any(t.shape_parameters or t.is_flicker or t.is_drift for t in rest.terms)
+    if not sizes or depends or not any(rest.params.values()):
+        return None
+    try:
+        return Walks.beside(wv, rest.psd, _BEYOND * sizes[0])
+    except np.linalg.LinAlgError:  # differences of the means are known to rounding
+        return None
+
+
+def slope_p_value(wv: WaveletVariance, psd: PSD) -> float:
+    """Probability of a slope as steep without a ramp, whatever walk the record does not resolve.
+
+    Two-sided, with a prior of K that is even in the logarithm.
+
+    psd: Spectrum ``psd(f, dt)`` of the noise without the drift, two-sided, in u^2/Hz.
+    Returns: 1 where too few blocks exist.
+    """
+    found = Walks.beside(wv, psd)
+    if found is None:
+        return 1.0
+    weight = np.exp(found.likelihoods - np.max(found.likelihoods))
+    chance = 2.0 * norm.sf(np.abs(found.slopes) / np.sqrt(found.variances))
+    return float(weight @ chance / np.sum(weight))

@@ -1,5 +1,9 @@
 """What an estimation found: parameters, their uncertainty, agreement with the data."""
 
+from gmwm.estimate.problem import (
+    CurveCoefficients as CurveCoefficients,
+    satterthwaite_dof as satterthwaite_dof,
+)
 from gmwm.estimate.result.conclusion import (
     Estimates as Estimates,
     agreement as agreement,

@@ -201,7 +201,7 @@ class Fit(Document, Printed):
         See `gmwm.estimate.result.estimate.confidence_interval`. An amplitude that is not
         significantly above zero has the interval from zero to its 95 % upper limit. Beside a rate
         ramp, those of R and of a faint K average over random walks of all sizes, see
-        `gmwm.estimate.problem.walks`.
+        `gmwm.estimate.problem.ramp`.
 
         Parameters
         ----------

@@ -22,8 +22,7 @@ from gmwm.ins.filter import KINDS, Solution
 from gmwm.ins.geometry import ned_difference
 from gmwm.ins.logs.alignment import Alignment, align
 from gmwm.ins.logs.faults import LEVEL, Faults, fault_notice
-from gmwm.ins.logs.measured import Measured
-from gmwm.ins.logs.reference import ReferenceErrors
+from gmwm.ins.logs.measured import Measured, ReferenceErrors
 from gmwm.ins.logs.replay import Replay, innovation_sizes
 from gmwm.ins.simulation import InnovationTest
 from gmwm.issues import Notice, Severity, notice, worst_first

@@ -18,7 +18,7 @@ from gmwm.ins import tuning
 from gmwm.ins.filter import Aiding, Filter, InitialSd, Outage, Outputs, Solution
 from gmwm.ins.geometry import matrix_from_rotation_vector, matrix_from_rpy, offset, rpy_from_matrix
 from gmwm.ins.imu import Imu, Recorded, SensorErrors, SensorModels, emulate
-from gmwm.ins.simulation.filter_errors import (
+from gmwm.ins.simulation.consistency import (
     PER_RUN,
     QUANTITIES,
     FilterErrors,

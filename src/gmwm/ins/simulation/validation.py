@@ -19,18 +19,16 @@ from gmwm.ins.filter import Outage
 from gmwm.ins.geometry import ned_difference
 from gmwm.ins.simulation.consistency import (
     LEVELS,
-    Consistency,
-    InnovationTest,
-    at_epoch,
-    innovation_test,
-    over_time,
-)
-from gmwm.ins.simulation.filter_errors import (
     QUANTITIES,
+    Consistency,
     ErrorDifference,
     ErrorSizes,
     FilterErrors,
+    InnovationTest,
+    at_epoch,
     difference,
+    innovation_test,
+    over_time,
     spread,
 )
 from gmwm.ins.simulation.trials import Experiment, MonteCarlo, RunOptions, monte_carlo, pooled_sizes

@@ -13,7 +13,7 @@ from gmwm.ins.filter.aiding import Aiding, Outage, barometer, gnss, standstills
 from gmwm.ins.filter.filter import Filter, InitialSd
 from gmwm.ins.imu import emulate
 from gmwm.ins.imu.sensors import SensorModels
-from gmwm.ins.simulation.filter_errors import GROUPS
+from gmwm.ins.simulation.consistency import GROUPS
 from gmwm.ins.simulation.trials import Scenario, Simulated, monte_carlo
 from gmwm.ins.trajectory.missions import car_drive, fixed_wing_loiter, helicopter_mapping
 

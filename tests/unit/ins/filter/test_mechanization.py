@@ -15,7 +15,7 @@ from gmwm.ins import (
     integrate,
 )
 from gmwm.ins.filter import Kinematics
-from gmwm.ins.filter.mechanization import step
+from gmwm.ins.filter.filter_kernels import step
 from gmwm.ins.filter.records import Increments
 from gmwm.ins.geometry import RATE, matrix_from_rotation_vector, matrix_from_rpy, ned_difference
 from marks import slow

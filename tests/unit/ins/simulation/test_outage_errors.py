@@ -10,7 +10,7 @@ from scipy.stats import binom, ttest_rel
 from gmwm.errors import InputError
 from gmwm.ins import FilterErrors, MonteCarlo, Outage, difference, spread
 from gmwm.ins.simulation import QUANTITIES
-from gmwm.ins.simulation.filter_errors import sizes
+from gmwm.ins.simulation.consistency import sizes
 from gmwm.ins.simulation.trials import pooled_sizes
 
 TIME = np.array([0.0, 30.0, 30.0, 60.0, 60.0])
