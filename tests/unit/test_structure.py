@@ -18,7 +18,7 @@ NATURAL = {"process.base", "process.model"}
 """A Process makes a Model with +, and a Model is made of Processes."""
 
 INNER = ("estimate", "ins")
-"""Rooms whose own rooms have faces for each other."""
+"""Rooms whose own rooms have faces for other rooms, and import each other directly."""
 
 
 def dotted(path):
@@ -109,16 +109,18 @@ def room(name):
 def test_outsiders_import_faces_only():
     """But the package's own ``__init__``, which says where pages are made."""
     looks = [(dotted(path), name) for path in FILES for name in imports(path) - PACKAGES]
-    looks = [(own, name) for own, name in looks if own]
+    looks = [
+        (own, name) for own, name in looks if own.split(".")[0] not in ("", name.split(".")[0])
+    ]
     free = ("", "_core", *INNER)
     assert not [(own, name) for own, name in looks if room(name) not in (*free, room(own))]
 
 
 LINES = {
-    "": 380, "_core": 2_310, "process": 3_220, "readers": 5_660, "plotting": 720,
-    "variance": 5_060, "diagnosis": 3_340, "estimate": 8_470, "selection": 1_190,
-    "calibration": 3_120, "motion": 1_690, "datasheet": 660, "filter_numbers": 3_710, "ins": 9_780,
-    "population": 2_590, "export": 1_390, "report": 2_610, "study": 1_860, "cli": 2_360,
+    "": 380, "_core": 2_310, "process": 3_220, "readers": 5_640, "plotting": 720,
+    "variance": 5_050, "diagnosis": 3_330, "estimate": 8_330, "selection": 1_190,
+    "calibration": 3_120, "motion": 1_690, "datasheet": 650, "filter_numbers": 3_700, "ins": 9_650,
+    "population": 2_590, "export": 1_390, "report": 2_590, "study": 1_860, "cli": 2_350,
 }  # fmt: skip
 """Most lines of Python of each room; only a new kind or room raises one."""
 

@@ -20,7 +20,8 @@ from gmwm._core.text import wrapped
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.estimate import tuning
-from gmwm.estimate.result import Fit, confidence_interval
+from gmwm.estimate.result.estimate import confidence_interval
+from gmwm.estimate.result.fit import Fit
 from gmwm.process import ARMA, GaussMarkov, Model, Process, WhiteNoise
 
 _TINY_STEP = 1e-30  # of complex differences, which have no rounding error

@@ -17,9 +17,12 @@ from gmwm._core.documents import Array, Document, Text
 from gmwm._core.frozen import freeze
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
-from gmwm.estimate.moments import Design, Profile, Weights, search
-from gmwm.estimate.problem import FittedMoments, drift_key, shape_of
-from gmwm.estimate.result import Fit
+from gmwm.estimate.moments.design import Design
+from gmwm.estimate.moments.profile import Profile, search
+from gmwm.estimate.moments.weights import Weights
+from gmwm.estimate.problem.moments import FittedMoments
+from gmwm.estimate.problem.parameters import drift_key, shape_of
+from gmwm.estimate.result.fit import Fit
 from gmwm.process import Model, Process, as_model
 
 

@@ -15,25 +15,13 @@ from gmwm._core.tables import cell, plain_table
 from gmwm._core.text import per_cent, wrapped
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
-from gmwm.estimate.likelihood import (
-    Columns,
-    Recursion,
-    accumulated,
-    arrays_of,
-    filtered,
-    regular_inverse,
-    stacked,
-)
-from gmwm.estimate.problem import (
-    Coordinates,
-    Slope,
-    detrended_covariance,
-    difference,
-    drift_key,
-    in_model_order,
-    spectral_information,
-    weight_root,
-)
+from gmwm.estimate.likelihood.conclusion import regular_inverse
+from gmwm.estimate.likelihood.kalman import Recursion, accumulated, filtered
+from gmwm.estimate.likelihood.likelihood import Columns, arrays_of, stacked
+from gmwm.estimate.problem.information import spectral_information
+from gmwm.estimate.problem.moments import weight_root
+from gmwm.estimate.problem.parameters import Coordinates, difference, drift_key, in_model_order
+from gmwm.estimate.problem.ramp import Slope, detrended_covariance
 from gmwm.process import Model, Process, StateSpace, as_model
 from gmwm.variance import MIN_SAMPLES
 from gmwm.variance.covariance import dyadic_levels, haar_covariance, mean_covariance

@@ -13,10 +13,12 @@ from gmwm._core import checks
 from gmwm._core.jobs import one_blas_thread
 from gmwm._core.typing import FloatArray
 from gmwm.errors import FitWarning, InputError
-from gmwm.estimate.likelihood import EM, MLE, Whittle
+from gmwm.estimate.likelihood.em import EM
+from gmwm.estimate.likelihood.mle import MLE, Whittle
 from gmwm.estimate.lines import AllanLines
-from gmwm.estimate.moments import GMWM, SimulatedMoments
-from gmwm.estimate.result import Fit, fit_joint
+from gmwm.estimate.moments.gmwm import GMWM, SimulatedMoments
+from gmwm.estimate.result.fit import Fit
+from gmwm.estimate.result.joint import fit_joint
 from gmwm.process import Model, Process, as_model
 from gmwm.readers import Channel
 from gmwm.variance import WaveletVariance, as_channel, as_wavelet_variance

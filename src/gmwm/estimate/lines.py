@@ -21,8 +21,10 @@ from gmwm._core.text import per_cent
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.estimate import tuning
-from gmwm.estimate.problem import ols_slope, weight_root
-from gmwm.estimate.result import Fit, Region, slope_name
+from gmwm.estimate.problem.moments import weight_root
+from gmwm.estimate.problem.ramp import ols_slope
+from gmwm.estimate.result.estimate import Region, slope_name
+from gmwm.estimate.result.fit import Fit
 from gmwm.issues import Notice, notice
 from gmwm.process import (
     BiasInstability,

@@ -14,17 +14,16 @@ from gmwm.filter_numbers import tuning
 from gmwm.filter_numbers.axes import AxisModel, One, Sd, SensorAxes, Several, given_tau, per_axis
 from gmwm.filter_numbers.propagation import Chain
 from gmwm.filter_numbers.result import AxisFilterNumbers, FilterNumbers, Predicted
-from gmwm.filter_numbers.spectra import (
+from gmwm.filter_numbers.spectra.dominance import (
     KINDS,
     TIGHTEST,
-    Estimated,
     Problem,
-    RequiredSpectrum,
     correlation_time,
     dominating,
-    region_spectra,
     standard_errors,
 )
+from gmwm.filter_numbers.spectra.region import Estimated, region_spectra
+from gmwm.filter_numbers.spectra.required import RequiredSpectrum
 from gmwm.issues import Notice, notice
 from gmwm.process import Model, RandomWalk, WhiteNoise
 

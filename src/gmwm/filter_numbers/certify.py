@@ -22,7 +22,7 @@ from gmwm.filter_numbers.imperfections import Imperfections, Motion
 from gmwm.filter_numbers.propagation import Chain
 from gmwm.filter_numbers.reduce import usable
 from gmwm.filter_numbers.result import AxisFilterNumbers, FilterNumbers, InUnits, shown_unit
-from gmwm.filter_numbers.spectra import KINDS
+from gmwm.filter_numbers.spectra.dominance import KINDS
 from gmwm.ins import AIDINGS, SensorModels, Trajectory, covariance_analysis, loiter_with_outages
 from gmwm.issues import Notice, notice
 from gmwm.process import Model, Process, RandomWalk, WhiteNoise, as_model

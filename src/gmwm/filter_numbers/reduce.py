@@ -35,7 +35,8 @@ from gmwm.filter_numbers.bound import (
 )
 from gmwm.filter_numbers.propagation import Chain, ChainErrors
 from gmwm.filter_numbers.result import FORMS, AxisFilterNumbers, FilterNumbers, Predicted
-from gmwm.filter_numbers.spectra import Problem, RequiredSpectrum, with_correlation_times
+from gmwm.filter_numbers.spectra.dominance import Problem, with_correlation_times
+from gmwm.filter_numbers.spectra.required import RequiredSpectrum
 from gmwm.issues import Notice, notice
 from gmwm.process import GaussMarkov, Model, RandomWalk, WhiteNoise
 

@@ -335,7 +335,7 @@ def test_latin_1_header(write, samples):
 
 
 def test_endless_line(tmp_path, monkeypatch):
-    from gmwm.readers.text import lines as text_file
+    from gmwm.readers.text import csv_table as text_file
 
     monkeypatch.setattr(text_file, "_LONGEST_LINE", 1 << 18)
     path = tmp_path / "a.csv"

@@ -18,9 +18,13 @@ from gmwm.estimate.likelihood.likelihood import (
     defined,
     objective_of,
 )
-from gmwm.estimate.moments import suffices
-from gmwm.estimate.problem import Coordinates, Moments, Slope, density, difference, frequency_nodes
-from gmwm.estimate.result import Estimates, Fit, agreement, conclude
+from gmwm.estimate.moments.weights import suffices
+from gmwm.estimate.problem.information import density, frequency_nodes
+from gmwm.estimate.problem.moments import Moments
+from gmwm.estimate.problem.parameters import Coordinates, difference
+from gmwm.estimate.problem.ramp import Slope
+from gmwm.estimate.result.conclusion import Estimates, agreement, conclude
+from gmwm.estimate.result.fit import Fit
 from gmwm.issues import Notice, notice
 from gmwm.process import Model, Process
 

@@ -42,8 +42,9 @@ from gmwm.estimate.likelihood.likelihood import (
     objective_of,
     stacked,
 )
-from gmwm.estimate.problem import ols_slope, spectral_information
-from gmwm.estimate.result import Fit
+from gmwm.estimate.problem.information import spectral_information
+from gmwm.estimate.problem.ramp import ols_slope
+from gmwm.estimate.result.fit import Fit
 from gmwm.issues import notice
 from gmwm.process import Model, Process, StateSpace, as_model
 from gmwm.readers import Channel

@@ -30,16 +30,14 @@ from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.estimate import tuning
 from gmwm.estimate.likelihood.kalman import Space, whiten
-from gmwm.estimate.moments import GMWM, dictionary
-from gmwm.estimate.problem import (
-    Coordinates,
-    Scales,
-    Slope,
-    density,
-    keys_by_term,
-    solve_nonnegative,
-)
-from gmwm.estimate.result import Fit
+from gmwm.estimate.moments.gmwm import GMWM
+from gmwm.estimate.moments.weights import dictionary
+from gmwm.estimate.problem.information import density
+from gmwm.estimate.problem.moments import Scales
+from gmwm.estimate.problem.nonnegative import solve_nonnegative
+from gmwm.estimate.problem.parameters import Coordinates, keys_by_term
+from gmwm.estimate.problem.ramp import Slope
+from gmwm.estimate.result.fit import Fit
 from gmwm.process import Model, Process, StateSpace, as_model
 from gmwm.readers import Channel
 from gmwm.variance import MIN_SAMPLES, Runs, WaveletVariance, wavelet_variance

@@ -32,8 +32,10 @@ from gmwm.estimate.likelihood.likelihood import (
     have_states,
     objective_of,
 )
-from gmwm.estimate.problem import Coordinates, Scales, spectral_information
-from gmwm.estimate.result import Fit
+from gmwm.estimate.problem.information import spectral_information
+from gmwm.estimate.problem.moments import Scales
+from gmwm.estimate.problem.parameters import Coordinates
+from gmwm.estimate.result.fit import Fit
 from gmwm.issues import notice
 from gmwm.process import Model, Process, as_model
 from gmwm.readers import Channel

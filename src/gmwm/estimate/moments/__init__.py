@@ -11,8 +11,6 @@ from gmwm.estimate.moments.profile import (
 from gmwm.estimate.moments.weights import (
     TEXTBOOK as TEXTBOOK,
     Reference as Reference,
-    Weights as Weights,
     dictionary as dictionary,
     dictionary_fit as dictionary_fit,
-    suffices as suffices,
 )

@@ -15,15 +15,12 @@ from gmwm.estimate import tuning
 from gmwm.estimate.moments.design import Design
 from gmwm.estimate.moments.profile import Point, Profile, search
 from gmwm.estimate.moments.weights import Weights
-from gmwm.estimate.problem import Coefficients, Moments, drift_key, in_model_order, weight_root
-from gmwm.estimate.result import (
-    Estimates,
-    Fit,
-    agreement,
-    conclude,
-    estimate_notices,
-    upper_amplitude,
-)
+from gmwm.estimate.problem.moments import Moments, weight_root
+from gmwm.estimate.problem.parameters import drift_key, in_model_order
+from gmwm.estimate.problem.regressors import Coefficients
+from gmwm.estimate.result.conclusion import Estimates, agreement, conclude, estimate_notices
+from gmwm.estimate.result.estimate import upper_amplitude
+from gmwm.estimate.result.fit import Fit
 from gmwm.issues import Notice, notice
 from gmwm.process import Model, Process
 from gmwm.variance import WaveletVariance

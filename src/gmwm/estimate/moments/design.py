@@ -18,7 +18,8 @@ from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.estimate import tuning
 from gmwm.estimate.moments.kernels import Shaped
-from gmwm.estimate.problem import Coordinates, Scales, difference, is_plain, shape_of
+from gmwm.estimate.problem.moments import Scales, is_plain
+from gmwm.estimate.problem.parameters import Coordinates, difference, shape_of
 from gmwm.process import Model, Process, Shape, compiled_levels
 
 MOST_SHAPES = 3  # parameters of the processes whose curves are known in compiled form

@@ -29,17 +29,10 @@ from gmwm.estimate.moments.weights import (
     dictionary_fit,
     with_discrepancy,
 )
-from gmwm.estimate.problem import (
-    Coordinates,
-    Moments,
-    Scales,
-    Simulation,
-    is_plain,
-    keys_by_term,
-    ols_slope,
-    weight_root,
-)
-from gmwm.estimate.result import Fit
+from gmwm.estimate.problem.moments import Moments, Scales, Simulation, is_plain, weight_root
+from gmwm.estimate.problem.parameters import Coordinates, keys_by_term
+from gmwm.estimate.problem.ramp import ols_slope
+from gmwm.estimate.result.fit import Fit
 from gmwm.issues import notice
 from gmwm.process import Model, Process, RateRamp, as_model, parameter
 from gmwm.variance import WaveletVariance

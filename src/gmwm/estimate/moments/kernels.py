@@ -13,7 +13,7 @@ import numpy as np
 
 from gmwm._core.compiled import compiled
 from gmwm._core.typing import BoolArray, FloatArray, IntArray
-from gmwm.estimate.problem import orthogonal_to, solve_columns
+from gmwm.estimate.problem.nonnegative import orthogonal_to, solve_columns
 from gmwm.process import shaped_curve, shaped_slope
 
 _STEP = 1e-5  # of central differences in z, whose natural scale is 1

@@ -19,7 +19,9 @@ from gmwm.errors import InputError
 from gmwm.estimate import tuning
 from gmwm.estimate.moments.design import MOST_SHAPES, Design
 from gmwm.estimate.moments.kernels import Weighted, linearized, profiled, projected
-from gmwm.estimate.problem import Scales, objectives_with, shape_of, solve_nonnegative
+from gmwm.estimate.problem.moments import Scales
+from gmwm.estimate.problem.nonnegative import objectives_with, solve_nonnegative
+from gmwm.estimate.problem.parameters import shape_of
 from gmwm.process import GaussMarkov, Model, Process, Shape, WhiteNoise
 
 _MOST = 200  # evaluations of a search

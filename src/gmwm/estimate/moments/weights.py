@@ -23,7 +23,8 @@ from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.estimate import tuning
 from gmwm.estimate.moments.design import Design
-from gmwm.estimate.problem import Scales, chi_square, is_plain, solve_nonnegative, weight_root
+from gmwm.estimate.problem.moments import Scales, chi_square, is_plain, weight_root
+from gmwm.estimate.problem.nonnegative import solve_nonnegative
 from gmwm.process import CATALOGUE, Model, Process, Shape
 from gmwm.variance import WaveletVariance
 

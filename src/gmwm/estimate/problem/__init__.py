@@ -4,35 +4,25 @@ from gmwm.estimate.problem.information import (
     density as density,
     error_growth as error_growth,
     frequency_nodes as frequency_nodes,
-    information_with as information_with,
     slope_dof as slope_dof,
     spectral_information as spectral_information,
 )
 from gmwm.estimate.problem.moments import (
     CurveCoefficients as CurveCoefficients,
-    FittedMoments as FittedMoments,
     Moments as Moments,
     Scales as Scales,
     Simulation as Simulation,
     chi_square as chi_square,
-    is_plain as is_plain,
     satterthwaite_dof as satterthwaite_dof,
     weight_root as weight_root,
 )
 from gmwm.estimate.problem.nonnegative import (
     objectives_with as objectives_with,
-    orthogonal_to as orthogonal_to,
-    solve_columns as solve_columns,
     solve_nonnegative as solve_nonnegative,
 )
 from gmwm.estimate.problem.parameters import (
     Coordinates as Coordinates,
-    Term as Term,
-    difference as difference,
-    drift_key as drift_key,
-    in_model_order as in_model_order,
     keys_by_term as keys_by_term,
-    shape_of as shape_of,
 )
 from gmwm.estimate.problem.ramp import (
     Slope as Slope,
@@ -41,11 +31,9 @@ from gmwm.estimate.problem.ramp import (
     gls_slope as gls_slope,
     ols_slope as ols_slope,
     slope_p_value as slope_p_value,
-    walks_beside as walks_beside,
 )
 from gmwm.estimate.problem.regressors import (
     Coefficients as Coefficients,
-    CurveRegression as CurveRegression,
     difference_covariance as difference_covariance,
     pilot as pilot,
 )

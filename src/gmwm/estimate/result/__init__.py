@@ -5,24 +5,18 @@ from gmwm.estimate.problem import (
     satterthwaite_dof as satterthwaite_dof,
 )
 from gmwm.estimate.result.conclusion import (
-    Estimates as Estimates,
-    agreement as agreement,
-    conclude as conclude,
     estimate_notices as estimate_notices,
     misfit_notices as misfit_notices,
     missed_level_notices as missed_level_notices,
 )
 from gmwm.estimate.result.estimate import (
     Estimate as Estimate,
-    Kind as Kind,
-    Region as Region,
     confidence_interval as confidence_interval,
     estimates_of as estimates_of,
     quantile_above_zero as quantile_above_zero,
-    slope_name as slope_name,
     upper_amplitude as upper_amplitude,
 )
-from gmwm.estimate.result.fit import Fit as Fit, dense_curves as dense_curves, plain as plain
+from gmwm.estimate.result.fit import Fit as Fit, dense_curves as dense_curves
 from gmwm.estimate.result.goodness import Goodness as Goodness, left_open as left_open
 from gmwm.estimate.result.joint import (
     JointFit as JointFit,

@@ -13,16 +13,11 @@ from gmwm._core.text import brief, per_cent
 from gmwm._core.typing import FloatArray
 from gmwm._core.units import customary_unit
 from gmwm.estimate import tuning
-from gmwm.estimate.problem import (
-    Coefficients,
-    Coordinates,
-    chi_square,
-    drift_key,
-    in_model_order,
-    slope_dof,
-    walks_beside,
-    weight_root,
-)
+from gmwm.estimate.problem.information import slope_dof
+from gmwm.estimate.problem.moments import chi_square, weight_root
+from gmwm.estimate.problem.parameters import Coordinates, drift_key, in_model_order
+from gmwm.estimate.problem.ramp import walks_beside
+from gmwm.estimate.problem.regressors import Coefficients
 from gmwm.estimate.result.estimate import upper_amplitude
 from gmwm.estimate.result.fit import Fit
 from gmwm.estimate.result.goodness import Goodness

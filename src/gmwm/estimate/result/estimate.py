@@ -17,7 +17,9 @@ from gmwm._core.distributions import student as t
 from gmwm._core.documents import Positive, Text
 from gmwm._core.units import customary_unit, field_units, si_parameter_unit
 from gmwm.estimate import tuning
-from gmwm.estimate.problem import Coordinates, Scales, information_with
+from gmwm.estimate.problem.information import information_with
+from gmwm.estimate.problem.moments import Scales
+from gmwm.estimate.problem.parameters import Coordinates
 from gmwm.process import Model, Parameter, Process
 from gmwm.variance import WaveletVariance
 

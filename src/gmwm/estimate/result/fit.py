@@ -20,14 +20,10 @@ from gmwm._core.typing import FloatArray
 from gmwm._core.units import shown_unit
 from gmwm.errors import InputError, MissingNameError
 from gmwm.estimate import tuning
-from gmwm.estimate.problem import (
-    FittedMoments,
-    Scales,
-    Walks,
-    drift_key,
-    error_growth,
-    walks_beside,
-)
+from gmwm.estimate.problem.information import error_growth
+from gmwm.estimate.problem.moments import FittedMoments, Scales
+from gmwm.estimate.problem.parameters import drift_key
+from gmwm.estimate.problem.ramp import Walks, walks_beside
 from gmwm.estimate.result.estimate import (
     Estimate,
     Region,

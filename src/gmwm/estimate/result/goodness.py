@@ -17,7 +17,7 @@ from gmwm._core.tables import cell, plain_table
 from gmwm._core.text import per_cent, wrapped
 from gmwm._core.typing import BoolArray, FloatArray
 from gmwm.estimate import tuning
-from gmwm.estimate.problem import FittedMoments, chi_square, weight_root
+from gmwm.estimate.problem.moments import FittedMoments, chi_square, weight_root
 from gmwm.process import GaussMarkov, Model
 from gmwm.variance import WaveletVariance
 

@@ -16,7 +16,7 @@ from gmwm._core.tables import cell, plain_table
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.estimate import tuning
-from gmwm.estimate.problem import FittedMoments, chi_square
+from gmwm.estimate.problem.moments import FittedMoments, chi_square
 from gmwm.estimate.result.fit import Fit
 from gmwm.issues import notice
 from gmwm.process import Model

@@ -16,30 +16,19 @@ from gmwm._core.typing import BoolArray, FloatArray, IntArray
 from gmwm.errors import InputError
 from gmwm.ins import tuning
 from gmwm.ins.covariance.joint_kernels import JointFilter, KeptCovariances, Track, run_jointly
-from gmwm.ins.filter import (
-    IS_RELATIVE,
-    KINDS,
-    NAVIGATION,
-    Aiding,
-    Events,
-    Filter,
-    Keyframe,
-    Kinematics,
-    Outage,
-    Outputs,
-    SensorStates,
-    gnss,
-    new_keyframe,
-    observe_since,
-    odometry,
-    poses,
-    unmodified,
-    wheels,
-)
+from gmwm.ins.filter.aiding import Aiding, Outage, gnss, odometry, poses, wheels
+from gmwm.ins.filter.covariance_kernels import NAVIGATION
+from gmwm.ins.filter.filter import Filter, Outputs, unmodified
+from gmwm.ins.filter.measurements import IS_RELATIVE, KINDS, new_keyframe, observe_since
+from gmwm.ins.filter.records import Events, Keyframe, Kinematics
+from gmwm.ins.filter.states import SensorStates
 from gmwm.ins.geometry import matrix_from_rpy
-from gmwm.ins.imu import Imu, SensorModels, emulate
-from gmwm.ins.simulation import Scenario, place_of
-from gmwm.ins.trajectory import Trajectory, car_drive, fixed_wing_loiter
+from gmwm.ins.imu.increments import Imu, emulate
+from gmwm.ins.imu.sensors import SensorModels
+from gmwm.ins.simulation.consistency import place_of
+from gmwm.ins.simulation.trials import Scenario
+from gmwm.ins.trajectory.missions import car_drive, fixed_wing_loiter
+from gmwm.ins.trajectory.trajectory import Trajectory
 from gmwm.issues import Notice, notice
 
 

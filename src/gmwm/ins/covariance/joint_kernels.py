@@ -17,23 +17,21 @@ import numpy as np
 
 from gmwm._core.compiled import compiled
 from gmwm._core.typing import FloatArray, IntArray
-from gmwm.ins.filter import (
-    IS_GNSS,
-    IS_RELATIVE,
+from gmwm.ins.filter.covariance_kernels import (
+    excess,
+    measurement_update,
+    propagate,
+    tilt_squared,
+    transition,
+)
+from gmwm.ins.filter.measurements import IS_GNSS, IS_RELATIVE, new_keyframe, observe, observe_since
+from gmwm.ins.filter.records import (
     Events,
     Keyframe,
     Kinematics,
     SensorTable,
     Settings,
-    excess,
-    measurement_update,
-    new_keyframe,
     new_transition,
-    observe,
-    observe_since,
-    propagate,
-    tilt_squared,
-    transition,
 )
 from gmwm.ins.geometry import gravity
 

@@ -51,8 +51,8 @@ from gmwm.ins.geometry import (
     rpy_from_matrix,
     turn_navigation,
 )
-from gmwm.ins.imu import Imu
-from gmwm.ins.trajectory import NavState, Trajectory, check_latitudes
+from gmwm.ins.imu.increments import Imu
+from gmwm.ins.trajectory.trajectory import NavState, Trajectory, check_latitudes
 
 
 @compiled()

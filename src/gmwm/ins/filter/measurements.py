@@ -23,8 +23,8 @@ from gmwm.ins.geometry import (
     radii_at,
     rpy_from_matrix,
 )
-from gmwm.ins.imu import Imu
-from gmwm.ins.trajectory import Trajectory
+from gmwm.ins.imu.increments import Imu
+from gmwm.ins.trajectory.trajectory import Trajectory
 
 if TYPE_CHECKING:
     from gmwm.ins.filter.aiding import Aiding

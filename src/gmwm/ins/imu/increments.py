@@ -23,7 +23,7 @@ from gmwm.ins.geometry import (
     skew,
 )
 from gmwm.ins.imu.sensors import AXES, SensorModels
-from gmwm.ins.trajectory import (
+from gmwm.ins.trajectory.trajectory import (
     Trajectory,
     check_latitudes,
     coefficients,

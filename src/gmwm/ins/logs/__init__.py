@@ -2,16 +2,10 @@
 
 from gmwm.ins.logs.alignment import align as align
 from gmwm.ins.logs.attitude import standstills as standstills, steady as steady
-from gmwm.ins.logs.comparison import (
-    Comparison as Comparison,
-    Outcome as Outcome,
-    Paired as Paired,
-    compare as compare,
-    paired as paired,
-)
+from gmwm.ins.logs.comparison import Comparison as Comparison, paired as paired
 from gmwm.ins.logs.faults import Fault as Fault, Faults as Faults, fault_notice as fault_notice
-from gmwm.ins.logs.fix_log import read_fix_log as read_fix_log, read_fixes as read_fixes
-from gmwm.ins.logs.imu_log import read_imu as read_imu, read_imu_log as read_imu_log
+from gmwm.ins.logs.fix_log import read_fix_log as read_fix_log
+from gmwm.ins.logs.imu_log import read_imu_log as read_imu_log
 from gmwm.ins.logs.measured import LogSpec as LogSpec, Measured as Measured
 from gmwm.ins.logs.navigated import Navigated as Navigated
-from gmwm.ins.logs.replay import Replay as Replay, Smoothed as Smoothed, smooth as smooth
+from gmwm.ins.logs.replay import Replay as Replay, smooth as smooth

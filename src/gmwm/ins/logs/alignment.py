@@ -13,9 +13,11 @@ from gmwm._core.spool import Spool, is_spooled, release, windows
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.ins import tuning
-from gmwm.ins.filter import Aiding, InitialSd
+from gmwm.ins.filter.aiding import Aiding
+from gmwm.ins.filter.filter import InitialSd
 from gmwm.ins.geometry import RATE, STANDARD_GRAVITY, matrix_from_rpy, offset, rpy_from_matrix
-from gmwm.ins.imu import AXES, Imu, SensorModels
+from gmwm.ins.imu.increments import Imu
+from gmwm.ins.imu.sensors import AXES, SensorModels
 from gmwm.ins.logs.attitude import (
     Heading,
     acceleration,
@@ -28,7 +30,7 @@ from gmwm.ins.logs.attitude import (
     velocity_at_rest,
 )
 from gmwm.ins.logs.measured import Measured
-from gmwm.ins.trajectory import NavState
+from gmwm.ins.trajectory.trajectory import NavState
 from gmwm.issues import Notice, notice
 
 

@@ -13,9 +13,9 @@ from gmwm._core.spool import release
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.ins import tuning
-from gmwm.ins.filter import Aiding, Fixes
+from gmwm.ins.filter.aiding import Aiding, Fixes
 from gmwm.ins.geometry import RATE, matrix_from_rpy, ned_difference, rpy_from_matrix, turn_body
-from gmwm.ins.imu import Imu
+from gmwm.ins.imu.increments import Imu
 
 _WINDOWS = 1024  # looked at together: a few MB
 

@@ -21,7 +21,7 @@ from gmwm._core.text import per_cent
 from gmwm._core.typing import BoolArray, FloatArray
 from gmwm.errors import InputError
 from gmwm.ins import tuning
-from gmwm.ins.filter import KINDS
+from gmwm.ins.filter.measurements import KINDS
 from gmwm.ins.logs.measured import Measured
 from gmwm.ins.logs.replay import Replay
 from gmwm.issues import Notice, notice

@@ -18,8 +18,9 @@ from gmwm._core.units import SI_UNIT
 from gmwm.errors import InputError
 from gmwm.ins import tuning
 from gmwm.ins.geometry import STANDARD_GRAVITY
-from gmwm.ins.imu import AXES, Imu, require_axes
-from gmwm.ins.trajectory import is_time
+from gmwm.ins.imu.increments import Imu
+from gmwm.ins.imu.sensors import AXES, require_axes
+from gmwm.ins.trajectory.trajectory_file import is_time
 from gmwm.issues import Notice, Severity, notice
 from gmwm.readers import CsvTable, Recording, bare, is_text, load_columns, read
 

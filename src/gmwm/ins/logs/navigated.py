@@ -18,13 +18,14 @@ from gmwm._core.text import brief, bullets, wrapped
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.ins import tuning
-from gmwm.ins.filter import KINDS, Solution
+from gmwm.ins.filter.filter import Solution
+from gmwm.ins.filter.measurements import KINDS
 from gmwm.ins.geometry import ned_difference
 from gmwm.ins.logs.alignment import Alignment, align
 from gmwm.ins.logs.faults import LEVEL, Faults, fault_notice
 from gmwm.ins.logs.measured import Measured, ReferenceErrors
 from gmwm.ins.logs.replay import Replay, innovation_sizes
-from gmwm.ins.simulation import InnovationTest
+from gmwm.ins.simulation.consistency import InnovationTest
 from gmwm.issues import Notice, Severity, notice, worst_first
 
 if TYPE_CHECKING:

@@ -11,32 +11,18 @@ import numpy as np
 from gmwm._core.distributions import norm
 from gmwm._core.typing import BoolArray, FloatArray, IntArray
 from gmwm.ins import tuning
-from gmwm.ins.filter import (
-    KINDS,
-    NAVIGATION,
-    Aiding,
-    Events,
-    Filter,
-    FilterInnovations,
-    Fixes,
-    InitialSd,
-    Kinematics,
-    Outputs,
-    Solution,
-    Transition,
-    measurement_update,
-    navigate,
-    new_transition,
-    observe,
-    propagate,
-    transition,
-)
+from gmwm.ins.filter.aiding import Aiding, Fixes
+from gmwm.ins.filter.covariance_kernels import NAVIGATION, measurement_update, propagate, transition
+from gmwm.ins.filter.filter import Filter, FilterInnovations, InitialSd, Outputs, Solution, navigate
+from gmwm.ins.filter.measurements import KINDS, observe
+from gmwm.ins.filter.records import Events, Kinematics, Transition, new_transition
 from gmwm.ins.geometry import gravity_at, matrix_from_rpy, offset
-from gmwm.ins.imu import AXES, Imu, SensorModels
+from gmwm.ins.imu.increments import Imu
+from gmwm.ins.imu.sensors import AXES, SensorModels
 from gmwm.ins.logs.alignment import Alignment, align, started
 from gmwm.ins.logs.measured import Measured
-from gmwm.ins.simulation import InnovationTest, chi_square_ratio, lag_one
-from gmwm.ins.trajectory import NavState
+from gmwm.ins.simulation.consistency import InnovationTest, chi_square_ratio, lag_one
+from gmwm.ins.trajectory.trajectory import NavState
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,9 +17,9 @@ from gmwm._core.distributions import chi2, norm, student as t
 from gmwm._core.typing import BoolArray, FloatArray, IntArray
 from gmwm.errors import InputError
 from gmwm.ins import tuning
-from gmwm.ins.filter import Outputs, Solution
-from gmwm.ins.imu import SensorErrors
-from gmwm.ins.trajectory import Trajectory
+from gmwm.ins.filter.filter import Outputs, Solution
+from gmwm.ins.imu.sensors import SensorErrors
+from gmwm.ins.trajectory.trajectory import Trajectory
 
 GROUPS = {
     "position": slice(0, 3),

@@ -15,9 +15,11 @@ from gmwm._core.runs import Earlier, do_runs
 from gmwm._core.typing import FloatArray, Progress
 from gmwm.errors import InputError
 from gmwm.ins import tuning
-from gmwm.ins.filter import Aiding, Filter, InitialSd, Outage, Outputs, Solution
+from gmwm.ins.filter.aiding import Aiding, Outage
+from gmwm.ins.filter.filter import Filter, InitialSd, Outputs, Solution
 from gmwm.ins.geometry import matrix_from_rotation_vector, matrix_from_rpy, offset, rpy_from_matrix
-from gmwm.ins.imu import Imu, Recorded, SensorErrors, SensorModels, emulate
+from gmwm.ins.imu.increments import Imu, emulate
+from gmwm.ins.imu.sensors import Recorded, SensorErrors, SensorModels
 from gmwm.ins.simulation.consistency import (
     PER_RUN,
     QUANTITIES,
@@ -25,7 +27,7 @@ from gmwm.ins.simulation.consistency import (
     errors_of_run,
     sizes,
 )
-from gmwm.ins.trajectory import NavState, Trajectory
+from gmwm.ins.trajectory.trajectory import NavState, Trajectory
 from gmwm.issues import Notice, notice
 
 _KEPT_EPOCHS = 300  # whose errors are kept, besides outages: a figure shows no more

@@ -15,7 +15,7 @@ from gmwm._core.text import bullets, wrapped
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.ins import tuning
-from gmwm.ins.filter import Outage
+from gmwm.ins.filter.aiding import Outage
 from gmwm.ins.geometry import ned_difference
 from gmwm.ins.simulation.consistency import (
     LEVELS,

@@ -14,9 +14,12 @@ from pydantic import BeforeValidator, Discriminator, Field, StrictInt, Tag
 from gmwm._core import checks
 from gmwm.errors import InputError
 from gmwm.ins import tuning
-from gmwm.ins.filter import Aiding, InitialSd, Outage, SensorStates, gnss
-from gmwm.ins.imu import Recorded, SensorModels, emulate
-from gmwm.ins.simulation import ErrorSource, Experiment, Scenario, Simulated
+from gmwm.ins.filter.aiding import Aiding, Outage, gnss
+from gmwm.ins.filter.filter import InitialSd
+from gmwm.ins.filter.states import SensorStates
+from gmwm.ins.imu.increments import emulate
+from gmwm.ins.imu.sensors import Recorded, SensorModels
+from gmwm.ins.simulation.trials import ErrorSource, Experiment, Scenario, Simulated
 from gmwm.ins.spec.fields import (
     RECORDINGS,
     FileName,
@@ -35,7 +38,8 @@ from gmwm.ins.spec.fields import (
     read_models,
     written,
 )
-from gmwm.ins.trajectory import Trajectory, car_drive, fixed_wing_loiter, helicopter_mapping
+from gmwm.ins.trajectory.missions import car_drive, fixed_wing_loiter, helicopter_mapping
+from gmwm.ins.trajectory.trajectory import Trajectory
 from gmwm.readers import read
 
 MISSIONS: dict[str, Callable[..., Trajectory]] = {
