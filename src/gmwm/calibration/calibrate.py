@@ -157,10 +157,19 @@ def _without_curves(
                 c if c.is_auxiliary or c.name not in designs else designs[c.name].without(c, place)
                 for c in each.channels
             ),
+            notices=(*each.notices, *_picked(each)),
         )
         for place, each in enumerate(recordings)
     ]
     return left, designs
+
+
+def _picked(recording: Recording) -> list[Notice]:
+    """That samples of a slow log may be single ones of a faster sensor."""
+    if recording.rate > tuning.SLOW_LOG:
+        return []
+    times = float(np.sqrt(tuning.USUAL_RATE / recording.rate))
+    return [notice("slow-log", "", {"rate": recording.rate, "times": times})]
 
 
 def _calibrated(

@@ -203,3 +203,19 @@ def test_a_curve_along_the_record_is_what_was_added(result):
         curve.along({"temperature": warm_up() + 10.0}, DT)
     with pytest.raises(gmwm.InputError, match="depends on temperature: give its values"):
         curve.along({"voltage": at}, DT)
+
+
+def test_a_log_that_picks_samples_has_the_curve_and_not_the_noise():
+    """Single samples of 20 Hz at 2 Hz: the density is ten times that of the sensor, and said."""
+    temperature = warm_up(10 * SIZE)
+    x = WhiteNoise(N).simulate(10 * SIZE, 0.05, 6) + cubic(temperature)
+    arrays = {"gyro_x": x[::10], "temperature": temperature[::10]}
+    units = {"gyro": "rad/s", "temperature": "degC"}
+    cal = calibrated(gmwm.Recording.from_arrays(arrays, 2.0, units), model="N")
+    difference, error = off(cal.curves["gyro_x"], np.linspace(26.0, 64.0, 8))
+    assert np.all(np.abs(difference) < 2.0 * error)
+    assert cal["gyro_x"].params["N"] == pytest.approx(np.sqrt(10.0) * N, rel=0.1)
+    (said,) = [each for each in cal.notices if each.code == "slow-log"]
+    assert said.severity == "warning"
+    fast = gmwm.Recording.from_arrays({name: x[:SIZE] for name, x in arrays.items()}, 20.0, units)
+    assert all(each.code != "slow-log" for each in calibrated(fast, "linear", model="N").notices)
