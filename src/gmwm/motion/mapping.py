@@ -59,7 +59,7 @@ class Mounting(Document):
 class Signals:
     """One sensor of one IMU at the instants of the target, turned into its axes.
 
-    values, slopes: (n, 3), and their time derivatives.
+    values, slopes: (n, 3), and means over 0.1 s of their time derivatives.
     arms: (n, 3, 3), what a lever arm of 1 m along each axis adds; None for gyros.
     """
 

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 from scipy.interpolate import CubicSpline
+from scipy.ndimage import uniform_filter1d
 from scipy.spatial.transform import Rotation
 
 from gmwm._core import checks
@@ -295,7 +296,9 @@ def _of_target(
             if sensor == "gyro":
                 turns.append(rotation_to(means(wanted, size), means(values, size)))
             values, slopes = values @ turns[j].T, slopes @ turns[j].T
-            signals.append(Signals(values, slopes, arms[j]))
+            # A lag times the slopes of vibration, beyond the means that give it, would be noise.
+            steady = uniform_filter1d(slopes, size, axis=0)
+            signals.append(Signals(values, steady, arms[j]))
             if sensor == "gyro":
                 arms[j] = arms_of(values, slopes)
         mapped, parameters, errors = map_onto(wanted, signals, good, target.dt)

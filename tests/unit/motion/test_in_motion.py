@@ -90,6 +90,26 @@ def test_clocks_and_mountings_are_found():
         assert np.all(np.abs(mounting.correction) < 5.0 * mounting.correction_error)
 
 
+def test_lags_of_motion_do_not_amplify_vibration():
+    """Accelerometers of one IMU are 8 ms late: its vibration is not 8 ms times its slopes."""
+    rng = np.random.default_rng(18)
+    body, errors = motion_of(rng), white(rng, 3)
+    errors[:, 1:, 3:] = 10.0 * np.diff(errors[:, :, 3:], axis=1)
+    recordings = [imu(body, own) for own in errors]
+    time = np.arange(errors.shape[1]) * DT
+    late = np.hstack([body(time)[:, :3], body(time - 0.008)[:, 3:]]) + errors[1]
+    recordings[1] = recording(late)
+    found = gmwm.motion(recordings)
+    (lag,) = (
+        m.lag for m in found.mountings if (m.imu, m.target, m.sensor) == ("imu 2", "imu 1", "accel")
+    )
+    assert lag == pytest.approx(0.008, abs=0.002)
+    for k, axis in enumerate(AXES[3:], start=3):
+        haar = np.diff(errors[:2, :, k], axis=1)
+        both = 0.5 * np.mean(haar**2, axis=1).sum()
+        assert found.curve("imu 1", axis).differences[0, 0] == pytest.approx(both, rel=0.05)
+
+
 def test_two_imus_give_the_sum_and_say_so():
     rng = np.random.default_rng(6)
     found = gmwm.motion(imus(rng, 2))
