@@ -7,6 +7,7 @@ from gmwm.calibration.channel import (
     Stopwatch as Stopwatch,
     stage as stage,
 )
+from gmwm.calibration.covariates import compensated as compensated
 from gmwm.calibration.curve import (
     BiasCurve as BiasCurve,
     Covariate as Covariate,
@@ -26,4 +27,5 @@ from gmwm.calibration.numbers import (
     fast_density as fast_density,
     upper_limit as upper_limit,
 )
+from gmwm.calibration.scaling import with_noise as with_noise
 from gmwm.calibration.screening import SCREENING as SCREENING

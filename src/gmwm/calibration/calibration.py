@@ -18,8 +18,10 @@ from gmwm._core.frozen import ByName, freeze
 from gmwm._core.pages import make
 from gmwm._core.tables import frame
 from gmwm._core.text import wrapped
+from gmwm.calibration.covariates import compensated
 from gmwm.calibration.curve import BiasCurve
 from gmwm.calibration.numbers import SensorNumbers, axis_numbers
+from gmwm.calibration.scaling import with_noise
 from gmwm.errors import InputError, MissingNameError
 from gmwm.estimate import Estimate, Fit
 from gmwm.issues import Notice, notice
@@ -124,6 +126,48 @@ class Calibration(ByName[Fit], Document):
         return SensorNumbers(
             {name: axis_numbers(fit, self.rivals.get(name, ())) for name, fit in self.items()}
         )
+
+    def at(self, x: float) -> Calibration:
+        """The same with the fast noise that it has at a value of the covariate.
+
+        White noise, N, its error and the variances are those at this temperature in place of the
+        average over the recording, so that filter numbers, budgets and files of it are.
+
+        Parameters
+        ----------
+        x : float
+            Of the first covariate, such as a temperature in degC.
+
+        Raises
+        ------
+        InputError
+            If the recording does not cover it, or it has no covariate.
+        """
+        fits, rivals, curves = dict(self.fits), dict(self.rivals), dict(self.curves)
+        if not curves:
+            raise InputError(
+                f"the noise at {x:g} is not known: calibrate with "
+                'covariates={"temperature": "auto"}'
+            )
+        for name, curve in self.curves.items():
+            factor, own = float(curve.noise_factor(x)), curve.scaling
+            assert own is not None
+            fits[name] = own.at(self.fits[name], x)
+            rivals[name] = tuple(with_noise(each, factor) for each in self.rivals.get(name, ()))
+            curves[name] = replace(curve, scaling=replace(own, reference=x))
+        unit = next(iter(self.curves.values())).covariates[0].unit
+        source = f"{self.source or 'a recording'} at {x:g} {unit}"
+        return replace(self, fits=fits, rivals=rivals, curves=curves, source=source)
+
+    def compensated(self, recording: Recording) -> Recording:
+        """A recording of the sensor less what its curves say that the covariates add.
+
+        The level, a turn-on bias or gravity, stays. Beyond its range a curve is held at its end,
+        and a notice of the recording says for how long.
+
+        Raises InputError if the recording has no channel of a covariate.
+        """
+        return compensated(recording, self.curves)[0]
 
     def __repr__(self) -> str:
         channels = [name if fit.valid else f"{name} (not valid)" for name, fit in self.items()]

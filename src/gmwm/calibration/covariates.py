@@ -11,7 +11,7 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -24,6 +24,7 @@ from gmwm.calibration.scaling import Scaling, scaling
 from gmwm.errors import InputError
 from gmwm.estimate import Fit
 from gmwm.estimate.problem import pilot
+from gmwm.issues import notice
 from gmwm.readers import Channel, Recording, block_means
 from gmwm.selection import penalty
 from gmwm.variance import RegressorPart, Regressors, WaveletVariance
@@ -110,9 +111,9 @@ class Nodes:
     rows: Mapping[str, FloatArray]
 
     @classmethod
-    def of(cls, recording: Recording, names: Sequence[str]) -> Nodes:
+    def of(cls, recording: Recording, names: Sequence[str], most: int = 0) -> Nodes:
         """Means of parts of a recording, interpolated where samples are missing."""
-        parts = min(tuning.NODES, recording.n // tuning.SHORTEST_NODE)
+        parts = min(max(tuning.NODES, most), recording.n // tuning.SHORTEST_NODE)
         step = recording.duration / max(parts, 1)
         time = np.asarray(step * (np.arange(parts) + 0.5), dtype=float)
         rows: dict[str, FloatArray] = {}
@@ -148,7 +149,8 @@ def _channel_of(recording: Recording, name: str) -> Channel | None:
     known = ", ".join(each.name for each in recording.channels if each.is_auxiliary) or "none"
     raise InputError(
         f"{recording.source or 'the recording'} has no channel {name!r} as a covariate: it has "
-        f"{known}; name its column with the unit, such as temperature [degC]"
+        f"{known}; name its column with the unit, such as temperature [degC]",
+        "no-covariate",
     )
 
 
@@ -169,15 +171,7 @@ class Design:
 
     def without(self, channel: Channel, place: int) -> Channel:
         """A channel of a recording less the first curve."""
-        curve, time = self.removed @ self.columns[place], self.nodes[place].time
-        left = alike(channel.values, channel.n)
-        for part in windows(channel.n):
-            # A sample stands for its interval, as the nodes do.
-            middles = channel.dt * (np.arange(part.start, part.stop) + 0.5)
-            left[part] = channel.values[part] - np.interp(middles, time, curve)
-            release(channel.values)
-            release(left)
-        return replace(channel, values=left)
+        return _less(channel, self.nodes[place].time, self.removed @ self.columns[place])
 
     def beside(self, wv: WaveletVariance, place: int) -> WaveletVariance:
         """The wavelet variance of such a channel with the regressors."""
@@ -195,6 +189,55 @@ class Design:
         name, nodes = self.covariates[0].name, [self.nodes[place] for place in places]
         pairs = zip(channels, nodes, strict=True)
         return scaling([(channel, own.time, own.rows[name]) for channel, own in pairs])
+
+
+def _less(channel: Channel, time: FloatArray, curve: FloatArray) -> Channel:
+    """A channel less a curve that is known at some times, s."""
+    left = alike(channel.values, channel.n)
+    for part in windows(channel.n):
+        # A sample stands for its interval, as the times do.
+        middles = channel.dt * (np.arange(part.start, part.stop) + 0.5)
+        left[part] = channel.values[part] - np.interp(middles, time, curve)
+        release(channel.values)
+        release(left)
+    return replace(channel, values=left)
+
+
+def compensated(
+    recording: Recording, curves: Mapping[str, BiasCurve]
+) -> tuple[Recording, dict[str, float]]:
+    """A recording less the curves of its channels, and the size of its noise over the models'.
+
+    Curves count against their value at the covariates' centres. Beyond its range a curve is held at
+    its end, which a notice says; the size is the root mean square over the record.
+
+    Raises InputError with the code "no-covariate" if the recording lacks one.
+    """
+    own = {name: curve for name, curve in curves.items() if name in recording}
+    if not own:
+        return recording, {}
+    scales = {one.name: one for curve in own.values() for one in curve.covariates}
+    nodes = Nodes.of(recording, tuple(scales), int(recording.duration / tuning.NODE_STEP))
+    notices, noise, less = list(recording.notices), dict[str, float](), dict[str, Channel]()
+    for name, one in scales.items():
+        x, reach = nodes.rows[name], tuning.MARGIN * (one.high - one.low)
+        out = (x < one.low - reach) | (x > one.high + reach)
+        values = {"share": float(np.mean(out)), "least": float(min(x)), "most": float(max(x))}
+        ends = {"low": f"{one.low:.4g}", "high": f"{one.high:.4g}", "unit": one.unit}
+        variant = "held" if np.any(out) else ""
+        about: dict[str, Any] = {"variant": variant, "name": name}
+        about["severity"] = "warning" if variant else "note"
+        notices.append(notice("curve-subtracted", "", values, **about, **ends))
+    for name, curve in own.items():
+        held = {e.name: np.clip(nodes.rows[e.name], e.low, e.high) for e in curve.covariates}
+        step, start = nodes.time[1] - nodes.time[0], nodes.start + nodes.time[0]
+        along = curve.along(held or {"time": nodes.time}, float(step), float(start))
+        less[name] = _less(recording[name], nodes.time, along)
+        if curve.scaling is not None and curve.covariates:
+            factor = curve.noise_factor(held[curve.covariates[0].name])
+            noise[name] = float(np.sqrt(np.mean(factor**2)))
+    channels = tuple(less.get(each.name, each) for each in recording.channels)
+    return replace(recording, channels=channels, notices=tuple(notices)), noise
 
 
 def designs_of(recordings: Sequence[Recording], given: Sequence[Wanted]) -> dict[str, Design]:

@@ -17,6 +17,7 @@ from gmwm._core.tables import plain_table
 from gmwm._core.text import Printed, brief, readable, with_error
 from gmwm._core.typing import FloatArray
 from gmwm._core.units import factor, shown_unit
+from gmwm.calibration import tuning
 from gmwm.calibration.scaling import Scaling
 from gmwm.errors import InputError
 from gmwm.estimate.result import CurveCoefficients, Fit, satterthwaite_dof
@@ -26,7 +27,6 @@ if TYPE_CHECKING:
 
 MOST_POWER = 6
 
-_MARGIN = 0.02  # means of a warm-up miss 1 % of its range
 _POINTS = 101  # of a curve in tables and figures
 
 
@@ -35,7 +35,7 @@ class Covariate:
     """What a curve depends on, over the range of its recording.
 
     centre, half: Of ``u = (x - centre) / half``, which lies between about -1 and 1.
-    low, high: Range of x, in means of some samples; the curve is known `_MARGIN` of it beyond.
+    low, high: Range of x, in means of some samples; a curve is known `tuning.MARGIN` of it beyond.
     """
 
     name: Text
@@ -195,7 +195,7 @@ class BiasCurve(Document, Printed):
         return self.scaling.factor(self._inside(np.asarray(x, dtype=float), self.covariates[0]))
 
     def _inside(self, x: FloatArray, one: Covariate) -> FloatArray:
-        margin = _MARGIN * (one.high - one.low)
+        margin = tuning.MARGIN * (one.high - one.low)
         if not np.all((x >= one.low - margin) & (x <= one.high + margin)):
             raise InputError(
                 f"the curve of {self.name} is known from {one.low:.4g} to {one.high:.4g} "

@@ -7,16 +7,19 @@ their mean covariate, ``log s = gamma x``, the deviation at each value of it is 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gmwm._core.distributions import student
+from gmwm._core.distributions import norm, student
 from gmwm._core.documents import Array, NotNegative, Probability
 from gmwm._core.text import per_cent
 from gmwm._core.typing import FloatArray
 from gmwm.calibration import tuning
+from gmwm.estimate import Fit
+from gmwm.estimate.problem import Scales
 from gmwm.issues import Notice, Severity, notice
+from gmwm.process import Model
 from gmwm.readers import Channel, block_means
 
 _ROUNDS = 20
@@ -31,19 +34,38 @@ class Scaling:
     error: Half its 95 % interval.
     p_value: Of the score test of ``gamma = 0``.
     reference: Where the noise is that of the model, the mean square of the recordings.
-    at, deviation: Covariate and deviation of parts of the recordings, over that of the model.
+    places, deviation: Covariate and deviation of parts of the recordings, over that of the model.
     """
 
     gamma: float
     error: NotNegative
     p_value: Probability
     reference: float
-    at: Array
+    places: Array
     deviation: Array
 
     def factor(self, x: FloatArray | float) -> FloatArray:
         """Deviation at values of the covariate over that of the model."""
         return np.asarray(np.exp(self.gamma * (np.asarray(x, dtype=float) - self.reference)))
+
+    def at(self, fit: Fit, x: float) -> Fit:
+        """A fit with the fast noise at a value of the covariate: as if all of the record had it.
+
+        The variances change by as much as the model's, the errors by that of gamma too.
+        """
+        factor = float(self.factor(x))
+        model = with_noise(fit.model, factor)
+        keys = _noise_keys(model)
+        scale = np.array([factor if key in keys else 1.0 for key in fit.keys])
+        turn = np.array([model.params[key] or 0.0 if key in keys else 0.0 for key in fit.keys])
+        turn *= (x - self.reference) * self.error / float(norm.ppf(0.975))
+        scales = Scales.of(fit.wv)
+        added = scales.curve(model) - scales.curve(fit.model)
+        variance = np.maximum(fit.wv.variance + added, np.finfo(float).tiny)
+        bounds = {k: v * factor if k in keys else v for k, v in fit.upper_bounds.items()}
+        covariance = fit.covariance * np.outer(scale, scale) + np.outer(turn, turn)
+        wv = replace(fit.wv, variance=variance)
+        return replace(fit, model=model, wv=wv, covariance=covariance, upper_bounds=bounds)
 
     def notice(self, name: str, unit: str, low: float, high: float) -> Notice | None:
         """Say that the noise grows, where that is clear."""
@@ -62,6 +84,18 @@ class Scaling:
         return notice(
             "noise-scales", "", values | {"ratio": ratio}, severity=severity, name=name, **words
         )
+
+
+def with_noise(model: Model, factor: float) -> Model:
+    """A model with its fast noise, white or filtered, so many times as large."""
+    return model.with_params(
+        {key: factor * (model.params[key] or 0.0) for key in _noise_keys(model)}
+    )
+
+
+def _noise_keys(model: Model) -> list[str]:
+    fast = [term.is_white or term.is_band_limited for term in model.terms]
+    return [p.key for p in model.parameters if fast[p.term] and p.parameter.name == "N"]
 
 
 def scaling(parts: Sequence[tuple[Channel, FloatArray, FloatArray]]) -> Scaling | None:

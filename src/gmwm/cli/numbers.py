@@ -25,6 +25,7 @@ _number_options = options(
     """
     --form TEXT  N+K, N+GM or N+K+GM; for gmwm reduce N+2GM too.
     --shared  The same numbers for all axes of a sensor.
+    --temperature
     --tau S  Correlation time of the Gauss-Markov process in seconds; "shared": the one for all
         axes that costs least. Each axis has its own by default.
     --gyro-bias RAD/S  Standard deviation of the turn-on bias of a gyro.
@@ -57,7 +58,7 @@ _number_options = options(
     """,
     horizon={"default": 60.0},
 )
-def bound(file: Path, **options: Any) -> None:
+def bound(file: Path, temperature: float | None, **options: Any) -> None:
     """Find the smallest numbers that are never overconfident.
 
     FILE is a calibration.json.
@@ -69,7 +70,7 @@ def bound(file: Path, **options: Any) -> None:
     from gmwm.calibration import Calibration
     from gmwm.filter_numbers import bound as run
 
-    calibration = Calibration.load(file)
+    calibration = _at(Calibration.load(file), temperature)
     _show(lambda **given: run(calibration, **given), **options)
 
 
@@ -84,7 +85,7 @@ def bound(file: Path, **options: Any) -> None:
     """,
     outages={"default": "10,30,60"},
 )
-def reduce(file: Path, outages: str, **options: Any) -> None:
+def reduce(file: Path, outages: str, temperature: float | None, **options: Any) -> None:
     """Find the numbers with which a small filter is consistent.
 
     FILE is a calibration.json.
@@ -96,7 +97,8 @@ def reduce(file: Path, outages: str, **options: Any) -> None:
     from gmwm.calibration import Calibration
     from gmwm.filter_numbers import reduce as run
 
-    calibration, times = Calibration.load(file), seconds("--outages", outages)
+    calibration = _at(Calibration.load(file), temperature)
+    times = seconds("--outages", outages)
     with progress_bar("reducing", "channels") as bar:
         options |= {"outages": times, "progress": bar}
         _show(lambda **given: run(calibration, **given), **options)
@@ -109,10 +111,11 @@ def reduce(file: Path, outages: str, **options: Any) -> None:
     --times T,T,...  Outage lengths in seconds.
     --unknown-start  Nothing is known of the errors at the start; by default the initial values of
         the slow ones are, as after aiding.
+    --temperature
     """,
     times={"default": "1,10,60,600"},
 )
-def budget(file: Path, times: str, unknown_start: bool) -> None:
+def budget(file: Path, times: str, unknown_start: bool, temperature: float | None) -> None:
     """Predict the error growth in outages.
 
     FILE is a calibration.json. For each term of each channel's model: attitude (deg), velocity
@@ -127,8 +130,19 @@ def budget(file: Path, times: str, unknown_start: bool) -> None:
     from gmwm.calibration import Calibration
     from gmwm.filter_numbers import error_budget
 
-    calibration = Calibration.load(file)
+    calibration = _at(Calibration.load(file), temperature)
     click.echo(error_budget(calibration, seconds("--times", times), calibrated=not unknown_start))
+
+
+def _at(given: Any, temperature: float | None) -> Any:
+    """A result with the noise at a temperature, if one is given."""
+    from gmwm.calibration import Calibration
+
+    if temperature is None:
+        return given
+    if not isinstance(given, Calibration):
+        raise InputError("--temperature needs a calibration.json, whose noise it changes")
+    return given.at(temperature)
 
 
 def _show(
@@ -186,6 +200,7 @@ _IN_SI = {
     --vibration-rectification MG/G^2  Vibration rectification of the accelerometers, for the
         vibration.
     --vibration G  Vibration, root mean square.
+    --temperature
     -o --output JSON  File to save the certificate in.
     -v --verbose  Print every check, all notices and the recommended numbers by axis too.
     --units
@@ -206,6 +221,7 @@ def certify(
     as_json: bool,
     verbose: bool,
     motion: str | None,
+    temperature: float | None,
     **given: Any,
 ) -> None:
     """Predict how consistent a filter is with the numbers in use.
@@ -226,7 +242,7 @@ def certify(
     from gmwm.ins import Trajectory
     from gmwm.readers import read
 
-    calibration = Calibration.load(file)
+    calibration = _at(Calibration.load(file), temperature)
     imperfections = Imperfections(**{name: given[name] * unit for name, unit in _IN_SI.items()})
     if imperfections.needs_motion and motion is None:
         raise InputError("these errors have no effect at rest: add --motion drone")
@@ -278,6 +294,7 @@ def _numbers(
     --form FORM  N+K, N+GM, ...: most programs hold one; state-space holds any.
     -o --output FILE  File to write instead of printing; .npz for state-space.
     --explain  Print what the numbers are, axis by axis, in place of the file.
+    --temperature
     --force  Write the numbers although an axis is not valid.
     --list  List the programs.
     """,
@@ -290,6 +307,7 @@ def export(
     target: str | None,
     horizon: float | None,
     form: str | None,
+    temperature: float | None,
     output: Path | None,
     explain: bool,
     force: bool,
@@ -325,7 +343,7 @@ def export(
     from gmwm._core import checks
 
     checks.choice("--to", target, (*TARGETS, *CURVES))
-    given = [load(file) for file in files]
+    given = [_at(load(file), temperature) for file in files]
     for each in (n for one in given for n in getattr(one, "notices", ()) if n.code == "other-run"):
         click.echo(f"gmwm: {each}", err=True)
     if explain:

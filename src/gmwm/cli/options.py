@@ -188,6 +188,8 @@ _SHARED |= _declared(
     --cluster ADDRESS  Dask scheduler that does the work, e.g. tcp://10.0.0.1:8786.
     --resume  Go on with what the folder holds.
     --horizon S  Longest outage that the filter numbers cover, in seconds.
+    --temperature NUMBER  With the noise that the calibration has at this temperature, or value of
+        another covariate; by default the average of the recording.
     --datasheet YAML  N, B and K by sensor or channel, each with its unit, to be drawn over the
         curves of the report: 'gyro: {N: 0.15 deg/sqrt(h), B: 7 deg/h}'.
     --memory GB  For the samples: those of a longer file are kept on disk, in TMPDIR, and about

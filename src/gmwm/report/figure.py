@@ -291,7 +291,7 @@ def leftover_figures(fitted: Fit, curve: BiasCurve) -> list[Figure]:
     if curve.scaling is not None and curve.covariates:
         one, own_noise = curve.covariates[0], curve.scaling
         x = np.linspace(one.low, one.high, 50)
-        points = _points(own_noise.at, own_noise.deviation, "parts", COMPONENT_COLOURS[0], 4)
+        points = _points(own_noise.places, own_noise.deviation, "parts", COMPONENT_COLOURS[0], 4)
         line = _line(x, own_noise.factor(x), "growth", SUM_COLOUR, "solid", 2.0)
         found.append(_against(one, [points, line], "fast noise / model"))
     return found

@@ -66,9 +66,9 @@ def test_intervals_and_test_have_their_levels(growth):
 
 def test_the_model_is_the_mean_square_of_the_record():
     found = scaling([part(5, 2.0 * GROWTH)])
-    assert np.mean(found.factor(found.at) ** 2) == pytest.approx(1.0)
+    assert np.mean(found.factor(found.places) ** 2) == pytest.approx(1.0)
     assert np.mean(found.deviation**2) == pytest.approx(1.0)
-    true = np.exp(2.0 * GROWTH * (found.at - 45.0))
+    true = np.exp(2.0 * GROWTH * (found.places - 45.0))
     true /= np.sqrt(np.mean(true**2))
-    reach = np.abs(found.at - found.reference) * found.error
-    assert np.all(np.abs(np.log(found.factor(found.at) / true)) < 1.5 * reach + 1e-3)
+    reach = np.abs(found.places - found.reference) * found.error
+    assert np.all(np.abs(np.log(found.factor(found.places) / true)) < 1.5 * reach + 1e-3)

@@ -10,7 +10,7 @@ import numpy as np
 
 from gmwm._core import checks
 from gmwm._core.typing import FloatArray
-from gmwm.calibration import Calibration
+from gmwm.calibration import BiasCurve, Calibration, with_noise
 from gmwm.errors import InputError
 from gmwm.ins import tuning
 from gmwm.issues import Notice, notice
@@ -36,11 +36,14 @@ class SensorModels:
         Axis -> standard deviation of a constant bias, in the axis' unit; zero for none.
     not_valid : tuple of str
         Axes whose models come from fits that are not valid.
+    curves : dict
+        Axis -> `BiasCurve` of a calibration against a temperature.
     """
 
     models: dict[str, Model]
     bias_sd: dict[str, float] = field(default_factory=lambda: dict.fromkeys(AXES, 0.0))
     not_valid: tuple[str, ...] = field(default=(), repr=False)
+    curves: dict[str, BiasCurve] = field(default_factory=dict, repr=False)
 
     @classmethod
     def of(
@@ -65,7 +68,9 @@ class SensorModels:
                 return source
             return replace(source, bias_sd=_standard_deviations(bias_sd))
         not_valid: tuple[str, ...] = ()
+        curves: dict[str, BiasCurve] = {}
         if isinstance(source, Calibration):
+            curves = {name: each for name, each in source.curves.items() if name in AXES}
             not_valid = tuple(axis for axis in AXES if axis in source and not source[axis].valid)
             source = {name: fit.model for name, fit in source.fits.items() if name in AXES}
         if not isinstance(source, Mapping):
@@ -82,7 +87,12 @@ class SensorModels:
             if axis not in given:
                 raise InputError(f"sensor models: {axis} has none: give one to each axis")
         models = {axis: _model(axis, given[axis]) for axis in AXES}
-        return cls(models, _standard_deviations(bias_sd or {}), not_valid)
+        return cls(models, _standard_deviations(bias_sd or {}), not_valid, curves)
+
+    def with_noise(self, factors: Mapping[str, float]) -> SensorModels:
+        """The same with the fast noise of axes so many times as large."""
+        models = {axis: with_noise(m, factors.get(axis, 1.0)) for axis, m in self.models.items()}
+        return replace(self, models=models)
 
     @property
     def notices(self) -> tuple[Notice, ...]:
@@ -94,8 +104,19 @@ class SensorModels:
         are = "are" if count > 1 else "is"
         return (notice("fit-not-valid", axes, variant="filter", hint=hint, count=count, are=are),)
 
-    def simulate(self, n: int, dt: float, rng: np.random.Generator) -> SensorErrors:
-        """Draw errors of all axes, n samples of ``dt`` (s); constant biases are drawn too."""
+    def simulate(
+        self,
+        n: int,
+        dt: float,
+        rng: np.random.Generator,
+        covariates: Mapping[str, FloatArray] | None = None,
+    ) -> SensorErrors:
+        """Draw errors of all axes, n samples of ``dt`` (s); constant biases are drawn too.
+
+        covariates: Values of the curves' covariates at all samples, such as ``{"temperature": t}``:
+            the curves are added, and the fast noise grows as it does.
+        Raises InputError if a curve is not known there.
+        """
         total, slow = np.empty((n, 6)), np.zeros((n, 6))
         for i, axis in enumerate(AXES):
             filtered = np.zeros(n)
@@ -103,12 +124,18 @@ class SensorModels:
                 if not term.is_white:
                     part = filtered if term.is_band_limited else slow[:, i]
                     part += term.simulate(n, dt, rng)
+            curve, factor = self.curves.get(axis), np.ones(1)
+            if curve is not None and covariates is not None:
+                slow[:, i] += curve.along(covariates, dt)
+                if curve.scaling is not None and curve.covariates:
+                    factor = curve.noise_factor(covariates[curve.covariates[0].name])
+            filtered *= factor
             if self.bias_sd[axis] > 0.0:
                 slow[:, i] += self.bias_sd[axis] * rng.standard_normal()
             total[:, i] = slow[:, i] + filtered
             density = self.models[axis].white_density()
             if density > 0.0:
-                total[:, i] += np.sqrt(density / dt) * rng.standard_normal(n)
+                total[:, i] += factor * np.sqrt(density / dt) * rng.standard_normal(n)
         return SensorErrors(total, slow)
 
 

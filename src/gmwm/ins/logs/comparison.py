@@ -186,6 +186,7 @@ class Comparison:
             for name, each in named.items()
         }
         measured = Measured.of({**rest, "sensors": next(iter(named.values()))}, folder)
+        models = {name: each.with_noise(measured.noise) for name, each in models.items()}
         return compare(measured, models, outages)
 
     @property

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +15,7 @@ from gmwm._core.files import existing_file
 from gmwm._core.spool import Spool, is_spooled, release, windows
 from gmwm._core.typing import FloatArray
 from gmwm._core.units import SI_UNIT
+from gmwm.calibration import BiasCurve, compensated
 from gmwm.errors import InputError
 from gmwm.ins import tuning
 from gmwm.ins.geometry import STANDARD_GRAVITY
@@ -29,12 +30,16 @@ _UNITS_OF_CLOCKS = (1.0, 1e-3, 1e-6, 1e-9)  # s
 
 @dataclass(frozen=True, eq=False)
 class ImuLog:
-    """An IMU record; ``start`` is the time of its first epoch, s, 0 without time stamps."""
+    """An IMU record; ``start`` is the time of its first epoch, s, 0 without time stamps.
+
+    noise: Axis -> size of its fast noise over that of its calibration, where curves show it.
+    """
 
     imu: Imu
     start: float
     source: str
     notices: tuple[Notice, ...] = ()
+    noise: Mapping[str, float] = field(default_factory=dict)
 
 
 def read_imu(
@@ -76,9 +81,11 @@ def read_imu_log(
     channels: Mapping[str, str | int] | None = None,
     time: str | int | bool | None = None,
     start: float | None = None,
+    *,
+    curves: Mapping[str, BiasCurve] | None = None,
     **reading: Any,
 ) -> ImuLog:
-    """Read an IMU record with its clock; see `read_imu`."""
+    """Read an IMU record with its clock, less curves of the biases; see `read_imu`."""
     columns, reversed_axes = dict(channels or {}), set[str]()
     for name, column in columns.items():
         if isinstance(column, str) and column.startswith("-") and len(column) > 1:
@@ -88,6 +95,7 @@ def read_imu_log(
     named = None if channels is None else columns
     recording = read(path, channels=named, time=time, **reading).of_one_rate("navigation")
     require_axes(recording)
+    recording, noise = _without_curves(recording, curves or {})
     dt, source = recording.dt, recording.source
     rotation = _joined(recording, AXES[:3], reversed_axes)
     velocity = _joined(recording, AXES[3:], reversed_axes)
@@ -126,7 +134,20 @@ def read_imu_log(
             each[part] *= dt
             release(each)
     imu = Imu(dt, rotation, velocity)
-    return ImuLog(imu, first - dt, source, (*recording.notices, *notices))
+    return ImuLog(imu, first - dt, source, (*recording.notices, *notices), noise)
+
+
+def _without_curves(
+    recording: Recording, curves: Mapping[str, BiasCurve]
+) -> tuple[Recording, dict[str, float]]:
+    """See `compensated`; a notice says that the record lacks a covariate."""
+    try:
+        return compensated(recording, curves)
+    except InputError as error:
+        if error.code != "no-covariate":
+            raise
+        missing = notice("curve-not-subtracted", why=str(error))
+        return replace(recording, notices=(*recording.notices, missing)), {}
 
 
 def _joined(recording: Recording, axes: tuple[str, ...], reversed_axes: set[str]) -> FloatArray:

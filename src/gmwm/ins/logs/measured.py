@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
@@ -261,6 +261,8 @@ class Measured:
         What the solution is compared with.
     title : str
     notices : tuple of Notice
+    noise : dict
+        Axis -> size of the fast noise over that of a calibration with a curve.
     """
 
     imu: Imu
@@ -274,6 +276,7 @@ class Measured:
     reference: Reference | None = None
     title: str = ""
     notices: tuple[Notice, ...] = ()
+    noise: Mapping[str, float] = field(default_factory=dict)
 
     @classmethod
     def of(cls, content: Mapping[str, Any], folder: Path = Path()) -> Measured:
@@ -289,7 +292,9 @@ class Measured:
             raise InputError("heading and attitude: the attitude has a yaw; leave the heading out")
         models = read_models("sensors", spec.sensors, folder)
         sensors, assumed = with_turn_on_bias(models, spec.bias.given)
-        log = read_imu_log(folder / spec.imu.file, **spec.imu.options())
+        given = spec.imu.options() | {"curves": sensors.curves}
+        log = read_imu_log(folder / spec.imu.file, **given)
+        sensors = sensors.with_noise(log.noise)
         found = read_fix_log(folder / spec.gnss_fixes)
         aiding = found.aiding(
             log.start - spec.gnss_shift, spec.position_sd, spec.velocity_sd, spec.lever_arm
@@ -331,7 +336,14 @@ class Measured:
         if spec.reference is not None:
             start["reference"] = Reference.read(folder / spec.reference)
         return cls(
-            log.imu, aiding, sensors, log.start, **start, title=log.source, notices=tuple(notices)
+            log.imu,
+            aiding,
+            sensors,
+            log.start,
+            **start,
+            title=log.source,
+            notices=tuple(notices),
+            noise=log.noise,
         )
 
 

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 from gmwm._core.spool import is_spooled
+from gmwm.calibration import BiasCurve, Covariate
+from gmwm.calibration.curve import Regressor
 from gmwm.errors import InputError
 from gmwm.ins import Imu, read_imu, tuning
 from gmwm.ins.logs import read_imu_log
@@ -128,3 +130,25 @@ def test_a_long_file_is_read_as_a_short_one(tmp_path, monkeypatch):
     assert long.dt == once.dt
     np.testing.assert_array_equal(long.rotation, once.rotation)
     np.testing.assert_array_equal(long.velocity, once.velocity)
+
+
+def test_a_curve_is_subtracted_where_the_log_has_its_temperature(tmp_path):
+    """The increments of a sensor at one temperature, but for the time that its node stands for."""
+    rows, hot = imu_rows(2000), 25.0 + 10.0 * np.arange(2000) / 2000
+    one = Covariate("temperature", "degC", 30.0, 5.0, 25.0, 35.0)
+    line = Regressor("power", "temperature", 1)
+    numbers = (np.array([0.01]), np.eye(1), np.ones((1, 1)), 0.5)
+    curve = BiasCurve("accel_y", "accel", "m/s^2", (one,), (line,), *numbers)
+    plain = read_imu_log(write_imu(tmp_path, rows)).imu
+    rows[:, 5] += 0.01 * (hot - 30.0) / 5.0
+    rows = np.hstack([rows, hot[:, None]])
+    path = write_imu(tmp_path, rows, f"{HEAD},temperature [degC]")
+    log = read_imu_log(path, curves={"accel_y": curve})
+    np.testing.assert_array_equal(log.imu.rotation, plain.rotation)
+    np.testing.assert_allclose(log.imu.velocity, plain.velocity, atol=0.02 * 0.01 * DT)
+    assert "curve-subtracted" in {each.code for each in log.notices}
+    path = write_imu(tmp_path, rows[:, :-1])
+    (said,) = [
+        e for e in read_imu_log(path, curves={"accel_y": curve}).notices if "curve" in e.code
+    ]
+    assert (said.code, said.severity) == ("curve-not-subtracted", "warning")
