@@ -1,7 +1,8 @@
 """Slow errors that channels share: their correlation, and a test that there is none.
 
-The slow part of the wavelet covariances of two channels is fitted by r (nu_j^a nu_j^b)^(1/2), with
-the slow terms' wavelet variances of both models, by generalized least squares. Its weights are the
+The wavelet covariances of two channels are fitted by r (nu_j^a nu_j^b)^(1/2), with the slow terms'
+wavelet variances of both models, by generalized least squares. Levels at which a channel has more
+fast noise than slow errors are left out: vibration that both have is not slow. The weights are the
 covariance of wavelet covariances of independent channels with these models, so that the estimate
 has the least variance where there is no sharing. There it is close to normal: it is a sum over
 many products of coefficients, of either sign (``python benchmarks/arrays.py size``).
@@ -48,30 +49,32 @@ def is_slow(term: Process) -> bool:
 
 
 def sharing(models: Mapping[str, Model], data: WaveletCovariance) -> list[Sharing]:
-    """Sharing of each pair of channels whose models have slow terms.
+    """Sharing of each pair of channels whose models have slow terms that dominate at some levels.
 
     Pairs whose correlation is not known to `tuning.LARGEST_ERROR` are left out.
     """
     slow: dict[int, FloatArray] = {}
     for place, name in enumerate(data.names):
-        terms = [term for term in models[name].terms if is_slow(term)]
-        if terms:
-            slow[place] = Model(tuple(terms)).haar_variance(data.tau, data.dt)
+        parts = np.array([term.haar_variance(data.tau, data.dt) for term in models[name].terms])
+        own = np.sum(parts[[is_slow(term) for term in models[name].terms]], axis=0)
+        if np.any(own):
+            slow[place] = np.where(own >= tuning.SLOW_SHARE * np.sum(parts, axis=0), own, 0.0)
     form = data.form([models[name].psd for name in data.names])
     found = []
     for a, b in combinations(slow, 2):
-        grown = np.sqrt((1.0 + data.change[:, a]) * (1.0 + data.change[:, b]))
-        deviation = np.sqrt(np.diag(form[a, b]))  # levels of any unit are weighed alike
+        used = (slow[a] > 0.0) & (slow[b] > 0.0)
+        own = form[a, b][np.ix_(used, used)]
+        deviation = np.sqrt(np.diag(own))  # levels of any unit are weighed alike
         if not np.all(deviation > 0.0):
             continue
-        shape = np.sqrt(slow[a] * slow[b]) / (deviation * grown)
-        correlation = form[a, b] / np.outer(deviation, deviation)
-        weighted = np.linalg.pinv(correlation, hermitian=True) @ shape
+        grown = deviation * np.sqrt(np.prod(1.0 + data.change[used][:, [a, b]], axis=1))
+        shape = np.sqrt(slow[a] * slow[b])[used] / grown
+        weighted = np.linalg.pinv(own / np.outer(deviation, deviation), hermitian=True) @ shape
         information = float(weighted @ shape)
         if information * tuning.LARGEST_ERROR**2 < 1.0:
             continue
         error = 1.0 / np.sqrt(information)
-        estimate = float(weighted @ (data.values[:, a, b] / (deviation * grown))) / information
+        estimate = float(weighted @ (data.values[used, a, b] / grown)) / information
         p_value = 2.0 * float(norm.sf(abs(estimate) / error))
         found.append(Sharing(data.names[a], data.names[b], estimate, error, p_value))
     return found

@@ -95,6 +95,7 @@ HARMFUL_UNSTEADY = 2.0  # loudest over quietest part; real recordings have 1.6 t
 
 SLOW = 1.0  # s, shortest correlation time of slow errors
 BLOCKS_OF_SLOW = 8  # blocks of that time, whose means are compared
+SLOW_SHARE = 0.6  # of slow terms in a channel's wavelet variance at levels that are compared
 LARGEST_ERROR = 0.5  # of a correlation that is tested: four degrees of freedom
 SHARED_LEVEL = 0.01  # of the tests of all pairs of a recording (Bonferroni)
 SHARED_LISTED = 3  # pairs that are named

@@ -62,3 +62,18 @@ def test_a_calibration_names_the_channels():
     assert notice.severity == "note" and "accel_x and accel_y (0." in notice.text
     alone = gmwm.calibrate(recording(np.random.default_rng(4), 0.0), "N + GM")
     assert not [n for n in alone.notices if n.code == SHARED]
+
+
+def test_shared_vibration_is_no_shared_slow_error():
+    rng, n = np.random.default_rng(5), 40_000
+    vibration, slow = GaussMarkov(0.5, 0.5), RandomWalk(0.03)
+    both, model = vibration.simulate(n, 0.1, rng), WhiteNoise(0.1) + vibration + slow
+    for shared in (0.0, 0.8):
+        common, channels = slow.simulate(n, 0.1, rng), []
+        for name in "ab":
+            own = RandomWalk(0.03 * np.sqrt(1.0 - shared**2))
+            alone = (WhiteNoise(0.1) + own).simulate(n, 0.1, rng)
+            channels.append(Channel(name, both + shared * common + alone, 0.1))
+        (found,) = sharing(dict.fromkeys("ab", model), wavelet_covariance(channels))
+        assert found.correlation == pytest.approx(shared**2, abs=4.0 * found.stderr)
+        assert (found.p_value < 0.001) == (shared > 0.0)
