@@ -86,7 +86,7 @@ def test_the_likelihood_never_falls(case):
 def test_it_arrives_at_the_maximum_from_a_bad_start(far, dt):
     unit = np.sqrt(dt)
     truth = WhiteNoise(0.5 * unit) + RandomWalk(0.1 / unit)
-    x = truth.simulate(2000, dt, seed=3)
+    x = truth.simulate(1000, dt, seed=3)
     exact = gmwm.fit(truth.opened(), x, dt=dt, method="mle")
     start = WhiteNoise(0.5 * far * unit) + RandomWalk(0.1 / far / unit)
     fit = em(truth.opened(), x, dt=dt, start=start)
@@ -109,10 +109,10 @@ def test_it_arrives_at_the_maximum_from_a_bad_start(far, dt):
     ],
     ids=repr,
 )
-@pytest.mark.parametrize("missing", [0, 300], ids=["complete", "gaps"])
+@pytest.mark.parametrize("missing", [0, 150], ids=["complete", "gaps"])
 def test_it_finds_the_estimates_of_maximum_likelihood(truth, missing):
-    x = truth.simulate(3000, 1.0, seed=4)
-    x[np.random.default_rng(1).choice(3000, missing, replace=False)] = np.nan
+    x = truth.simulate(1500, 1.0, seed=4)
+    x[np.random.default_rng(1).choice(1500, missing, replace=False)] = np.nan
     exact = gmwm.fit(truth.opened(), x, dt=1.0, method="mle")
     fit = em(truth.opened(), x)
     assert fit.valid, fit.message
@@ -157,7 +157,7 @@ def test_iterations_that_run_out_are_no_valid_fit(accelerate):
 
 def test_a_drift_of_a_walk_is_a_ramp_of_the_signal():
     truth = WhiteNoise(0.5) + RandomWalk(0.05) + RateRamp(0.03)
-    x = truth.simulate(2000, 1.0, seed=7)
+    x = truth.simulate(1000, 1.0, seed=7)
     ramp = em(truth.opened(), x)
     state = em(truth.opened(), x, drift="state")
     for key, error in ramp.stderr.items():
@@ -168,7 +168,7 @@ def test_a_drift_of_a_walk_is_a_ramp_of_the_signal():
 @pytest.mark.parametrize("order", [1, -1])
 def test_a_drift_of_a_gauss_markov_state_is_forgotten(order):
     """x[k+1] = phi x[k] + R dt + w[k]: its mean rises to R dt / (1 - phi)."""
-    tau, rate, n = 50.0, 0.05, 5000
+    tau, rate, n = 50.0, 0.05, 2000
     phi = np.exp(-1.0 / tau)
     rise = rate * (1.0 - phi ** np.arange(n)) / (1.0 - phi)
     x = (WhiteNoise(0.5) + GaussMarkov(0.5, tau)).simulate(n, 1.0, seed=8) + rise

@@ -45,8 +45,7 @@ def peer_fit(model, start, **options):
 # -- statsmodels ------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("missing", [0, 200], ids=["complete", "gaps"])
-@pytest.mark.parametrize("slope", [None, 3e-3], ids=["local level", "with a ramp"])
+@pytest.mark.parametrize(("slope", "missing"), [(None, 200), (3e-3, 0)])
 def test_walk_and_white_noise_are_the_local_level_of_statsmodels(slope, missing):
     truth = WhiteNoise(0.5) + RandomWalk(0.1)
     x = truth.simulate(2000, 1.0, seed=3) + 7.0
@@ -153,23 +152,10 @@ def test_standard_errors_are_the_spread_of_the_estimates(truth, n):
         assert abs(bias) < 4.0 / np.sqrt(runs) + relative, key
 
 
-def test_an_interval_of_95_percent_covers_95_percent():
-    truth = WhiteNoise(0.3) + RandomWalk(0.05)
-    runs = 40
-    rng = np.random.default_rng(8)
-    held = {key: 0 for key in truth.params}
-    for _ in range(runs):
-        fit = mle(truth.opened(), truth.simulate(500, 1.0, rng), start=truth)
-        for key, (low, high) in fit.interval().items():
-            held[key] += low <= truth.params[key] <= high
-    # Binomial: 0.95 with a deviation of 0.034.
-    assert all(0.84 < count / runs <= 1.0 for count in held.values()), held
-
-
 @pytest.mark.parametrize("method", ["mle", slow("whittle")])
 def test_an_amplitude_of_zero_has_an_upper_bound(method):
     zero = bounded = 0
-    runs = 12
+    runs = 8
     rng = np.random.default_rng(21)
     for _ in range(runs):
         x = WhiteNoise(1.0).simulate(1000, 1.0, rng)
@@ -213,7 +199,7 @@ def test_intervals_of_a_walk_that_can_hardly_be_seen_cover_it(K, method, runs):
 
 def test_missing_samples_cost_only_what_they_knew():
     truth = WhiteNoise(0.3) + GaussMarkov(0.5, 20.0) + RateRamp(1e-4)
-    n = 10_000
+    n = 5_000
     x = truth.simulate(n, 1.0, seed=9)
     gappy = x.copy()
     rng = np.random.default_rng(2)
@@ -230,8 +216,8 @@ def test_missing_samples_cost_only_what_they_knew():
 
 def test_one_long_gap_is_bridged():
     truth = WhiteNoise(0.3) + RandomWalk(0.02)
-    x = truth.simulate(12_000, 1.0, seed=10)
-    x[4000:7000] = np.nan
+    x = truth.simulate(4000, 1.0, seed=10)
+    x[1500:2500] = np.nan
     fit = mle(truth.opened(), x)
     for key, error in fit.stderr.items():
         assert abs(fit.params[key] - truth.params[key]) < norm.isf(1e-4) * error
@@ -239,7 +225,7 @@ def test_one_long_gap_is_bridged():
 
 def test_estimates_are_where_the_likelihood_is_flat():
     truth = QuantizationNoise(0.4) + WhiteNoise(0.2) + GaussMarkov(0.5, 20.0) + RandomWalk(0.02)
-    x = truth.simulate(20_000, 1.0, seed=11)
+    x = truth.simulate(8_000, 1.0, seed=11)
     fit = mle(truth.opened(), x)
     likelihood = KalmanLikelihood(Columns(x, 1.0, None, False))
     for key, error in fit.stderr.items():
@@ -259,7 +245,7 @@ def test_estimates_are_where_the_likelihood_is_flat():
 
 def test_offset_scale_and_units_do_not_matter():
     truth = WhiteNoise(0.2) + GaussMarkov(0.5, 20.0)
-    x = truth.simulate(5000, 1.0, seed=2)
+    x = truth.simulate(2000, 1.0, seed=2)
     plain = mle(truth.opened(), x)
     for scale, offset in ((1e-7, 3e-5), (1e4, 1e9), (1.0, 1e6)):
         scaled = mle(truth.opened(), scale * x + offset)
@@ -279,16 +265,16 @@ def test_a_steep_ramp_does_not_matter_where_the_drift_is_free(method):
     x = truth.simulate(n, 1.0, seed=3)
     model = truth.opened() + RateRamp()
     plain = gmwm.fit(model, x, dt=1.0, method=method)
-    for slope in (0.1, 10.0):
-        steep = gmwm.fit(model, x + slope * np.arange(n), dt=1.0, method=method)
-        assert steep.valid, steep.message
-        assert steep.params["R"] - slope == pytest.approx(
-            plain.params["R"], abs=0.01 * plain.stderr["R"]
-        )
-        for key in ("N", "K"):
-            error = plain.stderr[key]
-            assert steep.params[key] == pytest.approx(plain.params[key], abs=0.02 * error)
-            assert steep.stderr[key] == pytest.approx(error, rel=0.02)
+    slope = 10.0
+    steep = gmwm.fit(model, x + slope * np.arange(n), dt=1.0, method=method)
+    assert steep.valid, steep.message
+    assert steep.params["R"] - slope == pytest.approx(
+        plain.params["R"], abs=0.01 * plain.stderr["R"]
+    )
+    for key in ("N", "K"):
+        error = plain.stderr[key]
+        assert steep.params[key] == pytest.approx(plain.params[key], abs=0.02 * error)
+        assert steep.stderr[key] == pytest.approx(error, rel=0.02)
 
 
 # -- what is given --------------------------------------------------------------------------------
@@ -324,7 +310,7 @@ def test_given_parameters_stay_as_they_are(method, model):
 @pytest.mark.parametrize("method", OF_SAMPLES)
 def test_gauss_markov_terms_come_by_rising_time(method):
     truth = GaussMarkov(1.0, 3.0) + GaussMarkov(0.7, 100.0)
-    x = truth.simulate(4000, 1.0, seed=6)
+    x = truth.simulate(2000, 1.0, seed=6)
     turned = GaussMarkov(0.7, 100.0) + WhiteNoise(0.1) + GaussMarkov(1.0, 3.0)
     fit = gmwm.fit(2 * GaussMarkov(), x, dt=1.0, method=method)
     assert fit.params["tau_1"] < fit.params["tau_2"]
@@ -339,7 +325,7 @@ def test_gauss_markov_terms_come_by_rising_time(method):
 @pytest.mark.parametrize("method", OF_SAMPLES)
 def test_the_start_does_not_matter(method):
     truth = WhiteNoise(0.2) + GaussMarkov(0.5, 20.0)
-    x = truth.simulate(2000, 1.0, seed=7)
+    x = truth.simulate(1000, 1.0, seed=7)
     plain = gmwm.fit(truth.opened(), x, dt=1.0, method=method)
     for start in (
         WhiteNoise(0.4) + GaussMarkov(0.3, 60.0),
@@ -444,7 +430,7 @@ def test_it_is_never_below_any_grid_point(model):
             continue
         free = [name for name, value in term.values.items() if value is None]
         axis = [
-            np.linspace(-0.9, 0.999, 12) if name.startswith("ar") else np.geomspace(1e-3, 1e3, 12)
+            np.linspace(-0.9, 0.999, 9) if name.startswith("ar") else np.geomspace(1e-3, 1e3, 9)
             for name in free
         ]
         points = [dict(zip(free, map(float, v), strict=True)) for v in product(*axis)]
@@ -460,7 +446,7 @@ def test_it_is_never_below_any_grid_point(model):
 )  # fmt: skip
 def test_gaps_may_be_anywhere(method, kept):
     truth = WhiteNoise(0.2) + GaussMarkov(0.5, 20.0)
-    x = truth.simulate(4000, 1.0, seed=3)
+    x = truth.simulate(2000, 1.0, seed=3)
     gappy = np.where(kept(np.arange(x.size)), x, np.nan)
     fit = gmwm.fit(truth.opened(), gappy, 1.0, method=method)
     for key, value in truth.params.items():

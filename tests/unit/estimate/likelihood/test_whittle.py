@@ -25,13 +25,13 @@ from marks import slow
 MODELS = [
     slow(WhiteNoise(0.8) + GaussMarkov(0.5, 125.0) + RateRamp(0.001), 6000, 1.0),
     slow(WhiteNoise(0.2) + GaussMarkov(0.5, 20.0), 10_007, 1.0),
-    (WhiteNoise(0.2) + GaussMarkov(0.5, 0.2), 8193, 0.01),
-    (WhiteNoise(0.2) + RandomWalk(0.01) + RateRamp(-2e-3), 8193, 1.0),
+    (WhiteNoise(0.2) + GaussMarkov(0.5, 0.2), 4097, 0.01),
+    (WhiteNoise(0.2) + RandomWalk(0.01) + RateRamp(-2e-3), 4097, 1.0),
     slow(QuantizationNoise(0.4) + WhiteNoise(0.2) + GaussMarkov(0.5, 20.0), 9999, 1.0),
-    (QuantizationNoise(0.004) + WhiteNoise(0.02) + RandomWalk(0.02), 8192, 0.01),
+    (QuantizationNoise(0.004) + WhiteNoise(0.02) + RandomWalk(0.02), 4096, 0.01),
     (AR([1.2, -0.6], 2.0) + WhiteNoise(1.0), 3001, 1.0),
     slow(GaussMarkov(1.0, 2.0) + GaussMarkov(0.7, 50.0) + GaussMarkov(0.5, 1000.0), 40_000, 1.0),
-    (WhiteNoise(0.2) + Resonance(0.5, 0.05, 0.1), 8191, 1.0),
+    (WhiteNoise(0.2) + Resonance(0.5, 0.05, 0.1), 4095, 1.0),
     (as_model(ARMA([0.9], [-0.5], 1.0)), 5003, 1.0),
     (as_model(MA([-0.9], 1.0)), 4097, 1.0),
     slow(as_model(ARIMA(0, 1, [0.5], 1e-3)), 5001, 1.0),
@@ -55,7 +55,7 @@ def test_it_agrees_with_the_exact_within_a_tenth_of_a_standard_error(truth, n, d
     assert whittle.log_likelihood == pytest.approx(exact.log_likelihood, abs=0.02)
 
 
-@pytest.mark.parametrize("n", [997, 1000, 1023, 1024, 1025, 1331, 4099, 16_385])
+@pytest.mark.parametrize("n", [997, 1024, 1025, 1331, slow(16_385)])
 def test_no_length_is_awkward(n):
     truth = WhiteNoise(0.3) + RandomWalk(0.05)
     exact, whittle = both(truth.opened(), truth.simulate(n, 1.0, seed=n), 1.0)
@@ -143,7 +143,7 @@ class Coloured(gmwm.Process):
 @pytest.mark.parametrize("rest", ["N", slow("N + R"), "N + K"])
 def test_a_spectrum_alone_gives_the_same_estimates(rest):
     truth = WhiteNoise(1.0) + GaussMarkov(0.5, 50.0)
-    x = gmwm.simulate(truth, n=20_000, rate=1.0, seed=9)
+    x = gmwm.simulate(truth, n=6_000, rate=1.0, seed=9)
     known, spectral = (
         gmwm.fit(f"{rest} + {kind}", x, rate=1.0, method="whittle")
         for kind in ("GM", "OnlySpectrum")
@@ -158,8 +158,8 @@ def test_a_spectrum_alone_gives_the_same_estimates(rest):
 def test_coloured_noise_is_found_within_its_errors():
     truth = WhiteNoise(1.0) + Coloured(0.3, 1.2)
     scores = []
-    for seed in range(4):
-        x = gmwm.simulate(truth, n=8192, rate=1.0, seed=seed)
+    for seed in range(3):
+        x = gmwm.simulate(truth, n=4096, rate=1.0, seed=seed)
         found = gmwm.fit("N + Coloured", x, rate=1.0, method="whittle")
         scores += [(found.params[k] - truth.params[k]) / found.stderr[k] for k in found.keys]
     assert np.sqrt(np.mean(np.square(scores))) < 1.5
