@@ -116,8 +116,11 @@ def _change(channel: Examined) -> Notice | None:
     growth = np.sqrt(second / first) - 1.0
     if abs(np.log(second / first)) > error and abs(growth) > tuning.CHANGE:
         severity: Severity = "warning" if abs(growth) > tuning.LARGE_CHANGE else "note"
-        hint = "the model is an average: use the part that is like the use"
+        hint = "calibrate the part that matches how the sensor is used"
         words = {"growth": abs(growth), "word": "larger" if growth > 0.0 else "smaller"}
+        when, changed = _jump(channel)
+        numbers |= changed
+        words |= {"when": when, "level": readable(float(np.sqrt(np.mean(means))), channel.unit)}
         variant = "half"
     elif is_loud:
         severity, variant = "warning", "tenth"
@@ -129,6 +132,32 @@ def _change(channel: Examined) -> Notice | None:
     return notice(
         "variance", channel.name, numbers, severity=severity, variant=variant, hint=hint, **words
     )
+
+
+def _jump(channel: Examined) -> tuple[str, dict[str, float]]:
+    """When noise changed from one size to another, in words and values; "gradually" if it did.
+
+    Least squares on the logarithms of the mean squares of parts, against a straight line.
+    """
+    squares = np.where(channel.usable, channel.errors.values, np.nan) ** 2
+    logs = np.log(part_means(squares))
+    place = np.flatnonzero(np.isfinite(logs))
+    logs, steps = logs[place], []
+    if logs.size < tuning.FEWEST_PARTS:
+        return "at some time", {}
+    for k in range(2, logs.size - 1):
+        left, right = logs[:k], logs[k:]
+        rest = left.size * float(np.var(left)) + right.size * float(np.var(right))
+        steps.append((rest, k))
+    rest, k = min(steps)
+    line = np.polynomial.Polynomial.fit(place, logs, 1)
+    if rest >= float(np.sum((logs - line(place)) ** 2)):
+        return "gradually", {}
+    time = (place[k - 1] + place[k] + 1) / 2.0 * (squares.size // tuning.PARTS) * channel.dt
+    sizes = [float(np.exp(0.5 * np.mean(each))) for each in (logs[:k], logs[k:])]
+    before, after = (readable(each, channel.unit) for each in sizes)
+    changed = zip(("changed", "size_before", "size_after"), (float(time), *sizes), strict=True)
+    return f"at about {time:.4g} s from {before} to {after}", dict(changed)
 
 
 def _unsteadiness(channel: Examined) -> dict[str, float] | None:

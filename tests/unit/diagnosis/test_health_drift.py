@@ -74,6 +74,24 @@ def test_noise_that_grows(record, factor, severity):
     assert ratio == pytest.approx(factor, rel=0.03)
 
 
+@pytest.mark.parametrize(("at", "factor"), [(30_000, 1.2), (70_000, 0.85)])
+def test_when_the_noise_changed_is_said_and_by_how_much(record, at, factor):
+    """To a part of 64, and the sizes to three standard errors of 30,000 samples."""
+    x = white(100_000, 12)
+    x[at:] *= factor
+    (notice,) = of_kind(record, x, "variance")
+    found = notice.values
+    assert abs(found["changed"] - DT * at) <= 1.5 * DT * x.size / 64
+    assert found["size_after"] / found["size_before"] == pytest.approx(factor, rel=0.02)
+    assert "it changes at about" in notice.text and "root mean square" in notice.text
+
+
+def test_noise_that_grows_by_and_by_has_no_time_of_change(record):
+    x = white(100_000, 13) * np.linspace(1.0, 1.4, 100_000)
+    (notice,) = of_kind(record, x, "variance")
+    assert "changed" not in notice.values and "it changes gradually" in notice.text
+
+
 def test_a_loud_tenth_is_placed(record):
     x = white(100_000, 4)
     x[42_000:48_000] *= 1.6
