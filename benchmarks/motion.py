@@ -8,7 +8,7 @@ FOLDER holds ``flight_NN_imu_K.csv.gz`` of four IMUs on one quadrotor, 120 Hz (H
 2023, CC BY 4.0). `simulate` takes the motion below 15 Hz of one IMU for the truth, gives each of
 several IMUs a clock, a rotation, a lever arm and errors of known Allan variance (white noise,
 differenced white noise, random walk), and prints the ratio of the variances to the truth, the
-coverage of 95 % intervals, and the errors of clocks and lever arms in standard errors. `sessions`
+coverage of 95 % intervals with its own interval, and the errors of clocks and lever arms in standard errors. `sessions`
 prints in-motion over static Allan deviation by session. `predict` takes the numbers from every
 second flight of a session, and prints on the others, and the other way round, the NEES of the
 difference of two IMUs, also with the shares of time that classes of vibration have in each flight.
@@ -75,6 +75,14 @@ def allan(tau, N):
     )
 
 
+def share_of(covered: dict[int, list[bool]]) -> str:
+    """Share of intervals, with its 95 % interval: those of one run are not independent."""
+    is_in = np.concatenate([*covered.values()])
+    away = [sum(own) - len(own) * is_in.mean() for own in covered.values()]
+    reach = 196.0 * np.sqrt(np.sum(np.square(away))) / is_in.size
+    return f"{100 * is_in.mean():.1f} +-{reach:.1f} % of {is_in.size}"
+
+
 def simulate(folder: Path, args: argparse.Namespace) -> None:
     rng = np.random.default_rng(args.seed)
     numbers = [n for own in SESSIONS.values() for n in own]
@@ -93,7 +101,8 @@ def simulate(folder: Path, args: argparse.Namespace) -> None:
                                          inside[used], strict=True):  # fmt: skip
                 key = curve.quantity, round(float(tau), 4)
                 ratios.setdefault(key, []).append(ratio)
-                covered.setdefault(key, []).append(is_in)
+                for each in (key, ("all", curve.quantity), ("all", "octaves")):
+                    covered.setdefault(each, {}).setdefault(run, []).append(is_in)
         for clock, (_, _, (ahead, slow, _)) in zip(found.clocks, imus[1:], strict=True):
             away["offset"].append((clock.offset - ahead) / clock.offset_error)
             away["drift"].append((clock.drift - slow) / clock.drift_error)
@@ -106,7 +115,9 @@ def simulate(folder: Path, args: argparse.Namespace) -> None:
         own = np.array(ratios[key])
         error = own.std() / np.sqrt(len(own))
         print(f"{key[0]:5s} {key[1]:7.4f} s  variance / truth {own.mean():.3f} +-{error:.3f}  "
-              f"covered {100 * np.mean(covered[key]):.1f} % of {len(own)}")  # fmt: skip
+              f"covered {share_of(covered[key])}")  # fmt: skip
+    for quantity in ("gyro", "accel", "octaves"):
+        print(f"all {quantity}: covered {share_of(covered['all', quantity])}")
     for name, values in away.items():
         print(f"{name}: rms error {np.sqrt(np.mean(np.square(values))):.2f} standard errors")
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations
 
@@ -44,15 +44,18 @@ class Flight:
     """Differences (n, 3) of a target to each other IMU, and its vibration (n,), m/s^2 rms.
 
     vibration: NaN where it is not known.
+    absorbed: (K - 1, J, 3), share of the variance that the fit of each mapping takes, by octave;
+        None where nothing is fitted.
     """
 
     differences: Sequence[FloatArray]
     vibration: FloatArray
+    absorbed: FloatArray | None = None
 
     def within(self, low: float, high: float) -> Flight:
         """With a vibration of zero where it is not within limits: such instants do not count."""
         is_in = (self.vibration >= low) & (self.vibration < high)
-        return Flight(self.differences, np.where(is_in, self.vibration, 0.0))
+        return replace(self, vibration=np.where(is_in, self.vibration, 0.0))
 
 
 @dataclass(frozen=True)
@@ -75,15 +78,18 @@ class _Blocks:
     length: float
 
     @classmethod
-    def of(cls, flights: Sequence[Flight], m: int, dt: float) -> _Blocks:
-        """At m samples, in blocks of four averaging times."""
-        count = len(flights[0].differences)
+    def of(cls, flights: Sequence[Flight], octave: int, dt: float) -> _Blocks:
+        """In blocks of four averaging times. What fits took is given back."""
+        m, count = 2**octave, len(flights[0].differences)
         pairs = list(combinations(range(count), 2)) or [(0, 0)]
         block = max(tuning.BLOCK_LEVELS * m, tuning.BLOCK_LEAST / dt)
         parts: list[tuple[FloatArray, ...]] = []
         powers = np.zeros((count, 3))
         for number, flight in enumerate(flights):
             coefficients = [haar(each, m) for each in flight.differences]
+            if flight.absorbed is not None:
+                left = np.sqrt(1.0 - flight.absorbed[:, octave])
+                coefficients = [c / share for c, share in zip(coefficients, left, strict=True)]
             level = flight.vibration[m : m + len(coefficients[0])]
             used = (level != 0.0)[:, None]
             powers += [np.sum(used * each**2, axis=0) for each in coefficients]
@@ -167,7 +173,7 @@ def curves_of(flights: Sequence[Flight], dt: float, longest: int) -> Curves:
     rows = []
     for k in range(octaves + 1):
         long = [each for each in flights if len(each.vibration) >= tuning.WINDOWS * 2**k]
-        rows.append(_octave(_Blocks.of(long, 2**k, dt)))
+        rows.append(_octave(_Blocks.of(long, k, dt)))
     columns = [np.stack(each, axis=-1) for each in zip(*rows, strict=True)]
     tau = np.asarray(dt * 2.0 ** np.arange(octaves + 1), dtype=float)
     return Curves(tau, *columns)

@@ -14,6 +14,7 @@ from gmwm._core.frozen import freeze
 from gmwm._core.typing import QUARTILE, BoolArray, FloatArray
 from gmwm.motion import tuning
 from gmwm.motion.clocks import means
+from gmwm.motion.curves import haar
 
 _AXES = 3
 _LAG = 9  # place of the lag behind the nine entries of the matrix
@@ -114,8 +115,10 @@ def _cross(vectors: FloatArray) -> FloatArray:
 
 def map_onto(
     target: FloatArray, others: Sequence[Signals], good: BoolArray, dt: float
-) -> tuple[list[FloatArray], list[FloatArray], list[FloatArray]]:
-    """Differences of the target and each other, and the parameters of each with their errors.
+) -> tuple[list[FloatArray], list[FloatArray], list[FloatArray], FloatArray]:
+    """Differences of the target and each other, the parameters of each with their errors.
+
+    And the shares (K - 1, J, 3) of the variance of differences that the fits take, by octave.
 
     target: (n, 3), unfiltered.
     good: (n,), where no IMU lost a sample.
@@ -129,10 +132,11 @@ def map_onto(
     used_means = means(good.astype(float), size) == 1.0
     wanted = means(target - target.mean(axis=0), size)[used_means]
     spreads = others[0].spreads
-    known = [each.regressors(size)[used_means] * spreads for each in others]
+    regressors = [each.regressors(size) * spreads for each in others]
+    known = [each[used_means] for each in regressors]
     part = np.flatnonzero(used_means) * size * dt // tuning.ERROR_PART
     ends = np.flatnonzero(np.diff(part, prepend=-1.0))
-    differences, parameters, errors = [], [], []
+    differences, parameters, errors, absorbed = [], [], [], []
     for j, each in enumerate(others):
         used = [k for k in range(len(others)) if k != j] or [j]
         instruments = sum((known[k] for k in used), np.zeros(known[j].shape)) / len(used)
@@ -153,7 +157,25 @@ def map_onto(
         parameters.append(found * spreads)
         errors.append(np.sqrt(np.diag(spread)) * spreads)
         differences.append(target - each.mapped(found * spreads))
-    return differences, parameters, errors
+        # The hat matrix H = X A X' of errors e leaves (I - H) e.
+        taken = np.linalg.cholesky(2.0 * inverse - inverse @ product @ inverse)
+        absorbed.append(_absorbed(regressors[j] @ taken, size, len(target)))
+    return differences, parameters, errors, np.array(absorbed)
+
+
+def _absorbed(basis: FloatArray, size: int, n: int) -> FloatArray:
+    """(J, 3) Share of the Allan variance that a fit to means takes, at 1, 2, 4 ... of n samples.
+
+    Of errors that are white over an octave: a motion of half a hertz takes those at 1 s.
+    """
+    found = np.zeros((int(np.log2(n)), _AXES))
+    columns = basis.reshape(len(basis), -1)
+    for octave, share in enumerate(found):
+        m = round(2**octave / size)
+        if 0 < 2 * m <= len(basis):
+            power = np.mean(haar(columns, m) ** 2, axis=0).reshape(basis.shape[1:])
+            share[:] = np.minimum(0.5 * m * power.sum(axis=1), tuning.MOST_ABSORBED)
+    return found
 
 
 def far_out(differences: Sequence[FloatArray], dt: float) -> BoolArray:

@@ -301,13 +301,13 @@ def _of_target(
             signals.append(Signals(values, steady, arms[j]))
             if sensor == "gyro":
                 arms[j] = arms_of(values, slopes)
-        mapped, parameters, errors = map_onto(wanted, signals, good, target.dt)
+        mapped, parameters, errors, absorbed = map_onto(wanted, signals, good, target.dt)
         if np.any(away := far_out(mapped, target.dt)):
             good = good & ~away
             events += int(np.count_nonzero(np.diff(away, prepend=False) & away))
-            mapped, parameters, errors = map_onto(wanted, signals, good, target.dt)
+            mapped, parameters, errors, absorbed = map_onto(wanted, signals, good, target.dt)
         own_differences = [bridged(each, good, target.dt) for each in mapped]
-        found[sensor] = Flight(own_differences, target.vibration[inside])
+        found[sensor] = Flight(own_differences, target.vibration[inside], absorbed)
         for imu, turn, value, error in zip(others, turns, parameters, errors, strict=True):
             rotation = Rotation.from_matrix(turn).as_rotvec()
             mountings.append(

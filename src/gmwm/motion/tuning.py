@@ -20,6 +20,7 @@ PASSES, CLOSE = 12, 1e-7  # of the delay, s
 SCALE_SPREAD, LAG_SPREAD, ARM_SPREAD = 0.03, 0.003, 0.3  # share, s, m
 # Residuals of means are correlated: their variance counts so often against the spread.
 CORRELATION = 3.0
+MOST_ABSORBED = 0.5  # share of a variance that a fit may have taken and that is given back
 REWEIGHTED = 3  # times the spread of the residuals is found again
 ERROR_PART = 2.0  # s: parts whose sums give the errors of a mapping
 
