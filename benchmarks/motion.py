@@ -8,10 +8,11 @@ FOLDER holds ``flight_NN_imu_K.csv.gz`` of four IMUs on one quadrotor, 120 Hz (H
 2023, CC BY 4.0). `simulate` takes the motion below 15 Hz of one IMU for the truth, gives each of
 several IMUs a clock, a rotation, a lever arm and errors of known Allan variance (white noise,
 differenced white noise, random walk), and prints the ratio of the variances to the truth, the
-coverage of 95 % intervals with its own interval, and the errors of clocks and lever arms in standard errors. `sessions`
-prints in-motion over static Allan deviation by session. `predict` takes the numbers from every
-second flight of a session, and prints on the others, and the other way round, the NEES of the
-difference of two IMUs, also with the shares of time that classes of vibration have in each flight.
+coverage of 95 % intervals with its own interval, and the errors of clocks and lever arms in
+standard errors. `sessions` prints in-motion over static Allan deviation by session. `predict` takes
+the numbers from every second flight of a session, and prints on the others, and the other way
+round, the NEES of the difference of two IMUs, also with the shares of time that classes of
+vibration have in each flight.
 """
 
 from __future__ import annotations

@@ -10,6 +10,7 @@ import numpy as np
 from scipy.optimize import nnls
 from scipy.spatial.transform import Rotation, Slerp
 
+from gmwm._core.text import brief, per_cent
 from gmwm._core.typing import BoolArray, FloatArray
 from gmwm.errors import InputError
 from gmwm.motion import tuning
@@ -73,12 +74,12 @@ def without_reference(curves: Curves, dt: float, where: str) -> tuple[Curves, fl
     is of that form, and where tau is below two intervals of the reference, it is not known.
 
     dt: Of the reference, s.
-    Raises InputError if that is so at all times.
+    Raises InputError if that is so at all times, with the Fisher information that is left.
     """
     tau, total = curves.tau, curves.variance
     used = tau >= 2.0 * dt * (1.0 - 1e-9)
     lower, upper, variance = np.zeros_like(total), curves.upper.copy(), np.full_like(total, np.nan)
-    angles = []
+    pairs, angles = variance.copy(), []
     for axis in range(3):
         error = np.maximum(curves.upper - curves.lower, 1e-3 * total)[axis, used] / 4.0
         terms = np.column_stack([3.0 / tau**2, 1.0 / tau, tau / 3.0])[used] / error[:, None]
@@ -88,15 +89,21 @@ def without_reference(curves: Curves, dt: float, where: str) -> tuple[Curves, fl
         own = 3.0 * found[0] / tau**2
         seen = used & (own < 0.5 * total[axis])
         left, unsure = total[axis] - own, 2.0 * 3.0 * spread / tau**2
-        variance[axis, seen] = left[seen]
+        variance[axis, seen], pairs[axis, used] = left[seen], left[used]
         for end, sign, given in ((lower, -1.0, curves.lower), (upper, 1.0, curves.upper)):
             reach = np.hypot(given[axis] - total[axis], unsure)
             end[axis, seen] = np.maximum(left + sign * reach, 0.0)[seen]
         angles.append(float(np.sqrt(found[0])))
     if not np.any(np.isfinite(variance)):
+        known = np.max(np.maximum(pairs / total, 0.0) ** 2, axis=0)
+        by_octave = ", ".join(
+            f"{per_cent(share, 1)} at {brief(t)} s"
+            for share, t in zip(known[used], tau[used], strict=True)
+        )
         raise InputError(
             f"{where}: the noise of the reference's angle, {1e3 * max(angles):.2g} mrad, dominates "
-            f"up to {tau[-1]:.2g} s: record longer, or use a better reference"
+            f"up to {tau[-1]:.2g} s: record longer, or use a better reference (Fisher information "
+            f"against that of a perfect one: {by_octave})"
         )
-    pairs = variance[None]
-    return replace(curves, variance=variance, lower=lower, upper=upper, pairs=pairs), max(angles)
+    ends = {"lower": lower, "upper": upper}
+    return replace(curves, variance=variance, pairs=pairs[None], **ends), max(angles)

@@ -97,7 +97,11 @@ class MotionCurve(Document):
 
     @property
     def coherence(self) -> FloatArray:
-        """(J,) Mean coherence of two differences to other IMUs: the share of its own error."""
+        """(J,) Mean coherence of two differences to other IMUs: the share of its own error.
+
+        One half for equal IMUs that share nothing. With a reference the share of the gyro, whose
+        square is the Fisher information on its variance against that of a perfect reference.
+        """
         first, second = np.triu_indices(len(self.differences), min(1, len(self.differences) - 1))
         power = np.sqrt(self.differences[first] * self.differences[second])
         return np.asarray(np.mean(self.pairs / power, axis=0))
@@ -440,6 +444,11 @@ class InMotion(Document, Printed):
             rows.append((imu, *_texts(mean, scale, chosen)))
         reach = _median([np.sqrt(np.maximum(c.upper, 0.0)) / c.deviation for c in own])
         rows.append(("95 %", *(f"x/{reach[k]:.2f}" if reach[k] > 0.0 else "-" for k in chosen)))
+        if len(self.imus) != 2:
+            # Of one IMU, the Fisher information against that of a perfect reference.
+            name, power = ("information", 2) if len(self.imus) == 1 else ("coherence", 1)
+            shares = _median([np.maximum(c.coherence, 0.0) ** power for c in own])
+            rows.append((name, *(f"{shares[k]:.2f}".replace("nan", "-") for k in chosen)))
         if np.any(np.isfinite([c.static for c in own])):
             times = self.factor(sensor)
             rows.append(("over rest", *(brief(times[k]) for k in chosen)))

@@ -1,4 +1,4 @@
-"""The page of noise in motion: curves, factors over rest, vibration, and numbers for filters."""
+"""The page of noise in motion: curves, factors over rest, coherence, vibration, and numbers."""
 
 from __future__ import annotations
 
@@ -30,7 +30,6 @@ def write_motion_report(found: InMotion, path: str | os.PathLike[str]) -> Path:
     """
     path = writable_file(path)
     channels = dict.fromkeys(each.channel for each in found.curves)
-    known = any(np.any(np.isfinite(each.static)) for each in found.curves)
     shown = found.curves[0].tau[-1] >= HORIZON
     return write_page(
         path,
@@ -38,7 +37,8 @@ def write_motion_report(found: InMotion, path: str | os.PathLike[str]) -> Path:
         found=found,
         text=str(found),
         curves={channel: _curves(found, channel) for channel in channels},
-        factors={sensor: _factor(found, sensor) for sensor in found.sensors} if known else {},
+        factors=_ranges(found, "factor", "in motion over at rest", 10.0, "times ten"),
+        coherence=_ranges(found, "coherence", "coherence", 0.5, "") if len(found.imus) > 2 else {},
         vibration=_vibration(found) if found.classes else "",
         rows=list(_rows(found)) if shown else [],
         purpose=f"updates every {INTERVAL:g} s, outages up to {HORIZON:g} s",
@@ -74,18 +74,24 @@ def _curves(found: InMotion, channel: str) -> str:
     return svg(figure)
 
 
-def _factor(found: InMotion, sensor: str) -> str:
-    """Deviation in motion over that at rest: median and range over IMUs and axes."""
-    tau = found.curves[0].tau
-    figure, ax = _axes("in motion over at rest", sensor)
-    all_curves = np.array([each.factor for each in found.curves if each.quantity == sensor])
-    known = np.any(np.isfinite(all_curves), axis=0)
-    ends = (np.nanmin(all_curves[:, known], axis=0), np.nanmax(all_curves[:, known], axis=0))
-    ax.fill_between(tau[known], *ends, color=COMPONENT_COLOURS[0], alpha=0.25, linewidth=0.0)
-    ax.plot(tau, found.factor(sensor), color=COMPONENT_COLOURS[0], marker="o", markersize=3.0)
-    ax.axhline(10.0, color=DATA_COLOUR, linestyle="--", linewidth=1.0)
-    ax.annotate("times ten", (tau[0], 10.0), (2, 3), textcoords="offset points", fontsize="small")
-    return svg(figure)
+def _ranges(found: InMotion, name: str, value: str, level: float, text: str) -> dict[str, str]:
+    """By sensor, the median and range over IMUs and axes of what curves have, and a level."""
+    tau, pictures = found.curves[0].tau, {}
+    for sensor in found.sensors:
+        rows = np.array([getattr(c, name) for c in found.curves if c.quantity == sensor])
+        known = np.any(np.isfinite(rows), axis=0)
+        if not np.any(known):
+            continue
+        low, mid, high = (np.nanquantile(rows[:, known], q, axis=0) for q in (0.0, 0.5, 1.0))
+        figure, ax = _axes(value, sensor)
+        ax.fill_between(tau[known], low, high, color=COMPONENT_COLOURS[0], alpha=0.25, linewidth=0)
+        ax.plot(tau[known], mid, color=COMPONENT_COLOURS[0], marker="o", markersize=3.0)
+        ax.axhline(level, color=DATA_COLOUR, linestyle="--", linewidth=1.0)
+        ax.annotate(text, (tau[0], level), (2, 3), textcoords="offset points", fontsize="small")
+        if name == "coherence":
+            ax.set(yscale="linear", ylim=(min(0.0, low.min()), 1.0))
+        pictures[sensor] = svg(figure)
+    return pictures
 
 
 def _vibration(found: InMotion) -> str:

@@ -108,10 +108,10 @@ def test_export_writes_the_numbers():
 
 def test_page_shows_curves_factors_and_numbers(tmp_path):
     rest = allan(WhiteNoise(1e-4))
-    found = in_motion([allan(QuantizationNoise(1e-3) + WhiteNoise(1e-3))] * 2, rest)
+    found = in_motion([allan(QuantizationNoise(1e-3) + WhiteNoise(1e-3))] * 3, rest)
     page = found.report(tmp_path / "motion.html").read_text()
-    # A picture of each axis, and of the factor of each sensor; vibration is not known.
-    assert page.count("<svg") == 8
+    # Of each axis, and the factor and coherence of each sensor; vibration is not known.
+    assert page.count("<svg") == 10
     N = found.numbers()["gyro_x"].params["N"]
     assert f"{N:.2e} SI" in page
     assert "at rest" in page

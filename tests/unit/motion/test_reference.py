@@ -58,11 +58,16 @@ def test_noise_of_gyros_is_told_from_that_of_the_reference():
     # Rates of the reference stand in the middle of two attitudes.
     assert found.clocks[0].offset == pytest.approx(-0.25 - 0.005, abs=5e-4)
     assert "reference" in str(found)
+    (row,) = (line.split() for line in str(found).splitlines() if line.startswith("information"))
+    for text, tau in zip(row[2:], (0.04, 0.16, 0.64, 1.28, 2.56, 5.12), strict=True):
+        own, other = N**2 / tau, 3.0 * (4e-5 / tau) ** 2
+        assert float(text) == pytest.approx((own / (own + other)) ** 2, abs=0.06)
 
 
 def test_a_reference_that_dominates_is_rejected():
     recording, attitude = flight(4, angle=3e-3)
-    with pytest.raises(gmwm.InputError, match=r"noise of the reference's angle, .* dominates"):
+    message = r"noise of the reference's angle, .* dominates .*: .* at 0.02 s, 0 % at 0.04 s, "
+    with pytest.raises(gmwm.InputError, match=message):
         gmwm.motion(recording, reference=attitude)
 
 
