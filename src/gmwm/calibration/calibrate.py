@@ -36,7 +36,7 @@ from gmwm.calibration.screening import (
     with_outcomes,
 )
 from gmwm.calibration.sharing import sharing_notices
-from gmwm.diagnosis import first_in_common, thinned
+from gmwm.diagnosis import first_in_common, health, thinned
 from gmwm.errors import InputError
 from gmwm.issues import Notice, notice
 from gmwm.readers import Channel, Recording, is_frame, read, require_recording
@@ -188,12 +188,7 @@ def _calibrated(
     if not done:
         why = "; ".join(f"{name}: {each.text}" for name, each in skipped.items())
         raise InputError(f"{source or 'the recording'}: {why}")
-    issues: list[Notice] = []  # sensors with rates of their own share those of the reader
-    for one in treated:
-        for issue in one.notices:
-            named = replace(issue, source=one.recording.source) if len(given) > 1 else issue
-            if named not in issues:
-                issues.append(named)
+    issues = _issues(treated, designs, done, several=len(given) > 1)
     done, advice = advise_cut(done, given[0].n * given[0].dt if len(given) == 1 else 0.0)
     issues += advice
     done = with_validity(done, issues, still=work.still)
@@ -225,6 +220,29 @@ def _calibrated(
         curves={name: each.curve for name, each in done.items() if each.curve is not None},
         left_out=_left_out(given[0], treated[0].recording) if len(treated) == 1 else {},
     )
+
+
+def _issues(
+    treated: Sequence[Screened],
+    designs: Mapping[str, Design],
+    done: Mapping[str, ChannelModel],
+    *,
+    several: bool,
+) -> list[Notice]:
+    """What was found in the recordings, without changes of noise that follow a covariate."""
+    issues: list[Notice] = []  # sensors with rates of their own share those of the reader
+    for place, one in enumerate(treated):
+        for issue in one.notices:
+            kept, model = [issue], done.get(issue.where)
+            grows = model is not None and any(n.code == "noise-scales" for n in model.fit.notices)
+            if issue.code == "variance" and grows and model is not None and model.curve is not None:
+                own, growth = one.recording[issue.where], model.curve.scaling
+                steady = designs[issue.where].evened(own, place, growth)
+                again = health(replace(one.recording, channels=(steady,))).notices
+                kept = [each for each in again if each.code == "variance"]
+            source = one.recording.source if several else issue.source
+            issues += [n for each in kept if (n := replace(each, source=source)) not in issues]
+    return issues
 
 
 def _tasks(

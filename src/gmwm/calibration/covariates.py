@@ -173,6 +173,16 @@ class Design:
         """A channel of a recording less the first curve."""
         return _less(channel, self.nodes[place].time, self.removed @ self.columns[place])
 
+    def evened(self, channel: Channel, place: int, growth: Scaling | None) -> Channel:
+        """A channel less its mean, over the growth of its noise: of one size if that is all."""
+        if growth is None:
+            return channel
+        nodes = self.nodes[place]
+        factor = growth.factor(nodes.rows[self.covariates[0].name])
+        middles = channel.dt * (np.arange(channel.n) + 0.5)
+        values = (channel.values - channel.mean) / np.interp(middles, nodes.time, factor)
+        return replace(channel, values=values)
+
     def beside(self, wv: WaveletVariance, place: int) -> WaveletVariance:
         """The wavelet variance of such a channel with the regressors."""
         middles = wv.block * wv.dt * (np.arange(wv.blocks.size) + 0.5)

@@ -122,6 +122,8 @@ def with_option(notice: Notice, span: Span = None, lost: float = 0.0, longest: s
         "axis-up": "correct if the sensor is mounted upside down. If z points up give --channel "
         "gyro_z=-NAME --channel accel_z=-NAME, and also y if it points left; if accelerometers "
         "read gravity instead of the reaction to it, reverse accel_x, accel_y and accel_z only",
+        "noise-scales": "for numbers at your working temperature give --temperature to gmwm bound, "
+        "budget and export",
         "vibration": "leave it out with --start and --stop, or record again",
     }
     if unit := values.get("alike"):

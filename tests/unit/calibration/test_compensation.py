@@ -121,3 +121,21 @@ def test_the_noise_of_a_record_is_its_mean_square(first):
         assert noise[axis] == pytest.approx(float(first.curves[axis].noise_factor(60.0)))
     same = compensated(recording(np.zeros((SIZE, 6)), cycles()), first.curves)[1]
     assert same["gyro_x"] == pytest.approx(1.0, abs=0.01)
+
+
+def test_noise_that_follows_the_temperature_spoils_no_fit():
+    """Cycles make it come and go, which was taken for vibration; real vibration beside it is."""
+    n, rate = 36_000, 10.0
+    temperature = cycles(size=n)
+    x = np.random.default_rng(5).standard_normal(n)
+    x *= 1e-3 * np.exp(1.5 * GROWTH * (temperature - 45.0))
+    bursts = np.where(np.arange(n) // 900 % 3 == 0, 1.4, 1.0)
+    arrays = {"gyro_x": x, "gyro_y": x[::-1] * bursts, "temperature": temperature}
+    rec = gmwm.Recording.from_arrays(arrays, rate, UNITS)
+    words = {"temperature": "linear"}
+    cal = gmwm.calibrate(rec, "N", covariates=words, jobs=1)
+    (grows,) = [each for each in cal["gyro_x"].notices if each.code == "noise-scales"]
+    assert grows.severity == "warning"
+    assert cal["gyro_x"].valid and not cal["gyro_y"].valid
+    assert [n.where for n in cal.notices if n.code == "variance"] == ["gyro_y"]
+    assert not gmwm.calibrate(rec, "N", jobs=1)["gyro_x"].valid
