@@ -1,13 +1,6 @@
 """Error models of tests: what bounds and reductions are held to."""
 
-from gmwm import (
-    AR,
-    BiasInstability,
-    GaussMarkov,
-    Model,
-    RandomWalk,
-    WhiteNoise,
-)
+from gmwm import AR, BiasInstability, GaussMarkov, Model, RandomWalk, WhiteNoise
 
 TRUTHS = {
     "one": WhiteNoise(8e-5) + GaussMarkov(4e-5, 60.0),

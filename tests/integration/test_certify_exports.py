@@ -60,8 +60,7 @@ def calibration_of(kept, name):
 
 @pytest.mark.parametrize("target", marks.every(3, READABLE))
 @pytest.mark.parametrize(
-    "name",
-    ["one without K", *map(marks.slow, ("slow", "accels without K", "recording"))],
+    "name", ["one without K", *map(marks.slow, ("slow", "accels without K", "recording"))]
 )
 def test_a_certificate_agrees_with_the_file(calibrations, tmp_path, name, target):
     calibration = calibration_of(calibrations, name)

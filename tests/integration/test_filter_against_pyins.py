@@ -115,11 +115,7 @@ def flight(duration, seed, *, velocity, outages=(), start=0.0):
     sensors = models()
     errors = sensors.simulate(truth.n, DT, rng).total
     imu = emulate(truth).with_errors(errors[:, :3], errors[:, 3:])
-    aiding = gnss(
-        truth,
-        position_sd=POSITION_SD,
-        velocity_sd=VELOCITY_SD if velocity else None,
-    )
+    aiding = gnss(truth, position_sd=POSITION_SD, velocity_sd=VELOCITY_SD if velocity else None)
     return Flight(truth, imu, aiding.noisy(rng).without(outages))
 
 

@@ -139,8 +139,7 @@ def test_absurd_numbers_are_named(calibration, use):
 
 
 @pytest.mark.parametrize(
-    ("place", "value"),
-    [("initial_sd", 1e200), ("stderr", {"x": 1.0}), ("initial_sd", 10**59)],
+    ("place", "value"), [("initial_sd", 1e200), ("stderr", {"x": 1.0}), ("initial_sd", 10**59)]
 )
 def test_absurd_numbers_of_a_file_are_rejected(calibration, tmp_path, place, value):
     content = gmwm.bound(calibration).to_dict()

@@ -7,12 +7,7 @@ import pytest
 
 from gmwm import Channel, Recording, Resonance, Sinusoid, WhiteNoise
 from gmwm.calibration import tuning
-from gmwm.calibration.screening import (
-    offered_terms,
-    screened,
-    stretches_at_rest,
-    with_outcomes,
-)
+from gmwm.calibration.screening import offered_terms, screened, stretches_at_rest, with_outcomes
 from gmwm.issues import Notice
 from gmwm.process import as_model
 

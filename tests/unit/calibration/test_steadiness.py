@@ -80,11 +80,11 @@ STEADY = {
 
 @pytest.mark.parametrize(("model", "simulated"), every(2, STEADY.values()), ids=STEADY)
 def test_stationary_noise_has_no_notice_more_often_than_promised(model, simulated, monkeypatch):
-    """At a level of 5 %, of 15 records 3 at most (99 % of a binomial law)."""
+    """At a level of 5 %, of 10 records 2 at most (99 % of a binomial law)."""
     monkeypatch.setattr(tuning, "FALSE_ALARM", 0.05)
     monkeypatch.setattr(tuning, "UNSTEADY", 0.0)
-    alarms = sum(found(model, simulated(seed)) is not None for seed in range(15))
-    assert alarms <= stats.binom.ppf(0.99, 15, 0.05)
+    alarms = sum(found(model, simulated(seed)) is not None for seed in range(10))
+    assert alarms <= stats.binom.ppf(0.99, 10, 0.05)
 
 
 def test_sizes_are_compared_as_bartlett_does():

@@ -43,8 +43,7 @@ def test_what_a_drift_is_said_to_be(slope, lost):
 
 
 @pytest.mark.parametrize(
-    ("n", "lost", "there"),
-    [(N, 0, True), (N - 1, 0, False), (2 * N, 32, True), (2 * N, 33, False)],
+    ("n", "lost", "there"), [(N, 0, True), (N - 1, 0, False), (2 * N, 32, True), (2 * N, 33, False)]
 )
 def test_a_level_is_looked_at_in_long_records_of_which_half_is_there(n, lost, there):
     values = np.random.default_rng(2).normal(size=n) + np.repeat([0.0, 50.0], [n // 2, n - n // 2])

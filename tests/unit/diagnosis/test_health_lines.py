@@ -61,7 +61,7 @@ def test_a_line_is_found_with_frequency_and_amplitude(frequency, amplitude, n, n
 
 @pytest.mark.parametrize("name", every(3, NOISES))
 def test_clean_noise_has_no_lines(name):
-    runs = 110
+    runs = 60
     count = sum(bool(lines(simulated(NOISES[name], 3000, seed))) for seed in range(runs))
     # One chance in a million that the bound is passed.
     assert count <= binom.isf(1e-6, runs, FALSE_ALARM)

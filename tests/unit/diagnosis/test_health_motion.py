@@ -226,6 +226,7 @@ def test_an_accelerometer_that_wanders_is_no_slow_tilt(record, seed):
 
 def test_what_moved_is_calibrated_from_its_stretches_at_rest(moved):
     recording = moved(turn(12_000, 40, 80, 60.0, (0, 0, 1)))
+    recording = replace(recording, channels=recording.channels[2::3])
     cal = gmwm.calibrate(recording, WhiteNoise())
     assert not any("recording_static" in fit.reasons for fit in cal.values())
     (notice,) = [each for each in cal.notices if each.code == "still-stretches"]
@@ -235,7 +236,9 @@ def test_what_moved_is_calibrated_from_its_stretches_at_rest(moved):
 
 
 def test_fits_of_what_was_tilted_are_not_valid(moved):
-    cal = gmwm.calibrate(moved(turn(30_000, 150, 151, 5.0, (1, 0, 0))), WhiteNoise())
+    recording = moved(turn(30_000, 150, 151, 5.0, (1, 0, 0)))
+    recording = replace(recording, channels=recording.channels[::2])
+    cal = gmwm.calibrate(recording, WhiteNoise())
     kept = {name: "attitude_kept" not in fit.reasons for name, fit in cal.items()}
     assert kept == {name: name.startswith("gyro") for name in cal}
     again = gmwm.calibration.Calibration.from_content(cal.content())

@@ -9,12 +9,7 @@ from gmwm._core.text import per_cent
 from gmwm.diagnosis import tuning
 from gmwm.diagnosis.repeats import held_samples, repetition, thinned
 from gmwm.diagnosis.resolution import is_coarse, rounding
-from gmwm.diagnosis.samples import (
-    cut_off_or_abrupt_end,
-    gap_notices,
-    is_dithered,
-    repeated_value,
-)
+from gmwm.diagnosis.samples import cut_off_or_abrupt_end, gap_notices, is_dithered, repeated_value
 
 
 def channel(values, name="gyro_x", dt=0.01):

@@ -188,7 +188,7 @@ def stepped(slow):
     return replace(slow, fits=fits)
 
 
-@pytest.mark.parametrize("horizon", [None, 10.0])
+@pytest.mark.parametrize("horizon", [None, marks.slow(10.0)])
 def test_slow_terms_count_as_a_random_walk(slow, horizon):
     content = yaml.safe_load(gmwm.export(slow, "kalibr", horizon=horizon))
     found = bound(slow, "N+K", horizon or 60.0, shared=True)

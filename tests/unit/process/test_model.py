@@ -9,16 +9,7 @@ from hypothesis import given, strategies as st
 from hypothesis.extra import numpy as hnp
 
 import gmwm
-from gmwm import (
-    AR,
-    ARIMA,
-    ARMA,
-    GaussMarkov,
-    RandomWalk,
-    Resonance,
-    Sinusoid,
-    WhiteNoise,
-)
+from gmwm import AR, ARIMA, ARMA, GaussMarkov, RandomWalk, Resonance, Sinusoid, WhiteNoise
 from gmwm.process import CATALOGUE, as_model, model_from_list
 
 

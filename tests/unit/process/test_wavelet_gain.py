@@ -85,7 +85,7 @@ def test_stationary_processes_give_the_filter_against_their_autocovariance(proce
             assert value == pytest.approx(expected, rel=1e-8, abs=rounding), name
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=10, deadline=None)
 @given(st.sampled_from(SOME), st.floats(-3.0, -0.35), st.floats(-2.0, -0.05))
 def test_resonances_of_any_frequency_down_to_damping_of_one_per_cent(name, log_f, log_damping):
     process = gmwm.Resonance(1.0, 10.0**log_f, 10.0**log_damping)
@@ -103,7 +103,7 @@ def test_resonances_of_any_frequency_down_to_damping_of_one_per_cent(name, log_f
 
 
 def test_coarsest_levels_follow_the_power_laws_of_white_noise_and_random_walk():
-    for name in SOME[:-1]:
+    for name in SOME[:2]:
         white = of(gmwm.WhiteNoise(1.0), name, levels=30)
         np.testing.assert_allclose(white, 0.5 / 2.0 ** np.arange(30), rtol=1e-12)
         walk = of(gmwm.RandomWalk(1.0), name, levels=30)
@@ -191,7 +191,7 @@ def test_a_spectrum_that_is_none_is_refused():
 
 @pytest.mark.parametrize("name", [*SOME[:-1], slow(SOME[-1])])
 def test_pairs_of_gains_equal_a_rule_that_is_exact_for_their_products(name):
-    levels = 11
+    levels = 9
     pairs = pair_weights(name, levels)
     # Midpoints of the band integrate cosines exactly below their number.
     size = 4 * wavelet(name).width(levels)

@@ -99,8 +99,7 @@ def test_a_bias_of_one_degree_per_second_is_no_gravity(write):
 @pytest.mark.parametrize("is_given", [False, True])
 def test_a_gyro_in_another_unit_is_suspected(write, true, read_as, quality, is_given):
     path = write(
-        in_units(imu(**quality), true, "g"),
-        ",".join(NAMES) if is_given else header(read_as, "g"),
+        in_units(imu(**quality), true, "g"), ",".join(NAMES) if is_given else header(read_as, "g")
     )
     units = {"gyro": read_as, "accel": "g"} if is_given else None
     (found,) = notices(read(path, rate=100.0, units=units))

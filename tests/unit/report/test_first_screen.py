@@ -10,12 +10,7 @@ import pytest
 import gmwm
 from gmwm import QuantizationNoise, RandomWalk, WhiteNoise
 from gmwm.issues import Notice
-from gmwm.report.health import (
-    ambiguity,
-    health,
-    known_at,
-    length_sentence,
-)
+from gmwm.report.health import ambiguity, health, known_at, length_sentence
 
 TIE = Notice("ambiguity", "note", "gyro_x", "2 models fit", hint="the first is used")
 

@@ -303,7 +303,7 @@ def test_six_axes_with_much_to_say_take_eight_pages(tab, tmp_path):
         + LowPassNoise(4e-4, bandwidth=25.0, order=1, damping=0.7071)
     )  # fmt: skip
     names = [f"{sensor}_{axis}" for sensor in ("gyro", "accel") for axis in "xyz"]
-    samples = {name: model.simulate(8000, 0.01, seed) for seed, name in enumerate(names)}
+    samples = {name: model.simulate(4000, 0.01, seed) for seed, name in enumerate(names)}
     units = {"gyro": "rad/s", "accel": "m/s^2"}
     many = gmwm.Recording.from_arrays(samples, 100.0, units)
     found = gmwm.calibrate(many, model.with_params({"N": None}))

@@ -46,11 +46,7 @@ def test_few_runs_tell_nothing(tmp_path, made_up):
 
 @pytest.mark.parametrize(
     ("outages", "dead"),
-    [
-        ((), ("bold",)),
-        slow(((20, 10),), ("right",)),
-        (((20, 10),), ("right", "bold")),
-    ],
+    [((), ("bold",)), slow(((20, 10),), ("right",)), (((20, 10),), ("right", "bold"))],
 )
 def test_a_page_without_outages_or_with_filters_that_diverged(tmp_path, outages, dead, made_up):
     found = made_up({"right": 1.0, "bold": 3.0}, outages, dead=dead)

@@ -29,13 +29,10 @@ from marks import slow
 )
 def test_the_true_model_is_chosen(truth, words):
     truth = gmwm.process.as_model(truth)
-    chosen = []
-    for seed in range(3):
+    for seed in range(2):
         selection = gmwm.select(truth.simulate(100_000, 1.0, seed), dt=1.0)
-        chosen.append(selection.model.title())
         assert selection.fit.valid, selection.fit.message
-        assert len(selection.model.terms) <= len(truth.terms) + 1
-    assert chosen.count(words) >= 2, chosen
+        assert selection.model.title() == words
 
 
 def test_a_larger_model_is_never_worse():
@@ -117,11 +114,11 @@ def test_several_recordings_have_one_model():
 
 
 def test_no_random_walk_is_invented():
-    """White noise of an hour at 10 Hz: K is none, or its interval goes down to zero."""
+    """White noise of 15 minutes at 10 Hz: K is none, or its interval goes down to zero."""
     truth = WhiteNoise(0.005)
     held = 0
     for seed in range(20):
-        fit = gmwm.fit(WhiteNoise() + RandomWalk(), truth.simulate(36_000, 0.1, seed), dt=0.1)
+        fit = gmwm.fit(WhiteNoise() + RandomWalk(), truth.simulate(9_000, 0.1, seed), dt=0.1)
         held += fit.interval()["K"][0] == 0.0
     # 5 % of the bounds may fail: at least 16 of 20 hold in all but 0.3 % of cases.
     assert held >= 16
@@ -155,7 +152,7 @@ def test_merging_stops_where_it_must():
     longer = gmwm.select(np.tile(x, 2)[:64], dt=1.0, rule="merge", max_gauss_markov=2)
     assert any(len(item.model.terms) == 3 for item in longer)  # five parameters of six levels
     # White noise that is not there is no reason to leave Gauss-Markov processes out.
-    slow = gmwm.simulate(GaussMarkov(1.0, 300.0), 50_000, 1.0, 2)
+    slow = gmwm.simulate(GaussMarkov(1.0, 300.0), 20_000, 1.0, 2)
     kept = gmwm.select(slow, dt=1.0, rule="merge").model
     assert sum(isinstance(term, GaussMarkov) for term in kept.terms) == 1
     with pytest.raises(gmwm.InputError, match="rule = 'magic': choose from criterion, merge"):
@@ -192,7 +189,7 @@ def test_bias_instability_as_a_candidate():
 )
 def test_a_slow_process_that_is_seen_once_is_no_ramp(truth):
     # An hour: with the slope priced under what the line leaves, 12 of 60 of these were ramps.
-    for seed in range(1000, 1003):
+    for seed in range(1000, 1002):
         selection = gmwm.select(truth.simulate(36_000, 0.1, seed), dt=0.1)
         assert "R" not in selection.fit.params, seed
 

@@ -130,7 +130,7 @@ def test_times_are_rounded_sorted_and_cut_for_each_kind():
     ids=lambda process: type(process).__name__,
 )
 def test_intervals_hold_the_truth(process):
-    runs, n = 25, 512
+    runs, n = 25, 256
     rng = np.random.default_rng(11)
     found = [gmwm.deviations(process.simulate(n, 1.0, rng), 1.0) for _ in range(runs)]
     least = binom.ppf(1e-4, runs, 0.93)  # of a few per cent less than stated nobody takes harm

@@ -97,9 +97,7 @@ def test_gaps_go_with_everything(options):
 
 
 @pytest.mark.parametrize(
-    "options",
-    [{"wavelet": "db2"}, {"robust": True}, {"data_covariance": "none"}],
-    ids=str,
+    "options", [{"wavelet": "db2"}, {"robust": True}, {"data_covariance": "none"}], ids=str
 )
 def test_json_and_back(options):
     x = (TRUTH + QuantizationNoise(0.1)).simulate(3000, 1.0, 2)

@@ -7,15 +7,7 @@ from scipy.linalg import toeplitz
 from scipy.stats import chi2, norm
 
 import gmwm
-from gmwm import (
-    GaussMarkov,
-    Model,
-    QuantizationNoise,
-    RandomWalk,
-    RateRamp,
-    Resonance,
-    WhiteNoise,
-)
+from gmwm import GaussMarkov, Model, QuantizationNoise, RandomWalk, RateRamp, Resonance, WhiteNoise
 from gmwm.estimate import estimate
 from gmwm.variance.gaps import (
     Runs,
@@ -259,7 +251,7 @@ def test_every_length_and_share_gives_levels_or_one_sentence(n, share):
     assert np.all(found.counts >= 1.0)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(st.lists(st.tuples(st.integers(0, 990), st.integers(1, 500)), max_size=6), st.integers(0, 9))
 def test_any_pattern_is_finite(gaps, seed):
     rng = np.random.default_rng(seed)

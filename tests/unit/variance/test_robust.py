@@ -213,7 +213,7 @@ def expected_bias(m, variance, share=0.01, efficiency=0.6):
 @pytest.mark.parametrize(("variance", "least", "fine"), [(9.0, 0.25, 1), (100.0, 0.05, 3)])
 def test_bias_from_one_percent_of_outliers(variance, least, fine):
     """A quarter or a twentieth of the classical bias at fine levels, and why not at coarse ones."""
-    runs, n, most = 4, 500_000, 6
+    runs, n, most = 4, 250_000, 6
     rng = np.random.default_rng(21)
     added = np.empty((runs, most, 2))
     for run in range(runs):
@@ -363,7 +363,7 @@ def test_fewer_levels_and_counts_of_a_series_with_gaps():
     ids=repr,
 )
 def test_simulated_covariance_of_clean_series(process):
-    runs, n = 500, 4096
+    runs, n = 250, 4096
     rng = np.random.default_rng(5)
     found = np.array([estimates(process.simulate(n, 1.0, rng), 8)[:, 1] for _ in range(runs)])
     classical = haar_covariance(process.psd, n, 1.0)[:8, :8]

@@ -77,7 +77,7 @@ def test_removing_a_drift_from_the_moments_is_removing_it_from_the_series():
     ids=["N", "K", "B", "Q+N", "Q+K", "N and a narrow resonance", "N+K+R"],
 )
 def test_intervals_cover(model, n):
-    runs = 120
+    runs = 80
     rng = np.random.default_rng(12)
     found = [gmwm.wavelet_variance(model.simulate(n, 1.0, rng), dt=1.0) for _ in range(runs)]
     truth = model.haar_variance(found[0].tau, 1.0)

@@ -11,15 +11,7 @@ from statsmodels.tsa.statespace.sarimax import SARIMAX
 from statsmodels.tsa.statespace.structural import UnobservedComponents
 
 import gmwm
-from gmwm import (
-    AR,
-    ARMA,
-    GaussMarkov,
-    QuantizationNoise,
-    RandomWalk,
-    RateRamp,
-    WhiteNoise,
-)
+from gmwm import AR, ARMA, GaussMarkov, QuantizationNoise, RandomWalk, RateRamp, WhiteNoise
 from gmwm.errors import InputError
 from gmwm.estimate import METHODS, Fit
 from gmwm.estimate.likelihood.likelihood import Columns, KalmanLikelihood, defined
@@ -177,12 +169,7 @@ def test_an_amplitude_of_zero_has_an_upper_bound(method):
 
 
 @pytest.mark.parametrize(
-    ("K", "method", "runs"),
-    [
-        (1.5e-3, "mle", 12),
-        slow(6e-3, "mle", 12),
-        slow(1.5e-3, "em", 10),
-    ],
+    ("K", "method", "runs"), [(1.5e-3, "mle", 12), slow(6e-3, "mle", 12), slow(1.5e-3, "em", 10)]
 )
 @pytest.mark.slow
 def test_intervals_of_a_walk_that_can_hardly_be_seen_cover_it(K, method, runs):

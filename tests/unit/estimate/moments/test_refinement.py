@@ -7,12 +7,7 @@ import numpy as np
 import pytest
 
 import gmwm
-from gmwm.estimate.moments import (
-    GMWM,
-    Design,
-    Profile,
-    dictionary_fit,
-)
+from gmwm.estimate.moments import GMWM, Design, Profile, dictionary_fit
 from gmwm.estimate.problem import Scales, weight_root
 from gmwm.process import compiled_levels, quadrature, shaped_curve, shaped_slope
 

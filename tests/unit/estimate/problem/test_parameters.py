@@ -143,13 +143,7 @@ def test_keys_follow_terms_that_change_places():
 
 
 @pytest.mark.parametrize(
-    "process",
-    [
-        GaussMarkov(0.5, 20.0),
-        gmwm.Resonance(0.4, 0.2, 0.05),
-        WhiteNoise(0.2),
-    ],
-    ids=repr,
+    "process", [GaussMarkov(0.5, 20.0), gmwm.Resonance(0.4, 0.2, 0.05), WhiteNoise(0.2)], ids=repr
 )
 def test_a_point_out_of_range_is_no_crash(process):
     """What has no process there says so as for any other value out of range."""

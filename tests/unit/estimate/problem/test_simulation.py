@@ -84,33 +84,25 @@ def test_the_same_seed_gives_the_same_estimates(series):
 
 def test_noise_rounded_as_coarsely_as_it_is_large():
     """White noise alone is off by the variance of rounding; the simulation is not."""
-    errors, naive = [], []
-    for seed in range(2):
-        x = RoundedNoise(sigma=0.7, lsb=1.0).simulate(8192, 1.0, seed)
-        fit = gmwm.fit(RoundedNoise(lsb=1.0), x, dt=1.0, method=SimulatedMoments(replications=4))
-        assert fit.valid, fit.message
-        errors.append((fit.params["sigma"] - 0.7) / fit.stderr["sigma"])
-        white = gmwm.fit(WhiteNoise(), x, dt=1.0)
-        naive.append((white.params["N"] - 0.7) / white.stderr["N"])
-    assert np.mean(np.square(errors)) < 6.9  # chi-square of 2 over 2, at 0.001
-    assert np.min(naive) > 5.0
+    x = RoundedNoise(sigma=0.7, lsb=1.0).simulate(8192, 1.0, 0)
+    fit = gmwm.fit(RoundedNoise(lsb=1.0), x, dt=1.0, method=SimulatedMoments(replications=4))
+    assert fit.valid, fit.message
+    assert abs(fit.params["sigma"] - 0.7) < 3.3 * fit.stderr["sigma"]
+    white = gmwm.fit(WhiteNoise(), x, dt=1.0)
+    assert white.params["N"] - 0.7 > 5.0 * white.stderr["N"]
 
 
 def test_a_bias_held_in_blocks():
     truth = WhiteNoise(1.0) + BlockBias(level=0.5, hold=64.0)
-    fits = [
-        gmwm.fit(truth.opened(), truth.simulate(16_384, 1.0, seed), dt=1.0,
-method=SimulatedMoments(replications=4))
-        for seed in (1,)
-    ]  # fmt: skip
-    for fit in fits:
-        for key, value in truth.params.items():
-            assert abs(fit.params[key] - value) < 4.0 * fit.stderr[key], key
-        low, high = fit.interval()["block_hold"]
-        assert low < fit.params["block_hold"] < high
-        # Its curves can be drawn though there is no closed form.
-        assert fit.components.keys() == {"white noise", "BlockBias"}
-        assert np.all(fit.deviation_interval(fit.wv.tau)[0] > 0.0)
+    x = truth.simulate(16_384, 1.0, 1)
+    fit = gmwm.fit(truth.opened(), x, dt=1.0, method=SimulatedMoments(replications=4))
+    for key, value in truth.params.items():
+        assert abs(fit.params[key] - value) < 4.0 * fit.stderr[key], key
+    low, high = fit.interval()["block_hold"]
+    assert low < fit.params["block_hold"] < high
+    # Its curves can be drawn though there is no closed form.
+    assert fit.components.keys() == {"white noise", "BlockBias"}
+    assert np.all(fit.deviation_interval(fit.wv.tau)[0] > 0.0)
 
 
 def test_simulated_terms_are_simulated_without_being_asked_for():

@@ -15,11 +15,7 @@ SIGMA = Parameter("sigma", "u", role="scale")
 SIGMA2 = Parameter("sigma2", "u^2", role="variance")
 
 
-@given(
-    error=st.floats(1e-4, 0.3),
-    growth=st.floats(-1.0, 1.0),
-    level=st.floats(0.5, 0.999),
-)
+@given(error=st.floats(1e-4, 0.3), growth=st.floats(-1.0, 1.0), level=st.floats(0.5, 0.999))
 def test_ends_are_as_far_as_their_own_standard_errors_allow(error, growth, level):
     """At an end, the estimate is a quantile of the standard error at that end away."""
     low, high = confidence_interval(TAU, 1.0, error, level, growth=growth)

@@ -15,12 +15,7 @@ from gmwm import (
     wavelet_variance,
 )
 from gmwm.estimate import tuning
-from gmwm.estimate.result import (
-    Goodness,
-    estimate_notices,
-    misfit_notices,
-    missed_level_notices,
-)
+from gmwm.estimate.result import Goodness, estimate_notices, misfit_notices, missed_level_notices
 from gmwm.process import as_model
 
 DT = 0.01

@@ -25,7 +25,7 @@ def test_no_model_of_the_region_is_far_above_those_found(resonant):
     f = np.append(np.geomspace(1e-4, 50.0, 200), np.linspace(7.0, 9.0, 200))
     largest = np.max([each.psd(f) for each in found], axis=0)
     drawn = [
-        region.model_at(point).psd(f, DT) for point in region.draws(300, np.random.default_rng(7))
+        region.model_at(point).psd(f, DT) for point in region.draws(150, np.random.default_rng(7))
     ]
     assert np.max(np.max(drawn, axis=0) / largest) < tuning.ENVELOPE
     estimate = RequiredSpectrum.of(resonant.model, DT, HORIZON).psd(f)

@@ -145,7 +145,7 @@ KINDS = {
 @pytest.mark.parametrize("kind", every(2, KINDS))
 @pytest.mark.parametrize(
     ("duration", "dt", "outage", "runs", "seed"),
-    [(300.0, 0.05, 180.0, 40, 1), slow(900.0, 0.01, 600.0, 200, 2)],
+    [(300.0, 0.05, 180.0, 24, 1), slow(900.0, 0.01, 600.0, 200, 2)],
 )
 def test_errors_have_the_covariance_of_the_filter(kind, duration, dt, outage, runs, seed):
     truth = KINDS[kind](duration=duration, dt=dt)

@@ -84,7 +84,7 @@ def test_tables_are_sums_over_samples(term):
     "term", every(3, [t for t in TERMS if not isinstance(t, RateRamp)]), ids=repr
 )
 def test_the_integral_of_simulated_errors_has_the_variance_of_the_tables(term):
-    k, draws, white = 9, 700, 0.05
+    k, draws, white = 9, 400, 0.05
     states = states_of(term, white=white)
     rng = np.random.default_rng(11)
     model = term + WhiteNoise(white)

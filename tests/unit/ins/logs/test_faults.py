@@ -32,10 +32,10 @@ def codes(navigated):
     ("seed", "faults", "options", "expected"),
     [
         (204, ["off-grid"], {}, []),  # fixes between samples
+        (300, [], {"vehicle": "loiter"}, []),
         *(
-            (slow if seed else pytest.param)(300 + seed, [], {"vehicle": each}, [])
-            for seed in range(3)
-            for each in ("car", "loiter")
+            slow(300 + k // 2, [], {"vehicle": ("car", "loiter")[k % 2]}, [])
+            for k in (0, 2, 3, 4, 5)
         ),
         (208, ["stamps", "lever arm"], {"duration": 200.0}, ["lever-arm", "time-offset"]),
         # The filter diverges with either sign of any axis.
@@ -66,7 +66,7 @@ def test_stamps_that_are_late():
     assert navigated.verdict.values["explained"]
 
 
-@pytest.mark.parametrize("vehicle", ["loiter", "helicopter", slow("car")])
+@pytest.mark.parametrize("vehicle", ["loiter", slow("helicopter"), slow("car")])
 def test_a_clock_that_runs_slow(vehicle):
     """A loiter's had late stamps, a helicopter's poor sensors, and the car's filter was lost."""
     navigated = found(214, "slow clock", vehicle=vehicle)
@@ -139,7 +139,7 @@ def test_fixes_along_the_track_are_as_good_as_stamps_where_a_vehicle_rolls(by):
 )
 def test_noise_that_no_sensor_has_explains_nothing(spoil):
     """White noise of the gyros 200 to 600 times the model's was said to explain all."""
-    log, _ = emulated_log(5, duration=DURATION, rate=10.0)
+    log, _ = emulated_log(5, duration=100.0, rate=10.0)
     navigated = Navigated.of(replace(log, imu=spoil(log.imu)))
     assert not navigated.faults.explained
     assert navigated.verdict.code == "lost"

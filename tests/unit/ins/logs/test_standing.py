@@ -5,21 +5,10 @@ import pytest
 
 from gmwm.ins import tuning
 from gmwm.ins.filter import Aiding, Fixes
-from gmwm.ins.geometry import (
-    RATE,
-    matrix_from_rpy,
-    ned_difference,
-    offset,
-    rpy_from_matrix,
-)
+from gmwm.ins.geometry import RATE, matrix_from_rpy, ned_difference, offset, rpy_from_matrix
 from gmwm.ins.imu import Imu
 from gmwm.ins.logs import standstills, steady
-from gmwm.ins.logs.attitude import (
-    gyrocompass,
-    heading_from_course,
-    turned,
-    velocity_at_rest,
-)
+from gmwm.ins.logs.attitude import gyrocompass, heading_from_course, turned, velocity_at_rest
 
 DT = 0.1
 LLA = np.array([0.8, 0.2, 300.0])

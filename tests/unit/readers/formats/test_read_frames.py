@@ -216,10 +216,7 @@ def test_missing_half_floats_of_any_pattern_are_missing():
     assert np.flatnonzero(np.isnan(rec["gyro_x"].values)).tolist() == [7]
 
 
-@pytest.mark.parametrize(
-    ("place", "size"),
-    [("collection", 1 << 40), ("free space", 0)],
-)
+@pytest.mark.parametrize(("place", "size"), [("collection", 1 << 40), ("free space", 0)])
 def test_a_damaged_heap_of_hdf5_is_refused(place, size, tmp_path, monkeypatch):
     """It goes on without end where free space has no size, or where it ends before the heap does
     and zeros follow.

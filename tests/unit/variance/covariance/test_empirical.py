@@ -34,7 +34,7 @@ def test_it_is_the_sum_over_all_lags_of_squared_covariances(n):
 
 @pytest.mark.parametrize("window", ["none", "octave"])
 def test_its_mean_is_the_covariance_of_the_estimates(window):
-    n, runs = 4096, 60
+    n, runs = 4096, 40
     rng = np.random.default_rng(2)
     series = [MODEL.simulate(n, 1.0, rng) for _ in range(runs)]
     found = np.array(

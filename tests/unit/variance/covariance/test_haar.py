@@ -8,12 +8,7 @@ from scipy.signal import correlate
 import gmwm
 from gmwm.variance import tuning
 from gmwm.variance.covariance import haar as module
-from gmwm.variance.covariance.haar import (
-    dyadic_levels,
-    haar_covariance,
-    integrals,
-    mean_covariance,
-)
+from gmwm.variance.covariance.haar import dyadic_levels, haar_covariance, integrals, mean_covariance
 
 PROCESSES = [
     gmwm.WhiteNoise(1.0),
