@@ -8,19 +8,7 @@ import numpy as np
 import pytest
 
 import gmwm
-from gmwm import (
-    ARMA,
-    Channel,
-    Fit,
-    GaussMarkov,
-    InputError,
-    JointFit,
-    Process,
-    RandomWalk,
-    RateRamp,
-    WhiteNoise,
-    parameter,
-)
+from gmwm import Channel, Fit, GaussMarkov, InputError, JointFit, RandomWalk, RateRamp, WhiteNoise
 from gmwm._core import checks
 from gmwm.estimate import METHODS
 from gmwm.issues import Notice
@@ -232,7 +220,7 @@ def test_recordings_that_are_none():
         (lambda: WhiteNoise(foo=1), "its parameters are N"),
         (lambda: WhiteNoise(1.0, 2.0), "its parameters are N"),
         (lambda: GaussMarkov(1.0, sigma=2.0), "its parameters are sigma, tau"),
-        (lambda: ARMA(foo=1), "its parameters are ar, ma, sigma2"),
+        (lambda: gmwm.ARMA(foo=1), "its parameters are ar, ma, sigma2"),
         (lambda: WhiteNoise("0.2"), "N is '0.2': give a number"),
         (lambda: 2.5 * GaussMarkov(), "2.5 * process"),
         (lambda: np.float64(2.5) * GaussMarkov(), "2.5"),
@@ -254,8 +242,8 @@ def test_models_are_still_made_as_before():
     assert np.int64(2) * GaussMarkov() == 2 * GaussMarkov()
 
 
-class Own(Process):
-    sigma: float = parameter("u")
+class Own(gmwm.Process):
+    sigma: float = gmwm.parameter("u")
     drawn = staticmethod(lambda n: None)
 
     def draw(self, n, dt, rng):

@@ -9,16 +9,7 @@ import numpy as np
 import pytest
 
 import gmwm
-from gmwm import (
-    Calibration,
-    Channel,
-    GaussMarkov,
-    InputError,
-    RandomWalk,
-    RateRamp,
-    Recording,
-    WhiteNoise,
-)
+from gmwm import Calibration, GaussMarkov, InputError, RandomWalk, RateRamp, Recording, WhiteNoise
 from gmwm.calibration import Stopwatch, stage, tuning
 from gmwm.issues import Notice
 from marks import slow
@@ -42,7 +33,7 @@ MODELS = {
 
 def channel(name, values):
     quantity = name.split("_")[0]
-    return Channel(name, values, DT, quantity, {"gyro": "rad/s", "accel": "m/s^2"}[quantity])
+    return gmwm.Channel(name, values, DT, quantity, {"gyro": "rad/s", "accel": "m/s^2"}[quantity])
 
 
 def as_recording(values, source="", rate=100.0):

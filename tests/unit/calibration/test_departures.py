@@ -9,15 +9,7 @@ import pytest
 from scipy.stats import binom
 
 import gmwm
-from gmwm import (
-    BiasInstability,
-    GaussMarkov,
-    InputError,
-    RandomWalk,
-    RateRamp,
-    Recording,
-    WhiteNoise,
-)
+from gmwm import BiasInstability, GaussMarkov, RandomWalk, RateRamp, Recording, WhiteNoise
 from gmwm.calibration import departures
 from gmwm.cli.console import with_option
 from marks import every, slow
@@ -316,7 +308,7 @@ def test_several_steps_have_one_remedy_for_the_whole_recording():
 def test_a_recording_of_another_kind_is_refused():
     rec = recording(noise(15) + SAMPLE * STEP)
     fits = gmwm.calibrate(rec, WhiteNoise() + RandomWalk())
-    with pytest.raises(InputError, match="is not the one that was calibrated"):
+    with pytest.raises(gmwm.InputError, match="is not the one that was calibrated"):
         gmwm.without_departures(recording(np.zeros(100) + np.arange(100.0)), fits)
 
 

@@ -6,19 +6,7 @@ import numpy as np
 import pytest
 
 import gmwm
-from gmwm import (
-    BiasInstability,
-    GaussMarkov,
-    LowPassNoise,
-    Model,
-    Process,
-    QuantizationNoise,
-    RandomWalk,
-    RateRamp,
-    Resonance,
-    Sinusoid,
-    WhiteNoise,
-)
+from gmwm import GaussMarkov, Model, Process, QuantizationNoise, RandomWalk, WhiteNoise
 from gmwm.calibration import PLATEAU, axis_numbers, fast_density, upper_limit
 from gmwm.readers import Channel
 
@@ -50,9 +38,9 @@ def density_of(model):
         (WhiteNoise(2.0) + RandomWalk(0.01), 2.0),
         (WhiteNoise(3.0) + GaussMarkov(10.0, 0.02), np.hypot(3.0, np.sqrt(2 * 0.02) * 10.0)),
         (WhiteNoise(2.0) + GaussMarkov(1.0, 20.0), 2.0),
-        (WhiteNoise(2.0) + QuantizationNoise(0.02) + Sinusoid(0.3, 5.0), 2.0),
-        (LowPassNoise(2.0, 20.0, 2, 0.7), 2.0),
-        (WhiteNoise(1.0) + LowPassNoise(2.0, 20.0, 2, 0.7), np.hypot(1.0, 2.0)),
+        (WhiteNoise(2.0) + QuantizationNoise(0.02) + gmwm.Sinusoid(0.3, 5.0), 2.0),
+        (gmwm.LowPassNoise(2.0, 20.0, 2, 0.7), 2.0),
+        (WhiteNoise(1.0) + gmwm.LowPassNoise(2.0, 20.0, 2, 0.7), np.hypot(1.0, 2.0)),
     ],
 )
 def test_N_is_the_density_of_all_that_averages_out(model, density):
@@ -60,7 +48,7 @@ def test_N_is_the_density_of_all_that_averages_out(model, density):
 
 
 def test_a_resonance_counts_with_the_foot_of_its_spectrum():
-    resonance = Resonance(3.0, 20.0, 0.1)
+    resonance = gmwm.Resonance(3.0, 20.0, 0.1)
     foot = float(resonance.psd(np.array([0.01]), DT)[0])
     assert density_of(WhiteNoise(1.0) + resonance) == pytest.approx(
         np.hypot(1.0, foot**0.5), rel=0.02
@@ -75,7 +63,7 @@ def test_N_of_white_noise_is_its_own_estimate():
 
 
 def test_B_is_the_plateau_of_flicker_noise():
-    model = WhiteNoise(0.1) + BiasInstability(1.0) + RandomWalk(1e-3)
+    model = WhiteNoise(0.1) + gmwm.BiasInstability(1.0) + RandomWalk(1e-3)
     numbers = axis_numbers(fitted(model, free=["B"], n=1_000_000))
     assert numbers.B.value == pytest.approx(1.0, rel=0.15)
 
@@ -147,7 +135,7 @@ def test_density_of_white_noise_whatever_the_sampling_interval(dt):
 
 
 @pytest.mark.parametrize(
-    "slow", [RandomWalk(1.0), RateRamp(1.0), GaussMarkov(1.0, 1e4), BiasInstability(1.0)]
+    "slow", [RandomWalk(1.0), gmwm.RateRamp(1.0), GaussMarkov(1.0, 1e4), gmwm.BiasInstability(1.0)]
 )
 def test_slow_terms_have_no_density(slow):
     assert fast_density(Model((slow,)), DT) == 0.0

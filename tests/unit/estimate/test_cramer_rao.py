@@ -4,20 +4,7 @@ import numpy as np
 import pytest
 
 import gmwm
-from gmwm import (
-    AR,
-    BiasInstability,
-    GaussMarkov,
-    InputError,
-    Process,
-    QuantizationNoise,
-    RandomWalk,
-    RateRamp,
-    Resonance,
-    Sinusoid,
-    WhiteNoise,
-    cramer_rao,
-)
+from gmwm import BiasInstability, GaussMarkov, RandomWalk, RateRamp, WhiteNoise, cramer_rao
 from gmwm.estimate import CramerRao
 from gmwm.estimate.problem import Coordinates, spectral_information
 
@@ -25,9 +12,9 @@ MODELS = {
     "white": WhiteNoise(0.3),
     "white + walk": WhiteNoise(0.2) + RandomWalk(0.05),
     "white + Gauss-Markov": WhiteNoise(0.8) + GaussMarkov(0.5, 6.0),
-    "quantization + Gauss-Markov": QuantizationNoise(0.5) + GaussMarkov(0.5, 10.0),
-    "autoregression": AR([0.7, -0.2], 1.3) + WhiteNoise(0.4),
-    "resonance": Resonance(1.0, 0.1, 0.2) + WhiteNoise(0.5),
+    "quantization + Gauss-Markov": gmwm.QuantizationNoise(0.5) + GaussMarkov(0.5, 10.0),
+    "autoregression": gmwm.AR([0.7, -0.2], 1.3) + WhiteNoise(0.4),
+    "resonance": gmwm.Resonance(1.0, 0.1, 0.2) + WhiteNoise(0.5),
 }
 
 
@@ -216,7 +203,7 @@ def test_bound_falls_with_the_length_of_the_record():
 
 
 def test_flicker_noise_and_own_spectra_take_the_spectral_way():
-    class Own(Process):
+    class Own(gmwm.Process):
         level: float = gmwm.parameter("u", role="scale")
 
         def psd(self, f, dt):
@@ -250,11 +237,11 @@ def test_text_is_readable_at_80_columns():
         (WhiteNoise(1.0), 100, 0.0, "dt = 0.0"),
         (WhiteNoise(1.0), 100, float("nan"), "dt = nan"),
         (WhiteNoise(1.0) + RandomWalk(0.0), 100, 1.0, "K is zero"),
-        (WhiteNoise(1.0) + Sinusoid(1.0, 0.1), 100, 1.0, "Sinusoid"),
+        (WhiteNoise(1.0) + gmwm.Sinusoid(1.0, 0.1), 100, 1.0, "Sinusoid"),
         (RateRamp(1.0), 100, 1.0, "no noise process"),
         ("white", 100, 1.0, "'white' is not a term"),
     ],
 )
 def test_bad_input_is_one_sentence(model, n, dt, words):
-    with pytest.raises(InputError, match=words):
+    with pytest.raises(gmwm.InputError, match=words):
         cramer_rao(model, n, dt)

@@ -7,16 +7,7 @@ import pytest
 from scipy.linalg import expm
 
 import gmwm
-from gmwm import (
-    ARMA,
-    GaussMarkov,
-    QuantizationNoise,
-    RandomWalk,
-    RateRamp,
-    Resonance,
-    Sinusoid,
-    WhiteNoise,
-)
+from gmwm import GaussMarkov, RandomWalk, RateRamp, Resonance, Sinusoid, WhiteNoise
 from gmwm.export.state_space import channel
 from imu_numbers import RATE, numbers
 
@@ -89,7 +80,7 @@ def test_covariances_of_the_samples_are_those_of_the_model():
 
 
 def test_terms_that_live_on_samples_have_no_continuous_form():
-    for term in (QuantizationNoise(1e-6), ARMA((-0.5,), (), 1e-8)):
+    for term in (gmwm.QuantizationNoise(1e-6), gmwm.ARMA((-0.5,), (), 1e-8)):
         found = channel(term + WhiteNoise(1e-4), DT, "gyro")
         assert found["continuous"] is None
         assert found["discrete"]["F"].shape[0] == len(found["states"])

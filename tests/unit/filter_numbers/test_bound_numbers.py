@@ -7,23 +7,7 @@ import pytest
 
 import gmwm
 from error_models import DT, TRUTHS
-from gmwm import (
-    ARIMA,
-    MA,
-    AxisFilterNumbers,
-    FilterNumbers,
-    GaussMarkov,
-    InputError,
-    LowPassNoise,
-    Model,
-    Process,
-    QuantizationNoise,
-    RandomWalk,
-    RateRamp,
-    Resonance,
-    Sinusoid,
-    WhiteNoise,
-)
+from gmwm import GaussMarkov, Model, QuantizationNoise, RandomWalk, Resonance, Sinusoid, WhiteNoise
 from gmwm.filter_numbers import Chain
 from gmwm.filter_numbers.spectra import (
     Estimated,
@@ -76,7 +60,7 @@ def test_no_direction_is_too_optimistic_with_a_gauss_markov_process(name, form, 
 
 
 def test_a_horizon_within_the_low_pass_is_warned_of():
-    sensor = LowPassNoise(1e-3, 10.0, 2.0, 0.7071) + GaussMarkov(1e-4, 60.0)
+    sensor = gmwm.LowPassNoise(1e-3, 10.0, 2.0, 0.7071) + GaussMarkov(1e-4, 60.0)
     usual = gmwm.bound(sensor)
     for horizon, most, warned in ((0.05, 3000.0, True), (0.9, 1.7, True), (1.0, 1.4, False)):
         found = gmwm.bound(sensor, horizon=horizon)
@@ -222,7 +206,7 @@ def test_a_process_far_slower_than_the_horizon_is_not_taken_for_a_walk(form):
 
 
 def test_a_spectrum_alone_is_dominated_without_a_prediction():
-    class Pink(Process):
+    class Pink(gmwm.Process):
         level: float = gmwm.parameter("u", role="scale")
 
         def psd(self, f, dt):
@@ -258,7 +242,7 @@ def test_numbers_do_not_shrink_as_the_record_grows():
 
 def test_what_is_left_out_and_is_not_small_is_a_warning():
     # A ramp that outgrows its constant, and quantization of an angle without white noise above it.
-    ramp = WhiteNoise(1e-4) + RateRamp(1e-5)
+    ramp = WhiteNoise(1e-4) + gmwm.RateRamp(1e-5)
     coarse = Model((QuantizationNoise(1e-2), RandomWalk(1e-6)))
     # The angle by this line is back where it was after the horizon, and after ten.
     line = ONE + Sinusoid(3e-4, 1.0 / 60.0)
@@ -369,7 +353,7 @@ def test_a_random_walk_says_what_else_it_stands_for(solve):
 
 def test_white_noise_behind_a_low_pass_is_nothing_to_be_explained():
     """It was said that the model had no white noise."""
-    truth = LowPassNoise(2e-4, 20.0, 2.0, 0.7) + SLOW
+    truth = gmwm.LowPassNoise(2e-4, 20.0, 2.0, 0.7) + SLOW
     assert pytest.approx(2e-4, rel=0.05) == (found := gmwm.bound(truth, "N+K", 60.0)).N
     assert "more-than-white-noise" not in {notice.code for notice in found.notices}
 
@@ -482,7 +466,7 @@ def test_standard_errors_of_shared_axes_and_of_none(fitted):
     assert not gmwm.bound(ONE).stderr
     assert not gmwm.bound(fitted, level=0.95).stderr
     assert not gmwm.bound(fitted, "N+GM").stderr
-    assert AxisFilterNumbers.from_dict(one.to_dict()) == one
+    assert gmwm.AxisFilterNumbers.from_dict(one.to_dict()) == one
     assert f"+- {one.stderr['K']:.2g}" in one.text("si")
 
 
@@ -522,7 +506,7 @@ def test_quantization_lines_and_fast_peaks_are_left_out_with_a_notice():
     for term, code in (
         (QuantizationNoise(1e-3), "fast-peak-left-out"),
         (Sinusoid(0.01, 7.0), "line-left-out"),
-        (MA([-0.999], 1e-4), "fast-peak-left-out"),
+        (gmwm.MA([-0.999], 1e-4), "fast-peak-left-out"),
     ):
         found, notices = notices_of(term)
         assert pytest.approx(plain.N, rel=0.01) == found.N
@@ -573,7 +557,7 @@ def test_a_slow_resonance_and_a_slow_line_are_not_passed_over():
 
 def test_a_ramp_is_a_constant_of_what_it_does_over_the_horizon():
     plain = gmwm.bound(ONE, "N+K", 60.0)
-    found, notices = notices_of(RateRamp(-1e-5))
+    found, notices = notices_of(gmwm.RateRamp(-1e-5))
     assert notices["ramp-as-constant"].values == {"R": -1e-5, "sd": pytest.approx(6e-4)}
     assert found.initial_sd == pytest.approx(np.hypot(plain.initial_sd, 6e-4))
 
@@ -594,7 +578,7 @@ def test_a_turn_on_bias_is_part_of_the_start():
 def test_axes_may_share_their_numbers():
     models = {"gyro_x": ONE, "gyro_y": TRUTHS["two"], "accel_x": TRUTHS["three"]}
     own, shared = gmwm.bound(models), gmwm.bound(models, shared=True)
-    assert isinstance(own, FilterNumbers)
+    assert isinstance(own, gmwm.FilterNumbers)
     assert list(shared) == list(models)
     assert shared["gyro_x"].model == shared["gyro_y"].model
     assert shared["accel_x"].model == own["accel_x"].model
@@ -618,11 +602,11 @@ def test_a_calibration_gives_numbers_by_channel():
     assert (found.rate, found.duration) == (100.0, 50.0)
     assert [each.quantity for each in found.values()] == ["gyro", "accel"]
     single = gmwm.bound(calibration["gyro_x"])
-    assert isinstance(single, AxisFilterNumbers)
+    assert isinstance(single, gmwm.AxisFilterNumbers)
     assert single == found["gyro_x"]
 
 
-class Drawn(Process):
+class Drawn(gmwm.Process):
     def draw(self, n, dt, rng):
         return rng.standard_normal(n)
 
@@ -641,7 +625,7 @@ class Drawn(Process):
         (WhiteNoise(), {}, r"free parameters \(N\)"),
         (Model((QuantizationNoise(1e-3),)), {}, "no term that white noise"),
         (Drawn(), {}, "only be simulated"),
-        (ARIMA(d=2, sigma2=1.0), {}, "no form dominates it"),
+        (gmwm.ARIMA(d=2, sigma2=1.0), {}, "no form dominates it"),
         (TRUTHS["walk"], {"form": "N+GM"}, "with a random walk"),
         (TRUTHS["flicker"], {"form": "N+GM"}, "with a random walk"),
         ({}, {}, "has no error model"),
@@ -650,7 +634,7 @@ class Drawn(Process):
     ],
 )
 def test_what_cannot_be_used(source, options, message):
-    with pytest.raises(InputError, match=message):
+    with pytest.raises(gmwm.InputError, match=message):
         gmwm.bound(source, **options)
 
 

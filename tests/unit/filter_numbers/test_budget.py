@@ -14,23 +14,19 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 import gmwm
-from gmwm import (
-    BiasInstability,
-    GaussMarkov,
-    InputError,
-    QuantizationNoise,
-    RandomWalk,
-    RateRamp,
-    WhiteNoise,
-    error_budget,
-)
+from gmwm import GaussMarkov, QuantizationNoise, RandomWalk, RateRamp, WhiteNoise, error_budget
 from gmwm.process import CATALOGUE
 
 G = 9.80665
 DEG = np.pi / 180.0
 DT = 0.01
 GYRO = WhiteNoise(2e-5) + GaussMarkov(1e-5, 100.0) + RandomWalk(1e-7)
-ACCEL = WhiteNoise(1e-3) + BiasInstability(1e-4) + GaussMarkov(2e-4, 5.0) + GaussMarkov(1e-4, 300.0)
+ACCEL = (
+    WhiteNoise(1e-3)
+    + gmwm.BiasInstability(1e-4)
+    + GaussMarkov(2e-4, 5.0)
+    + GaussMarkov(1e-4, 300.0)
+)
 IMU = {f"{kind}_{axis}": m for kind, m in (("gyro", GYRO), ("accel", ACCEL)) for axis in "xyz"}
 
 
@@ -280,7 +276,7 @@ REFUSED = {
 @pytest.mark.parametrize("what", REFUSED)
 def test_bad_input(what):
     call, words = REFUSED[what]
-    with pytest.raises(InputError, match=re.escape(words)) as refused:
+    with pytest.raises(gmwm.InputError, match=re.escape(words)) as refused:
         call()
     assert "\n" not in str(refused.value)
 

@@ -7,17 +7,7 @@ import pytest
 
 import gmwm
 from error_models import DT, TRUTHS
-from gmwm import (
-    BiasInstability,
-    Certificate,
-    GaussMarkov,
-    Imperfections,
-    InputError,
-    Motion,
-    QuantizationNoise,
-    RandomWalk,
-    WhiteNoise,
-)
+from gmwm import GaussMarkov, Imperfections, InputError, Motion, RandomWalk, WhiteNoise
 from gmwm.ins import SensorModels, car_drive, covariance_analysis, loiter_with_outages
 
 ONE = TRUTHS["one"]
@@ -181,7 +171,7 @@ def test_the_uncertainty_of_a_fit_is_a_cause():
 
 
 def test_what_the_navigation_filter_cannot_hold_is_left_out_with_a_notice():
-    models = SENSOR | {"gyro_x": WhiteNoise(1e-4) + BiasInstability(3e-5)}
+    models = SENSOR | {"gyro_x": WhiteNoise(1e-4) + gmwm.BiasInstability(3e-5)}
     found = gmwm.certify(models, SHEET, dt=0.1)
     assert found.of("outage") == ()
     assert len(found.of("free")) == 12
@@ -213,7 +203,7 @@ def test_text_and_files(sheet, tmp_path):
     assert "rad/s/sqrt(Hz)" in sheet.text("si")
     assert max(map(len, f"{verbose}\n{sheet.text('si')}".splitlines())) <= 80
     again = gmwm.load(sheet.save(tmp_path / "certificate.json"))
-    assert isinstance(again, Certificate)
+    assert isinstance(again, gmwm.Certificate)
     assert again.to_dict() == sheet.to_dict()
     assert again.checks == sheet.checks
     assert "NEES up to" in repr(sheet)
@@ -221,7 +211,7 @@ def test_text_and_files(sheet, tmp_path):
         content = sheet.to_dict()
         content["checks"][0] |= change
         with pytest.raises(InputError, match="times"):
-            Certificate.from_dict(content)
+            gmwm.Certificate.from_dict(content)
     pandas = pytest.importorskip("pandas")
     assert isinstance(sheet.to_frame(), pandas.DataFrame)
 
@@ -287,7 +277,7 @@ def test_terms_of_imperfections():
         ({"keyframe": 0.01}, "two sampling intervals"),
         ({"motion": "boat"}, "motion 'boat' is not known: write handheld, drone, car, fixed-wing"),
         ({"imperfections": Imperfections(scale_error=0.01)}, "have no effect at rest"),
-        ({"source": QuantizationNoise(1e-3)}, "no term that white noise"),
+        ({"source": gmwm.QuantizationNoise(1e-3)}, "no term that white noise"),
     ],
 )
 def test_what_cannot_be_used(options, message):
@@ -318,7 +308,7 @@ def test_numbers_by_axis_or_kind():
         ({"accel": (1e-4, 1e-6)}, "no numbers for gyro_x: give them by axis, or for gyro"),
         ({"gyro": (1e-4, -1e-6)}, "N and K of gyro_x = -1e-06"),
         ({"gyro": 1e-4}, "gives no filter numbers"),
-        ({"gyro": WhiteNoise(1e-4) + QuantizationNoise(1e-4)}, "form = 'N'"),
+        ({"gyro": WhiteNoise(1e-4) + gmwm.QuantizationNoise(1e-4)}, "form = 'N'"),
     ],
 )
 def test_numbers_that_cannot_be_used(given, message):

@@ -7,19 +7,7 @@ from scipy.special import gammaln
 from scipy.stats import chi2
 
 import gmwm
-from gmwm import (
-    BiasInstability,
-    GaussMarkov,
-    InputError,
-    Process,
-    QuantizationNoise,
-    RandomWalk,
-    RateRamp,
-    Resonance,
-    Sinusoid,
-    WhiteNoise,
-    parameter,
-)
+from gmwm import BiasInstability, Process, QuantizationNoise, RateRamp, WhiteNoise, parameter
 from gmwm.filter_numbers.propagation import integral_rms
 from marks import EXAMPLES, FIRST, slow
 
@@ -82,7 +70,7 @@ class PowerLaw(Process):
     [
         (WhiteNoise(0.3), lambda t: 0.3 * t ** np.array([0.5, 1.5, 2.5]) / [1, 3**0.5, 20**0.5]),
         (
-            RandomWalk(0.02),
+            gmwm.RandomWalk(0.02),
             lambda t: 0.02 * t ** np.array([1.5, 2.5, 3.5]) / np.sqrt([3.0, 20.0, 252.0]),
         ),
         (RateRamp(-0.1), lambda t: 0.1 * np.array([t**2 / 2, t**3 / 6, t**4 / 24])),
@@ -101,7 +89,7 @@ def test_angle_under_stationary_gauss_markov(ratio):
     t = ratio * tau
     bracket = ratio - 1.0 + np.exp(-ratio) if ratio > 0.01 else ratio**2 / 2 - ratio**3 / 6
     expected = 2.0 * tau * np.sqrt(2.0 * bracket)
-    assert rms(GaussMarkov(2.0, tau), t, FINE * t)[0] == pytest.approx(expected, rel=1e-6)
+    assert rms(gmwm.GaussMarkov(2.0, tau), t, FINE * t)[0] == pytest.approx(expected, rel=1e-6)
 
 
 def continuous(a, q, h, p0, t):
@@ -129,7 +117,7 @@ def test_gauss_markov_and_resonance_against_continuous_time(t, known):
     p0 = np.zeros((1, 1)) if known else np.array([[sigma**2]])
     expected = continuous(np.array([[-1 / tau]]), np.array([[2 * sigma**2 / tau]]), [1.0], p0, t)
     np.testing.assert_allclose(
-        rms(GaussMarkov(sigma, tau), t, FINE * t, known), expected, rtol=1e-6
+        rms(gmwm.GaussMarkov(sigma, tau), t, FINE * t, known), expected, rtol=1e-6
     )
 
     frequency, zeta = 0.05, 0.2
@@ -137,14 +125,14 @@ def test_gauss_markov_and_resonance_against_continuous_time(t, known):
     a = np.array([[0.0, w], [-w, -2 * zeta * w]])
     q = np.diag([0.0, 4 * zeta * w * sigma**2])
     p0 = np.zeros((2, 2)) if known else sigma**2 * np.eye(2)
-    found = rms(Resonance(sigma, frequency, zeta), t, 1e-4 * t, known)
+    found = rms(gmwm.Resonance(sigma, frequency, zeta), t, 1e-4 * t, known)
     np.testing.assert_allclose(found, continuous(a, q, [1.0, 0.0], p0, t), rtol=1e-3)
 
 
 @pytest.mark.parametrize("known", [True, False])
 def test_a_line_has_a_random_phase_in_both_cases(known):
     amplitude, t = 3.0, 17.0
-    process = Sinusoid(amplitude, 0.03)
+    process = gmwm.Sinusoid(amplitude, 0.03)
     w = 2 * np.pi * 0.03
     # From cos(w s + phase), mean square over the phase: |transform of (t - s)^(m-1)/(m-1)!|^2 / 2.
     turn = np.exp(1j * w * t)
@@ -226,11 +214,11 @@ def test_flicker_of_known_past():
     [
         WhiteNoise(0.2),
         QuantizationNoise(0.1),
-        GaussMarkov(0.5, 0.4),
-        Resonance(0.4, 3.0, 0.05),
-        RandomWalk(0.3),
+        gmwm.GaussMarkov(0.5, 0.4),
+        gmwm.Resonance(0.4, 3.0, 0.05),
+        gmwm.RandomWalk(0.3),
         gmwm.AR([0.9], 0.1),
-        Sinusoid(0.3, 0.7713),
+        gmwm.Sinusoid(0.3, 0.7713),
         RateRamp(-0.2),
     ],
     ids=repr,
@@ -244,7 +232,7 @@ def test_a_spectrum_alone_gives_the_same(process, known):
 
 
 def test_a_spectrum_that_is_too_steep():
-    with pytest.raises(InputError, match=r"rises too fast .*: give the process a state_space"):
+    with pytest.raises(gmwm.InputError, match=r"rises too fast .*: give the process a state_space"):
         rms(PowerLaw(1.0, 3.2), 10.0, 0.1)
 
 
@@ -255,7 +243,7 @@ def test_simulation_alone_is_not_enough():
         def draw(self, n, dt, rng):
             return self.lsb * np.rint(rng.standard_normal(n))
 
-    with pytest.raises(InputError, match=r"Rounded can only be simulated"):
+    with pytest.raises(gmwm.InputError, match=r"Rounded can only be simulated"):
         rms(Rounded(1.0), 10.0, 0.1)
 
 

@@ -6,15 +6,7 @@ from scipy.optimize import minimize
 
 import gmwm
 from error_models import DT, TRUTHS
-from gmwm import (
-    FilterNumbers,
-    GaussMarkov,
-    InputError,
-    Model,
-    QuantizationNoise,
-    RandomWalk,
-    WhiteNoise,
-)
+from gmwm import GaussMarkov, InputError, Model, QuantizationNoise, RandomWalk, WhiteNoise
 from gmwm.filter_numbers import Chain, tuning
 from gmwm.filter_numbers.axes import SensorAxes
 from gmwm.ins import Outage, Scenario, SensorModels, covariance_analysis, fixed_wing_loiter, gnss
@@ -175,7 +167,7 @@ def test_axes_may_share_their_numbers():
     models = {"gyro_x": ONE, "gyro_y": TRUTHS["two"], "accel_x": TRUTHS["three"]}
     steps = []
     shared = gmwm.reduce(models, shared=True, progress=lambda *each: steps.append(each))
-    assert isinstance(shared, FilterNumbers)
+    assert isinstance(shared, gmwm.FilterNumbers)
     assert list(shared) == list(models)
     assert shared["gyro_x"].model == shared["gyro_y"].model
     # Right for both together: too timid for the one, too bold for the other.

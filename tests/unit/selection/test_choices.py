@@ -6,15 +6,7 @@ import numpy as np
 import pytest
 
 import gmwm
-from gmwm import (
-    InputError,
-    LowPassNoise,
-    QuantizationNoise,
-    RandomWalk,
-    RateRamp,
-    Sinusoid,
-    WhiteNoise,
-)
+from gmwm import LowPassNoise, QuantizationNoise, RandomWalk, RateRamp, Sinusoid, WhiteNoise
 from gmwm.process import as_model
 from gmwm.selection.bandwidth import Bandwidth
 from gmwm.selection.ranking import Candidate, Choices, candidate_of, rank_key
@@ -32,7 +24,7 @@ def candidate(criterion, size=2, model=None):
 
 @pytest.mark.parametrize("most", [-1, 6, 2.5, "2", None, True])
 def test_a_number_of_terms_that_none_is(most):
-    with pytest.raises(InputError, match="from 0 to 5"):
+    with pytest.raises(gmwm.InputError, match="from 0 to 5"):
         Choices(most)
 
 

@@ -7,15 +7,7 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 import gmwm
-from gmwm import (
-    GaussMarkov,
-    InputError,
-    QuantizationNoise,
-    RandomWalk,
-    RateRamp,
-    Sinusoid,
-    WhiteNoise,
-)
+from gmwm import GaussMarkov, QuantizationNoise, RandomWalk, RateRamp, Sinusoid, WhiteNoise
 from gmwm.selection.ties import ranges, wider_ranges
 
 SLOW = WhiteNoise(1.0) + GaussMarkov(0.3, 20.0) + GaussMarkov(0.3, 900.0)
@@ -132,7 +124,7 @@ class TestSelection:
     def test_they_grow_with_the_level(self, tied):
         for key, (low, high) in tied.ranges(0.5).items():
             assert tied.ranges(0.99)[key][0] <= low <= high <= tied.ranges(0.99)[key][1]
-        with pytest.raises(InputError, match="between 0 and 1"):
+        with pytest.raises(gmwm.InputError, match="between 0 and 1"):
             tied.ranges(95)
 
     def test_what_is_wider_is_told_in_the_units_of_the_field(self, tied):

@@ -32,7 +32,7 @@ def test_expectation_by_hand():
 
 def test_means_fall_on_the_expectation_and_not_on_the_truth(monkeypatch):
     monkeypatch.setattr(appendix, "LENGTHS", (2_000, 30_000))
-    rows = converge(runs=24, seed=3)
+    rows = converge(runs=40, seed=3)
     truth = np.array([0.04, 4e-4])
     for row in rows:
         # Four standard errors of the means.
@@ -41,7 +41,7 @@ def test_means_fall_on_the_expectation_and_not_on_the_truth(monkeypatch):
     assert np.all(np.abs(last.means[2] - truth) < 4.0 * last.errors[2])
     assert np.all(last.means[0] - truth > 4.0 * last.errors[0])
     raw = raw_estimates(rows)
-    assert raw.num_rows == 2 * 24 * 3
+    assert raw.num_rows == 2 * 40 * 3
     assert raw["sigma2_RW"][-1].as_py() == last.estimates[-1, 2, 1]
     report = convergence_table(rows)
     assert max(map(len, report.splitlines())) <= 80

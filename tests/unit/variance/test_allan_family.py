@@ -14,16 +14,7 @@ import pytest
 from scipy.stats import binom
 
 import gmwm
-from gmwm import (
-    BiasInstability,
-    Channel,
-    InputError,
-    QuantizationNoise,
-    RandomWalk,
-    RateRamp,
-    Resonance,
-    WhiteNoise,
-)
+from gmwm import Channel, InputError, QuantizationNoise, RandomWalk, RateRamp, Resonance, WhiteNoise
 from marks import slow
 from places import SHARED
 
@@ -126,7 +117,7 @@ def test_times_are_rounded_sorted_and_cut_for_each_kind():
 
 @pytest.mark.parametrize(
     "process",
-    [slow(WhiteNoise(1.0)), slow(BiasInstability(1.0)), RandomWalk(1.0)],
+    [slow(WhiteNoise(1.0)), slow(gmwm.BiasInstability(1.0)), RandomWalk(1.0)],
     ids=lambda process: type(process).__name__,
 )
 def test_intervals_hold_the_truth(process):

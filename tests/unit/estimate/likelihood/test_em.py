@@ -6,20 +6,7 @@ from hypothesis import given, settings, strategies as st
 from scipy.optimize import minimize
 
 import gmwm
-from gmwm import (
-    AR,
-    ARIMA,
-    ARMA,
-    MA,
-    BiasInstability,
-    GaussMarkov,
-    QuantizationNoise,
-    RandomWalk,
-    RateRamp,
-    Resonance,
-    Sinusoid,
-    WhiteNoise,
-)
+from gmwm import AR, ARIMA, GaussMarkov, RandomWalk, RateRamp, Resonance, Sinusoid, WhiteNoise
 from gmwm.errors import InputError
 from gmwm.estimate.likelihood import Columns, KalmanLikelihood, stacked
 from gmwm.estimate.likelihood.em import _gauss_markov, expect
@@ -273,13 +260,13 @@ def test_expected_moments_are_those_of_draws_from_the_posterior(drift):
 @pytest.mark.parametrize(
     "process",
     [
-        QuantizationNoise(),
-        BiasInstability(),
+        gmwm.QuantizationNoise(),
+        gmwm.BiasInstability(),
         Resonance(),
         Sinusoid(),
-        MA(1),
+        gmwm.MA(1),
         AR(1),
-        ARMA(1, 1),
+        gmwm.ARMA(1, 1),
         ARIMA(1, 1, 0),
         ARIMA(0, 1, 0),
     ],

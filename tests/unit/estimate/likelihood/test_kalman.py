@@ -5,17 +5,8 @@ import pytest
 from scipy.linalg import solve_triangular
 from statsmodels.tsa.statespace.kalman_smoother import KalmanSmoother
 
-from gmwm import (
-    AR,
-    ARIMA,
-    MA,
-    GaussMarkov,
-    QuantizationNoise,
-    RandomWalk,
-    Resonance,
-    Sinusoid,
-    WhiteNoise,
-)
+import gmwm
+from gmwm import AR, MA, GaussMarkov, QuantizationNoise, RandomWalk, Resonance, Sinusoid, WhiteNoise
 from gmwm.estimate.likelihood.kalman import Space, smooth, whiten
 from gmwm.process import as_model
 
@@ -26,7 +17,7 @@ MODELS = [
     QuantizationNoise(0.7) + GaussMarkov(0.3, 5.0),
     AR([1.5, -0.7], 0.3),
     MA([-0.9, 0.3], 0.2),
-    ARIMA([0.5], 1, [0.3], 0.7) + WhiteNoise(0.4),
+    gmwm.ARIMA([0.5], 1, [0.3], 0.7) + WhiteNoise(0.4),
     Resonance(0.4, 0.05, 0.1),
     Resonance(0.4, 0.2, 0.05) + WhiteNoise(0.1),
     WhiteNoise(0.3) + Sinusoid(1.0, 0.03),

@@ -5,16 +5,8 @@ import pytest
 from statsmodels.tsa.statespace.sarimax import SARIMAX
 from statsmodels.tsa.statespace.structural import UnobservedComponents
 
-from gmwm import (
-    AR,
-    ARMA,
-    GaussMarkov,
-    QuantizationNoise,
-    RandomWalk,
-    Resonance,
-    Sinusoid,
-    WhiteNoise,
-)
+import gmwm
+from gmwm import AR, ARMA, GaussMarkov, QuantizationNoise, RandomWalk, Sinusoid, WhiteNoise
 from gmwm.estimate.likelihood import Columns, KalmanLikelihood
 from gmwm.estimate.likelihood.likelihood import Regression, whitened
 
@@ -25,7 +17,7 @@ MODELS = [
     (QuantizationNoise(0.7), RandomWalk(0.2)),
     (AR([1.5, -0.7], 0.3), WhiteNoise(0.5)),
     (ARMA([0.6, 0.2], [0.5], 0.3),),
-    (Resonance(0.4, 0.2, 0.1),),
+    (gmwm.Resonance(0.4, 0.2, 0.1),),
     (WhiteNoise(0.3), Sinusoid(1.0, 0.03)),
     (GaussMarkov(1.0, 1e5), WhiteNoise(0.1)),
 ]

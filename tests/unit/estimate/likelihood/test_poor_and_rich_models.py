@@ -5,16 +5,7 @@ import pytest
 from scipy.stats import norm
 
 import gmwm
-from gmwm import (
-    ARIMA,
-    GaussMarkov,
-    QuantizationNoise,
-    RandomWalk,
-    RateRamp,
-    Resonance,
-    Sinusoid,
-    WhiteNoise,
-)
+from gmwm import ARIMA, GaussMarkov, QuantizationNoise, RandomWalk, Resonance, Sinusoid, WhiteNoise
 from gmwm.estimate import METHODS
 from gmwm.process import as_model
 from marks import slow
@@ -25,7 +16,7 @@ OF_SAMPLES = ("mle", "whittle", "em")
 @pytest.mark.parametrize("method", OF_SAMPLES)
 @pytest.mark.parametrize("ramp", [False, True])
 def test_a_walk_alone_has_the_variance_of_its_steps(method, ramp):
-    truth = RandomWalk(0.1) + RateRamp(0.01) if ramp else as_model(RandomWalk(0.1))
+    truth = RandomWalk(0.1) + gmwm.RateRamp(0.01) if ramp else as_model(RandomWalk(0.1))
     x = truth.simulate(1000, 1.0, seed=1)
     fit = gmwm.fit(truth.opened(), x, dt=1.0, method=method)
     steps = np.diff(x)

@@ -4,19 +4,7 @@ import numpy as np
 import pytest
 
 import gmwm
-from gmwm import (
-    AR,
-    ARIMA,
-    ARMA,
-    MA,
-    BiasInstability,
-    GaussMarkov,
-    QuantizationNoise,
-    RandomWalk,
-    RateRamp,
-    Resonance,
-    WhiteNoise,
-)
+from gmwm import AR, GaussMarkov, QuantizationNoise, RandomWalk, RateRamp, Resonance, WhiteNoise
 from gmwm.estimate.likelihood import Columns, KalmanLikelihood
 from gmwm.estimate.likelihood.likelihood import WhittleLikelihood
 from gmwm.process import as_model
@@ -32,9 +20,9 @@ MODELS = [
     (AR([1.2, -0.6], 2.0) + WhiteNoise(1.0), 3001, 1.0),
     slow(GaussMarkov(1.0, 2.0) + GaussMarkov(0.7, 50.0) + GaussMarkov(0.5, 1000.0), 40_000, 1.0),
     (WhiteNoise(0.2) + Resonance(0.5, 0.05, 0.1), 4095, 1.0),
-    (as_model(ARMA([0.9], [-0.5], 1.0)), 5003, 1.0),
-    (as_model(MA([-0.9], 1.0)), 4097, 1.0),
-    slow(as_model(ARIMA(0, 1, [0.5], 1e-3)), 5001, 1.0),
+    (as_model(gmwm.ARMA([0.9], [-0.5], 1.0)), 5003, 1.0),
+    (as_model(gmwm.MA([-0.9], 1.0)), 4097, 1.0),
+    slow(as_model(gmwm.ARIMA(0, 1, [0.5], 1e-3)), 5001, 1.0),
     (as_model(QuantizationNoise(0.3)), 3001, 1.0),
     (as_model(WhiteNoise(2.0)), 1009, 0.01),
 ]
@@ -112,7 +100,7 @@ def test_flicker_agrees_with_the_exact_too():
     """The bank of Gauss-Markov processes that stands for 1/f has the same spectrum at low
     frequencies; near 1/(2 dt), where it is up to a fifth too high, there must be white noise.
     """
-    truth = WhiteNoise(0.5) + BiasInstability(0.1)
+    truth = WhiteNoise(0.5) + gmwm.BiasInstability(0.1)
     exact, whittle = both(truth.opened(), truth.simulate(2000, 1.0, seed=1), 1.0)
     for key, error in exact.stderr.items():
         assert abs(whittle.params[key] - exact.params[key]) < 0.1 * error, key

@@ -8,7 +8,7 @@ from gmwm import GMWM, GaussMarkov, InputError, RandomWalk, RateRamp, WhiteNoise
 from marks import slow
 
 TRUTH = WhiteNoise(0.2) + RandomWalk(0.02) + RateRamp(0.003)
-SEEDS = range(20)
+SEEDS = range(12)
 
 
 def series(seed, truth=TRUTH, n=6000):
@@ -17,13 +17,13 @@ def series(seed, truth=TRUTH, n=6000):
 
 @pytest.mark.parametrize("weights", ["data", slow("model")])
 def test_a_ramp_in_the_moments_is_estimated_with_its_error(weights):
-    """Of 20 intervals of 95 % fewer than 16 hold the truth once in 400 times."""
+    """Of 12 intervals of 95 % fewer than 9 hold the truth once in 400 times."""
     method = GMWM(weights=weights, drift="moments")
     fits = [gmwm.fit(TRUTH.opened(), series(seed), 1.0, method=method) for seed in SEEDS]
     for key, value in TRUTH.params.items():
         held = [low <= value <= high for low, high in (fit.interval()[key] for fit in fits)]
-        assert sum(held) >= 16, key
-    assert sum(fit.valid for fit in fits) >= 18
+        assert sum(held) >= 9, key
+    assert sum(fit.valid for fit in fits) >= 11
 
 
 def test_its_sign_is_that_of_the_mean_slope():

@@ -8,16 +8,7 @@ import numpy as np
 import pytest
 
 import gmwm
-from gmwm import (
-    GaussMarkov,
-    InputError,
-    Process,
-    RandomWalk,
-    RateRamp,
-    Resonance,
-    WhiteNoise,
-    parameter,
-)
+from gmwm import GaussMarkov, Process, RandomWalk, RateRamp, Resonance, WhiteNoise, parameter
 from places import GOLDEN
 
 TRUTH = WhiteNoise(0.2) + GaussMarkov(0.5, 20.0)
@@ -302,5 +293,5 @@ class TestNeededLength:
 
     @pytest.mark.parametrize("value", [0.0, -1.0, "much", np.nan, None])
     def test_an_error_that_is_none(self, value):
-        with pytest.raises(InputError, match="relative_error"):
+        with pytest.raises(gmwm.InputError, match="relative_error"):
             fitted(WhiteNoise(1.0), n=100).needed_length(value)

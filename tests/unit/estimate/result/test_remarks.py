@@ -4,16 +4,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from gmwm import (
-    ARMA,
-    AveragedNoise,
-    GaussMarkov,
-    LowPassNoise,
-    RandomWalk,
-    Resonance,
-    WhiteNoise,
-    wavelet_variance,
-)
+import gmwm
+from gmwm import GaussMarkov, LowPassNoise, RandomWalk, Resonance, WhiteNoise, wavelet_variance
 from gmwm.estimate import tuning
 from gmwm.estimate.result import Goodness, estimate_notices, misfit_notices, missed_level_notices
 from gmwm.process import as_model
@@ -81,7 +73,7 @@ def test_parameters_of_which_one_combination_is_known(correlation, loose, found)
 
 def test_the_most_correlated_parameters_stand_for_their_term():
     """An ARMA(3, 2) had fifteen notices of its pairs."""
-    model, keys = as_model(ARMA([0.5, 0.2], [0.3], 1.0)), ("ar_1", "ar_2", "ma_1", "sigma2")
+    model, keys = as_model(gmwm.ARMA([0.5, 0.2], [0.3], 1.0)), ("ar_1", "ar_2", "ma_1", "sigma2")
     share = np.array([1.0, -1.0, 1.0, 1.0])
     covariance = np.outer(share, share) + np.diag([1e-5, 2e-5, 3e-5, 4e-5])
     (notice,) = reported("confounded", model, keys, covariance)
@@ -214,7 +206,7 @@ def test_what_a_misfit_means(residual, misfit, failed, severity, words):
     [
         (LowPassNoise(0.3, 12.0, 2.0, 0.7), 12.0),
         (LowPassNoise(0.3, 5.0, 4.0, 0.9), 5.0),
-        (AveragedNoise(0.3, 0.1), 4.43),  # sinc is 0.7071 at 0.443
+        (gmwm.AveragedNoise(0.3, 0.1), 4.43),  # sinc is 0.7071 at 0.443
         (GaussMarkov(1.0, 0.09), 1.0 / (2.0 * np.pi * 0.09)),
     ],
 )

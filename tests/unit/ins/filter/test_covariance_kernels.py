@@ -4,17 +4,8 @@ import numpy as np
 import pytest
 from scipy.linalg import block_diag, expm
 
-from gmwm import (
-    AR,
-    ARIMA,
-    GaussMarkov,
-    QuantizationNoise,
-    RandomWalk,
-    RateRamp,
-    Resonance,
-    Sinusoid,
-    WhiteNoise,
-)
+import gmwm
+from gmwm import GaussMarkov, RandomWalk, RateRamp, Resonance, Sinusoid, WhiteNoise
 from gmwm.ins import Imu, NavState, SensorModels, integrate
 from gmwm.ins.filter import (
     Kinematics,
@@ -180,9 +171,9 @@ def test_sensor_errors_do_what_they_do_to_an_integrated_imu(case, k):
 BLOCKS = {
     "gyro_x": WhiteNoise(1e-4) + GaussMarkov(2e-4, 0.05) + GaussMarkov(1e-4, 40.0),
     "gyro_y": WhiteNoise(2e-4) + RandomWalk(1e-5) + Sinusoid(1e-4, 3.0),
-    "gyro_z": QuantizationNoise(1e-6) + RateRamp(1e-6),
+    "gyro_z": gmwm.QuantizationNoise(1e-6) + RateRamp(1e-6),
     "accel_x": WhiteNoise(1e-3) + Resonance(1e-3, 8.0, 0.1),
-    "accel_y": AR([1.5, -0.7], 1e-6) + WhiteNoise(1e-3) + ARIMA([0.4], 1, [], 1e-8),
+    "accel_y": gmwm.AR([1.5, -0.7], 1e-6) + WhiteNoise(1e-3) + gmwm.ARIMA([0.4], 1, [], 1e-8),
     "accel_z": GaussMarkov(1e-3, 5.0) + RandomWalk(1e-4),
 }
 SENSORS = SensorModels.of(BLOCKS, bias_sd={"gyro_x": 1e-4, "accel": 1e-3})

@@ -6,16 +6,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from gmwm import (
-    AR,
-    GaussMarkov,
-    QuantizationNoise,
-    RandomWalk,
-    RateRamp,
-    Resonance,
-    Sinusoid,
-    WhiteNoise,
-)
+import gmwm
+from gmwm import GaussMarkov, RandomWalk, RateRamp, Resonance, Sinusoid, WhiteNoise
 from gmwm.errors import InputError
 from gmwm.ins import (
     Aiding,
@@ -265,11 +257,14 @@ def test_thirty_sensor_states_and_every_kind_of_block():
     truth = helicopter_mapping(duration=150.0, dt=0.02)
     gyro = WhiteNoise(5e-5) + GaussMarkov(1e-4, 3.0) + Resonance(1e-4, 5.0, 0.1) + RandomWalk(1e-6)
     accel = (
-        WhiteNoise(1e-3) + QuantizationNoise(1e-5) + Sinusoid(1e-3, 0.3) + GaussMarkov(1e-3, 40.0)
+        WhiteNoise(1e-3)
+        + gmwm.QuantizationNoise(1e-5)
+        + Sinusoid(1e-3, 0.3)
+        + GaussMarkov(1e-3, 40.0)
     )
     sensors = SensorModels.of(
         {"gyro": gyro, "gyro_z": gyro + RateRamp(1e-7), "accel": accel,
-         "accel_y": AR([1.5, -0.7], 1e-8) + accel},
+         "accel_y": gmwm.AR([1.5, -0.7], 1e-8) + accel},
         bias_sd={"gyro": 5e-5, "accel": 1e-3},
     )  # fmt: skip
     ensemble(truth, gnss(truth, velocity_sd=0.1), 25, before=[], sensors=sensors, seed=7).check()

@@ -3,19 +3,8 @@
 import numpy as np
 import pytest
 
-from gmwm import (
-    AR,
-    ARIMA,
-    ARMA,
-    BiasInstability,
-    GaussMarkov,
-    QuantizationNoise,
-    RandomWalk,
-    RateRamp,
-    Resonance,
-    Sinusoid,
-    WhiteNoise,
-)
+import gmwm
+from gmwm import AR, ARIMA, GaussMarkov, RandomWalk, RateRamp, Resonance, Sinusoid, WhiteNoise
 from gmwm.errors import InputError
 from gmwm.ins import SensorModels
 from gmwm.ins.filter import SensorStates
@@ -29,9 +18,9 @@ TERMS = [
     RateRamp(-0.4),
     Resonance(0.5, 4.0, 0.05),
     Sinusoid(0.7, 3.0),
-    QuantizationNoise(0.01),
+    gmwm.QuantizationNoise(0.01),
     AR([1.5, -0.7], 0.3),
-    ARMA([0.6], [0.3], 0.2),
+    gmwm.ARMA([0.6], [0.3], 0.2),
     ARIMA([0.5], 1, [], 0.1),
 ]
 IDS = [repr(term) for term in TERMS]
@@ -149,7 +138,7 @@ def test_extra_markov_states_touch_no_sensor():
 
 
 @pytest.mark.parametrize(
-    "term", [BiasInstability(0.1), AR([0.5, 0.1, 0.1], 1.0), ARIMA([0.5], 1, [0.3], 0.7)]
+    "term", [gmwm.BiasInstability(0.1), AR([0.5, 0.1, 0.1], 1.0), ARIMA([0.5], 1, [0.3], 0.7)]
 )
 def test_large_blocks_are_refused_with_a_mend(term):
     with pytest.raises(InputError, match=r"accel_y: .* states in a filter, more than two: approx"):
