@@ -183,7 +183,8 @@ class ChannelTask:
         if self.design is not None:
             one = next(iter(self.design.covariates), None)
             growth = self.design.scaling(self.parts, self.places)
-            curve = replace(self.design.curve(fit), scaling=growth)
+            found_curve = self.design.curve(fit, may_lack=self.model is None)
+            curve = replace(found_curve, scaling=growth)
             if growth is not None and one is not None:
                 said = growth.notice(one.name, one.unit, one.low, one.high)
                 named += [said] if said is not None else []

@@ -189,8 +189,9 @@ class Design:
         rows = [np.interp(middles, self.nodes[place].time, row) for row in self.columns[place]]
         return replace(wv, regressors=Regressors.of(wv, rows, self.removed))
 
-    def curve(self, fit: Fit) -> BiasCurve:
-        return BiasCurve.of(fit, self.covariates, self.regressors, self.offset)
+    def curve(self, fit: Fit, *, may_lack: bool) -> BiasCurve:
+        about = (self.covariates, self.regressors, self.offset)
+        return BiasCurve.of(fit, *about, may_lack=may_lack)
 
     def scaling(self, channels: Sequence[Channel], places: Sequence[int]) -> Scaling | None:
         """How the fast noise of such channels depends on the first covariate."""

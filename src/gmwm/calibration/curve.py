@@ -11,7 +11,6 @@ import scipy
 from annotated_types import Ge, Le
 
 from gmwm._core import checks
-from gmwm._core.distributions import student
 from gmwm._core.documents import Array, Document, NotNegative, Positive, Text, check_covariance
 from gmwm._core.tables import plain_table
 from gmwm._core.text import Printed, brief, readable, with_error
@@ -20,7 +19,7 @@ from gmwm._core.units import factor, shown_unit
 from gmwm.calibration import tuning
 from gmwm.calibration.scaling import Scaling
 from gmwm.errors import InputError
-from gmwm.estimate.result import CurveCoefficients, Fit, satterthwaite_dof
+from gmwm.estimate.result import CurveCoefficients, Fit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -72,10 +71,11 @@ class Regressor:
             return np.exp(-time / self.constant)
         if self.kind == "power":
             return np.asarray(((x - own.centre) / own.half) ** self.power)
-        keep = float(np.exp(-(time[1] - time[0]) / self.constant))
-        # Exact for a line between the times but for its end.
-        means = (1.0 - keep) * 0.5 * (x[1:] + x[:-1])
-        late = scipy.signal.lfilter([1.0], [1.0, -keep], np.concatenate([x[:1], means]))
+        share = (time[1] - time[0]) / self.constant
+        keep = float(np.exp(-share))
+        mean = (1.0 - keep) / share  # exact for a line between the times
+        drive = np.concatenate([x[:1], (1.0 - mean) * x[1:] + (mean - keep) * x[:-1]])
+        late = scipy.signal.lfilter([1.0], [1.0, -keep], drive)
         return np.asarray((late - x) / own.half)
 
 
@@ -96,7 +96,10 @@ class BiasCurve(Document, Printed):
     covariance : (p, p) ndarray
         Of these, u^2, under the fitted noise.
     spread : (k, p p) ndarray
-        Errors of ``covariance`` by the errors of the noise: degrees of freedom of intervals.
+        Errors of ``covariance`` by the errors of the noise; with weights what it is less under each
+        of k random walks.
+    weights : (k,) ndarray
+        Probabilities of walks; empty where the fitted noise is taken alone.
     offset : float
         Mean of the channel less the curve, u. The turn-on bias is part of it; zero for an
         accelerometer, where it would hold gravity.
@@ -114,6 +117,7 @@ class BiasCurve(Document, Printed):
     values: Array
     covariance: Array
     spread: Array
+    weights: Array
     offset: float
     scaling: Scaling | None = None
 
@@ -124,10 +128,15 @@ class BiasCurve(Document, Printed):
         covariates: tuple[Covariate, ...],
         regressors: tuple[Regressor, ...],
         offset: float,
+        *,
+        may_lack: bool = False,
     ) -> BiasCurve:
-        """That of a fit beside these regressors."""
-        found, wv = CurveCoefficients.of(fit), fit.wv
-        numbers = (found.values, found.covariance, found.spread)
+        """That of a fit beside these regressors.
+
+        may_lack: Whether there may be a random walk where the model has none.
+        """
+        found, wv = CurveCoefficients.of(fit, may_lack=may_lack), fit.wv
+        numbers = (found.values, found.covariance, found.spread, found.weights)
         offset = 0.0 if wv.quantity == "accel" else offset
         return cls(wv.name, wv.quantity, wv.unit, covariates, regressors, *numbers, offset)
 
@@ -217,10 +226,8 @@ class BiasCurve(Document, Printed):
 
     def errors(self, contrast: FloatArray, level: float = 0.95) -> FloatArray:
         """Half the interval of ``contrast @ values``, u, (k,)."""
-        level = checks.share("level", level, 0.95)
-        variance = np.einsum("ki,ij,kj->k", contrast, self.covariance, contrast)
-        dof = satterthwaite_dof(contrast, self.covariance, self.spread)
-        return np.asarray(student.ppf(0.5 + 0.5 * level, dof) * np.sqrt(np.maximum(variance, 0.0)))
+        found = CurveCoefficients(self.values, self.covariance, self.spread, self.weights)
+        return found.errors(contrast, checks.share("level", level, 0.95))
 
     def band(
         self, x: FloatArray | None = None, level: float = 0.95, of: str = ""

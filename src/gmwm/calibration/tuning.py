@@ -69,7 +69,7 @@ SPANNED = 1e-6  # of the largest singular value: smaller ones are not independen
 
 # -- covariates -----------------------------------------------------------------------------------
 
-NODES, SHORTEST_NODE = 512, 8  # means of a recording that hold its covariates; samples of one
+NODES, SHORTEST_NODE = 2048, 8  # means of a recording that hold its covariates; samples of one
 MOST_DEGREE = 3  # chosen automatically: autopilots hold no more
 LAGS, LAG_STEPS, LONGEST_LAG = (20.0, 3000.0), 10, 0.33  # s; a slower one looks like a drift
 NODE_STEP = 10.0  # s between them in longer recordings: faster than a thermometer follows

@@ -13,7 +13,6 @@ from gmwm.estimate.problem.moments import (
     Scales as Scales,
     Simulation as Simulation,
     chi_square as chi_square,
-    satterthwaite_dof as satterthwaite_dof,
     weight_root as weight_root,
 )
 from gmwm.estimate.problem.nonnegative import (

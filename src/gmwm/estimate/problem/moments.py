@@ -19,12 +19,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from gmwm._core.distributions import norm, student
 from gmwm._core.frozen import frozen
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.estimate import tuning
 from gmwm.estimate.problem.parameters import drift_key
-from gmwm.estimate.problem.ramp import RampRegression, Slope, ols_slope
+from gmwm.estimate.problem.ramp import RampRegression, Slope, ols_slope, walks_beside
 from gmwm.estimate.problem.regressors import Coefficients, CurveRegression, Regression
 from gmwm.process import PSD, Model, Process, Shape
 from gmwm.variance import WaveletVariance, pilot_psd, wavelet_variance
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
     from gmwm.estimate.result.fit import Fit
 
 _COEFFICIENT_STEP = 1e-2  # of a standard error
+_FARTHEST, _HALVINGS = 40.0, 40  # deviations of a normal number that can be; of their range
 
 
 @dataclass(frozen=True)
@@ -313,18 +315,25 @@ class CurveCoefficients:
 
     values: (p,), u.
     covariance: (p, p), u^2.
-    spread: (k, p * p), errors of ``covariance`` by each of k independent errors of the noise.
+    spread: (k, p * p), errors of ``covariance`` by each of k independent errors of the noise; with
+        weights what it is less under each of k random walks.
+    weights: (k,), probabilities of walks; empty where the fitted noise is taken alone.
     """
 
     values: FloatArray
     covariance: FloatArray
     spread: FloatArray
+    weights: FloatArray
 
     @classmethod
-    def of(cls, fit: Fit) -> CurveCoefficients:
+    def of(cls, fit: Fit, *, may_lack: bool = False) -> CurveCoefficients:
         """By generalized least squares under the noise of a fit.
 
-        A term that came out as zero counts with its mean size within its limit.
+        Errors average over all random walks that the record allows, see
+        `gmwm.estimate.problem.ramp`. Another term that came out as zero counts with its mean size
+        within its limit.
+
+        may_lack: Whether there may be a walk where the model has none.
         """
         wv, curve = fit.wv, fit.wv.regressors
         if curve is None:
@@ -335,7 +344,15 @@ class CurveCoefficients:
         def covariance(model: Model) -> FloatArray:
             return regression.covariances(found, [scales.spectrum(model)])[0]
 
-        total, size = covariance(fit.model), curve.removed.size
+        size, open_keys = curve.removed.size, {*fit.keys, *fit.upper_bounds}
+        walks = walks_beside(fit.model, open_keys, wv, may_lack=may_lack)
+        if walks is not None:
+            off, weights = walks.values - found.values, walks.weights
+            each = walks.covariances + off[:, :, None] * off[:, None, :]
+            total = np.tensordot(weights, each, 1)
+            spread = (each - total).reshape(weights.size, -1)
+            return cls(curve.removed + found.values, total, spread, weights)
+        total = covariance(fit.model)
         for item in fit.model.parameters:
             limit, term = fit.upper_bounds.get(item.key, np.inf), fit.model.terms[item.term]
             if fit.params[item.key] == 0.0 and np.isfinite(limit) and limit > 0.0:
@@ -352,26 +369,31 @@ class CurveCoefficients:
                 changes[row] = np.subtract(*ends).ravel() / (2.0 * step)
         values, vectors = np.linalg.eigh(fit.covariance) if fit.keys else (np.zeros(0), changes)
         root = vectors * np.sqrt(np.maximum(values, 0.0))
-        return cls(curve.removed + found.values, total, root.T @ changes)
+        return cls(curve.removed + found.values, total, root.T @ changes, np.zeros(0))
 
+    def errors(self, contrast: FloatArray, level: float) -> FloatArray:
+        """Half the interval of ``contrast @ values``, u, (m,), for contrasts (m, p).
 
-def satterthwaite_dof(
-    contrast: FloatArray, covariance: FloatArray, spread: FloatArray
-) -> FloatArray:
-    """Degrees of freedom of the variance of ``contrast @ coefficients``, (k,).
-
-    That variance is computed from estimated noise; one of relative error r has 2/r^2 of them
-    (Satterthwaite 1946, *Biometrics Bulletin* 2, 110-114).
-
-    contrast: (k, p).
-    covariance, spread: See `CurveCoefficients`.
-    """
-    variance = np.einsum("ki,ij,kj->k", contrast, covariance, contrast)
-    size = contrast.shape[1]
-    error = np.einsum("ki,mij,kj->km", contrast, spread.reshape(-1, size, size), contrast)
-    square = np.sum(error**2, axis=1)
-    ratio = np.divide(2.0 * variance**2, square, out=np.full_like(square, np.inf), where=square > 0)
-    return np.maximum(ratio, 1.0)
+        Over walks it holds the probability of their mixture. Else it is Student's: a variance that
+        is known to a relative error of r has 2/r^2 degrees of freedom (Satterthwaite 1946,
+        *Biometrics Bulletin* 2, 110-114).
+        """
+        size = contrast.shape[1]
+        variance = np.einsum("ki,ij,kj->k", contrast, self.covariance, contrast)
+        off = np.einsum("ki,mij,kj->km", contrast, self.spread.reshape(-1, size, size), contrast)
+        if not self.weights.size:
+            square = np.sum(off**2, axis=1)
+            dof = np.full_like(square, np.inf)
+            dof = np.maximum(np.divide(2.0 * variance**2, square, out=dof, where=square > 0.0), 1.0)
+            half = student.ppf(0.5 + 0.5 * level, dof) * np.sqrt(np.maximum(variance, 0.0))
+            return np.asarray(half)
+        deviation = np.sqrt(np.maximum(variance[:, None] + off, 0.0)) + np.finfo(float).tiny
+        low, high = np.zeros(len(contrast)), _FARTHEST * np.max(deviation, axis=1)
+        for _ in range(_HALVINGS):
+            middle = 0.5 * (low + high)
+            outside = 2.0 * norm.sf(middle[:, None] / deviation) @ self.weights
+            low, high = np.where(outside > 1.0 - level, (middle, high), (low, middle))
+        return high
 
 
 def _has_power(noise: Model) -> bool:

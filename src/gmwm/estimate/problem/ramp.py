@@ -12,14 +12,15 @@ slope has no part (Harville 1974, *Biometrika* 61, 383-385).
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import make_interp_spline
-from scipy.linalg import lstsq, solve, solve_toeplitz, toeplitz
+from scipy.linalg import eigvalsh, lstsq, solve, solve_toeplitz, toeplitz
 from scipy.optimize import brentq
 
 from gmwm._core.distributions import norm
@@ -153,6 +154,7 @@ def detrended_covariance(
     return regressed_covariance(covariance, common * means, common**2)
 
 
+_UNKNOWN = 1e-9  # of the largest: a regressor that does not change
 _MERGED = 128  # block means of which dense matrices are made
 _WALKS = 40
 _BETWEEN = 1000  # sizes of walks at which those are interpolated
@@ -161,19 +163,19 @@ _BEYOND = 10.0  # times the estimated K: the largest walk that is tried
 
 @dataclass(frozen=True, eq=False)
 class Walks:
-    """Random walks beside a noise, and the generalized least-squares slope under each.
+    """Random walks beside a noise, and the generalized least-squares coefficients under each.
 
     Intervals have an even prior of K, as for other scales near zero (Gelman 2006, *Bayesian
     Analysis* 1, 515-534).
 
     sizes: (k,), K of each, evenly in the logarithm, u/s/sqrt(Hz).
-    slopes, variances: (k,), of the estimated slope, u/s and its square.
+    values, covariances: (k, p) and (k, p, p), of the coefficients: of a ramp its slope, u/s.
     likelihoods: (k,), in logarithms, up to a constant.
     """
 
     sizes: FloatArray
-    slopes: FloatArray
-    variances: FloatArray
+    values: FloatArray
+    covariances: FloatArray
     likelihoods: FloatArray
 
     @classmethod
@@ -182,36 +184,39 @@ class Walks:
 
         Returns: ``None`` where too few blocks exist.
         """
-        # Few enough block means that dense matrices of them are quick.
-        merged = -(-wv.blocks.size // _MERGED)
-        whole = wv.blocks.size // merged * merged
-        blocks, block = wv.blocks[:whole].reshape(-1, merged).mean(axis=1), wv.block * merged
-        first = beside(np.flatnonzero(~np.isnan(blocks)))
-        if first.size + 1 < tuning.FEWEST_BLOCKS:
+        parts = [_merged(*part) for part in _parts(wv)]
+        sizes = [len(beside(np.flatnonzero(~np.isnan(y)))) for y, *_ in parts]
+        if sum(sizes) + 1 < tuning.FEWEST_BLOCKS:
             return None
-        noise, walk = (
-            toeplitz(difference_covariance(each, wv.dt, block, blocks.size))[np.ix_(first, first)]
-            for each in (psd, RandomWalk(1.0).psd)
-        )
-        x, y = np.full((first.size, 1), block * wv.dt), blocks[first + 1] - blocks[first]
-        # K^2 of a walk that makes the slope as uncertain as the noise does.
-        unit = float(np.sum(x)) / restricted(noise, x, y)[0][0, 0]
-        most = max(tuning.LARGEST_WALK, largest**2 / unit)
-        squares = unit * np.geomspace(tuning.LEAST_WALK, most, _WALKS)
-        fits = (restricted(noise + square * walk, x, y) for square in squares)
-        information, score, left, half = np.array(
-            [(fit[0][0, 0], fit[1][0], *fit[2:]) for fit in fits]
-        ).T
-        slopes = score / information
-        likelihoods = -half - 0.5 * np.log(information) - 0.5 * (left - slopes * score)
-        return cls(np.sqrt(squares), slopes, growth(wv) / information, likelihoods)
+        rows = [_Rows.of(*part, wv.dt, (psd, RandomWalk(1.0).psd)) for part in parts]
+        # K^2 of walks that make some coefficients as uncertain as the noise does.
+        noise, walk = (np.sum([each.information(k) for each in rows], axis=0) for k in (0, 1))
+        units = eigvalsh(walk, noise)
+        units = units[units > _UNKNOWN * units[-1]]
+        most = max(tuning.LARGEST_WALK * units[-1], largest**2)
+        squares = np.geomspace(tuning.LEAST_WALK * units[0], most, _WALKS)
+        fits = [_summed(each.fitted(square) for each in rows) for square in squares]
+        information, score, left, half = (np.array(each) for each in zip(*fits, strict=True))
+        inverse = np.linalg.inv(information)
+        values = (inverse @ score[..., None])[..., 0]
+        likelihoods = -half - 0.5 * np.linalg.slogdet(information)[1]
+        likelihoods -= 0.5 * (left - np.sum(values * score, axis=1))
+        return cls(np.sqrt(squares), values, growth(wv) * inverse, likelihoods)
+
+    @property
+    def weights(self) -> FloatArray:
+        """Probabilities of the sizes, (k,)."""
+        weight = np.exp(self.likelihoods - np.max(self.likelihoods)) * self.sizes
+        weight[0] /= np.log(self.sizes[1] / self.sizes[0])  # all walks that are smaller
+        return np.asarray(weight / np.sum(weight))
 
     @cached_property
     def _averaged(self) -> FloatArray:
         """Sizes, slopes, their standard errors and weights, between the sizes too, (4, k)."""
         at = np.log(self.sizes)
         between = np.linspace(at[0], at[-1], _BETWEEN)
-        rows = np.stack([self.slopes, 0.5 * np.log(self.variances), self.likelihoods], axis=1)
+        slopes, variances = self.values[:, 0], self.covariances[:, 0, 0]
+        rows = np.stack([slopes, 0.5 * np.log(variances), self.likelihoods], axis=1)
         slopes, errors, likelihoods = make_interp_spline(at, rows)(between).T
         weight = np.exp(likelihoods - np.max(likelihoods) + between)
         weight[0] /= between[1] - between[0]  # all walks that are smaller
@@ -241,21 +246,74 @@ class Walks:
         return value - reach, value + reach
 
 
-def walks_beside(model: Model, keys: Collection[str], wv: WaveletVariance) -> Walks | None:
-    """Sizes that the random walk of a model may have beside its ramp.
+@dataclass(frozen=True, eq=False)
+class _Rows:
+    """Differences of neighbouring block means, and their covariance by a noise and by a walk."""
+
+    x: FloatArray  # (D, p)
+    y: FloatArray  # (D,)
+    noises: tuple[FloatArray, FloatArray]  # (D, D)
+
+    @classmethod
+    def of(
+        cls, y: FloatArray, x: FloatArray, block: int, dt: float, psds: tuple[PSD, PSD]
+    ) -> _Rows:
+        """Of block means of a series, (B,), and of regressors, (p, B)."""
+        first = beside(np.flatnonzero(~np.isnan(y)))
+        noise, walk = (
+            toeplitz(difference_covariance(each, dt, block, y.size))[np.ix_(first, first)]
+            for each in psds
+        )
+        return cls(np.diff(x)[:, first].T, np.diff(y)[first], (noise, walk))
+
+    def information(self, which: int) -> FloatArray:
+        return restricted(self.noises[which], self.x, self.y)[0]
+
+    def fitted(self, square: float) -> tuple[FloatArray, FloatArray, float, float]:
+        return restricted(self.noises[0] + square * self.noises[1], self.x, self.y)
+
+
+def _parts(wv: WaveletVariance) -> list[tuple[FloatArray, FloatArray, int]]:
+    """Block means of the series, of the regressors, and samples of a block, for each recording."""
+    if wv.regressors is None:
+        time = wv.block * wv.dt * np.arange(wv.blocks.size, dtype=float)
+        return [(wv.blocks, time[None, :], wv.block)]
+    return [(part.blocks, part.columns, part.block) for part in wv.regressors.parts]
+
+
+def _merged(y: FloatArray, x: FloatArray, block: int) -> tuple[FloatArray, FloatArray, int]:
+    """Few enough block means that dense matrices of them are quick."""
+    merged = -(-y.size // _MERGED)
+    rows = np.vstack([y, x])[:, : y.size // merged * merged]
+    means = rows.reshape(len(rows), -1, merged).mean(axis=2)
+    return means[0], means[1:], block * merged
+
+
+def _summed(fits: Iterable[tuple[Any, ...]]) -> tuple[Any, ...]:
+    """Of several recordings."""
+    return tuple(sum(each) for each in zip(*fits, strict=True))
+
+
+def walks_beside(
+    model: Model, keys: Collection[str], wv: WaveletVariance, *, may_lack: bool = False
+) -> Walks | None:
+    """Sizes that the random walk of a model may have beside its ramp or a curve.
 
     model: With values.
     keys: Of the parameters that were open.
-    Returns: ``None`` without a walk, or where the rest has slow noise too, on which K depends.
+    may_lack: Whether there may be a walk where the model has none.
+    Returns: ``None`` without a walk, or where it competes with other slow noise of the model.
     """
     values = {i.term: float(i.value or 0.0) for i in model.parameters if i.key in keys}
     sizes = [value for i, value in values.items() if model.terms[i].is_walk]
     rest = Model(tuple(t for t in model.terms if not (t.is_drift or t.is_walk)) or model.terms)
     depends = any(t.shape_parameters or t.is_flicker or t.is_drift for t in rest.terms)
-    if not sizes or depends or not any(rest.params.values()):
+    if depends or not (sizes or may_lack) or not any(rest.params.values()):
+        return None
+    if not all(term.has_spectrum() for term in rest.terms):
         return None
     try:
-        return Walks.beside(wv, rest.psd, _BEYOND * sizes[0])
+        return Walks.beside(wv, rest.psd, _BEYOND * max(sizes, default=0.0))
     except np.linalg.LinAlgError:  # differences of the means are known to rounding
         return None
 
@@ -272,5 +330,5 @@ def slope_p_value(wv: WaveletVariance, psd: PSD) -> float:
     if found is None:
         return 1.0
     weight = np.exp(found.likelihoods - np.max(found.likelihoods))
-    chance = 2.0 * norm.sf(np.abs(found.slopes) / np.sqrt(found.variances))
+    chance = 2.0 * norm.sf(np.abs(found.values[:, 0]) / np.sqrt(found.covariances[:, 0, 0]))
     return float(weight @ chance / np.sum(weight))

@@ -2,7 +2,6 @@
 
 from gmwm.estimate.problem import (
     CurveCoefficients as CurveCoefficients,
-    satterthwaite_dof as satterthwaite_dof,
 )
 from gmwm.estimate.result.conclusion import (
     estimate_notices as estimate_notices,
