@@ -20,7 +20,14 @@ from gmwm._core.text import readable
 from gmwm._core.typing import Progress, known_of
 from gmwm.diagnosis import repeats, samples, tuning
 from gmwm.diagnosis.drift import drift, temperature_notices, variance
-from gmwm.diagnosis.events import event, find_events, with_single_outliers
+from gmwm.diagnosis.events import (
+    contamination,
+    event,
+    find_events,
+    heavy_tails,
+    outliers_or_tails,
+    with_single_outliers,
+)
 from gmwm.diagnosis.health import ChannelHealth, Health
 from gmwm.diagnosis.innovations import Examined, crosstalk_notices, innovations
 from gmwm.diagnosis.lines import line_notices
@@ -29,7 +36,6 @@ from gmwm.diagnosis.repeats import Copy, copied_rows, find_copies
 from gmwm.diagnosis.resolution import rounding, step_size, widest_step
 from gmwm.diagnosis.resonances import peaks, resonance_notice
 from gmwm.diagnosis.still import moves, vibration
-from gmwm.diagnosis.tails import contamination, heavy_tails, outliers_or_tails
 from gmwm.issues import Notice, Severity, notice, worst_first
 from gmwm.readers import Channel, Recording, require_recording
 

@@ -22,7 +22,7 @@ from gmwm.diagnosis import tuning
 from gmwm.issues import Notice, Severity, notice
 
 if TYPE_CHECKING:
-    from gmwm.diagnosis.tails import Tails
+    from gmwm.diagnosis.events import Tails
 
 _CLIPPED = 0.99892  # variance of the normal distribution within tuning.CLIP
 _NORMAL_MAD = 1.482602  # standard deviation over median absolute value

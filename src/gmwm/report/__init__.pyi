@@ -12,6 +12,6 @@ from .navigation import (
     write_navigated_report as write_navigated_report,
     write_validation_report as write_validation_report,
 )
+from .numbers import write_sheet_report as write_sheet_report
 from .page import duration_text as duration_text
-from .sheet import write_sheet_report as write_sheet_report
 from .summary import filter_key as filter_key, summary_text as summary_text

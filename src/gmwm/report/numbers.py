@@ -1,15 +1,20 @@
-"""Filter numbers for outages, the texts to copy, and the error budget."""
+"""Filter numbers for outages, the texts to copy, the error budget, and the page of a data sheet."""
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Set
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import yaml
 
+from gmwm._core.files import writable_file
+from gmwm._core.pages import page_of
 from gmwm._core.text import brief
 from gmwm.calibration import Calibration
+from gmwm.datasheet import Datasheet
 from gmwm.errors import InputError
 from gmwm.estimate import Fit
 from gmwm.export import SENSORS, TARGETS, Axis, ImuFile, Triad, axis_of, imu_of
@@ -20,6 +25,7 @@ from gmwm.filter_numbers import (
     QUANTITIES,
     TIMES,
     ErrorBudget,
+    FilterNumbers,
     axis,
     error_budget,
     is_steep,
@@ -27,6 +33,8 @@ from gmwm.filter_numbers import (
     usable,
 )
 from gmwm.report.figure import growth_figure
+from gmwm.report.navigation import svg
+from gmwm.report.page import origin, write_page
 
 SHOWN = HORIZON
 """s: length of outages of all filter numbers on a page."""
@@ -204,4 +212,35 @@ def _sentence(known: ErrorBudget, unknown: ErrorBudget) -> str:
         "After a 60 s outage from exact attitude, velocity and position the errors are "
         f"{lost(known)} (1 sigma) if the slow errors are known at its start, and {lost(unknown)} "
         "if they are unknown. After fixes they are larger: use gmwm certify."
+    )
+
+
+@page_of(Datasheet)
+def write_sheet_report(
+    sheet: Datasheet, path: str | os.PathLike[str], numbers: FilterNumbers, answer: str = ""
+) -> Path:
+    """Write what a data sheet says as one HTML file that needs no network.
+
+    numbers: Of `Datasheet.numbers`.
+    answer: Text about them.
+
+    Raises InputError if the file cannot be written.
+    """
+    import matplotlib.pyplot as plt
+
+    path = writable_file(path)
+    pictures = {}
+    for sensor in numbers:
+        figure, axes = plt.subplots(figsize=(7.0, 4.6), layout="constrained")
+        sheet.plot(sensor, numbers, ax=axes)
+        pictures[sensor] = svg(figure)
+    known = {"data sheet": sheet.document or sheet.name}
+    text = sheet.text(form=numbers.form, horizon=numbers.horizon)
+    return write_page(
+        path,
+        "sheet.html",
+        sheet=sheet,
+        pictures=pictures,
+        text=f"{answer or numbers.text()}\n\n{text}",
+        provenance=origin(known, "page of", None),
     )

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import gmwm
+from gmwm.diagnosis.events import contamination
 from gmwm.diagnosis.innovations import Innovations
-from gmwm.diagnosis.tails import contamination
 from marks import every
 
 DATA_RATE = 100.0

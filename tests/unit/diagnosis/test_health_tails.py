@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 import gmwm
-from gmwm.diagnosis.events import find_events
+from gmwm.diagnosis.events import Tails, find_events, heavy_tails
 from gmwm.diagnosis.innovations import innovations
-from gmwm.diagnosis.tails import Tails, heavy_tails
 from marks import every, slow
 
 N = 36_000
