@@ -104,10 +104,7 @@ def stamp_of(loop: Any) -> bytes:
 
 @contextmanager
 def _alone(index: Path) -> Iterator[None]:
-    """Wait for a process that compiles the same loop for the first time, and load what it made.
-
-    index: Of what is kept of the loop. Where there is one, nobody waits.
-    """
+    """Wait for a process that compiles the same loop for the first time, and load what it made."""
     if index.exists():
         yield
         return

@@ -97,10 +97,7 @@ Array = Annotated[FloatArray, _IsArray()]
 
 
 def _array_of(value: Any) -> FloatArray:
-    """An array of one or two dimensions from nested lists.
-
-    Raises ValueError if an element is no number or rows have unequal lengths.
-    """
+    """An array from nested lists; raises ValueError unless they are numbers in equal rows."""
     if isinstance(value, np.ndarray):
         return value
     rows = value if isinstance(value, list) and value and isinstance(value[0], list) else [value]

@@ -80,11 +80,7 @@ def do_runs(
 
 
 class _Store:
-    """Finished runs, and the files that hold them; a file appears whole or not at all.
-
-    folder: None keeps nothing on disk.
-    study: In JSON types; kept in every file.
-    """
+    """Finished runs of a study, and the files that hold them, whole; None keeps nothing on disk."""
 
     def __init__(self, folder: Path | None, study: dict[str, Any]) -> None:
         self.runs: dict[int, Mapping[str, Any]] = {}

@@ -117,10 +117,7 @@ def _told_apart(stream: TextIO) -> TextIO:
 
 @contextmanager
 def _ended_as_interrupted() -> Iterator[list[int]]:
-    """Let what ends a process do so as an interrupt does, after which nothing is left behind.
-
-    Yields: the signals that come.
-    """
+    """Let signals end a process as an interrupt does, leaving nothing; yields those that come."""
     came: list[int] = []
 
     def end(number: int, _: object) -> None:

@@ -119,10 +119,7 @@ def _allan(terms: list[Process], tau: FloatArray) -> FloatArray:
 
 
 def _size(base: FloatArray, unit: FloatArray, tau: FloatArray, target: float) -> float | None:
-    """Size of a term whose Allan variance is ``unit`` for 1, that makes the sum flat at ``target``.
-
-    ``None`` if no size does.
-    """
+    """Size of a term of Allan variance ``unit`` that makes the sum flat at ``target``, or None."""
     steps = np.diff(np.log(tau))
 
     def reading(square: float) -> float:

@@ -88,11 +88,7 @@ def with_single_outliers(
 
 
 def _level(values: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Medians of blocks, joined by lines, and the robust standard deviation from them.
-
-    The blocks are as long as they can be without adding to the distances: samples that are cut off
-    on both sides of a short one depend on each other.
-    """
+    """Medians of blocks, joined by lines, and the robust standard deviation from them."""
     place = np.arange(values.size)
     found: list[tuple[FloatArray, FloatArray]] = []
     count = 1

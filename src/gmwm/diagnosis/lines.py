@@ -132,12 +132,7 @@ def _largest(
     total: FloatArray, low: int, start: int, place: FloatArray,
     widths: IntArray, slowest: IntArray, table: FloatArray,
 ) -> tuple[FloatArray, IntArray]:  # fmt: skip
-    """Hot loop of `_scores`.
-
-    total: Sums of ratios from bin ``low`` on.
-    place: Of bins from ``start`` on, where they are between the columns of ``table``.
-    widths, slowest, table: By width, the first bin and the limits.
-    """
+    """Hot loop of `_scores`."""
     score, best = np.zeros(place.size), np.ones(place.size, dtype=np.int64)
     for i in range(place.size):
         k = start + i

@@ -92,10 +92,7 @@ def _fitted(
     height: float,
     line: Line | None = None,
 ) -> Bump | None:
-    """Whittle fit of a resonance on a background whose logarithm is a parabola in log f.
-
-    line: What a narrow resonance was taken for; it must be all that is there.
-    """
+    """Whittle fit of a resonance on a background whose logarithm is a parabola in log f."""
     ratio = 1.0 + tuning.FEET * line.width / centre if line else tuning.FITTED_OCTAVES
     start = max(int(centre / ratio / spectrum.resolution), 1)
     stop = min(int(centre * ratio / spectrum.resolution), spectrum.density.size - 1)

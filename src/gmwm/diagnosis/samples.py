@@ -118,11 +118,7 @@ def cut_off_or_abrupt_end(channel: Examined) -> Iterator[Notice]:
 
 
 def _cut_off(channel: Examined) -> Iterator[Notice]:
-    """Find more samples at the largest or smallest value than at the one before it.
-
-    A tail falls faster and faster: from the last step but one to the last by no less than before,
-    up to chance (binomial test). Peaks of shocks may be cut off without harm.
-    """
+    """Find more samples at an extreme than at the value before it, by a binomial test."""
     step, values = channel.step, channel.present
     if not is_dithered(values, step):
         return
@@ -230,10 +226,7 @@ def _repeated(channel: Examined, value: float, count: float, **words: str) -> No
 
 
 def _cut_towards_zero(channel: Examined) -> Iterator[Notice]:
-    """Find twice as many zeros as noise has, as where numbers are cut instead of rounded.
-
-    The fall from zero to one step is larger then than from one to two; that of noise is smaller.
-    """
+    """Find twice as many zeros as noise has, as where numbers are cut instead of rounded."""
     step, values = channel.step, channel.present
     if step == 0.0:
         return

@@ -172,10 +172,7 @@ def _variances(
 def _jacobian(
     roots: FloatArray, ma: Sequence[float] | FloatArray, sigma2: float, variances: FloatArray
 ) -> FloatArray:
-    """Derivatives of the logarithms of N, sigma and tau, in the order of the model, by the ARMA's.
-
-    roots: (p,), by falling size; the model has its terms by rising correlation time.
-    """
+    """Derivatives of log N, sigma and tau, in the order of the model, by the ARMA's; roots (p,)."""
     p, q = roots.size, len(ma)
     inner = np.concatenate([roots, ma, [sigma2]]).astype(complex)
     by_inner = np.empty((variances.size, inner.size))

@@ -203,11 +203,7 @@ def _slope_variance(processes: Sequence[Process], n: int, dt: float) -> float:
 def _wavelet_information(
     coordinates: Coordinates, processes: Sequence[Process], n: int, dt: float, slope: Slope | None
 ) -> FloatArray:
-    """Information of the coordinates in the Haar wavelet variances, (d, d).
-
-    Removing an estimated slope takes r^2 var(slope) from each, for r = tau/2, and that depends on
-    the noise too.
-    """
+    """Information of the coordinates in the Haar wavelet variances, (d, d)."""
     tau = dyadic_levels(n) * dt
     noise = Model(tuple(processes))
     covariance = haar_covariance(noise.psd, n, dt)
@@ -232,11 +228,7 @@ def _wavelet_information(
 
 
 def _held_to(most: FloatArray, information: FloatArray) -> FloatArray:
-    """The information, limited in every direction to ``most``, (d, d).
-
-    A statistic knows no more than the series, but approximate covariances of coarse levels can
-    claim more.
-    """
+    """The information, limited in every direction to that of the series itself, (d, d)."""
     root = np.linalg.cholesky(regular_inverse(most))
     values, vectors = np.linalg.eigh(root.T @ information @ root)
     back = np.linalg.solve(root.T, vectors)

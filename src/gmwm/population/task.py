@@ -198,11 +198,7 @@ def _matching(text: str, folder: Path | None) -> list[str]:
 
 
 def _names(paths: Sequence[str]) -> list[str]:
-    """Short names that differ in more than the case of letters.
-
-    The name of the file without its ending; where that is not enough, with its ending and folders;
-    where that is not enough, with a number.
-    """
+    """Short names that differ in more than case: file names, with folders, with numbers."""
 
     def repeated(names: Sequence[str]) -> list[bool]:
         counts = Counter(name.lower() for name in names)

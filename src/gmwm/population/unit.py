@@ -290,10 +290,7 @@ def _is_common(term: Process) -> bool:
 
 
 def _noise(model: Model) -> Model:
-    """The terms of a model that units have in common, open; N also stands for band-limited noise.
-
-    Lines, resonances, the sensor's bandwidth and drifts belong to the unit or its recording.
-    """
+    """The terms that units have in common, open; N also for band-limited noise."""
     terms = [term for term in model.opened().terms if _is_common(term)]
     if not any(term.is_white for term in terms):
         terms.insert(0, WhiteNoise())
@@ -335,10 +332,7 @@ def _best(tried: Mapping[str, dict[str, Fit]]) -> tuple[str, dict[str, Fit]]:
 
 
 def _criteria(candidates: Sequence[Fit | None]) -> list[float]:
-    """Hannan and Quinn's criterion of each structure for one unit.
-
-    All with the discrepancy of the one that needs least.
-    """
+    """Hannan and Quinn's criterion of each structure, all with the least discrepancy needed."""
     least = min((fit.discrepancy for fit in candidates if fit is not None), default=0.0)
     found = []
     for fit in candidates:

@@ -99,10 +99,7 @@ class Parameter:
 
 
 class _Declared(Parameter):
-    """A parameter in the body of a class, which gives it its name.
-
-    An instance holds its values in its dictionary, which is looked up before this descriptor.
-    """
+    """A parameter in a class body, which gives it its name; instances shadow this descriptor."""
 
     def __set_name__(self, owner: type, name: str) -> None:
         object.__setattr__(self, "name", name)

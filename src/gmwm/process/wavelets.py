@@ -277,10 +277,7 @@ def gain_measures(name: str, count: int) -> FloatArray:
 
 
 def _octaves(levels: int) -> Iterator[tuple[int, FloatArray, FloatArray]]:
-    """Panels of every octave, from the lowest to the top one.
-
-    Their width is 2^-s; s, fine frequencies (P, _ORDER), nodes (P, _NODES_PER_PANEL).
-    """
+    """Panels of every octave, from the lowest on: s, fine frequencies and nodes; width 2^-s."""
     x, _ = unit_legendre(_NODES_PER_PANEL)
     u, _ = unit_legendre(_ORDER)
     for octave in range(levels + _OCTAVES_BELOW, -1, -1):

@@ -405,10 +405,7 @@ def _used(channel: Channel, spans: Spans) -> FloatArray:
 
 
 def _bins(channel: Channel, spans: Spans) -> FloatArray:
-    """Middle (s), mean, smallest and largest of the used samples in bins, less their mean, (4, b).
-
-    NaN where there are none.
-    """
+    """Middle (s), mean, smallest and largest of used samples in bins, less their mean, (4, b)."""
     values = _used(channel, spans)
     values -= np.nanmean(values)
     edges = np.unique(np.linspace(0, values.size, min(_BINS, values.size) + 1).astype(int))
@@ -433,10 +430,7 @@ def _gone(channel: Channel, spans: Spans) -> list[tuple[float, float]]:
 
 
 def _density(channel: Channel, spans: Spans) -> tuple[FloatArray, FloatArray]:
-    """Frequency (Hz) and root of the two-sided density (u/sqrt(Hz)) of a channel.
-
-    Means of the periodogram over a twelfth of an octave. White noise of N lies at N.
-    """
+    """Frequency (Hz) and root of the two-sided density of a channel, by twelfths of an octave."""
     found = spectrum(_used(channel, spans), channel.dt)
     octaves = np.log2(found.density.size / _FIRST_BIN)
     grid = np.linspace(0.0, octaves, int(_PER_OCTAVE * octaves) + 1)

@@ -132,10 +132,7 @@ def _row(spread: Spread) -> dict[str, Any]:
 
 
 def _limits(fleet: Fleet) -> dict[str, Any]:
-    """The grid of verdicts: axes, a row a unit, and how many of a large lot have none.
-
-    Units of a large lot that pass come last.
-    """
+    """The grid of verdicts, those that pass last, and how many units of a large lot have none."""
     axes = list(dict.fromkeys(axis for row in fleet.grid.values() for axis in row))
     rows = []
     for name, row in fleet.grid.items():

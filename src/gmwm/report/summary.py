@@ -231,10 +231,7 @@ def reason(name: str, calibration: Calibration) -> str:
 
 
 def _filter(calibration: Calibration) -> tuple[list[str], list[list[str]]]:
-    """Lines of N and K of each sensor by key and of the start bias; by sensor, of what they cover.
-
-    Empty where there are none.
-    """
+    """Lines of N and K of each sensor and the start bias; by sensor, of what they cover."""
     lines, starts = [], []
     covered: list[list[str]] = []
     for quantity in (q for q in SENSORS if q in {f.wv.quantity for f in calibration.values()}):

@@ -8,7 +8,6 @@ estimates it anew.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -28,7 +27,14 @@ from gmwm.process import (
 from gmwm.selection import tuning
 from gmwm.variance import WaveletVariance
 
-_ORDERS = (1.0, 2.0, 3.0, 4.0)
+_FAMILIES: tuple[Process, ...] = (
+    *(LowPassNoise(order=order, damping=BUTTERWORTH) for order in (1.0, 2.0, 3.0, 4.0)),
+    AveragedNoise(),
+    LowPassNoise(damping=BUTTERWORTH),
+    LowPassNoise(order=2.0),
+    LowPassNoise(),
+)
+"""Filters of one, two and three open shapes, simplest first."""
 _ROUNDS = 2
 _REACH = 3.0  # of the search from the best shape of the grid, in logarithms
 
@@ -64,21 +70,11 @@ def sensor_bandwidth(
         tried = []
         for price, left_out in ((0.0, QuantizationNoise), (penalty, None)):
             problem = _Beside.of(wv, extra, reference.covariance, tuning.FILTER_LIKE, left_out)
-            tried += [(*problem.best(each), price) for each in _families()]
+            tried += [(*problem.best(each), price) for each in _FAMILIES]
         best, objective, _ = min(tried, key=lambda t: t[1] + penalty * t[0].n_shapes + t[2])
         reference = dictionary_fit(wv, wv.variance, (*extra, best.given))
     needed = tuning.BANDWIDTH_GAIN * penalty * (1 + best.n_shapes)
     return best if alone - objective > needed else None
-
-
-def _families() -> Iterator[Process]:
-    """Filters of one, two and three open shapes, simplest first."""
-    for order in _ORDERS:
-        yield LowPassNoise(order=order, damping=BUTTERWORTH)
-    yield AveragedNoise()
-    yield LowPassNoise(damping=BUTTERWORTH)
-    yield LowPassNoise(order=2.0)
-    yield LowPassNoise()
 
 
 @dataclass(frozen=True, eq=False)

@@ -31,11 +31,12 @@ from gmwm.estimate.problem import (
     Scales,
     chi_square,
     gls_slope,
+    shape_of,
     slope_p_value,
     weight_root,
 )
 from gmwm.estimate.result import Fit
-from gmwm.process import CATALOGUE, Model, Process
+from gmwm.process import CATALOGUE, Model, Process, Shape
 from gmwm.selection import tuning
 from gmwm.selection.bandwidth import Bandwidth, sensor_bandwidth
 from gmwm.variance import PooledVariance, WaveletVariance
@@ -207,7 +208,15 @@ def rank(wv: WaveletVariance, choices: Choices) -> tuple[list[Candidate], Coeffi
                 common = _CommonWeights.of(wv.variance, reference, allowed)
                 plain, flicker = _candidates(wv, common, choices), _flicker(wv, common, choices)
             drifting = _candidates(wv, _CommonWeights.of(target, drift_free, allowed), choices)
-            ramped = [_with_ramp(candidate, penalty(wv.n)) for candidate, _ in drifting]
+            ramped = [  # the slope is a moment of its own: the degrees of freedom stay
+                replace(
+                    each,
+                    model=each.model + _RAMP,
+                    criterion=each.criterion + penalty(wv.n),
+                    n_parameters=each.n_parameters + 1,
+                )
+                for each, _ in drifting
+            ]
         elif slope.value**2 / slope.variance > penalty(wv.n) + tuning.RAMP_MARGIN:
             ambiguous = slope  # a ramp would have won but for the walk
     ranking = sorted(choices.among(_without_ramp(plain, wv, without) + ramped), key=rank_key)
@@ -241,16 +250,6 @@ def _drift_free(
         reference = dictionary_fit(wv, target, choices.given)
         slope = gls_slope(wv, reference.mixture.psd)
     return target, reference, slope
-
-
-def _with_ramp(candidate: Candidate, penalty: float) -> Candidate:
-    # The slope is a moment of its own: the degrees of freedom stay.
-    return replace(
-        candidate,
-        model=candidate.model + _RAMP,
-        criterion=candidate.criterion + penalty,
-        n_parameters=candidate.n_parameters + 1,
-    )
 
 
 def _without_ramp(
@@ -360,7 +359,7 @@ def _sums(
 ) -> Iterator[tuple[Candidate, Point]]:
     """Sums on each base, each started from the one with one term less."""
     for base in bases:
-        shapes: list[tuple[float, ...] | None] = [_given_shape(process) for process in base]
+        shapes: list[Shape | None] = [shape_of(process) for process in base]
         before = np.inf
         for g in range(choices.max_gauss_markov + 1):
             if g == 0 and all(process.is_line for process in base):
@@ -387,7 +386,3 @@ def _at_best(wv: WaveletVariance, common: _CommonWeights, model: Model) -> tuple
     design = Design(model, Scales.of(wv))
     point = search(Profile(design, common.target, common.root))
     return common.candidate(design, point), point
-
-
-def _given_shape(process: Process) -> tuple[float, ...]:
-    return tuple(float(process.values[p.name] or 0.0) for p in process.shape_parameters)

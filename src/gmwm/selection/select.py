@@ -290,14 +290,13 @@ def _listed(name: str, given: Any, example: str) -> tuple[Any, ...]:
 def _choose(
     ranking: Sequence[Candidate], wv: WaveletVariance, *, is_closed: bool = False
 ) -> tuple[Candidate, Fit]:
-    """The best of a ranking that the data support, and its fit.
-
-    is_closed: Whether no other model may be chosen.
-    """
+    """The best of a ranking that the data support, and its fit."""
     limit = rank_key(ranking[0]) + tuning.TIE
     tried: list[tuple[Candidate, Fit]] = []
     found: tuple[Candidate, Fit] | None = None
-    for candidate in _simplest_of_ties(ranking)[: tuning.FITS]:
+    tied = [item for item in ranking if rank_key(item) <= limit]
+    tied.sort(key=lambda item: item.n_parameters)
+    for candidate in (*tied, *ranking[len(tied) :])[: tuning.FITS]:
         if found is not None and found[1].valid and rank_key(candidate) > limit:
             break
         fitted = estimate(candidate.model, wv)
@@ -390,10 +389,7 @@ def _by_merging(wv: WaveletVariance, choices: Choices) -> Selection:
 
 
 def _with_slowest_held(others: Sequence[Process], wv: WaveletVariance) -> Fit | None:
-    """The best valid fit of a Gauss-Markov term of held time beside others; None if there is none.
-
-    From the length of the record on, a Gauss-Markov process is a random walk in it.
-    """
+    """The best valid fit of a Gauss-Markov term of held time beside others, or None."""
     times = wv.n * wv.dt / 2.0 ** np.arange(tuning.HELD_TIMES)
     models = (Model((*others, GaussMarkov(tau=float(tau)))) for tau in times)
     tried = [(estimate(model, wv), float(tau)) for model, tau in zip(models, times, strict=True)]
@@ -414,14 +410,6 @@ def _of_each(chosen: Candidate, fitted: Fit, wv: WaveletVariance) -> Fit:
     if not isinstance(wv, PooledVariance):
         return fitted
     return fit_joint(chosen.model, wv.parts, estimate, fitted)
-
-
-def _simplest_of_ties(ranking: Sequence[Candidate]) -> list[Candidate]:
-    """The ranking with the candidates that fit as well as the best one ordered by size."""
-    limit = rank_key(ranking[0]) + tuning.TIE
-    tied = [item for item in ranking if rank_key(item) <= limit]
-    tied.sort(key=lambda item: item.n_parameters)
-    return tied + list(ranking[len(tied) :])
 
 
 def _simplest_by_own_fit(

@@ -74,10 +74,7 @@ def ramp_or_walk(fitted: Fit, slope: Coefficients) -> Notice:
 
 
 def _partners(model: Model, other: Model) -> list[int | None]:
-    """For each term of a model, that of the other which stands for the same noise.
-
-    Gauss-Markov terms go one to one, those of the nearest correlation times together.
-    """
+    """For each term of a model, that of the other for the same noise; GM by nearest times."""
     partners: list[int | None] = []
     for term in model.terms:
         alike = [k for k, candidate in enumerate(other.terms) if _same(term, candidate)]

@@ -334,11 +334,7 @@ def _nodes(m: int) -> tuple[FloatArray, FloatArray]:
 def _of_blocks(
     kind: AllanFilter, spectrum: Periodogram, n: int, m: int
 ) -> tuple[float, float, float]:
-    """What the ends of a series do to an estimate, from means of blocks.
-
-    Returns: what reflection does to the mean, a factor; half the variance without reflection,
-        relative to its spectral integral; what reflection adds to it, u^4.
-    """
+    """What the ends do: factor of the mean; half the variance relative; variance added, u^4."""
     block = max(m // tuning.BLOCKS_OF_FAMILY, 1)
     size, average = round(n / block), round(m / block)
     grid = LagGrid.holding(3 * size, block)

@@ -173,10 +173,7 @@ def curve(
 
 
 def _apart(m: FloatArray) -> list[int]:
-    """Places of the averaging times that are kept.
-
-    m: Averaging times in samples, rising.
-    """
+    """Places of the averaging times, rising, in samples, that are kept."""
     kept: list[int] = []
     for place, each in enumerate(np.rint(m).tolist()):
         if each >= (np.rint(m[kept[-1]]) * tuning.LEAST_RATIO if kept else 1.0):

@@ -60,10 +60,7 @@ def pilot_psd(variance: FloatArray, averaging: FloatArray, dt: float) -> PSD:
 
 @lru_cache(maxsize=32)  # gaps hide other levels in each channel; 0.1 MB each
 def _points(averaging: tuple[float, ...]) -> tuple[FloatArray, FloatArray]:
-    """Logarithms of frequencies (cycles per sample), and weights of a spectrum there by level.
-
-    A power law on an octave is a polynomial of its points to rounding.
-    """
+    """Logarithms of frequencies (cycles per sample), and weights of a spectrum there by level."""
     frequency, weight = node_weights(averaging)
     lowest = np.log(tuning.HAAR_PEAK / averaging[-1])
     octaves = Panels.of(np.log(frequency) - lowest, np.log(2.0))
@@ -74,13 +71,7 @@ def _points(averaging: tuple[float, ...]) -> tuple[FloatArray, FloatArray]:
 
 
 class _Places:
-    """Places of values between knots, for repeated piecewise linear interpolation.
-
-    It is quick where many values in a row lie in one piece.
-
-    x: (n,).
-    knots: (K,), rising.
-    """
+    """Places (n,) between knots (K,), for repeated linear interpolation of values in long runs."""
 
     def __init__(self, x: FloatArray, knots: FloatArray) -> None:
         self._knots = knots

@@ -70,7 +70,8 @@ class Periodogram:
         """Two-sided spectrum, u^2/Hz."""
         powers, missed = self._fit
         factor = np.exp(missed[self._bin(f * dt)])
-        return np.asarray(dt * (powers @ _laws(f * dt)) * factor)
+        laws = np.stack([_law(law, f * dt, 1.0) for law in tuning.LAWS])
+        return np.asarray(dt * (powers @ laws) * factor)
 
     def root_square(self, f: FloatArray, dt: float) -> FloatArray:
         """Root of the mean square of the spectrum about a frequency, u^2/Hz."""
@@ -140,11 +141,7 @@ def _ordinates(piece: FloatArray) -> FloatArray:
 
 
 def _bins(power: FloatArray, spacing: float, block: int, high: float) -> FloatArray:
-    """Centre, count, mean, peakedness and block of the bins below a frequency, (5, bins).
-
-    power: (P, K), ordinates of several pieces, u^2 per cycle per block.
-    spacing: Of the ordinates, cycles per block.
-    """
+    """Centre, count, mean, peakedness and block of the bins below a frequency, (5, bins)."""
     least = tuning.LEAST_ORDINATE if len(power) > 1 else 2
     start, centre, width = _places(least, power.shape[1] + 2, spacing / block, high)
     power = power[:, least - 2 : least - 2 + int(np.sum(width))]
@@ -214,10 +211,6 @@ def _fitted(
                 pull[k] += part * ratio
         powers *= np.sqrt(pull / share)
     return powers
-
-
-def _laws(f: FloatArray) -> FloatArray:
-    return np.stack([_law(law, f, 1.0) for law in tuning.LAWS])
 
 
 def _law(power: float, f: FloatArray, dt: float) -> FloatArray:

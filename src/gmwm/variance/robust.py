@@ -53,7 +53,7 @@ import numpy as np
 from scipy import fft
 from scipy.optimize import brentq
 
-from gmwm._core.typing import FloatArray
+from gmwm._core.typing import QUARTILE, FloatArray
 from gmwm.process import PSD, legendre, quadrature
 from gmwm.variance import tuning
 from gmwm.variance.covariance.haar import centred_pairs, dyadic_levels, haar_counts
@@ -61,7 +61,6 @@ from gmwm.variance.covariance.lags import block_density
 from gmwm.variance.kernels import biweight_means, weighted_series
 
 EFFICIENCY = 0.6  # at Gaussian data, by default
-_QUARTILE = 0.6744897501960817  # median of |Z|
 _TAIL = 13.0  # the normal density beyond is below double precision
 _NODES = 256
 _SMALLEST_C, _LARGEST_C = 2.0, 1e4  # efficiency 0 is at c = 2.395; 1 - 1e-7 is below 1e4
@@ -140,13 +139,9 @@ def robust_variance(coefficients: FloatArray, efficiency: float = EFFICIENCY) ->
 
 
 def _start(w: FloatArray, largest: float) -> float:
-    """Median of the absolute coefficients over 0.6745, or their root mean square if it is zero.
-
-    Coefficients that are zero come out as rounding errors of the cumulative sum: with long slow
-    series up to about a millionth of the others.
-    """
+    """Median of the absolute coefficients over 0.6745; their root mean square if only rounding."""
     rank = w.size // 2
-    scale = float(np.partition(np.abs(w), rank)[rank]) / _QUARTILE
+    scale = float(np.partition(np.abs(w), rank)[rank]) / QUARTILE
     if scale > _ZERO * largest:  # which is at least the root mean square
         return scale
     square = largest * float(np.sqrt(np.mean((w / largest) ** 2)))

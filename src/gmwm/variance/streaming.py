@@ -78,10 +78,7 @@ def variance_of(sums: kernels.Sums, channel: Channel, confidence: float) -> Wave
 
 
 def _block_means(sums: kernels.Sums) -> tuple[FloatArray, int]:
-    """Means of blocks about the mean of the series, NaN where half of one is missing; their size.
-
-    There are fewer of them where samples are missing, for the covariance of blocks with gaps.
-    """
+    """Means of blocks about the mean, NaN where half of one is missing; their size."""
     n, missing, _, count, octave = sums.tallies.tolist()
     most = tuning.MOST_BLOCKS_WITH_GAPS if missing else tuning.MOST_BLOCKS
     values, there = sums.blocks[:, :count].copy()
@@ -350,11 +347,7 @@ class _Series:
         return own | self.sums._asdict()
 
     def set(self, arrays: Mapping[str, FloatArray]) -> None:
-        """Inverse of `arrays`.
-
-        Raises ValueError if they do not have the shapes and types of a series, or counts and places
-            in them lie outside these arrays.
-        """
+        """Inverse of `arrays`; raises ValueError if they are not those of a series."""
         for name, own in (self.rows._asdict() | self.sums._asdict()).items():
             given = arrays[name]
             if name in ("data", "present"):

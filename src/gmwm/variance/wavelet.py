@@ -428,6 +428,11 @@ class PooledVariance(WaveletVariance):
         return _shares(self.parts, self.tau.size)
 
     @property
+    def extent(self) -> str:
+        pooled = f"{len(self.parts)} recordings, {self.n_all:,} samples in all"
+        return f"{pooled} at {1.0 / self.dt:g} Hz"
+
+    @property
     def n_all(self) -> int:
         """Number of samples of all recordings."""
         return sum(part.n for part in self.parts)

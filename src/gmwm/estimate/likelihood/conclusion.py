@@ -233,15 +233,7 @@ def redundant_term(
 
 
 def _upper_limit(process: Process, top: Top, columns: Columns) -> float:
-    """95 % upper limit of the scale of a term whose amplitude is zero, at its present shape.
-
-    The quantile of the profile likelihood as a density of the scale. A random walk that can hardly
-    be seen shows in few degrees of freedom, so that the likelihood falls off much slower than its
-    curvature at zero suggests.
-
-    process: The term; its amplitude does not matter.
-    top: Of the other terms.
-    """
+    """95 % upper limit of the scale of a term of no amplitude, by its profile likelihood."""
     power = next(p.power for p in process.parameters if p.linear)
 
     def profile(scale: float) -> float:

@@ -283,10 +283,7 @@ class Iteration:
     def _extrapolated(
         self, stage: Stage, first: Stage, reached: Expectation
     ) -> tuple[Stage, Expectation]:
-        """A long step in the direction of two, if it climbs; else the second of them, if it does.
-
-        ``reached`` is the expectation of the first.
-        """
+        """A long step in the direction of two, if it climbs; else the second, if that does."""
         second = self.maximization(first, reached)
         coordinates = self.series.coordinates
         zs = [coordinates.pack(s.processes) for s in (stage, first, second)]
@@ -313,10 +310,7 @@ class Iteration:
 def _gauss_markov(
     process: Process, like: Process, moments: tuple[float, ...], steps: int, dt: float
 ) -> Process:
-    """A Gauss-Markov process with the parameters of the M step that ``like`` has open.
-
-    moments: Second moments of its state: later, cross, earlier and first, see `Expectation`.
-    """
+    """A Gauss-Markov process with the parameters of the M step that ``like`` has open."""
     n, sigma = steps + 1, like.values["sigma"]
     later, cross, earlier, first = moments
     delta = -float(np.expm1(-dt / float(process.values["tau"] or np.inf)))  # 1 - phi

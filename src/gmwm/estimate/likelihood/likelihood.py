@@ -395,10 +395,7 @@ def _from_user(model: Model, start: Model, coordinates: Coordinates) -> tuple[Pr
 
 
 def _filled(terms: Sequence[Process], model: Model) -> list[Any]:
-    """For each term the one of a model that is it with its open parameters filled in, or None.
-
-    The model has sorted its terms; any with the kind and the given values will do.
-    """
+    """For each term the one of a model that is it with its open parameters filled in, or None."""
     left, found = list(model.terms), []
     for term in terms:
         same = (

@@ -184,10 +184,7 @@ def _fit(series: Series, climb: Climb, method: str) -> Fit:
 
 
 def _spread(series: Series) -> tuple[Process, ...]:
-    """The noise terms with shapes spread over those that the record can show.
-
-    Each has the largest free amplitude that stays below the wavelet variances.
-    """
+    """The noise terms with shapes spread over the record's, each below the wavelet variances."""
     wv, terms, found = series.wv, series.coordinates.terms, []
     rank, count = 0.5, sum(bool(term.n_shapes) for term in terms)
     for term, process in zip(terms, series.start, strict=True):

@@ -162,10 +162,7 @@ def _present(design: Design, point: Point) -> list[int]:
 
 
 def _jacobian(end: Converged, moments: Moments) -> tuple[FloatArray, FloatArray]:
-    """Derivative of the moments by the coordinates of the terms that have an amplitude, (J, d).
-
-    Returns: derivative; curves of all terms at unit amplitude, less what the slope takes.
-    """
+    """Derivative of the moments by the coordinates of terms with an amplitude; curves of all."""
     design, point = end.design, end.point
     amplitudes, curves = design.amplitudes(point.x), design.curves(point.shapes)
     lost = moments.lost(design.unit_terms(point.shapes))
@@ -181,10 +178,7 @@ def _jacobian(end: Converged, moments: Moments) -> tuple[FloatArray, FloatArray]
 
 
 def _sandwich(jacobian: FloatArray, covariance: FloatArray, root: FloatArray) -> FloatArray:
-    """B V B' with B = (D' Omega D)^-1 D' Omega, on parameters scaled to be of like size.
-
-    root: (J, J), L with L'L = Omega.
-    """
+    """B V B' with B = (D' L' L D)^-1 D' L' L, on parameters scaled to be of like size."""
     if jacobian.shape[1] == 0:
         return np.zeros((0, 0))
     weighted = root @ jacobian

@@ -200,13 +200,7 @@ class GMWM:
         return found
 
     def _as_good_as_nested(self, found: Converged, problem: _Problem) -> Converged:
-        """The minimum under the weights of a model without one of its open terms.
-
-        It is taken if that needs less discrepancy.
-
-        The iteration of a model that does not describe the data may have several fixed points, and
-        a large discrepancy hides the misfit of the worse ones.
-        """
+        """The minimum under the weights of a nested model, if it needs less discrepancy."""
         terms, wv = problem.design.model.terms, problem.moments.wv
         noise = {term: i for i, term in enumerate(terms) if term.is_open and not term.is_drift}
         for i in noise.values():
@@ -292,10 +286,7 @@ class _Problem:
         return search(Profile(self.design, target, weight_root(covariance)))
 
     def dof(self, point: Point) -> int:
-        """Levels less the parameters of terms that have an amplitude.
-
-        A term without one fits nothing, and counted it would only raise the discrepancy.
-        """
+        """Levels less the parameters of terms that have an amplitude; one without fits nothing."""
         present = self.design.amplitudes(point.x) > 0.0
         return int(
             self.moments.wv.tau.size - sum(present[i] for i, _ in self.design.coordinates.owners)

@@ -22,6 +22,7 @@ from gmwm.estimate.problem.nonnegative import (
 from gmwm.estimate.problem.parameters import (
     Coordinates as Coordinates,
     keys_by_term as keys_by_term,
+    shape_of as shape_of,
 )
 from gmwm.estimate.problem.ramp import (
     Slope as Slope,

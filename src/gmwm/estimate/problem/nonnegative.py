@@ -27,10 +27,7 @@ def objectives_with(columns: FloatArray, candidates: FloatArray, y: FloatArray) 
 
 @compiled()
 def _orthonormal(unit: FloatArray, order: IntArray, size: int) -> tuple[FloatArray, FloatArray]:
-    """Q' (size, J) and R (size, size) of the first columns of ``order``, by Gram-Schmidt twice.
-
-    A column that depends on those before it has zeros in place of its direction.
-    """
+    """Q' (size, J), zeros if dependent, and R of the first columns; Gram-Schmidt twice."""
     rows = unit.shape[0]
     basis, upper = np.empty((size, rows)), np.zeros((size, size))
     for p in range(size):

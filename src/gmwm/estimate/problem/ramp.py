@@ -128,11 +128,7 @@ def _existing(wv: WaveletVariance) -> NDArray[np.intp]:
 
 
 def _solve(column: FloatArray, first: NDArray[np.intp], right: FloatArray) -> FloatArray:
-    """Solve for the covariance of differences of neighbouring blocks, at these places of all.
-
-    ``column`` is the autocovariance of all differences. A covariance that is singular to rounding
-    is solved by least squares.
-    """
+    """Solve for the covariance of block differences at these places; least squares if singular."""
     try:
         if first.size == column.size:
             return np.asarray(solve_toeplitz(column, right))

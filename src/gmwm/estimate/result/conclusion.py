@@ -219,11 +219,7 @@ def _indistinct_notices(model: Model, keys: Sequence[str], matrix: FloatArray) -
 
 
 def _bandwidth_notices(model: Model, wv: WaveletVariance) -> list[Notice]:
-    """Terms that are the sensor's own filter, and the white noise that they act as.
-
-    A Gauss-Markov process with a correlation time of a few samples is a low-pass of first order
-    where the model has no white noise beside it.
-    """
+    """Terms that are the sensor's own filter, and the white noise that they act as."""
     filtered = [i for i, term in enumerate(model.terms) if term.is_band_limited]
     if not filtered and not any(term.is_white for term in model.terms):
         times = ((i, term.values.get("tau")) for i, term in enumerate(model.terms))

@@ -335,10 +335,7 @@ def upper_amplitude(
 
 
 def _all_of_the_variance(process: Process, wv: WaveletVariance) -> float:
-    """Smallest 95 % upper limit over the levels of an amplitude that explains all of the variance.
-
-    Levels whose variance is not positive, as happens across gaps, are left out.
-    """
+    """Smallest 95 % upper limit over the levels of an amplitude that explains all variance."""
     alone = Scales.of(wv).curve(process.with_amplitude(1.0))
     tail = (1.0 - tuning.UPPER_LEVEL) / wv.tau.size
     quantile = np.maximum(2.0 * gammaincinv(0.5 * wv.dof, tail), _LEAST_QUANTILE)

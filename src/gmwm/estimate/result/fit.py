@@ -397,7 +397,7 @@ class Fit(Document, Printed):
             how += f", {self.weights} weights"
         elif self.trace:
             how += f", {len(self.trace)} iterations"
-        lines += wrapped(f"{self._size()}, {self.wv.tau.size} levels; {how}", indent=2)
+        lines += wrapped(f"{self.wv.extent}, {self.wv.tau.size} levels; {how}", indent=2)
         lines += ["", plain_table(_HEADS, [each.cells(units) for each in self.estimates]), ""]
         fitness = f"objective {self.objective:.4g} on {self.dof} degrees of freedom"
         if np.isfinite(self.p_value):
@@ -415,9 +415,6 @@ class Fit(Document, Printed):
         lines.append("valid" if self.valid else "NOT VALID")
         lines += bullets(self.notices)
         return "\n".join(lines)
-
-    def _size(self) -> str:
-        return self.wv.extent
 
     def plot(self, ax: Axes | None = None, *, units: str = "field") -> Axes:
         """Allan deviation with error bars, fitted curve, its 95 % band and components.

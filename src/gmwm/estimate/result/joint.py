@@ -71,10 +71,6 @@ class JointFit(Fit):
         table = plain_table(["parameter", "spread", "of each recording", "unit"], rows)
         return "\n".join([super().text(units), "", self.agreement, table])
 
-    def _size(self) -> str:
-        pooled = f"{len(self.parts)} recordings, {self.wv.n_all:,} samples in all"
-        return f"{pooled} at {1.0 / self.wv.dt:g} Hz"
-
     @property
     def agreement(self) -> str:
         """How many recordings there are, and whether they agree."""
@@ -136,11 +132,7 @@ def _curves_test(whole: Fit, each: Sequence[Fit]) -> float:
 
 
 def _heterogeneity(whole: Fit, each: Sequence[Fit]) -> tuple[float, dict[str, float]]:
-    """p-value of equal parameters, and the spread of each parameter.
-
-    Positive parameters are compared by their logarithm. Only recordings that determine all
-    parameters of the joint fit take part.
-    """
+    """p-value of equal parameters (positive ones as logarithms), and the spread of each."""
     keys = [key for key in whole.keys if key not in whole.upper_bounds]
     positive = _positive(whole.model)
     points, matrices = [], []

@@ -126,10 +126,7 @@ def update_jointly(
 
 @compiled()
 def _propagated(P: FloatArray, A: FloatArray, Q: FloatArray) -> FloatArray:
-    """A P A' + Q, symmetric: nothing damps what rounding leaves of an asymmetry.
-
-    Loops, for a product of matrices takes numba seconds to compile.
-    """
+    """A P A' + Q, symmetric; by loops, for numba takes seconds to compile a product."""
     size = P.shape[0]
     left, result = np.zeros((size, size)), Q.copy()
     for i in range(size):

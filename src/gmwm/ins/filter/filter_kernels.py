@@ -260,10 +260,7 @@ def _aid(
     innovated: Innovated,
     where: RunPlace,
 ) -> int:
-    """Correct the estimate by all measurements of an epoch; returns the event after them.
-
-    A measurement that is far off leaves covariance and estimate as they were.
-    """
+    """Correct the estimate by all measurements of an epoch; returns the event after them."""
     at, P, x = estimate
     epoch, n, rejected = events.epoch[event], samples.rotation.shape[0], where.rejected
     attitude = P[6, 6] + P[7, 7] + P[8, 8] if settings.second_order else 0.0
@@ -327,11 +324,7 @@ def _look(
     offset: float,
     change: Transition,
 ) -> tuple[Kinematics, FloatArray]:
-    """Solution ``offset`` s from an epoch, and angular rate; fills the errors' transition to there.
-
-    Noise and sensor errors over a part of a sampling interval are left out: they are far below the
-    noise of any fix.
-    """
+    """Solution ``offset`` s from an epoch, and angular rate; fills the transition to there."""
     at, _, x = estimate
     i = min(max(epoch if offset > 0.0 else epoch - 1, 0), samples.rotation.shape[0] - 1)
     sensed = np.empty(6)

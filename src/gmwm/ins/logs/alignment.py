@@ -123,11 +123,7 @@ def _state(
 def _levelled(
     measured: Measured, stretch: tuple[int, int], rest_sd: float | None, moving: float
 ) -> Alignment:
-    """A start that is levelled on a steady stretch, with a given heading or one from the data.
-
-    rest_sd: Standard deviation of the velocity at rest; ``None`` in motion.
-    moving: Tilt error by the accelerations of the motion, rad.
-    """
+    """A start that is levelled on a steady stretch, with a given heading or one from the data."""
     imu, aiding, models = measured.imu, measured.aiding, measured.sensors
     first, last = stretch
     length = (last - first) * imu.dt

@@ -220,10 +220,7 @@ def _course(aiding: Aiding, start: float) -> _Course | None:
 
 
 def _course_of_positions(positions: Fixes, start: float) -> _Course | None:
-    """Course between two fixes; those between them and the next one lie on the line.
-
-    Else one of the two is an outlier; if no others are far apart, the first two are taken.
-    """
+    """Course between two fixes; those between them and the next one lie on the line."""
     time, sd = positions.time, np.sqrt(np.mean(positions.sd[:, :2] ** 2, axis=1))
     first = None
     for i in np.flatnonzero((time >= start - 1e-6) & (time <= start + tuning.SEARCHED)):

@@ -261,11 +261,7 @@ def _deviations(
 
 
 def _repeated(time: FloatArray, position: FloatArray) -> BoolArray:
-    """Whether each position is the one before, written again, of a vehicle that moves.
-
-    A receiver at rest may hold its position, so that nothing is left out unless positions repeat in
-    motion: until the next one the vehicle has gone farther than ``tuning.REPEATED_WAY``.
-    """
+    """Whether each position is the one before, written again, of a vehicle that moves."""
     again = np.zeros(time.size, dtype=bool)
     again[1:] = np.all(position[1:] == position[:-1], axis=1)
     new = np.flatnonzero(~again & np.isfinite(position[:, 0]))

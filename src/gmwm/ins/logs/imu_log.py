@@ -208,11 +208,7 @@ def longest_run(samples: FloatArray) -> tuple[int, int]:
 
 
 def _cut_off(samples: FloatArray) -> dict[float, int]:
-    """Ends of the range at which samples stay -> how many.
-
-    Samples at an extreme that is none of the range are as often equal to the one before as others,
-    up to chance (binomial test).
-    """
+    """Ends of the range at which samples stay more than others (binomial test) -> how many."""
     parts = list(windows(samples.size))
     ends = [min(np.min(samples[p]) for p in parts), max(np.max(samples[p]) for p in parts)]
     at, again, equal = np.zeros(2, dtype=int), np.zeros(2, dtype=int), 0

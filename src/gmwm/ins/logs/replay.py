@@ -298,10 +298,7 @@ def smooth(replay: Replay, at: FloatArray) -> Smoothed:
 
 @dataclass(frozen=True, eq=False)
 class _Forward:
-    """The covariance along a solution, and the measurements for the way back.
-
-    Transitions are computed again on the way back: kept, they would be most of the memory.
-    """
+    """The covariance along a solution, and the measurements for the way back."""
 
     replay: Replay
     ready: Filter

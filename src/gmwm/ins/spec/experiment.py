@@ -14,7 +14,7 @@ from pydantic import BeforeValidator, Discriminator, Field, StrictInt, Tag
 from gmwm._core import checks
 from gmwm.errors import InputError
 from gmwm.ins import tuning
-from gmwm.ins.filter.aiding import Aiding, Outage, gnss
+from gmwm.ins.filter.aiding import Outage, gnss
 from gmwm.ins.filter.filter import InitialSd
 from gmwm.ins.filter.states import SensorStates
 from gmwm.ins.imu.increments import emulate
@@ -209,7 +209,8 @@ def _scenario(spec: ExperimentSpec, trajectory: Trajectory) -> Scenario:
                 f"outages: the one from {second.start:g} s begins before the one from "
                 f"{first.start:g} s ends at {first.end:g} s: join or separate them"
             )
-    aiding = _aiding(spec.gnss, trajectory)
+    imu = emulate(trajectory) if any(spec.gnss.lever_arm) else None
+    aiding = gnss(trajectory, **spec.gnss.given, imu=imu)
     scenario = Scenario(trajectory, aiding, tuple(outages), InitialSd(**spec.initial_sd.given))
     total = sum(each.time.size for each in aiding.fixes)
     if not total:
@@ -224,10 +225,6 @@ def _scenario(spec: ExperimentSpec, trajectory: Trajectory) -> Scenario:
                 "make the outage longer than the interval of the fixes"
             )
     return scenario
-
-
-def _aiding(spec: GnssSpec, trajectory: Trajectory) -> Aiding:
-    return gnss(trajectory, **spec.given, imu=emulate(trajectory) if any(spec.lever_arm) else None)
 
 
 def _source(given: _Truth, trajectory: Trajectory, folder: Path) -> Recorded | Simulated:

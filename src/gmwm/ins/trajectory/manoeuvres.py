@@ -301,11 +301,7 @@ def _course(plans: Sequence[Plan], time: FloatArray, speed: float, heading: floa
 def _attitude(
     course: _Course, lla: FloatArray, *, flat: bool = False, level: bool = False
 ) -> FloatArray:
-    """Roll, pitch and yaw at the epochs.
-
-    The specific force that is banked for has the Coriolis acceleration of the Earth's rotation, but
-    not that of the curved way, which is 1e-5 of gravity at 30 m/s.
-    """
+    """Roll, pitch and yaw at the epochs; banked for Coriolis too, not for the curved way."""
     speed, heading, climb = course.speed[::2], course.heading[::2], course.climb[::2]
     pitch, roll = np.zeros(speed.size), np.zeros(speed.size)
     if not level:

@@ -286,11 +286,7 @@ def _coefficients(given: Any, name: str) -> tuple[float | None, ...]:
 
 
 def _stable(coefficients: Sequence[float]) -> bool:
-    """Whether 1 - c1 z - c2 z^2 ... has all roots outside the unit circle.
-
-    By the partial autocorrelations, which must lie within (-1, 1): roots that nearly coincide
-    would be found too inexactly.
-    """
+    """Whether 1 - c1 z - c2 z^2 ... is stable, by partial autocorrelations: roots are inexact."""
     with np.errstate(divide="ignore", invalid="ignore"):
         return bool(np.all(np.abs(_partial_from_ar(coefficients)) < 1.0))
 

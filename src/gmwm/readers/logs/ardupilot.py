@@ -62,11 +62,7 @@ def _walk(
     kinds: npt.NDArray[np.int64],
     places: npt.NDArray[np.int64],
 ) -> tuple[int, int, int, int]:
-    """Kinds and places of wanted messages, up to an FMT or the end of what is there.
-
-    end: Of the message before.
-    Returns: their count, where the walk goes on, bytes that are no messages, end of the last one.
-    """
+    """Kinds and places of wanted messages up to an FMT: count, next place, odd bytes, last end."""
     count = between = 0
     while at + 3 <= data.size:
         kind = data[at + 2]

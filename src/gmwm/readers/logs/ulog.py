@@ -120,10 +120,7 @@ class _Stream(io.BufferedReader):
 
 
 def _check_format(text: bytes) -> None:
-    """Raise ValueError if messages of an IMU would have more numbers than a message has bytes.
-
-    pyulog writes out each element of arrays, and of messages within messages.
-    """
+    """Raise ValueError if IMU messages have more numbers than bytes; pyulog writes out each."""
     name, _, fields = text.decode(errors="replace").partition(":")
     if any(name in names for names in _RANKS):
         types = [field.split(" ")[0] for field in fields.split(";") if field]

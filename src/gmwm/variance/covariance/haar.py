@@ -93,11 +93,7 @@ def dyadic_levels(n: int) -> FloatArray:
 
 
 def _tent_sum(distance: FloatArray, block: int) -> FloatArray:
-    """Contribution of a kink of unit slope in the counts to their sum under a tent of +-block lags.
-
-    sum_h (1 - |h - x|/b)_+ (h)_+ - b (x)_+ with integer h, x: even in x, (y^3 - y)/(6 b) with
-    y = b - |x|.
-    """
+    """Sum of a kink of unit slope under a tent: (y^3 - y)/(6 b) with y = b - |x|."""
     y = np.maximum(block - np.abs(distance), 0.0)
     return np.asarray((y**3 - y) / (6.0 * block))
 
