@@ -28,7 +28,7 @@ BOUNDS = {
 RUN = {
     "table2": (TABLE_2, ["GMWM", "AV"], 6),
     "table3": (TABLE_3, ["GMWM", "MLE", "EM"], 6),
-    "table4": (TABLE_4, ["GMWM"], 3),
+    "table4": (TABLE_4, ["GMWM"], 2),
 }
 CASES = [(study, name) for name, by_study in BOUNDS.items() for study in by_study]
 # 48 correlation times in the record: maximum likelihood is above the bound, too.

@@ -358,7 +358,7 @@ def test_how_many_times_a_step_enlarges_the_deviation_is_judged_by_the_model(see
 def test_the_noise_that_an_estimated_step_takes_is_given_back():
     """Without that, the coarsest levels of white noise come out too small."""
     ratios = []
-    for seed in range(4):
+    for seed in range(6):
         x = noise(500 + seed, WHITE) + SAMPLE * (TIME > 2000.0) - SAMPLE * (TIME > 5000.0)
         fit = gmwm.calibrate(recording(x), WhiteNoise(), screening=(), remove_departures=True)
         wv = fit["gyro_x"].wv

@@ -105,7 +105,7 @@ def test_closed_form_equals_mean_over_simulation(process):
 )  # fmt: skip
 def test_variance_of_the_estimates_is_as_predicted(process):
     """It follows from the spectrum alone, which the other laws compare with each process."""
-    n, runs = 512, 200
+    n, runs = 512, 400
     rng = np.random.default_rng(21)
     waves = [wavelet_variance(process.simulate(n, 1.0, rng), 1.0).variance for _ in range(runs)]
     predicted = haar_covariance(process.psd, n, 1.0)
