@@ -4,7 +4,6 @@ from gmwm.estimate.problem.information import (
     density as density,
     error_growth as error_growth,
     frequency_nodes as frequency_nodes,
-    slope_dof as slope_dof,
     spectral_information as spectral_information,
 )
 from gmwm.estimate.problem.moments import (
@@ -13,6 +12,7 @@ from gmwm.estimate.problem.moments import (
     Scales as Scales,
     Simulation as Simulation,
     chi_square as chi_square,
+    slope_dof as slope_dof,
     weight_root as weight_root,
 )
 from gmwm.estimate.problem.nonnegative import (

@@ -108,37 +108,6 @@ def information_with(
     return information
 
 
-def slope_dof(
-    model: Model, keys: Sequence[str], covariance: FloatArray, n: int, dt: float
-) -> float:
-    """Degrees of freedom of the variance of a ramp's estimated slope.
-
-    That variance is computed from estimated noise; one of relative error r has 2/r^2 degrees of
-    freedom (Satterthwaite 1946, *Biometrics Bulletin* 2, 110-114). By the spectrum it is the
-    inverse of ``int |T|^2 / S df`` with T the Fourier transform of the ramp.
-
-    model: With the estimates.
-    keys: The estimated parameters of its noise.
-    covariance: (d, d), of these.
-    dt: Sampling interval, s.
-    """
-    coordinates, processes, names = _opened(model, keys)
-    if not names or not all(process.has_spectrum() for process in processes):
-        return np.inf
-    order = [list(keys).index(name) for name in names]
-    f, weight = frequency_nodes(n, dt)
-    phase = np.pi * f * n * dt
-    ramp = ((np.sin(phase) - phase * np.cos(phase)) / f**2) ** 2
-    total = density(processes, f, dt)
-    if not np.all(total > 0.0):
-        return np.inf
-    share = weight * ramp / total
-    by_z = share @ _log_slopes(coordinates, processes, f, dt) / np.sum(share)
-    gradient = np.linalg.solve(coordinates.jacobian(processes).T, by_z)
-    variance = float(gradient @ covariance[np.ix_(order, order)] @ gradient)
-    return 2.0 / variance if variance > 0.0 else np.inf
-
-
 def error_growth(model: Model, keys: Sequence[str], n: int, dt: float) -> dict[str, float]:
     """Exponents with which the relative standard errors of positive parameters grow, by key.
 

@@ -344,7 +344,7 @@ class CurveCoefficients:
         def covariance(model: Model) -> FloatArray:
             return regression.covariances(found, [scales.spectrum(model)])[0]
 
-        size, open_keys = curve.removed.size, {*fit.keys, *fit.upper_bounds}
+        open_keys = {*fit.keys, *fit.upper_bounds}
         walks = walks_beside(fit.model, open_keys, wv, may_lack=may_lack)
         if walks is not None:
             off, weights = walks.values - found.values, walks.weights
@@ -358,18 +358,8 @@ class CurveCoefficients:
             if fit.params[item.key] == 0.0 and np.isfinite(limit) and limit > 0.0:
                 largest = term.with_values(**{item.parameter.name: float(limit)})
                 total = total + tuning.MEAN_OF_LIMIT * covariance(Model((largest,)))
-        changes = np.zeros((len(fit.keys), size * size))
-        for row, key in enumerate(fit.keys):
-            step = _COEFFICIENT_STEP * min(fit.stderr[key], abs(fit.params[key]))
-            ends = (
-                covariance(fit.model.with_params({key: fit.params[key] + sign * step}))
-                for sign in (1.0, -1.0)
-            )
-            if step > 0.0:
-                changes[row] = np.subtract(*ends).ravel() / (2.0 * step)
-        values, vectors = np.linalg.eigh(fit.covariance) if fit.keys else (np.zeros(0), changes)
-        root = vectors * np.sqrt(np.maximum(values, 0.0))
-        return cls(curve.removed + found.values, total, root.T @ changes, np.zeros(0))
+        spread = _noise_errors(regression, found, fit.model, fit.keys, fit.covariance)
+        return cls(curve.removed + found.values, total, spread, np.zeros(0))
 
     def errors(self, contrast: FloatArray, level: float) -> FloatArray:
         """Half the interval of ``contrast @ values``, u, (m,), for contrasts (m, p).
@@ -394,6 +384,47 @@ class CurveCoefficients:
             outside = 2.0 * norm.sf(middle[:, None] / deviation) @ self.weights
             low, high = np.where(outside > 1.0 - level, (middle, high), (low, middle))
         return high
+
+
+def _noise_errors(
+    regression: Regression,
+    found: Coefficients,
+    model: Model,
+    keys: Sequence[str],
+    covariance: FloatArray,
+) -> FloatArray:
+    """Errors of the coefficients' covariance by each of k independent ones of the noise, (k, p p).
+
+    keys, covariance: Estimated parameters of a model, and (d, d), their covariance.
+    """
+    scales, deviation = Scales.of(regression.wv), np.sqrt(np.diag(covariance))
+    changes = np.zeros((len(keys), found.covariance.size))
+    for row, key in enumerate(keys):
+        value = model.params[key] or 0.0
+        step = _COEFFICIENT_STEP * min(deviation[row], abs(value))
+        ends = (model.with_params({key: value + sign * step}) for sign in (1.0, -1.0))
+        if step > 0.0:
+            above, below = regression.covariances(found, [scales.spectrum(each) for each in ends])
+            changes[row] = (above - below).ravel() / (2.0 * step)
+    values, vectors = np.linalg.eigh(covariance) if len(keys) else (np.zeros(0), changes)
+    return np.asarray((vectors * np.sqrt(np.maximum(values, 0.0))).T @ changes)
+
+
+def slope_dof(
+    model: Model, keys: Sequence[str], covariance: FloatArray, wv: WaveletVariance
+) -> float:
+    """Degrees of freedom of the variance of a ramp's slope, see `CurveCoefficients.errors`.
+
+    keys, covariance: Estimated parameters of a model's noise, and (d, d), their covariance.
+    """
+    noise = Model(tuple(term for term in model.terms if not term.is_drift) or model.terms)
+    if not keys or not all(term.has_spectrum() for term in noise.terms) or not _has_power(noise):
+        return np.inf
+    regression = RampRegression(wv)
+    found = regression.estimated(noise.psd)
+    error = _noise_errors(regression, found, noise, keys, covariance)
+    square = float(np.sum(error**2))
+    return 2.0 * found.variance**2 / square if square > 0.0 else np.inf
 
 
 def _has_power(noise: Model) -> bool:

@@ -13,8 +13,7 @@ from gmwm._core.text import brief, per_cent
 from gmwm._core.typing import FloatArray
 from gmwm._core.units import customary_unit
 from gmwm.estimate import tuning
-from gmwm.estimate.problem.information import slope_dof
-from gmwm.estimate.problem.moments import chi_square, weight_root
+from gmwm.estimate.problem.moments import chi_square, slope_dof, weight_root
 from gmwm.estimate.problem.parameters import Coordinates, drift_key, in_model_order
 from gmwm.estimate.problem.ramp import walks_beside
 from gmwm.estimate.problem.regressors import Coefficients
@@ -107,7 +106,7 @@ def conclude(
     upper = _upper_limits(found, all_keys, wv)
     dof = float("inf")
     if slope is not None:
-        dof = slope_dof(model, keys, matrix, wv.n, wv.dt)
+        dof = slope_dof(model, keys, matrix, wv)
         faint = [i for i in model.parameters if model.terms[i.term].is_walk and i.key in upper]
         walks = walks_beside(model, all_keys, wv) if faint and np.isfinite(dof) else None
         if walks is not None:

@@ -66,19 +66,26 @@ class TestSlopeOfAWalk:
         assert slope_p_value(gmwm.wavelet_variance(x, 1.0), WhiteNoise(1.0).psd) == 1.0
 
 
-@pytest.mark.parametrize("estimated", ["N", "sigma"])
-def test_degrees_of_freedom_are_those_of_generalised_least_squares(estimated):
-    n, error, step, truth = 1000, 0.1, 1e-4, {"N": 1.0, "sigma": 0.05}
+@pytest.mark.parametrize(("size", "estimated"), [(0.05, "N"), (0.05, "sigma"), (0.2, "K")])
+def test_degrees_of_freedom_are_those_of_generalised_least_squares(size, estimated):
+    """By dense matrices of all samples. Those of a walk were of its fast part, which is white."""
+    n, error, step = 1000, 0.1 * size, 1e-4
+    shape = toeplitz(np.exp(-np.arange(n) / 20.0))
+    if estimated == "K":
+        shape = np.minimum.outer(np.arange(n), np.arange(n)) + 1.0
+    truth = {"N": 1.0, estimated: size} if estimated != "N" else {"N": 1.0, "sigma": size}
 
-    def log_variance(N, sigma):
-        covariance = toeplitz(sigma**2 * np.exp(-np.arange(n) / 20.0)) + N**2 * np.eye(n)
+    def log_variance(N, other):
         design = np.column_stack([np.arange(n) - 0.5 * (n - 1), np.ones(n)])
-        return np.log(np.linalg.inv(design.T @ np.linalg.solve(covariance, design))[0, 0])
+        solved = np.linalg.solve(other**2 * shape + N**2 * np.eye(n), design)
+        return np.log(np.linalg.inv(design.T @ solved)[0, 0])
 
-    beside = [truth | {estimated: truth[estimated] + d} for d in (step, -step)]
-    gradient = (log_variance(**beside[0]) - log_variance(**beside[1])) / (2.0 * step)
-    model = WhiteNoise(truth["N"]) + GaussMarkov(sigma=truth["sigma"], tau=20.0)
-    found = slope_dof(model, [estimated], np.array([[error**2]]), n, 1.0)
+    ends = [truth | {estimated: truth[estimated] + d} for d in (step, -step)]
+    above, below = (log_variance(*each.values()) for each in ends)
+    slow = RandomWalk(size) if estimated == "K" else GaussMarkov(sigma=size, tau=20.0)
+    model, wv = WhiteNoise(1.0) + slow, gmwm.wavelet_variance(np.arange(float(n)) % 2, 1.0)
+    found = slope_dof(model, [estimated], np.array([[error**2]]), wv)
+    gradient = (above - below) / (2.0 * step)
     assert found == pytest.approx(2.0 / (gradient * error) ** 2, rel=0.03)
 
 
