@@ -106,7 +106,7 @@ def quantity_of(unit: str) -> str:
     )
 
 
-AUXILIARY = ("temperature", "voltage", "clock")
+AUXILIARY = ("temperature", "voltage", "vibration", "clock")
 """Quantities of channels that are kept for what they explain; no error model is fitted to them."""
 
 

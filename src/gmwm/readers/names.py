@@ -141,13 +141,12 @@ def _as_channel(words: Sequence[str], bracket: str) -> Meaning | None:
 
 
 def _as_auxiliary(words: Sequence[str], bracket: str) -> Meaning | None:
-    """Temperature and voltage, by a word of the name (``imu_temp1``) or by the unit."""
+    """Temperature, voltage and vibration, by a word of the name (``imu_temp1``) or by the unit."""
     if not _OTHER_AUXILIARY.isdisjoint({*words[:1]} - {"t"} | {*words[1:]}):
         return None  # "T [degC]" is one, "time of temp" is not
     found = auxiliary_unit(bracket)
     if found is not None:
-        is_known = found.quantity in ("temperature", "voltage")
-        return Meaning(found.quantity, bracket) if is_known else None
+        return None if found.quantity == "clock" else Meaning(found.quantity, bracket)
     quantities = [_AUXILIARY_WORDS.get(word.rstrip("0123456789")) for word in words]
     quantity = next((quantity for quantity in quantities if quantity), None)
     if quantity is None:

@@ -35,7 +35,7 @@ class Channel:
         Samples in the SI unit of the quantity, mean not removed; NaN where one is missing.
     dt : float
         Sampling interval, s.
-    quantity : {"gyro", "accel", "temperature", "voltage", "clock", None}
+    quantity : {"gyro", "accel", "temperature", "voltage", "vibration", "clock", None}
         Angular rate (rad/s), specific force (m/s^2), an auxiliary quantity (degC, V, s) or, if
         ``None``, something else in its own unit.
     unit : str

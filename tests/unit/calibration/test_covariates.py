@@ -121,6 +121,22 @@ def test_a_curve_leaves_nothing_of_a_clean_channel():
     assert np.std(left[8:-8]) < 1e-3 * np.std(cubic(temperature))
 
 
+def test_bias_follows_the_power_of_vibration(tmp_path):
+    """Of a shaker: the column is kept by its name, and its power may be in g^2."""
+    power = 2.0 * (1.0 - np.cos(4.0 * np.pi * np.arange(SIZE) / SIZE))
+    bias = 0.01 * power + N / np.sqrt(DT) * np.random.default_rng(4).normal(size=SIZE)
+    columns = {"time [s]": DT * np.arange(SIZE), "accel_x [m/s^2]": bias}
+    columns["vibration [g^2]"] = power / 9.80665**2
+    rows = np.column_stack([*columns.values()])
+    path = tmp_path / "shaker.csv"
+    np.savetxt(path, rows, "%.9g", ",", header=",".join(columns), comments="")
+    found = gmwm.calibrate(gmwm.read(path), covariates={"vibration": "linear"}, model="N", jobs=1)
+    curve = found.curves["accel_x"]
+    _, value, error = curve.band(np.array([0.5, 3.5]))
+    assert np.diff(value)[0] == pytest.approx(0.03, abs=2.0 * error.sum())
+    assert error.sum() < 1e-3
+
+
 def test_channels_of_two_rates_have_curves():
     fast, slow = recording(4), recording(5, temperature=warm_up()[::2], size=SIZE // 2)
     other = replace(slow["gyro_x"], name="gyro_y", dt=2.0 * DT)
