@@ -290,7 +290,8 @@ def _numbers(
 @options(
     """
     --to NAME  The program; see --list.
-    --horizon S  Longest outage that the numbers cover, in seconds; 60 by default.
+    --horizon S  Longest outage that the numbers cover, in seconds; 60 by default, 1 in motion.
+    --interval S  Shortest time between updates in seconds, for a motion.json; 0.1 by default.
     --form FORM  N+K, N+GM, ...: most programs hold one; state-space holds any.
     -o --output FILE  File to write instead of printing; .npz for state-space.
     --explain  Print what the numbers are, axis by axis, in place of the file.
@@ -306,6 +307,7 @@ def export(
     files: tuple[Path, ...],
     target: str | None,
     horizon: float | None,
+    interval: float | None,
     form: str | None,
     temperature: float | None,
     output: Path | None,
@@ -316,9 +318,9 @@ def export(
     """Write numbers for a filter as the program wants them.
 
     FILE is a calibration.json, numbers that gmwm bound or gmwm reduce saved, or a motion.json, then
-    for updates every 0.1 s and outages up to --horizon, by default 1 s. Several files make one IMU,
-    such as gyros and accelerometers of different rates. The numbers of a calibration are the
-    smallest that are not overconfident for its error models; --explain has the details.
+    for updates every --interval and outages up to --horizon. Several files make one IMU, such as
+    gyros and accelerometers of different rates. The numbers of a calibration are the smallest that
+    are not overconfident for its error models; --explain has the details.
 
     Exit status: 0 if the numbers were written, 1 if an axis is not valid (nothing is written), 2 if
     the input cannot be used.
@@ -329,7 +331,7 @@ def export(
       gmwm export gyro.json accel.json --to px4
       gmwm export --list
     """
-    from gmwm.export import CURVES, TARGETS, not_valid, refusal
+    from gmwm.export import CURVES, TARGETS, in_motion, not_valid, refusal
 
     if listed:
         rows = [(t.name, t.title, t.form, t.file_name) for t in TARGETS.values()]
@@ -343,7 +345,7 @@ def export(
     from gmwm._core import checks
 
     checks.choice("--to", target, (*TARGETS, *CURVES))
-    given = [_at(load(file), temperature) for file in files]
+    given = in_motion([_at(load(file), temperature) for file in files], horizon, interval)
     for each in (n for one in given for n in getattr(one, "notices", ()) if n.code == "other-run"):
         click.echo(f"gmwm: {each}", err=True)
     if explain:

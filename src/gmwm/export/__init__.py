@@ -18,6 +18,7 @@ from gmwm.export.imu import (
     Triad as Triad,
     axis_of as axis_of,
     imu_of as imu_of,
+    in_motion as in_motion,
     is_reserved as is_reserved,
     not_valid as not_valid,
     reason as reason,

@@ -14,6 +14,7 @@ from gmwm._core.files import content_of, toml_beside, writable_file, write_text
 from gmwm.calibration import Calibration
 from gmwm.errors import InputError
 from gmwm.export.curves import CURVES
+from gmwm.export.imu import in_motion
 from gmwm.export.keys import MemoryKeys, Pair, WalkKeys, entries
 from gmwm.export.state_space import StateSpaceFile
 from gmwm.export.target import ImuFile, JsonFile, Target
@@ -53,6 +54,7 @@ def export(
     target: str,
     *,
     horizon: float | None = None,
+    interval: float | None = None,
     form: str | None = None,
     path: str | os.PathLike[str] | None = None,
 ) -> str:
@@ -65,12 +67,14 @@ def export(
     numbers : Calibration, FilterNumbers, InMotion, or a sequence of them
         Of a calibration, those of `gmwm.bound` are written; those of `gmwm.reduce` if it has a
         random walk and the program has no place for one. Of noise in motion, `InMotion.numbers`
-        from 0.1 s to the horizon, the largest of all IMUs. Several together make one IMU, such as
-        gyros and accelerometers of different rates.
+        from the interval to the horizon, the largest of all IMUs. Several together make one IMU,
+        such as gyros and accelerometers of different rates.
     target : str
         Name of the program: "kalibr", "gtsam", ...
     horizon : float, optional
         Longest outage that the numbers are for, s; 60 s by default, 1 s in motion.
+    interval : float, optional
+        Shortest time between updates, s, for noise in motion; 0.1 s by default.
     form : str, optional
         Of the numbers, "N+K" or "N+GM"; each program holds one. For "state-space", which holds the
         full model, also another: see `gmwm.bound`.
@@ -95,7 +99,7 @@ def export(
         if path is not None:
             write_text(writable_file(path), text)
         return text
-    chosen = TARGETS[target]
+    chosen, given = TARGETS[target], in_motion(given, horizon, interval)
     if path is None:
         return chosen.export(given, horizon, form)
     return chosen.save(writable_file(path), given, horizon, form)

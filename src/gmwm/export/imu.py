@@ -208,8 +208,6 @@ def numbers_of(
     """
     if isinstance(given, Calibration):
         return usable(given, form, HORIZON if horizon is None else horizon, tau=tau)
-    if isinstance(given, InMotion):
-        given = in_motion(given, MOTION_HORIZON if horizon is None else horizon)
     if not isinstance(given, FilterNumbers):
         raise InputError(
             f"{checks.shown(given)} has no numbers to export: give a calibration, noise in motion, "
@@ -228,10 +226,23 @@ def numbers_of(
     return given
 
 
-def in_motion(found: InMotion, horizon: float) -> FilterNumbers:
-    """The largest N and K of all IMUs for updates every 0.1 s, or every horizon if it is less."""
+def in_motion(given: Iterable[Any], horizon: float | None, interval: float | None) -> list[Any]:
+    """What is given, with the largest N and K of all IMUs in place of noise in motion.
+
+    horizon, interval: s; by default 1 s, and updates every 0.1 s or the horizon if that is less.
+    Raises InputError if an interval is given to nothing in motion, or flights do not show it.
+    """
+    found = list(given)
+    if interval is not None and not any(isinstance(each, InMotion) for each in found):
+        raise InputError("interval: only numbers of noise in motion depend on it, leave it out")
+    end = MOTION_HORIZON if horizon is None else horizon
+    start = min(INTERVAL, end) if interval is None else interval
+    return [_bounding(each, start, end) if isinstance(each, InMotion) else each for each in found]
+
+
+def _bounding(found: InMotion, interval: float, horizon: float) -> FilterNumbers:
     axes = {}
-    for name, model in found.numbers(min(INTERVAL, horizon), horizon).items():
+    for name, model in found.numbers(interval, horizon).items():
         tau, variance = found.envelope(name)
         true = float(between(tau, variance, np.array([horizon]))[0])
         nees = true / float(2.0 * model.haar_variance(np.array([horizon]), tau[0])[0])
@@ -240,7 +251,7 @@ def in_motion(found: InMotion, horizon: float) -> FilterNumbers:
         axes[name] = AxisFilterNumbers(
             "N+K", model, horizon, 0.0, "motion", predicted, quantity=quantity
         )
-    source = f"{len(found.imus)} IMUs in motion"
+    source = f"{len(found.imus)} IMUs in motion, updates every {interval:g} s"
     return FilterNumbers(axes, source, 1.0 / tau[0], sum(found.durations))
 
 

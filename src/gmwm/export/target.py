@@ -44,7 +44,7 @@ _HOW = {
     "bound": "the smallest that are never overconfident for the error models",
     "reduce": "by gmwm.reduce, consistent on average, since no N+GM bounds a random walk",
     "given": "given, not from a recording",
-    "motion": "with them errors in motion grow at most as predicted from 0.1 s on",
+    "motion": "with them errors in motion grow at most as predicted between updates",
 }
 
 

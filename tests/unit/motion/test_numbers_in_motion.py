@@ -1,5 +1,7 @@
 """Numbers for filters from curves in motion."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -104,6 +106,24 @@ def test_export_writes_the_numbers():
     assert "NEES at 1 s: gyro 0." in by_axis
     with pytest.raises(gmwm.InputError, match="these flights show"):
         gmwm.export(found, "kalibr", horizon=60.0)
+
+
+def test_exports_are_for_the_interval_of_the_updates(run, tmp_path):
+    """Bounded angles at 1 s need an N that is less by the root of ten than at 0.1 s."""
+    found = in_motion([allan(QuantizationNoise(1e-3))])
+    found.save(tmp_path / "motion.json")
+    densities = []
+    for given in ({}, {"interval": 1.0, "horizon": 2.0}):
+        flags = [part for name, value in given.items() for part in (f"--{name}", value)]
+        code, out, error = run("export", tmp_path / "motion.json", "--to", "kalibr", *flags)
+        assert (code, error) == (0, "")
+        assert f"updates every {given.get('interval', 0.1):g} s" in out
+        assert out == gmwm.export(found, "kalibr", **given)
+        densities.append(float(re.search(r"gyroscope_noise_density: (\S+)", out)[1]))
+        assert "gyro_x" in gmwm.export(found, "state-space", **given)
+    assert densities[0] / densities[1] == pytest.approx(np.sqrt(10.0), rel=0.02)
+    with pytest.raises(gmwm.InputError, match="only numbers of noise in motion depend on it"):
+        gmwm.export([], "kalibr", interval=1.0)
 
 
 def test_page_shows_curves_factors_and_numbers(tmp_path):
