@@ -9,7 +9,7 @@ import pytest
 import fuzz
 from marks import slow
 
-SOME = {"npy": 150, "odd": 1, "document": 10, "study": 6, "field": 12, "fleet": 2}
+SOME = {"npy": 150, "odd": 2, "document": 10, "study": 6, "field": 12, "fleet": 2}
 SOME |= {"gzip": 40, "datasheet": 60}
 SOME |= dict.fromkeys(("mat", "mat73", "hdf5"), 3)  # each is first tried in a process of its own
 
