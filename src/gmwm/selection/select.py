@@ -294,9 +294,7 @@ def _choose(
     limit = rank_key(ranking[0]) + tuning.TIE
     tried: list[tuple[Candidate, Fit]] = []
     found: tuple[Candidate, Fit] | None = None
-    tied = [item for item in ranking if rank_key(item) <= limit]
-    tied.sort(key=lambda item: item.n_parameters)
-    for candidate in (*tied, *ranking[len(tied) :])[: tuning.FITS]:
+    for candidate in _simplest_of_ties(ranking)[: tuning.FITS]:
         if found is not None and found[1].valid and rank_key(candidate) > limit:
             break
         fitted = estimate(candidate.model, wv)
@@ -410,6 +408,14 @@ def _of_each(chosen: Candidate, fitted: Fit, wv: WaveletVariance) -> Fit:
     if not isinstance(wv, PooledVariance):
         return fitted
     return fit_joint(chosen.model, wv.parts, estimate, fitted)
+
+
+def _simplest_of_ties(ranking: Sequence[Candidate]) -> list[Candidate]:
+    """The ranking with the candidates that fit as well as the best one ordered by size."""
+    limit = rank_key(ranking[0]) + tuning.TIE
+    tied = [item for item in ranking if rank_key(item) <= limit]
+    tied.sort(key=lambda item: item.n_parameters)
+    return tied + list(ranking[len(tied) :])
 
 
 def _simplest_by_own_fit(
