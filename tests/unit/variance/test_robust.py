@@ -392,3 +392,12 @@ def test_simulated_covariance_of_clean_series(process):
     # Consistent: the bias is of second order, below the relative variance of an estimate.
     error = 4.0 * np.sqrt(variance / runs)
     assert np.all(np.abs(found.mean(axis=0) - truth) < error + relative * truth)
+
+
+@pytest.mark.parametrize("process", [gmwm.QuantizationNoise(1.0), gmwm.RandomWalk(1.0)], ids=repr)
+@pytest.mark.parametrize("efficiency", [0.6, 0.95])
+def test_no_variance_is_larger_than_the_efficiency_says(process, efficiency):
+    """Sums over blocks would make that of pure quantization noise twice as large."""
+    classical = haar_covariance(process.psd, 4096, 1.0)
+    found = robust_covariance(process.psd, 4096, 1.0, efficiency, classical)
+    assert np.all(np.diag(found) < 1.000001 * np.diag(classical) / efficiency)
