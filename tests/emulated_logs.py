@@ -8,24 +8,14 @@ from functools import lru_cache
 
 import numpy as np
 
-from gmwm.ins import (
-    Fixes,
-    Imu,
-    Measured,
-    SensorModels,
-    Trajectory,
-    car_drive,
-    emulate,
-    fixed_wing_loiter,
-    gnss,
-    helicopter_mapping,
-)
+import gmwm
+from gmwm.ins import Fixes, Imu, Measured, SensorModels, Trajectory, gnss, helicopter_mapping
 from gmwm.study.demo import LEVER_ARM, sensors
 
 VEHICLES: dict[str, Callable[..., Trajectory]] = {
-    "car": car_drive,
+    "car": gmwm.ins.car_drive,
     "helicopter": helicopter_mapping,
-    "loiter": fixed_wing_loiter,
+    "loiter": gmwm.ins.fixed_wing_loiter,
 }
 
 FAULTS = {
@@ -112,7 +102,7 @@ def emulated_log(
 @lru_cache(maxsize=4)
 def _world(vehicle: str, duration: float, rate: float) -> tuple[Trajectory, Imu]:
     truth = VEHICLES[vehicle](duration=duration, dt=1.0 / rate)
-    return truth, emulate(truth)
+    return truth, gmwm.ins.emulate(truth)
 
 
 def _with_outliers(fixes: Fixes, faults: tuple[str, ...], rng: np.random.Generator) -> Fixes:

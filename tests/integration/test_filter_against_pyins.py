@@ -12,17 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
+import gmwm
 from gmwm import GaussMarkov, RandomWalk, WhiteNoise
-from gmwm.ins import (
-    InitialSd,
-    Outage,
-    SensorModels,
-    Trajectory,
-    emulate,
-    gnss,
-    helicopter_mapping,
-    navigate,
-)
+from gmwm.ins import Outage, SensorModels, Trajectory, emulate, gnss, helicopter_mapping, navigate
 from gmwm.ins.geometry import ned_difference
 
 with warnings.catch_warnings():
@@ -36,7 +28,9 @@ pytestmark = [
 
 DT = 1.0 / 32.0  # sums of it are exact, so both filters cut their steps at the same epochs
 STEP = 8 * DT
-INITIAL = InitialSd(position=2.0, velocity=0.1, tilt=np.radians(0.1), heading=np.radians(0.5))
+INITIAL = gmwm.ins.InitialSd(
+    position=2.0, velocity=0.1, tilt=np.radians(0.1), heading=np.radians(0.5)
+)
 POSITION_SD, VELOCITY_SD = 1.0, 0.05
 
 

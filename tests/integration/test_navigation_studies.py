@@ -9,22 +9,9 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
+import gmwm
 from gmwm import GaussMarkov, WhiteNoise
-from gmwm.ins import (
-    Outage,
-    Scenario,
-    SensorModels,
-    Simulated,
-    at_epoch,
-    covariance_analysis,
-    difference,
-    gnss,
-    helicopter_mapping,
-    innovation_test,
-    monte_carlo,
-    over_time,
-    spread,
-)
+from gmwm.ins import Outage, SensorModels, innovation_test, monte_carlo, over_time, spread
 from gmwm.ins.simulation import GROUPS
 from gmwm.ins.simulation.consistency import sizes
 
@@ -47,12 +34,12 @@ class Study:
     """Two filters over the same runs, with one outage before the end."""
 
     def __init__(self, duration, dt, outage, runs, seed, jobs=1):
-        truth = helicopter_mapping(duration=duration, dt=dt)
-        self.scenario = Scenario(truth, gnss(truth), (outage,))
+        truth = gmwm.ins.helicopter_mapping(duration=duration, dt=dt)
+        self.scenario = gmwm.ins.Scenario(truth, gmwm.ins.gnss(truth), (outage,))
         self.outage, self.runs = outage, runs
         self.found = monte_carlo(
             self.scenario,
-            Simulated(TRUE),
+            gmwm.ins.Simulated(TRUE),
             {"true": TRUE, "slow": SLOW_ONLY},
             runs,
             seed,
@@ -63,7 +50,7 @@ class Study:
         """At the end of the outage, and while GNSS is on and the filter has settled."""
         runs = self.found[name]
         return (
-            at_epoch(runs, runs.index(self.outage.end)),
+            gmwm.ins.at_epoch(runs, runs.index(self.outage.end)),
             over_time(runs, 0.15 * self.outage.start, self.outage.start),
         )
 
@@ -114,7 +101,7 @@ def assert_found_out(study):
 def assert_analysis_agrees(study):
     """Expected and observed figures at the end of the outage."""
     for name, believed in (("true", TRUE), ("slow", SLOW_ONLY)):
-        analysis = covariance_analysis(study.scenario, TRUE, believed)
+        analysis = gmwm.ins.covariance_analysis(study.scenario, TRUE, believed)
         at, runs = analysis.index(study.outage.end), study.found[name]
         found = spread(runs, study.outage.end)["horizontal"]
         north, east = analysis.sd[at, :2]
@@ -130,7 +117,7 @@ def assert_analysis_agrees(study):
 
 def assert_better_model_navigates_better(study):
     each = study.horizontal()
-    found = difference(each["slow"], each["true"], "horizontal")
+    found = gmwm.ins.difference(each["slow"], each["true"], "horizontal")
     assert found.significant
     assert found.value > 0.0
     assert found.ratio_lower > 1.0

@@ -11,7 +11,7 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
-from scipy.stats import binom
+from scipy.stats import binom, chi2
 
 import gmwm
 from gmwm import Channel, InputError, QuantizationNoise, RandomWalk, RateRamp, Resonance, WhiteNoise
@@ -113,6 +113,18 @@ def test_times_are_rounded_sorted_and_cut_for_each_kind():
 
 
 # -- intervals ------------------------------------------------------------------------------------
+
+
+def test_intervals_of_the_total_deviation_have_the_bias_and_freedom_that_are_published():
+    """Of a random walk of N samples: 1 - 0.75 m/N and 0.93 N/m - 0.36 (NIST SP 1065, table 7)."""
+    n = 1024
+    x = RandomWalk(1.0).simulate(n, 1.0, 3)
+    found = gmwm.deviations(x, 1.0, "total", [64.0, 128.0, 256.0], confidence=1e-6)
+    share = found.tau["total"] / n
+    freedom = 0.93 / share - 0.36
+    median = (1.0 - 0.75 * share) * chi2.ppf(0.5, freedom) / freedom
+    ratio = (found.deviation["total"] / found.lower["total"]) ** 2
+    np.testing.assert_allclose(ratio, median, rtol=0.05)
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ import allantools
 import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
-from scipy.stats import binom
+from scipy.stats import binom, chi2
 
 import gmwm
 from marks import slow
@@ -61,6 +61,12 @@ def test_removing_a_drift_from_the_moments_is_removing_it_from_the_series():
     np.testing.assert_allclose(
         before.detrended(0.7), gmwm.wavelet_variance(x, dt=0.1).variance, rtol=1e-9
     )
+
+
+def test_ends_of_intervals_are_quantiles_of_chi_square():
+    wv = gmwm.wavelet_variance(gmwm.WhiteNoise(1.0).simulate(1000, 1.0, 3), dt=1.0, confidence=0.9)
+    for end, chance in ((wv.lower, 0.95), (wv.upper, 0.05)):
+        np.testing.assert_allclose(chi2.cdf(wv.dof * wv.variance / end, wv.dof), chance)
 
 
 @pytest.mark.parametrize(

@@ -9,23 +9,7 @@ from scipy import stats
 import gmwm
 from gmwm import GaussMarkov, RandomWalk, RateRamp, Resonance, Sinusoid, WhiteNoise
 from gmwm.errors import InputError
-from gmwm.ins import (
-    Aiding,
-    Fixes,
-    Imu,
-    InitialSd,
-    NavState,
-    Outage,
-    SensorModels,
-    barometer,
-    car_drive,
-    emulate,
-    gnss,
-    helicopter_mapping,
-    integrate,
-    navigate,
-    standstills,
-)
+from gmwm.ins import Aiding, Fixes, SensorModels, emulate, gnss, helicopter_mapping, navigate
 from gmwm.ins.filter import Filter
 from gmwm.ins.geometry import matrix_from_rotation_vector, matrix_from_rpy, rpy_from_matrix
 from marks import every, slow
@@ -36,7 +20,9 @@ SENSORS = SensorModels.of(
         "accel": WhiteNoise(1e-3) + GaussMarkov(2e-3, 2.0) + GaussMarkov(1e-3, 100.0),
     }
 )
-INITIAL = InitialSd(position=1.0, velocity=0.1, tilt=np.radians(0.1), heading=np.radians(0.3))
+INITIAL = gmwm.ins.InitialSd(
+    position=1.0, velocity=0.1, tilt=np.radians(0.1), heading=np.radians(0.3)
+)
 TAIL = 1e-7
 """Chance that a right filter fails one check on one side; there are some thousand."""
 
@@ -47,7 +33,7 @@ def started(truth, rng):
     radius = 6.37e6
     lla = first.lla + np.array([x[0] / radius, x[1] / (radius * np.cos(first.lla[0])), -x[2]])
     turned = matrix_from_rotation_vector(-x[6:]) @ matrix_from_rpy(first.rpy)
-    return NavState(lla, first.velocity + x[3:6], rpy_from_matrix(turned))
+    return gmwm.ins.NavState(lla, first.velocity + x[3:6], rpy_from_matrix(turned))
 
 
 @dataclass(frozen=True)
@@ -122,15 +108,17 @@ def aided(kind, truth):
     if kind == "coloured":
         return gnss(
             truth, position_sd=0.3, coloured_sd=(1.5, 1.5, 3.0), coloured_tau=60.0, velocity_sd=0.1
-        ) + barometer(truth, 2.0, 1.0)
-    return gnss(truth) + standstills(truth, 0.5, 0.02) + barometer(truth, 5.0, 2.0)
+        ) + gmwm.ins.barometer(truth, 2.0, 1.0)
+    return (
+        gnss(truth) + gmwm.ins.standstills(truth, 0.5, 0.02) + gmwm.ins.barometer(truth, 5.0, 2.0)
+    )
 
 
 KINDS = {
     "position": helicopter_mapping,
     "antenna": helicopter_mapping,
     "coloured": helicopter_mapping,
-    "car": car_drive,
+    "car": gmwm.ins.car_drive,
 }
 
 
@@ -141,7 +129,7 @@ KINDS = {
 )
 def test_errors_have_the_covariance_of_the_filter(kind, duration, dt, outage, runs, seed):
     truth = KINDS[kind](duration=duration, dt=dt)
-    aiding = aided(kind, truth).without([Outage(outage, 60.0)])
+    aiding = aided(kind, truth).without([gmwm.ins.Outage(outage, 60.0)])
     ensemble(truth, aiding, runs, before=[outage + 60.0], seed=seed).check()
 
 
@@ -238,7 +226,7 @@ def test_without_fixes_it_is_the_free_inertial_solution(hop):
     solution = navigate(
         imu, hop.state(0), SENSORS, Aiding(), interval=hop.duration, second_order=False
     )
-    free = integrate(imu, hop.state(0))
+    free = gmwm.ins.integrate(imu, hop.state(0))
     assert solution.innovations.time.size == 0
     # The attitude matrix is cleaned at other epochs.
     np.testing.assert_allclose(solution.lla[-1], free.lla[-1], rtol=1e-12)
@@ -272,7 +260,7 @@ def test_thirty_sensor_states_and_every_kind_of_block():
 
 def test_a_covariance_step_of_ten_samples_is_as_good_as_one():
     truth = helicopter_mapping(duration=150.0, dt=0.02)
-    aiding = gnss(truth).without([Outage(90.0, 40.0)])
+    aiding = gnss(truth).without([gmwm.ins.Outage(90.0, 40.0)])
     fine, _ = flown(truth, aiding, step=0.02, before=[130.0])
     coarse, _ = flown(truth, aiding, step=0.2, before=[130.0])
     np.testing.assert_allclose(coarse.sd, fine.sd, rtol=2e-3)
@@ -285,7 +273,7 @@ def test_an_estimated_sensor_error_decays_in_an_outage():
     sensors = SensorModels.of(
         {"gyro": WhiteNoise(1e-5), "accel": WhiteNoise(1e-4) + GaussMarkov(0.02, 10.0)}
     )
-    aiding = gnss(truth, position_sd=0.05, velocity_sd=0.01).without([Outage(80.0, 50.0)])
+    aiding = gnss(truth, position_sd=0.05, velocity_sd=0.01).without([gmwm.ins.Outage(80.0, 50.0)])
     solution, _ = flown(truth, aiding, sensors=sensors)
     found, time = solution.sensor_errors[80:120, 3:], solution.time[80:120] - 80.0
     assert np.abs(found[0]).min() > 1e-3
@@ -316,7 +304,8 @@ def test_a_filter_that_diverges_says_when(wrong):
           np.ones((1, 3))),))}, "position fix at 40 s"),
         ({"aiding": Aiding(coloured_sd=(1.0, 1.0, 1.0), fixes=(Fixes("height", np.ones(1),
           np.zeros((1, 3)), np.ones((1, 3))),))}, "coloured_sd without position fixes"),
-        ({"initial": NavState(np.array([1.56, 0.0, 0.0]), np.zeros(3), np.zeros(3))}, "too near a"),
+        ({"initial": gmwm.ins.NavState(np.array([1.56, 0.0, 0.0]), np.zeros(3), np.zeros(3))},
+         "too near a"),
         ({"initial_sd": {"tilt": 0.0}}, "initial tilt = 0.0"),
     ],
 )  # fmt: skip
@@ -325,7 +314,7 @@ def test_what_cannot_be_used_is_said_in_one_sentence(hop, options, words):
     imu, initial, aiding = emulate(hop), given.pop("initial"), given.pop("aiding")
     with pytest.raises(InputError, match=words) as caught:
         if "initial_sd" in given:
-            given["initial_sd"] = InitialSd(**given["initial_sd"])
+            given["initial_sd"] = gmwm.ins.InitialSd(**given["initial_sd"])
         navigate(imu, initial, SENSORS, aiding, **given)
     assert "\n" not in str(caught.value)
 
@@ -338,7 +327,7 @@ def test_ten_hours(dt):
     rng = np.random.default_rng(9)
     n = loops * imu.n
     drawn = SENSORS.simulate(n, dt, rng).total
-    still = Imu(dt, np.tile(imu.rotation, (loops, 1)), np.tile(imu.velocity, (loops, 1)))
+    still = gmwm.ins.Imu(dt, np.tile(imu.rotation, (loops, 1)), np.tile(imu.velocity, (loops, 1)))
     noisy = still.with_errors(drawn[:, :3], drawn[:, 3:])
     time = np.arange(1.0, n * dt)
     place = np.tile(truth.lla[0], (time.size, 1))

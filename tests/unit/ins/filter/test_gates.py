@@ -6,19 +6,9 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
+import gmwm
 from gmwm import GaussMarkov, WhiteNoise
-from gmwm.ins import (
-    Aiding,
-    Fixes,
-    Outage,
-    SensorModels,
-    barometer,
-    car_drive,
-    emulate,
-    gnss,
-    navigate,
-    tuning,
-)
+from gmwm.ins import Outage, SensorModels, barometer, car_drive, emulate, gnss, navigate, tuning
 from gmwm.ins.filter import KINDS, filter_kernels
 
 DT = 0.05
@@ -114,8 +104,10 @@ def test_a_standstill_that_is_none_is_never_used(drive, fixes):
     truth, imu = drive
     speed = np.linalg.norm(truth.velocity, axis=1)
     time = DT * np.flatnonzero(speed > 8.0)[::10]
-    false = Fixes("standstill", time, np.zeros((time.size, 3)), np.full((time.size, 3), 0.02))
-    both = Aiding((*fixes.fixes, false))
+    false = gmwm.ins.Fixes(
+        "standstill", time, np.zeros((time.size, 3)), np.full((time.size, 3), 0.02)
+    )
+    both = gmwm.ins.Aiding((*fixes.fixes, false))
     found = navigate(imu, truth.state(0), SENSORS, both)
     assert time.size > 100
     assert not np.any(found.innovations.used[found.innovations.kind == KINDS["standstill"]])

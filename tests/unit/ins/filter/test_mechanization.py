@@ -4,16 +4,8 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from gmwm.ins import (
-    Imu,
-    NavState,
-    Trajectory,
-    car_drive,
-    emulate,
-    fixed_wing_loiter,
-    helicopter_mapping,
-    integrate,
-)
+import gmwm
+from gmwm.ins import Trajectory, emulate, fixed_wing_loiter, helicopter_mapping, integrate
 from gmwm.ins.filter import Kinematics
 from gmwm.ins.filter.filter_kernels import step
 from gmwm.ins.filter.records import Increments
@@ -39,8 +31,8 @@ def attitude_error(found: Trajectory, true: Trajectory) -> np.ndarray:
     [
         (helicopter_mapping, SOUTH),
         slow(helicopter_mapping, (math.radians(84.0), 3.0, 3000.0)),
-        slow(car_drive, NORTH),
-        (car_drive, DATE_LINE),
+        slow(gmwm.ins.car_drive, NORTH),
+        (gmwm.ins.car_drive, DATE_LINE),
         (fixed_wing_loiter, SOUTH),
         slow(fixed_wing_loiter, (0.0, 0.0, 100.0)),
     ],
@@ -158,8 +150,8 @@ def test_rate_and_force_that_change_linearly_leave_no_second_order_error(seed: i
 def test_no_step_has_none_before_it() -> None:
     # One interval alone, of constant rate and force in inertial space, is exact but for the Earth.
     rotation, dt = np.array([[0.3, -0.2, 0.5]]), 1e-3
-    imu = Imu(dt, rotation, np.zeros((1, 3)))
-    state = NavState(np.array(NORTH), np.zeros(3), np.zeros(3))
+    imu = gmwm.ins.Imu(dt, rotation, np.zeros((1, 3)))
+    state = gmwm.ins.NavState(np.array(NORTH), np.zeros(3), np.zeros(3))
     found = integrate(imu, state)
     expected = matrix_from_rotation_vector(rotation[0])
     np.testing.assert_allclose(matrix_from_rpy(found.rpy[1]), expected, atol=1e-7)

@@ -9,20 +9,10 @@ import pytest
 import yaml
 from click.testing import CliRunner
 
+import gmwm
 from gmwm.cli.navigate import navigate
 from gmwm.errors import InputError
-from gmwm.ins import (
-    Accelerate,
-    Measured,
-    Navigated,
-    Outage,
-    Straight,
-    Turn,
-    car_drive,
-    emulate,
-    gnss,
-    perform,
-)
+from gmwm.ins import Measured, Navigated, Outage, Straight, Turn, car_drive, emulate, gnss, perform
 from gmwm.ins.geometry import ned_difference
 from gmwm.ins.spec import sensor_models
 
@@ -246,7 +236,7 @@ def test_an_attitude_that_is_given_starts_a_record_in_motion(underway, tmp_path)
 @pytest.mark.parametrize("velocity", [True, False])
 def test_acceleration_is_not_taken_for_a_slope(tmp_path, velocity):
     """4 m/s^2 from rest: the pitch was 19 deg."""
-    speeding = [Accelerate(4.0 * 5.0, 4.0), Straight(30.0), Turn(1.0, 0.2), Straight(20.0)]
+    speeding = [gmwm.ins.Accelerate(4.0 * 5.0, 4.0), Straight(30.0), Turn(1.0, 0.2), Straight(20.0)]
     truth = perform(speeding, start=(0.8, 0.1, 400.0), ramp=1.0, dt=1.0 / RATE, flat=True)
     log = Log(truth, velocity=velocity)
     log.imu(tmp_path)

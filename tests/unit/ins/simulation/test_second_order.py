@@ -3,18 +3,9 @@
 import numpy as np
 import pytest
 
+import gmwm
 from gmwm import WhiteNoise
-from gmwm.ins import (
-    InitialSd,
-    Outage,
-    Scenario,
-    SensorModels,
-    Simulated,
-    at_epoch,
-    gnss,
-    helicopter_mapping,
-    monte_carlo,
-)
+from gmwm.ins import SensorModels, Simulated, at_epoch, gnss, helicopter_mapping, monte_carlo
 
 SENSORS = SensorModels.of({"gyro": WhiteNoise(1e-6), "accel": WhiteNoise(1e-5)})
 
@@ -22,10 +13,10 @@ SENSORS = SensorModels.of({"gyro": WhiteNoise(1e-6), "accel": WhiteNoise(1e-5)})
 @pytest.fixture(scope="module")
 def found():
     truth = helicopter_mapping(duration=110.0, dt=0.05).segment(60.0, 110.0)
-    outage = Outage(1.0, 45.0)
-    scenario = Scenario(
-        truth, gnss(truth), (outage,), InitialSd(tilt=np.radians(1.5), heading=np.radians(1.0)),
-        interval=10.0,
+    outage = gmwm.ins.Outage(1.0, 45.0)
+    scenario = gmwm.ins.Scenario(
+        truth, gnss(truth), (outage,),
+        gmwm.ins.InitialSd(tilt=np.radians(1.5), heading=np.radians(1.0)), interval=10.0,
     )  # fmt: skip
     runs = monte_carlo(scenario, Simulated(SENSORS), {"true": SENSORS}, 80, 1)["true"]
     return at_epoch(runs, runs.index(outage.end))

@@ -6,25 +6,10 @@ import numpy as np
 import pytest
 from scipy.stats import chi2, kstest
 
+import gmwm
 from gmwm import GaussMarkov, RandomWalk, WhiteNoise
 from gmwm.errors import InputError
-from gmwm.ins import (
-    Aiding,
-    FilterErrors,
-    InitialSd,
-    NavState,
-    Outage,
-    Recorded,
-    Scenario,
-    SensorErrors,
-    SensorModels,
-    Simulated,
-    Solution,
-    barometer,
-    gnss,
-    helicopter_mapping,
-    monte_carlo,
-)
+from gmwm.ins import FilterErrors, InitialSd, Outage, Scenario, SensorModels, Simulated, gnss
 from gmwm.ins.geometry import matrix_from_rpy
 from gmwm.ins.imu import AXES
 from gmwm.ins.simulation import GROUPS
@@ -32,7 +17,7 @@ from gmwm.ins.simulation.trials import disturbed
 from gmwm.readers.recording import Recording
 
 DT = 0.05
-TRUTH = helicopter_mapping(duration=130.0, dt=DT).segment(70.0, 130.0)
+TRUTH = gmwm.ins.helicopter_mapping(duration=130.0, dt=DT).segment(70.0, 130.0)
 GOOD = SensorModels.of(
     {
         "gyro": WhiteNoise(1e-4) + GaussMarkov(2e-4, 20.0),
@@ -50,7 +35,7 @@ def assert_same(first: FilterErrors, second: FilterErrors):
 
 def study(runs=3, seed=1, filters=None, scenario=SCENARIO, source=None, **options):
     filters = {"good": GOOD} if filters is None else filters
-    return monte_carlo(scenario, source or Simulated(GOOD), filters, runs, seed, **options)
+    return gmwm.ins.monte_carlo(scenario, source or Simulated(GOOD), filters, runs, seed, **options)
 
 
 @pytest.fixture(scope="module")
@@ -117,7 +102,7 @@ def other_scenarios():
         "noise": replace(SCENARIO, aiding=gnss(TRUTH, position_sd=(1.0, 1.0, 1.5 + 1e-12))),
         "colour": replace(SCENARIO, aiding=gnss(TRUTH, coloured_sd=(0.1, 0.0, 0.0))),
         "kind": replace(SCENARIO, aiding=replace(plain, fixes=(replace(fixes, kind="velocity"),))),
-        "barometer": replace(SCENARIO, aiding=plain + barometer(TRUTH)),
+        "barometer": replace(SCENARIO, aiding=plain + gmwm.ins.barometer(TRUTH)),
     }
 
 
@@ -154,7 +139,7 @@ def recorded(stretches, extra=0):
     values = np.random.default_rng(5).standard_normal((stretches * TRUTH.n + extra, 6)) * 1e-3
     arrays = dict(zip(AXES, values.T, strict=True))
     given_in = Recording.from_arrays(arrays, 1.0 / DT, {"gyro": "rad/s", "accel": "m/s^2"}, "a.csv")
-    return Recorded.of(given_in, TRUTH.duration)
+    return gmwm.ins.Recorded.of(given_in, TRUTH.duration)
 
 
 def test_fewer_stretches_than_runs_are_noted():
@@ -175,7 +160,7 @@ def test_fewer_stretches_than_runs_are_noted():
 
 def test_initial_errors_have_the_covariance_claimed():
     sd = InitialSd(position=3.0, velocity=0.2, tilt=0.02, heading=0.05)
-    state = NavState(np.array([0.8, 3.1, 500.0]), np.array([40.0, -25.0, 3.0]),
+    state = gmwm.ins.NavState(np.array([0.8, 3.1, 500.0]), np.array([40.0, -25.0, 3.0]),
                      np.array([0.4, -0.3, 2.5]))  # fmt: skip
     rng = np.random.default_rng(6)
     count = 1500
@@ -198,7 +183,7 @@ def error_of(estimate, truth):
         velocity=np.tile(truth.velocity, (2, 1)),
         rpy=np.tile(truth.rpy, (2, 1)),
     )
-    solution = Solution(
+    solution = gmwm.ins.Solution(
         time=np.zeros(1), before=np.zeros(1, dtype=bool), lla=estimate.lla[None],
         velocity=estimate.velocity[None], matrix=matrix_from_rpy(estimate.rpy)[None],
         covariance=one, sensor_errors=np.zeros((1, 6)), sensor_covariance=np.zeros((1, 6, 6)),
@@ -210,7 +195,10 @@ def error_of(estimate, truth):
 def test_the_first_nees_is_right_and_stays_so_without_aiding():
     """A flight at 30 m/s: a wrong sign of the attitude error would show within seconds."""
     free = Scenario(
-        TRUTH.segment(0.0, 20.0), Aiding(), initial_sd=InitialSd(1.0, 0.1, 0.01, 0.03), interval=4.0
+        TRUTH.segment(0.0, 20.0),
+        gmwm.ins.Aiding(),
+        initial_sd=InitialSd(1.0, 0.1, 0.01, 0.03),
+        interval=4.0,
     )
     found = study(200, scenario=free)["good"]
     total = found.nees.sum(axis=0)
@@ -240,7 +228,7 @@ class Steady:
 
     def draw(self, run, n, dt, rng):
         slow = np.tile(self.values, (n, 1)) + 1e-9 * np.arange(n)[:, None]
-        return SensorErrors(slow, slow)
+        return gmwm.ins.SensorErrors(slow, slow)
 
 
 def test_sensor_errors_are_those_of_the_sample_after_an_epoch():
@@ -291,7 +279,7 @@ class Wild:
         total = np.zeros((n, 6))
         if run in self.runs:
             total[n // 2 :, 3:] = 1e9
-        return SensorErrors(total)
+        return gmwm.ins.SensorErrors(total)
 
 
 def test_a_filter_that_diverges_is_counted():
