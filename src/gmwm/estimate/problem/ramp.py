@@ -12,10 +12,9 @@ slope has no part (Harville 1974, *Biometrika* 61, 383-385).
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -180,19 +179,23 @@ class Walks:
 
         Returns: ``None`` where too few blocks exist.
         """
-        parts = [_merged(*part) for part in _parts(wv)]
-        sizes = [len(beside(np.flatnonzero(~np.isnan(y)))) for y, *_ in parts]
-        if sum(sizes) + 1 < tuning.FEWEST_BLOCKS:
+        parts = list(_parts(wv, psd))
+        if sum(len(y) for *_, y in parts) + 1 < tuning.FEWEST_BLOCKS:
             return None
-        rows = [_Rows.of(*part, wv.dt, (psd, RandomWalk(1.0).psd)) for part in parts]
         # K^2 of walks that make some coefficients as uncertain as the noise does.
-        noise, walk = (np.sum([each.information(k) for each in rows], axis=0) for k in (0, 1))
+        noise, walk = (
+            np.sum([restricted(each[k], *each[2:])[0] for each in parts], axis=0) for k in (0, 1)
+        )
         units = eigvalsh(walk, noise)
         units = units[units > _UNKNOWN * units[-1]]
         most = max(tuning.LARGEST_WALK * units[-1], largest**2)
         squares = np.geomspace(tuning.LEAST_WALK * units[0], most, _WALKS)
-        fits = [_summed(each.fitted(square) for each in rows) for square in squares]
-        information, score, left, half = (np.array(each) for each in zip(*fits, strict=True))
+        fits = (
+            [restricted(noise + square * walk, x, y) for noise, walk, x, y in parts]
+            for square in squares
+        )
+        sums = ([sum(each) for each in zip(*fit, strict=True)] for fit in fits)
+        information, score, left, half = (np.array(each) for each in zip(*sums, strict=True))
         inverse = np.linalg.inv(information)
         values = (inverse @ score[..., None])[..., 0]
         likelihoods = -half - 0.5 * np.linalg.slogdet(information)[1]
@@ -242,52 +245,28 @@ class Walks:
         return value - reach, value + reach
 
 
-@dataclass(frozen=True, eq=False)
-class _Rows:
-    """Differences of neighbouring block means, and their covariance by a noise and by a walk."""
+def _parts(wv: WaveletVariance, psd: PSD) -> Iterator[tuple[FloatArray, ...]]:
+    """Differences of neighbouring block means of each recording, few enough for dense matrices.
 
-    x: FloatArray  # (D, p)
-    y: FloatArray  # (D,)
-    noises: tuple[FloatArray, FloatArray]  # (D, D)
-
-    @classmethod
-    def of(
-        cls, y: FloatArray, x: FloatArray, block: int, dt: float, psds: tuple[PSD, PSD]
-    ) -> _Rows:
-        """Of block means of a series, (B,), and of regressors, (p, B)."""
-        first = beside(np.flatnonzero(~np.isnan(y)))
+    Yields: their covariance by a noise and by a walk, (D, D), those of the regressors, (D, p), and
+        of the series, (D,).
+    """
+    time = wv.block * wv.dt * np.arange(wv.blocks.size, dtype=float)
+    parts = [(wv.blocks, time[None, :], wv.block)]
+    if wv.regressors is not None:
+        parts = [(part.blocks, part.columns, part.block) for part in wv.regressors.parts]
+    for series, columns, block in parts:
+        merged = -(-series.size // _MERGED)
+        rows = np.vstack([series, columns])[:, : series.size // merged * merged]
+        rows = rows.reshape(len(rows), -1, merged).mean(axis=2)
+        first = beside(np.flatnonzero(~np.isnan(rows[0])))
         noise, walk = (
-            toeplitz(difference_covariance(each, dt, block, y.size))[np.ix_(first, first)]
-            for each in psds
+            toeplitz(difference_covariance(each, wv.dt, block * merged, rows.shape[1]))
+            for each in (psd, RandomWalk(1.0).psd)
         )
-        return cls(np.diff(x)[:, first].T, np.diff(y)[first], (noise, walk))
-
-    def information(self, which: int) -> FloatArray:
-        return restricted(self.noises[which], self.x, self.y)[0]
-
-    def fitted(self, square: float) -> tuple[FloatArray, FloatArray, float, float]:
-        return restricted(self.noises[0] + square * self.noises[1], self.x, self.y)
-
-
-def _parts(wv: WaveletVariance) -> list[tuple[FloatArray, FloatArray, int]]:
-    """Block means of the series, of the regressors, and samples of a block, for each recording."""
-    if wv.regressors is None:
-        time = wv.block * wv.dt * np.arange(wv.blocks.size, dtype=float)
-        return [(wv.blocks, time[None, :], wv.block)]
-    return [(part.blocks, part.columns, part.block) for part in wv.regressors.parts]
-
-
-def _merged(y: FloatArray, x: FloatArray, block: int) -> tuple[FloatArray, FloatArray, int]:
-    """Few enough block means that dense matrices of them are quick."""
-    merged = -(-y.size // _MERGED)
-    rows = np.vstack([y, x])[:, : y.size // merged * merged]
-    means = rows.reshape(len(rows), -1, merged).mean(axis=2)
-    return means[0], means[1:], block * merged
-
-
-def _summed(fits: Iterable[tuple[Any, ...]]) -> tuple[Any, ...]:
-    """Of several recordings."""
-    return tuple(sum(each) for each in zip(*fits, strict=True))
+        y, *x = np.diff(rows)[:, first]
+        place = np.ix_(first, first)
+        yield noise[place], walk[place], np.transpose(x), y
 
 
 def walks_beside(
