@@ -24,7 +24,7 @@ from gmwm.calibration.scaling import Scaling, scaling
 from gmwm.errors import InputError
 from gmwm.estimate import Fit
 from gmwm.estimate.problem import pilot
-from gmwm.issues import notice
+from gmwm.issues import Severity, notice
 from gmwm.readers import Channel, Recording, block_means
 from gmwm.selection import penalty
 from gmwm.variance import RegressorPart, Regressors, WaveletVariance
@@ -236,8 +236,11 @@ def compensated(
         values = {"share": float(np.mean(out)), "least": float(min(x)), "most": float(max(x))}
         ends = {"low": f"{one.low:.4g}", "high": f"{one.high:.4g}", "unit": one.unit}
         variant = "held" if np.any(out) else ""
-        about: dict[str, Any] = {"variant": variant, "name": name}
-        about["severity"] = "warning" if variant else "note"
+        severity: Severity = "note"
+        if variant:
+            severity = "bad" if values["share"] > tuning.MOST_HELD else "warning"
+        about: dict[str, Any] = {"variant": variant, "severity": severity, "name": name}
+        about |= {} if variant else {"hint": ""}
         notices.append(notice("curve-subtracted", "", values, **about, **ends))
     for name, curve in own.items():
         held = {e.name: np.clip(nodes.rows[e.name], e.low, e.high) for e in curve.covariates}

@@ -80,7 +80,7 @@ def test_beyond_its_range_a_curve_is_held_and_that_is_said(first):
     temperature, still = cycles(45.0, 85.0), np.zeros((SIZE, 6))
     rec = first.compensated(recording(still, temperature))
     (said,) = rec.notices
-    assert (said.code, said.severity) == ("curve-subtracted", "warning")
+    assert (said.code, said.severity) == ("curve-subtracted", "bad")
     assert said.values["share"] == pytest.approx(np.mean(temperature > 65.8), abs=0.02)
     assert "outside 25 to 65 degC" in said.sentence
     curve = first.curves["gyro_x"]

@@ -137,7 +137,7 @@ def test_a_curve_is_subtracted_where_the_log_has_its_temperature(tmp_path):
     rows, hot = imu_rows(2000), 25.0 + 10.0 * np.arange(2000) / 2000
     one = Covariate("temperature", "degC", 30.0, 5.0, 25.0, 35.0)
     line = Regressor("power", "temperature", 1)
-    numbers = (np.array([0.01]), np.eye(1), np.ones((1, 1)), 0.5)
+    numbers = (np.array([0.01]), np.eye(1), np.ones((1, 1)), np.zeros(0), 0.5)
     curve = BiasCurve("accel_y", "accel", "m/s^2", (one,), (line,), *numbers)
     plain = read_imu_log(write_imu(tmp_path, rows)).imu
     rows[:, 5] += 0.01 * (hot - 30.0) / 5.0
@@ -151,4 +151,4 @@ def test_a_curve_is_subtracted_where_the_log_has_its_temperature(tmp_path):
     (said,) = [
         e for e in read_imu_log(path, curves={"accel_y": curve}).notices if "curve" in e.code
     ]
-    assert (said.code, said.severity) == ("curve-not-subtracted", "warning")
+    assert (said.code, said.severity) == ("curve-not-subtracted", "bad")
