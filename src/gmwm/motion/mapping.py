@@ -133,17 +133,19 @@ def map_onto(
     wanted = means(target - target.mean(axis=0), size)[used_means]
     spreads = others[0].spreads
     regressors = [each.regressors(size) * spreads for each in others]
-    known = [each[used_means] for each in regressors]
     part = np.flatnonzero(used_means) * size * dt // tuning.ERROR_PART
     ends = np.flatnonzero(np.diff(part, prepend=-1.0))
     differences, parameters, errors, absorbed = [], [], [], []
     for j, each in enumerate(others):
         used = [k for k in range(len(others)) if k != j] or [j]
-        instruments = sum((known[k] for k in used), np.zeros(known[j].shape)) / len(used)
+        instruments = np.mean([regressors[k] for k in used], axis=0)
         left = wanted - means(each.values - each.values.mean(axis=0), size)[used_means]
-        z, x = (array.reshape(-1, len(spreads)) for array in (instruments, known[j]))
+        z, x = (
+            array[used_means].reshape(-1, len(spreads)) for array in (instruments, regressors[j])
+        )
         # Two-stage least squares: what the others explain of the regressors has no noise of theirs.
-        shared = z @ np.linalg.lstsq(z, x, rcond=None)[0]
+        first = np.linalg.lstsq(z, x, rcond=None)[0]
+        shared = z @ first
         product = shared.T @ shared
         found = np.zeros(len(spreads))
         for _ in range(tuning.REWEIGHTED):
@@ -151,7 +153,7 @@ def map_onto(
             inverse = np.linalg.inv(product + scatter * np.eye(len(spreads)))
             found = inverse @ (shared.T @ left.ravel())
         rest = (left.ravel() - x @ found).reshape(wanted.shape)
-        by_row = np.einsum("nap,na->np", shared.reshape(instruments.shape), rest)
+        by_row = np.einsum("nap,na->np", shared.reshape(*rest.shape, -1), rest)
         sums = np.add.reduceat(by_row, ends)
         spread = inverse @ (sums.T @ sums + scatter**2 * np.eye(len(spreads))) @ inverse
         parameters.append(found * spreads)
@@ -159,7 +161,7 @@ def map_onto(
         differences.append(target - each.mapped(found * spreads))
         # The hat matrix H = X A X' of errors e leaves (I - H) e.
         taken = np.linalg.cholesky(2.0 * inverse - inverse @ product @ inverse)
-        absorbed.append(_absorbed(regressors[j] @ taken, size, len(target)))
+        absorbed.append(_absorbed(instruments @ (first @ taken), size, len(target)))
     return differences, parameters, errors, np.array(absorbed)
 
 
