@@ -26,12 +26,17 @@ def dotted(path):
     return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
 
 
+@cache
+def tree(path):
+    return ast.parse(path.read_text())
+
+
 MODULES = {dotted(path) for path in FILES}
 PACKAGES = {dotted(path) for path in FILES if path.name == "__init__.py"}
 FACES = {
     dotted(path): {
         alias.asname or alias.name
-        for node in ast.parse(path.read_text()).body
+        for node in tree(path).body
         if isinstance(node, ast.ImportFrom)
         for alias in node.names
     }
@@ -48,14 +53,13 @@ def imports(path):
 
 
 def _imports(path):
-    tree = ast.parse(path.read_text())
     typing_only = {
         id(node)
-        for branch in ast.walk(tree)
+        for branch in ast.walk(tree(path))
         if isinstance(branch, ast.If) and "TYPE_CHECKING" in ast.dump(branch.test)
         for node in ast.walk(branch)
     }
-    for node in ast.walk(tree):
+    for node in ast.walk(tree(path)):
         if isinstance(node, ast.ImportFrom) and id(node) not in typing_only:
             module = (node.module or "").removeprefix("gmwm").removeprefix(".")
             if not (node.module or "").startswith("gmwm"):
@@ -142,7 +146,7 @@ def definitions():
     """Classes, and functions that are no kernels, each with its file."""
     classes, functions = [], []
     for path in FILES:
-        for node in ast.walk(ast.parse(path.read_text())):
+        for node in ast.walk(tree(path)):
             if isinstance(node, ast.ClassDef):
                 classes.append((path, node))
             elif isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
