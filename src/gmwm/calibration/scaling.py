@@ -7,7 +7,7 @@ their mean covariate, ``log s = gamma x``, the deviation at each value of it is 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -41,8 +41,8 @@ class Scaling:
     error: NotNegative
     p_value: Probability
     reference: float
-    places: Array
-    deviation: Array
+    places: Array = field(repr=False)
+    deviation: Array = field(repr=False)
 
     def factor(self, x: FloatArray | float) -> FloatArray:
         """Deviation at values of the covariate over that of the model."""
