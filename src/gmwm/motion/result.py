@@ -410,25 +410,10 @@ class InMotion(Document, Printed):
                 mean = 100.0 * np.mean([m.lever_arm for m in arms], axis=0)
                 error = 100.0 * max(m.lever_arm_error.max() for m in arms)
                 arm = f"{' '.join(f'{v:.1f}' for v in mean)} +-{error:.1g}"
-            rows.append(
-                (
-                    imu,
-                    _ends(offsets, 1),
-                    _ends(drifts, 0),
-                    f"{angle:.1f} +-{tilt:.1g}",
-                    per_cent(scale),
-                    arm,
-                )
-            )
-        heads = (
-            f"to {self.imus[0]}",
-            "clock, ms",
-            "drift, ppm",
-            "turned, deg",
-            "scale",
-            "lever arm, cm",
-        )
-        return plain_table(heads, rows)
+            clock = _ends(offsets, 1), _ends(drifts, 0)
+            rows.append((imu, *clock, f"{angle:.1f} +-{tilt:.1g}", per_cent(scale), arm))
+        heads = ("clock, ms", "drift, ppm", "turned, deg", "scale", "lever arm, cm")
+        return plain_table((f"to {self.imus[0]}", *heads), rows)
 
     def _table(self, sensor: str) -> str:
         """Root mean square deviations over the axes at some averaging times.
