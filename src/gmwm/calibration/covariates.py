@@ -231,6 +231,13 @@ def compensated(
     nodes = Nodes.of(recording, tuple(scales), int(recording.duration / tuning.NODE_STEP))
     notices, noise, less = list(recording.notices), dict[str, float](), dict[str, Channel]()
     for name, one in scales.items():
+        channel = _channel_of(recording, name)
+        if channel is not None and (channel.unit or "unit") != one.unit:
+            raise InputError(
+                f"{name} of {recording.source or 'the recording'} is in {channel.unit or 'no unit'}"
+                f", its curve in {one.unit}: name the column with it, such as {name} [{one.unit}]",
+                "no-covariate",
+            )
         x, reach = nodes.rows[name], tuning.MARGIN * (one.high - one.low)
         out = (x < one.low - reach) | (x > one.high + reach)
         values = {"share": float(np.mean(out)), "least": float(min(x)), "most": float(max(x))}

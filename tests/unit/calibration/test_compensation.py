@@ -90,6 +90,11 @@ def test_beyond_its_range_a_curve_is_held_and_that_is_said(first):
         drawn(first, temperature)
     with pytest.raises(gmwm.InputError, match="no channel 'temperature'"):
         first.compensated(gmwm.Recording.from_arrays({"gyro_x": still[:, 0]}, 5.0, UNITS))
+    volts = gmwm.Recording.from_arrays(
+        {"gyro_x": still[:, 0], "temperature": temperature}, 5.0, UNITS | {"temperature": "V"}
+    )
+    with pytest.raises(gmwm.InputError, match="is in V, its curve in degC"):
+        first.compensated(volts)
 
 
 def test_numbers_at_a_temperature_follow_the_noise(first):

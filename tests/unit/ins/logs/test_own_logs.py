@@ -1,5 +1,6 @@
 """Logs as IMUs and receivers write them: jitter, holes, dates, signs; starts in motion; aids."""
 
+from copy import copy
 from dataclasses import replace
 from datetime import UTC, datetime
 from functools import partial
@@ -335,3 +336,36 @@ def test_the_options_of_the_command(underway, tmp_path):
     assert (tmp_path / "out" / "report.html").exists()
     with pytest.raises(InputError, match="write ROLL,PITCH,YAW in degrees"):
         CliRunner().invoke(navigate, ["--attitude", "1,2"], catch_exceptions=False)
+
+
+def test_curves_of_the_sensors_are_subtracted_from_a_log(log, tmp_path):
+    """The increments are those of a log without them, and N is that at its temperature."""
+    rng, n = np.random.default_rng(8), 4096
+    warm = 45.0 - 20.0 * np.cos(4.0 * np.pi * np.arange(n) / n)
+    arrays = {name: 1e-3 * np.exp(0.01 * (warm - 45.0)) * rng.standard_normal(n) for name in NAMES}
+    arrays = {name: x + 1e-3 * (warm - 45.0) for name, x in arrays.items()}
+    units = {"gyro": "rad/s", "accel": "m/s^2", "temperature": "degC"}
+    rec = gmwm.Recording.from_arrays(arrays | {"temperature": warm}, 10.0, units)
+    cal = gmwm.calibrate(rec, "N", covariates={"temperature": "linear"}, screening=(), jobs=1)
+    cal.save(tmp_path / "cal.json")
+    replace(cal, curves={}).save(tmp_path / "plain.json")
+    log.fixes(tmp_path)
+    content = {"gnss_fixes": "fixes.csv", "sensors": "cal.json", "bias": BIAS}
+    content["imu"] = {"file": "imu.csv", "units": {"gyro": "rad/s", "accel": "m/s^2"}}
+    log.imu(tmp_path)
+    plain = Measured.of(content | {"sensors": "plain.json"}, tmp_path)
+    bare = Measured.of(content, tmp_path)
+    assert "curve-not-subtracted" in {each.code for each in bare.notices}
+    temperature = np.linspace(50.0, 60.0, len(log.samples))
+    added = [cal.curves[a].along({"temperature": temperature}, 1.0 / RATE) for a in NAMES]
+    warmer = copy(log)
+    warmer.samples = np.column_stack([log.samples + np.transpose(added), temperature])
+    warmer.imu(tmp_path, names=(*NAMES, "temperature [degC]"))
+    found = Measured.of(content, tmp_path)
+    np.testing.assert_array_equal(bare.imu.rotation, plain.imu.rotation)
+    for kind in ("rotation", "velocity"):
+        left = getattr(found.imu, kind) - getattr(plain.imu, kind)
+        assert np.max(np.abs(left)) < 0.01 / RATE * np.max(np.abs(added))
+    for axis in NAMES:
+        here, mean = (each.sensors.models[axis].params["N"] for each in (found, plain))
+        assert here == pytest.approx(mean * float(cal.curves[axis].noise_factor(55.0)), rel=0.01)
