@@ -279,14 +279,16 @@ def _tested(shape: _Shape, data: FloatArray, noises: Sequence[_Noise]) -> _Test:
     freedom = data.size - len(noises[0].basis)
     alone, beside, fits = [], [], []
     for noise in noises:
-        series, curves = data * noise.scale, shape.rows * noise.scale
-        series, known = series - noise.basis.T @ (noise.basis @ series), curves @ noise.basis.T
+        # Projected, not by differences of squares, which leave gains of what is known already.
+        series, curves = (
+            white - (white @ noise.basis.T) @ noise.basis
+            for white in (data * noise.scale, shape.rows * noise.scale)
+        )
         total = float(series @ series)
         score = curves @ series
-        whole = curves @ np.swapaxes(curves, 1, 2)
-        information = whole - known @ np.swapaxes(known, 1, 2)
+        information = curves @ np.swapaxes(curves, 1, 2)
         # What is known explains a curve that is part of it.
-        least = tuning.NO_INFORMATION * np.max(np.trace(whole, axis1=1, axis2=2))
+        least = tuning.NO_INFORMATION * np.max(np.trace(information, axis1=1, axis2=2))
         inverse = np.linalg.inv(information + least * np.eye(information.shape[-1]))
         sizes = (inverse @ score[..., None])[..., 0]
         left = np.maximum(total - np.sum(score * sizes, axis=1), tuning.NO_INFORMATION * total)
