@@ -160,7 +160,8 @@ def map_onto(
         errors.append(np.sqrt(np.diag(spread)) * spreads)
         differences.append(target - each.mapped(found * spreads))
         # The hat matrix H = X A X' of errors e leaves (I - H) e.
-        taken = np.linalg.cholesky(2.0 * inverse - inverse @ product @ inverse)
+        power, axes = np.linalg.eigh(product)
+        taken = axes * (np.sqrt(np.abs(power) + 2.0 * scatter) / (np.abs(power) + scatter))
         absorbed.append(_absorbed(instruments @ (first @ taken), size, len(target)))
     return differences, parameters, errors, np.array(absorbed)
 
