@@ -246,9 +246,9 @@ def compensated(
         severity: Severity = "note"
         if variant:
             severity = "bad" if values["share"] > tuning.MOST_HELD else "warning"
-        about: dict[str, Any] = {"variant": variant, "severity": severity, "name": name}
+        about: dict[str, Any] = {"variant": variant, "severity": severity, "name": name, **ends}
         about |= {} if variant else {"hint": ""}
-        notices.append(notice("curve-subtracted", "", values, **about, **ends))
+        notices.append(notice("curve-subtracted", "", values, **about))
     for name, curve in own.items():
         held = {e.name: np.clip(nodes.rows[e.name], e.low, e.high) for e in curve.covariates}
         step, start = nodes.time[1] - nodes.time[0], nodes.start + nodes.time[0]

@@ -184,7 +184,8 @@ class BiasCurve(Document, Printed):
                 raise InputError(f"the curve of {self.name} depends on {one.name}: give its values")
             known[one.name] = self._inside(np.asarray(covariates[one.name], dtype=float), one)
         n = len(next(iter(known.values()), next(iter(covariates.values()), np.zeros(0))))
-        time, by_name = start + dt * np.arange(n), {each.name: each for each in self.covariates}
+        time = np.asarray(start + dt * np.arange(n), dtype=float)
+        by_name = {each.name: each for each in self.covariates}
         curve = np.zeros(n)
         for each, value in zip(self.regressors, self.values, strict=True):
             own = known.get(each.covariate), by_name.get(each.covariate)
