@@ -16,6 +16,7 @@ from gmwm.calibration.curve import (
 from gmwm.calibration.departures import (
     DEPARTURES as DEPARTURES,
     Departure as Departure,
+    departure_notices as departure_notices,
     departures as departures,
     without_departures as without_departures,
 )
@@ -28,4 +29,4 @@ from gmwm.calibration.numbers import (
     upper_limit as upper_limit,
 )
 from gmwm.calibration.scaling import with_noise as with_noise
-from gmwm.calibration.screening import SCREENING as SCREENING
+from gmwm.calibration.screening import SCREENING as SCREENING, screened as screened

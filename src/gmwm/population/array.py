@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
@@ -16,16 +16,17 @@ from gmwm._core.tables import frame, plain_table
 from gmwm._core.text import Printed, brief, bullets
 from gmwm._core.typing import FloatArray, Progress
 from gmwm._core.units import factor
+from gmwm.calibration import departure_notices, departures, screened
 from gmwm.diagnosis import rest_of
 from gmwm.errors import InputError, MissingNameError
-from gmwm.estimate import fit_shared
+from gmwm.estimate import fit, fit_shared
 from gmwm.filter_numbers import integral_rms
 from gmwm.issues import Notice, notice
 from gmwm.population import tuning
 from gmwm.population.compare import labelled
 from gmwm.process import GaussMarkov, Process, RandomWalk, WhiteNoise
 from gmwm.readers import Channel, Recording, require_recording
-from gmwm.variance import wavelet_covariance
+from gmwm.variance import wavelet_covariance, wavelet_variance
 
 if TYPE_CHECKING:
     import pandas
@@ -62,7 +63,7 @@ class ArrayAxis(Document):
         Standard deviation of the angle (rad) or velocity (m/s) of each IMU after the horizon.
     best, mean, inverse : float
         The same of the sum with ``weights``, of the mean of all, and with weights 1/N^2 from the
-        angle or velocity random walks.
+        angle or velocity random walks. ``best`` includes what the weights' errors cost.
     cost : float
         By how much the variance exceeds that of the best weights, on average, as these are known
         from a recording only; relative.
@@ -173,8 +174,9 @@ def array(
     Parameters
     ----------
     recordings : sequence or mapping of str to Recording
-        Two or more, at rest, that begin together, with aligned axes. Rates may differ: means over
-        a 32nd of the horizon are compared.
+        Two or more, at rest, of one time, with aligned axes: cut to what their time stamps have
+        in common; without stamps they begin together. Rates may differ: means over a 32nd of the
+        horizon are compared. Shocks and spikes are left out.
     horizon : float, optional
         Length of the outages, s.
     progress : callable, optional
@@ -183,17 +185,24 @@ def array(
     Raises
     ------
     InputError
-        If there are fewer than two recordings, they have no channel in common, one is not static,
-        two have the same samples, or they are shorter than 16 horizons.
+        If there are fewer than two recordings, they have no time or no channel in common, one is
+        not static or has a channel that is stuck or dead, two have the same samples, they are
+        shorter than 16 horizons, or the horizon has too few samples.
     """
     horizon = checks.positive("horizon", horizon, "give the length of outages in seconds")
-    named = _named(recordings)
+    named = _together(_named(recordings))
     shared = list(named.values())
     names = [c.name for c in shared[0].inertial if all(c.name in each for each in shared[1:])]
     names = [name for name in names if shared[0][name].quantity in _UNITS]
     if not names:
         raise InputError("the recordings have no channel of a gyro or accelerometer in common")
-    step = max(horizon / tuning.BLOCKS_OF_HORIZON, *(each[n].dt for each in shared for n in names))
+    intervals = {each[name].dt for each in shared for name in names}
+    least = max(intervals) * (1.0 if len(intervals) == 1 else tuning.FEWEST_OF_BLOCK)
+    step, blocks = max(horizon / tuning.BLOCKS_OF_HORIZON, least), tuning.FEWEST_BLOCKS
+    if horizon < blocks * step:
+        raise InputError(
+            f"horizon = {horizon:g}: these rates need outages of {blocks * step:g} s or more"
+        )
     duration = min(each.duration for each in shared)
     if duration < tuning.LEAST_HORIZONS * horizon:
         raise InputError(
@@ -201,21 +210,28 @@ def array(
             f"{tuning.LEAST_HORIZONS * horizon:g} s or more; record longer, or give a shorter "
             "horizon"
         )
-    times = np.geomspace(4.0 * step, duration / 8.0, _parts(duration / step))
+    named = {imu: _without_shocks(imu, each, names) for imu, each in named.items()}
+    times = np.geomspace(step, duration / 8.0, _parts(duration / step))
     parts = (WhiteNoise(1.0), *(GaussMarkov(1.0, tau) for tau in times.tolist()), RandomWalk(1.0))
-    axes = []
+    axes, notices = [], list[Notice]()
     for done, name in enumerate(names):
         if progress is not None:
             progress(done, len(names), name)
         own = [
-            Channel(imu, _means(each[name], step, int(duration / step)), step)
+            Channel(
+                imu,
+                _means(each[name], step, int(duration / step)),
+                step,
+                each[name].quantity,
+                each[name].unit,
+            )
             for imu, each in named.items()
         ]
         axes.append(_axis(name, str(shared[0][name].quantity), own, parts, horizon))
+        notices += [each for channel in own for each in _steps(channel, name)]
     if progress is not None:
         progress(len(names), len(names), "")
-    notices = []
-    alike = [each.channel for each in axes if each.p_value > tuning.LEVEL]
+    alike = [x.channel for x in axes if x.p_value > tuning.LEVEL or x.best >= x.mean]
     if alike:
         notices.append(notice("array-mean", values={"axes": len(alike)}, listed=", ".join(alike)))
     return SensorArray(tuple(named), horizon, duration, tuple(axes), tuple(notices))
@@ -238,9 +254,39 @@ def _named(recordings: Sequence[Recording] | Mapping[str, Recording]) -> dict[st
     return labelled(given, [""] * len(given))
 
 
+def _together(named: Mapping[str, Recording]) -> dict[str, Recording]:
+    """Recordings cut to the time that they have in common by their stamps."""
+    start = max(each.start for each in named.values())
+    stop = min(each.start + each.duration for each in named.values())
+    if stop <= start:
+        raise InputError(
+            "the time stamps of the recordings have no time in common: give files of one time; if "
+            "they began together, read them by their rate, without stamps (--rate, --time none)"
+        )
+    return {imu: each.part(start - each.start, stop - each.start) for imu, each in named.items()}
+
+
+def _without_shocks(imu: str, recording: Recording, names: Collection[str]) -> Recording:
+    """A recording without shocks and spikes, if its channels can be compared."""
+    found = screened(recording, ("events",))
+    for each in found.notices:
+        if each.severity == "bad" and each.where in names:
+            raise InputError(f"{imu}, {each.where}: {each.text}: leave out this IMU")
+    return found.recording
+
+
+def _steps(channel: Channel, name: str) -> list[Notice]:
+    """Departures that pass for slow noise of a channel whose name is that of its IMU."""
+    data = wavelet_variance(channel)
+    fitted = fit("N + K", data)
+    found = departure_notices(fitted, departures(fitted), (), data, data, removing=True)
+    where = f"{channel.name}, {name}"
+    return [replace(each, where=where) for each in found if each.severity == "bad"]
+
+
 def _parts(blocks: float) -> int:
-    """Number of Gauss-Markov parts: one in two octaves of correlation times."""
-    return max(int(np.log2(blocks / 32.0) / 2.0) + 1, 1)
+    """Number of Gauss-Markov parts: one an octave of correlation times."""
+    return max(int(np.log2(blocks / 8.0)) + 1, 2)
 
 
 def _means(channel: Channel, step: float, count: int) -> FloatArray:
@@ -258,10 +304,10 @@ def _axis(
     name: str, quantity: str, own: Sequence[Channel], parts: Sequence[Process], horizon: float
 ) -> ArrayAxis:
     """The weights of one axis."""
-    fit = fit_shared(parts, wavelet_covariance(own), refine=False)
+    shared = fit_shared(parts, wavelet_covariance(own), refine=False)
     step = own[0].dt
     growth = [integral_rms(each, [horizon], step, known_start=True)[0, 0] ** 2 for each in parts]
-    total, covariance = fit.matrix(np.array(growth))
+    total, covariance = shared.matrix(np.array(growth))
     size, (first, second) = len(own), np.triu_indices(len(own))
     inverse = np.linalg.inv(total)
     variance = 1.0 / np.sum(inverse)
@@ -272,11 +318,12 @@ def _axis(
     slope += np.where(first == second, 0.0, turned[:, second] * weights[first])
     spread = slope @ covariance @ slope.T
     reach = _Z * np.sqrt(np.diag(spread))
-    plain = 1.0 / np.diag(fit.matrices[0])
+    plain = 1.0 / np.diag(shared.matrices[0])
     plain /= np.sum(plain)
     mean, away = np.full(size, 1.0 / size), weights - 1.0 / size
     deviation = np.sqrt(np.diag(total))
     statistic = float(away @ np.linalg.pinv(spread, hermitian=True) @ away)
+    cost = float(np.sum(total * spread) / variance)
     return ArrayAxis(
         channel=name,
         quantity=quantity,
@@ -284,10 +331,10 @@ def _axis(
         lower=weights - reach,
         upper=weights + reach,
         alone=deviation,
-        best=float(np.sqrt(variance)),
+        best=float(np.sqrt(variance * (1.0 + 2.0 * cost))),  # of the fit's own sample, and the cost
         mean=float(np.sqrt(mean @ total @ mean)),
         inverse=float(np.sqrt(plain @ total @ plain)),
-        cost=float(np.sum(total * spread) / variance),
+        cost=cost,
         p_value=float(chi2.sf(statistic, size - 1)),
         correlation=total / np.outer(deviation, deviation),
     )

@@ -36,5 +36,7 @@ CONTRADICTION = 30.0
 # -- array ----------------------------------------------------------------------------------------
 
 BLOCKS_OF_HORIZON = 32  # whose means are compared: faster errors are white over the horizon
+FEWEST_BLOCKS = 8  # of a horizon
+FEWEST_OF_BLOCK = 4  # samples, where rates differ: blocks have a sample more or less
 LEAST_HORIZONS = 16  # of the recordings, for a covariance over one of them
 WITH_INTERVALS = 5  # IMUs, in a table of 80 columns

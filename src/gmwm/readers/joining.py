@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -16,18 +16,6 @@ from gmwm.readers.recording import Channel, Recording, auxiliary_channel, notice
 from gmwm.readers.table import Table
 
 _SAMPLE = 0.5  # by which two clocks may part over a recording and count as one
-
-
-@dataclass(frozen=True)
-class Part:
-    """The recording of one table, and the stamp of its first sample, s."""
-
-    recording: Recording
-    start: float = 0.0
-
-    @property
-    def stop(self) -> float:
-        return self.start + self.recording.duration
 
 
 def has_sensors(table: Table) -> bool:
@@ -62,12 +50,13 @@ def shares(
     return found
 
 
-def joined(parts: Sequence[Part]) -> Recording:
-    """Parts cut to the time that they have in common."""
-    first = parts[0].recording
+def joined(parts: Sequence[Recording]) -> Recording:
+    """Recordings of topics, cut to the time that they have in common."""
+    first = parts[0]
     if len(parts) == 1:
         return first
-    start, stop = max(part.start for part in parts), min(part.stop for part in parts)
+    start = max(part.start for part in parts)
+    stop = min(part.start + part.duration for part in parts)
     if not stop > start:
         text = f'{first.source}: its topics have no time in common: choose one, or clock="log"'
         raise InputError(text, "topics-apart")
@@ -86,30 +75,29 @@ def joined(parts: Sequence[Part]) -> Recording:
         for channel in channels
     ]
     notices: list[Notice] = []
-    for each in (each for part in parts for each in part.recording.notices):
+    for each in (each for part in parts for each in part.notices):
         if each.code != "missing-samples" and each not in notices:
             notices.append(each)
     values = {
         "duration": stop - start,
-        "lost": max(part.recording.duration for part in parts) - (stop - start),
+        "lost": max(part.duration for part in parts) - (stop - start),
         "rates": len({channel.dt for channel in channels if not channel.is_auxiliary}),
     }
-    rates = ", ".join(f"{part.recording.rate:.6g} Hz" for part in parts)
+    rates = ", ".join(f"{part.rate:.6g} Hz" for part in parts)
     notices.append(notice("topics-joined", "", values, count=len(parts), listed=rates))
-    jitter = [part.recording.jitter for part in parts if part.recording.jitter is not None]
+    jitter = [part.jitter for part in parts if part.jitter is not None]
     return replace(
         first,
         channels=tuple(channels),
         notices=(*notices, *notices_of_gaps(channels)),
         jitter=max(jitter, default=None),
+        start=start,
     )
 
 
-def _cut(part: Part, start: float, stop: float) -> list[Channel]:
-    recording = part.recording
-    rows = slice(
-        round((start - part.start) * recording.rate), round((stop - part.start) * recording.rate)
-    )
+def _cut(recording: Recording, start: float, stop: float) -> list[Channel]:
+    begin, end = (round((time - recording.start) * recording.rate) for time in (start, stop))
+    rows = slice(begin, end)
     if rows.stop - rows.start < tuning.FEWEST_SAMPLES:
         common = f"{recording.source}: its topics have {stop - start:.3g} s in common"
         hint = f"fewer than {tuning.FEWEST_SAMPLES} samples: choose one, or record longer"
@@ -117,12 +105,11 @@ def _cut(part: Part, start: float, stop: float) -> list[Channel]:
     return [replace(channel, values=channel.values[rows]) for channel in recording.channels]
 
 
-def with_temperature(part: Part, table: Table) -> Part:
+def with_temperature(recording: Recording, table: Table) -> Recording:
     """A thermometer beside the sensors, interpolated at their rate between its stamps."""
-    recording = part.recording
     roles = [each.role for each in table.meanings]
     if TIME not in roles or "temperature" not in roles:
-        return part
+        return recording
     time, channels = roles.index(TIME), list[Channel]()
     try:
         arrays = table.load([i for i, role in enumerate(roles) if role == "temperature"] + [time])
@@ -131,7 +118,7 @@ def with_temperature(part: Part, table: Table) -> Part:
     else:
         stamps = arrays.pop(time) * (table.meanings[time].seconds or 1.0)
         order = np.argsort(stamps, kind="stable")
-        grid = part.start + recording.dt * np.arange(recording.n)
+        grid = recording.start + recording.dt * np.arange(recording.n)
         for column, own in arrays.items():
             values = np.interp(grid, stamps[order], own[order], left=np.nan, right=np.nan)
             name, unit = bare(table.names[column]), table.meanings[column].unit or "degC"
@@ -141,7 +128,7 @@ def with_temperature(part: Part, table: Table) -> Part:
         count = {"count": stamps.size}
         outcome = notice("temperature-interpolated", "", count, listed=names, first=first)
     wider, notices = (*recording.channels, *channels), (*recording.notices, outcome)
-    return replace(part, recording=replace(recording, channels=wider, notices=notices))
+    return replace(recording, channels=wider, notices=notices)
 
 
 def with_thermometer(recording: Recording, table: Table) -> Recording:
@@ -149,11 +136,11 @@ def with_thermometer(recording: Recording, table: Table) -> Recording:
 
     Raises InputError if the table has no temperatures by time, or none during the recording.
     """
-    found = with_temperature(Part(recording), table).recording
+    found = with_temperature(replace(recording, start=0.0), table)
     added = found.channels[len(recording.channels) :]
     if not added or all(channel.missing == channel.n for channel in added):
         raise InputError(
             f"{table.source}: no temperature falls within the recording: give columns such as "
             "'time [s]' and 'temperature [degC]', with times from its first sample"
         )
-    return found
+    return replace(found, start=recording.start)

@@ -21,7 +21,7 @@ from gmwm.readers import clock as clocks, tuning
 from gmwm.readers.clock import Clock, Timing
 from gmwm.readers.columns import AuxiliaryColumn, Given, Reference, Roles, channel_units, roles_of
 from gmwm.readers.formats.binary import BinaryTable, layout_of
-from gmwm.readers.joining import Part, has_sensors, joined, shares, with_temperature
+from gmwm.readers.joining import has_sensors, joined, shares, with_temperature
 from gmwm.readers.missing import without_sentinels
 from gmwm.readers.names import NUMBERS_OF_SENSORS, TIME, bare, stated_seconds
 from gmwm.readers.recording import Channel, Recording, auxiliary_channel
@@ -157,7 +157,7 @@ def _recording(tables: Sequence[Table], given: Given) -> Recording:
     """One recording of the tables of an IMU."""
     channels = given.channels
     if len(tables) == 1:
-        return recording_of(tables[0], given).recording
+        return recording_of(tables[0], given)
     own = [table for table in tables if has_sensors(table)]
     chosen = [(own[0], channels)] if len(own) == 1 else shares(own, channels)
     parts = [recording_of(table, replace(given, channels=only)) for table, only in chosen]
@@ -167,8 +167,8 @@ def _recording(tables: Sequence[Table], given: Given) -> Recording:
     return joined(parts)
 
 
-def recording_of(table: Table, given: Given) -> Part:
-    """The recording of a table, and the time of its first sample."""
+def recording_of(table: Table, given: Given) -> Recording:
+    """The recording of a table."""
     stated = _stated_rate(table, given.rate)
     roles = roles_of(table, given)
     _check_one_sensor(table, roles)
@@ -218,7 +218,7 @@ def recording_of(table: Table, given: Given) -> Part:
     )
     channels, notices = (*recording.channels, *further), (*at_rest, *recording.notices)
     jitter = timing.jitter if timing else None
-    return Part(replace(recording, channels=channels, notices=notices, jitter=jitter), start)
+    return replace(recording, channels=channels, notices=notices, jitter=jitter, start=start)
 
 
 def _stated_rate(table: Table, rate: float | None) -> float | None:

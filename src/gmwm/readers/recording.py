@@ -121,12 +121,15 @@ class Recording(Mapping[str, Channel], Printed):
     jitter : float or None
         Standard deviation of the steps of its time stamps, as a share of the sampling interval;
         None if it has none.
+    start : float
+        Time stamp of its first sample, s; 0 if it has none.
     """
 
     channels: tuple[Channel, ...]
     source: str = ""
     notices: tuple[Notice, ...] = ()
     jitter: float | None = None
+    start: float = 0.0
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "source", printable(self.source))
@@ -275,7 +278,7 @@ class Recording(Mapping[str, Channel], Printed):
         part = notice("part", "", {"start": float(start), "stop": end})
         kept = [each for each in self.notices if each.code != "missing-samples"]
         notices = (*kept, part, *notices_of_gaps(channels))
-        return replace(self, channels=channels, notices=notices)
+        return replace(self, channels=channels, notices=notices, start=self.start + start)
 
     def __getitem__(self, name: str) -> Channel:
         for channel in self.channels:

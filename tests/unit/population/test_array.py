@@ -1,5 +1,7 @@
 """Weights of IMUs that are read together."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -90,3 +92,69 @@ def test_what_is_no_array_is_rejected():
     ):
         with pytest.raises(InputError, match=message):
             gmwm.array(given)
+
+
+def test_one_shock_changes_no_weight():
+    own = white(np.random.default_rng(9), 1e-4, 1e-4)
+    own[0][5000] += 1.0
+    axis = gmwm.array([imu(x) for x in own])["gyro_x"]
+    assert axis.lower[0] < 0.5 < axis.upper[0]
+
+
+def test_a_step_of_the_bias_is_named():
+    own = white(np.random.default_rng(10), 1e-4, 1e-4)
+    own[1][N // 2 :] += 1e-3
+    found = gmwm.array({"one": imu(own[0]), "two": imu(own[1])})
+    assert ("step", "two, gyro_x") in [(each.code, each.where) for each in found.notices]
+
+
+@pytest.mark.parametrize("value", [0.0, 1e-3])
+def test_a_stuck_imu_is_rejected(value):
+    own = white(np.random.default_rng(11), 1e-4, 1e-4)
+    own[0][N // 2 :] = value
+    with pytest.raises(InputError, match=r"one, gyro_x: stuck at .*: leave out this IMU"):
+        gmwm.array({"one": imu(own[0]), "two": imu(own[1])})
+    with pytest.raises(InputError, match="the channel is dead: leave out this IMU"):
+        gmwm.array({"one": imu(np.full(N, value)), "two": imu(own[1])})
+
+
+def test_recordings_are_cut_to_what_their_stamps_have_in_common():
+    rng = np.random.default_rng(12)
+    common = GaussMarkov(3e-5, 60.0).simulate(N, DT, rng)
+    one, other = (imu(x + common) for x in white(rng, 1e-5, 1e-5))
+    late = other.part(100.0)
+    assert late.start == 100.0
+    found, apart = gmwm.array([one, late]), gmwm.array([one, replace(late, start=0.0)])
+    assert found.duration == pytest.approx(N * DT - 100.0)
+    assert found["gyro_x"].correlation[0, 1] > 0.8 > apart["gyro_x"].correlation[0, 1]
+    with pytest.raises(InputError, match="no time in common"):
+        gmwm.array([one, replace(late, start=1e6)])
+
+
+def test_errors_of_a_few_blocks_are_weighed_by_their_slow_part():
+    """Correlated over 3 s, where means of 1.9 s are compared: equal to white noise after 60 s."""
+    rng, weights = np.random.default_rng(13), []
+    fast = WhiteNoise(0.5e-4) + GaussMarkov(np.sqrt(0.75e-8 / 6.0), 3.0)
+    for _ in range(4):
+        (plain,) = white(rng, 1e-4, n=2 * N)
+        axis = gmwm.array([imu(plain), imu(fast.simulate(2 * N, DT, rng))])["gyro_x"]
+        weights.append(axis.weights[0])
+    error = 0.5 * (axis.upper[0] - axis.lower[0]) / 1.96
+    assert np.mean(weights) == pytest.approx(0.5, abs=3.0 * error / 2.0)
+
+
+def test_a_short_record_promises_no_more_than_its_weights_keep():
+    """Five equal IMUs over 16 horizons: no sum is better than the mean, and none is promised."""
+    rng = np.random.default_rng(14)
+    gains = []
+    for _ in range(3):
+        own = white(rng, *[1e-4] * 5, n=9_700)
+        axis = gmwm.array([imu(x) for x in own])["gyro_x"]
+        gains.append(axis.best / axis.mean)
+    assert np.mean(gains) > 0.98
+
+
+def test_a_horizon_of_few_samples_is_rejected():
+    one, other = (imu(x) for x in white(np.random.default_rng(15), 1e-4, 2e-4))
+    with pytest.raises(InputError, match=r"these rates need outages of 0.8 s or more"):
+        gmwm.array([one, other], horizon=0.5)
