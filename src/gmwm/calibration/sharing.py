@@ -4,8 +4,9 @@ The wavelet covariances of two channels are fitted by r (nu_j^a nu_j^b)^(1/2), w
 wavelet variances of both models, by generalized least squares. Levels at which a channel has more
 fast noise than slow errors are left out: vibration that both have is not slow. The weights are the
 covariance of wavelet covariances of independent channels with these models, so that the estimate
-has the least variance where there is no sharing. There it is close to normal: it is a sum over
-many products of coefficients, of either sign (``python benchmarks/arrays.py size``).
+has the least variance where there is no sharing. There it is like a mean of products of independent
+normals, as many as its information: Student's t has their variance and kurtosis (``python
+benchmarks/arrays.py size``).
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from itertools import combinations
 
 import numpy as np
 
-from gmwm._core.distributions import norm
+from gmwm._core.distributions import student
 from gmwm._core.typing import FloatArray
 from gmwm.calibration import tuning
 from gmwm.calibration.screening import Screened
@@ -75,7 +76,9 @@ def sharing(models: Mapping[str, Model], data: WaveletCovariance) -> list[Sharin
             continue
         error = 1.0 / np.sqrt(information)
         estimate = float(weighted @ (data.values[used, a, b] / grown)) / information
-        p_value = 2.0 * float(norm.sf(abs(estimate) / error))
+        dof = information + 4.0  # of equal kurtosis: the mean of so many products of normals
+        z = abs(estimate) / error * np.sqrt(dof / (dof - 2.0))
+        p_value = 2.0 * float(student.sf(z, dof))
         found.append(Sharing(data.names[a], data.names[b], estimate, error, p_value))
     return found
 
