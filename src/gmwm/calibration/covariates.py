@@ -304,7 +304,7 @@ def _design(
         means[place] = block_means([channel.values], size)[: nodes[place].time.size, 0]
     count = sum(channel.n for channel in channels.values())
     length = max(each.duration for each in recordings)
-    best: tuple[float, tuple[Regressor, ...], FloatArray] | None = None
+    tried: list[tuple[float, tuple[Regressor, ...], FloatArray]] = []
     weight = np.ones(1)
     for parts in product(*(each.choices(length) for each in given)):
         chosen = tuple(one for part in parts for one in part)
@@ -318,11 +318,8 @@ def _design(
         regressors = Regressors(own, np.zeros(len(chosen)), np.ones(1), channels[places[0]].dt)
         found, likelihood = pilot(regressors)
         cost = len(chosen) + sum(one.constant > 0.0 for one in chosen)
-        criterion = penalty(count) * cost - 2.0 * likelihood
-        if best is None or criterion < best[0]:
-            best = criterion, chosen, found.values
-    assert best is not None
-    _, chosen, removed = best
+        tried.append((penalty(count) * cost - 2.0 * likelihood, chosen, found.values))
+    _, chosen, removed = min(tried, key=lambda each: each[0])
     columns = tuple(np.array([each.columns(one, known) for one in chosen]) for each in nodes)
     left = [np.nanmean(means[k] - removed @ columns[k]) for k in places]
     return Design(name, scales, chosen, nodes, columns, removed, float(np.mean(left)))
