@@ -45,7 +45,7 @@ class Sharing:
 
 def is_slow(term: Process) -> bool:
     """Whether a term is random and slower than `tuning.SLOW`."""
-    is_long = term.is_exponential and term.tau >= tuning.SLOW  # type: ignore[attr-defined]
+    is_long = term.is_exponential and (term.values["tau"] or 0.0) >= tuning.SLOW
     return term.is_walk or term.is_flicker or is_long
 
 
