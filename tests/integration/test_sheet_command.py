@@ -72,3 +72,13 @@ def test_a_sheet_without_slow_noise_tells_its_white_noise(run, tmp_path):
     code, _, said = run("sheet", "white.yaml", "-o", "numbers.json")
     assert (code, "leaves K open" in said) == (2, True)
     assert not (tmp_path / "numbers.json").exists()
+
+
+def test_a_sheet_of_one_axis_and_a_larger_form_are_printed_whole(run, tmp_path):
+    sheet = tmp_path / "one.yaml"
+    sheet.write_text("gyro_x: {N: 0.2 deg/sqrt(h), B: 8 deg/h}\n")
+    code, out, _ = run("sheet", sheet)
+    assert code == 0 and "gyro_x                       N 1.17e-04" in out
+    code, out, _ = run("sheet", "stim300", "--form", "N+K+GM")
+    assert code == 0 and out.count("  Gauss-Markov ") == 2
+    assert "gyroscope_random_walk" not in out  # K alone is not the answer

@@ -451,21 +451,33 @@ def _for_filter(name: str, numbers: FilterNumbers, unit_spread: float) -> str:
     """N, K and the start bias of each sensor in SI by key, and how consistent they are."""
     from gmwm._core.units import SI_UNIT
     from gmwm.filter_numbers import shown_unit
+    from gmwm.process import GaussMarkov
     from gmwm.report import filter_key
 
+    is_usual = numbers.form == "N+K"
+    what = "keys of Kalibr, OpenVINS" if is_usual else f"of the form {numbers.form}: all its terms"
     title = (
-        f"{name}, for your filter (keys of Kalibr, OpenVINS): covers all models that agree with "
-        f"the sheet, units up to {unit_spread:g} times as noisy, outages up to "
-        f"{numbers.horizon:g} s"
+        f"{name}, for your filter ({what}): covers all models that agree with the sheet, units up "
+        f"to {unit_spread:g} times as noisy, outages up to {numbers.horizon:g} s"
     )
     lines = wrapped(title)
-    for quantity, each in numbers.items():
-        for letter in "NK":
+    for sensor, each in numbers.items():
+        quantity = sensor.partition("_")[0]
+        for letter in "NK" if each.K else "N":
             (unit, scale), value = shown_unit(letter, quantity, "field"), getattr(each, letter)
             si = f"{value:.2e} {shown_unit(letter, quantity, 'si')[0]}"
-            key = filter_key(quantity, letter)
+            key = filter_key(quantity, letter) if is_usual and sensor == quantity else sensor
             lines.append(f"{key:<27}  {letter} {si:<25}  {brief(value * scale, 3)} {unit}")
-    starts = [f"{k} {n.initial_sd:.2e} {SI_UNIT[k]}" for k, n in numbers.items() if n.initial_sd]
+        lines += [
+            f"{sensor:<27}  Gauss-Markov {term.sigma:.2e} {SI_UNIT[quantity]}, {term.tau:.3g} s"
+            for term in each.model.terms
+            if isinstance(term, GaussMarkov)
+        ]
+    starts = [
+        f"{k} {n.initial_sd:.2e} {SI_UNIT[k.partition('_')[0]]}"
+        for k, n in numbers.items()
+        if n.initial_sd
+    ]
     lines += (
         wrapped(
             f"start bias, 1 sigma (with the turn-on bias of the sheet, if any): {', '.join(starts)}"

@@ -25,6 +25,8 @@ _WORDS = {
 _VALUE = re.compile(r"\s*([-+.\deE]+)\s+(\S.*?)(?:\s+\((.+)\))?\s*")
 _ABOUT = ("name", "document", "temperature")
 _HINT = "write it like 'N: 0.15 deg/sqrt(h)', 'B: 7 deg/h'"
+_ALIKE = (("N", "noise_density", 0.84), ("lowest_deviation", "B", 0.664))
+"""Two that say one thing, and the usual ratio of the first to the second."""
 _SHEETS = files("gmwm.datasheet").joinpath("sheets")
 
 
@@ -124,6 +126,13 @@ def _read(place: str, content: Any, channels: dict[str, str] | None) -> Datashee
         pages[name] = {key: page for key, _, page in found if page}
         if len(entries[name]) < len(found):
             raise InputError(f"{place}: {name} states a number twice: leave one out")
+        for first, second, usual in _ALIKE:
+            ratio = entries[name].get(first, usual) / entries[name].get(second, 1.0) / usual
+            if {first, second} <= {*entries[name]} and not 0.5 <= ratio <= 2.0:
+                raise InputError(
+                    f"{place}: {name}: {first} and {second} contradict each other by a factor of "
+                    f"{max(ratio, 1.0 / ratio):.3g}: leave one out"
+                )
     about.setdefault("name", Path(place).name)
     return Datasheet(entries=entries, pages=pages, **about)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,13 +17,23 @@ from gmwm._core.typing import FloatArray
 from gmwm._core.units import SI_UNIT, factor, quantity_of
 from gmwm.errors import InputError
 from gmwm.process import PSD
-from gmwm.readers import AXES, TIME, Wanted, bare, load_columns, meaning, open_tables
+from gmwm.readers import (
+    AXES,
+    TIME,
+    Wanted,
+    bare,
+    load_columns,
+    meaning,
+    open_tables,
+    stated_seconds,
+)
 from gmwm.variance import tuning
 from gmwm.variance.covariance.haar import haar_covariance, line_covariance
 from gmwm.variance.wavelet import WaveletVariance
 
 _PER_WAVELET = {"deviation": 0.5, "variance": 0.5, "wavelet": 1.0}
 """Kind of values -> wavelet variance per square of a deviation, or per variance."""
+_TAU = re.compile(r"^(averaging[ _]times?|taus?)(?![a-z])", re.IGNORECASE)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -239,14 +250,17 @@ def read_curves(
         (table,) = open_tables(path, Wanted(by_channel=True))[:1]
         values = load_columns(table, range(len(table.names)))
         columns = {name or str(i): values[i] for i, name in enumerate(table.names)}
-    roles = {name: meaning(name) for name in columns}
-    times = next(
-        (n for n, role in roles.items() if bare(n).lower().startswith("tau") or role.role == TIME),
-        None,
-    )
-    if times is None:
+        if len(columns) < len(table.names):
+            raise InputError(f"{path.name} has two columns of one name: leave one out")
+    named = {name: _TAU.sub("time", name.strip()) for name in columns}
+    roles = {name: meaning(as_time) for name, as_time in named.items()}
+    times = [n for n, role in roles.items() if role.role == TIME or named[n] != n.strip()]
+    if not times:
         raise InputError(f"{path.name} has no column of averaging times: name one tau")
-    tau = columns.pop(times) * (roles.pop(times).seconds or 1.0)
+    if len(times) > 1:
+        raise InputError(f"{path.name} has {len(times)} columns of averaging times: split the file")
+    tau = columns.pop(times[0]) * (stated_seconds(path.name, named[times[0]]) or 1.0)
+    roles.pop(times[0])
     axes = {n: r.role for n, r in roles.items() if r.role and r.role[-1] in AXES} or dict.fromkeys(
         columns
     )
@@ -261,6 +275,8 @@ def read_curves(
                 f"{path.name} does not give the unit of {name}: write it as in gyro_x [deg/h], or "
                 "give unit='deg/h'"
             )
+        if axis and quantity_of(own) != axis.partition("_")[0]:
+            raise InputError(f"{path.name}: {own!r} is no unit of {name}")
         there = np.isfinite(columns[name])
         label = axis or bare(name)
         try:

@@ -164,3 +164,12 @@ def test_installed_sheets_name_their_documents_and_pages():
         if not sheet.leaves_K_open:
             assert all(sheet.models(sensor) for sensor in sheet.entries), name
         assert all(letters["N"] for letters in sheet.letters.values()), name
+
+
+@pytest.mark.parametrize(
+    "second", ["noise_density: 2 deg/s/sqrt(Hz)", "lowest_deviation: 20 deg/h"]
+)
+def test_numbers_that_contradict_each_other_are_rejected(tmp_path, second):
+    (tmp_path / "s.yaml").write_text(f"gyro: {{N: 0.2 deg/sqrt(h), B: 8 deg/h, {second}}}")
+    with pytest.raises(gmwm.InputError, match="contradict each other by a factor of"):
+        gmwm.datasheet(tmp_path / "s.yaml")

@@ -246,3 +246,30 @@ def test_files_that_are_no_curves(tmp_path, name, text, words):
     with pytest.raises(InputError) as caught:
         gmwm.read_curves(tmp_path / name)
     assert words in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("head", "scale"), [("tau [h]", 3600.0), ("tau_ms", 1e-3), ("Tau (min)", 60.0), ("tau", 1.0)]
+)
+def test_averaging_times_are_read_in_their_unit(tmp_path, head, scale):
+    tau = 0.01 * 2.0 ** np.arange(14)
+    rows = np.column_stack([tau / scale, 1e-3 / np.sqrt(tau)])
+    np.savetxt(tmp_path / "c.csv", rows, "%.9g", ",", header=f"{head},gyro_x [rad/s]", comments="")
+    (found,) = gmwm.read_curves(tmp_path / "c.csv", duration=3600).values()
+    np.testing.assert_allclose(found.tau, tau, rtol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("head", "message"),
+    [
+        ("tau,gyro_x [deg/h],tau_y,gyro_y [deg/h]", "has 2 columns of averaging times"),
+        ("tau,gyro_x [deg/h],gyro_x [deg/h]", "two columns of one name"),
+        ("tau [furlong],gyro_x [deg/h]", "not a known unit of time"),
+        ("tau,gyro_x [ug]", "'ug' is no unit of gyro_x"),
+    ],
+)
+def test_columns_that_contradict_are_rejected(tmp_path, head, message):
+    rows = np.tile(0.01 * 2.0 ** np.arange(14)[:, None], (1, head.count(",") + 1))
+    np.savetxt(tmp_path / "c.csv", rows, "%.9g", ",", header=head, comments="")
+    with pytest.raises(gmwm.InputError, match=message):
+        gmwm.read_curves(tmp_path / "c.csv", duration=3600)
