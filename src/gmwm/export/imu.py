@@ -211,7 +211,7 @@ def numbers_of(
     if not isinstance(given, FilterNumbers):
         raise InputError(
             f"{checks.shown(given)} has no numbers to export: give a calibration, noise in motion, "
-            "or a result of gmwm.bound or gmwm.reduce"
+            "or a result of gmwm.bound or gmwm.reduce for axes by name ({'gyro_x': fit})"
         )
     if given.form != form:
         raise InputError(

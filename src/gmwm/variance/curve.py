@@ -247,11 +247,7 @@ def read_curves(
     elif path.suffix.lower() == ".json":
         columns = _of_json(path)
     else:
-        (table,) = open_tables(path, Wanted(by_channel=True))[:1]
-        values = load_columns(table, range(len(table.names)))
-        columns = {name or str(i): values[i] for i, name in enumerate(table.names)}
-        if len(columns) < len(table.names):
-            raise InputError(f"{path.name} has two columns of one name: leave one out")
+        columns = _of_table(path)
     named = {name: _TAU.sub("time", name.strip()) for name in columns}
     roles = {name: meaning(as_time) for name, as_time in named.items()}
     times = [n for n, role in roles.items() if role.role == TIME or named[n] != n.strip()]
@@ -293,6 +289,16 @@ def read_curves(
         except InputError as wrong:
             raise InputError(f"{path.name}, {name}: {wrong}") from None
     return found
+
+
+def _of_table(path: Path) -> Columns:
+    """Columns of a table by their names."""
+    (table,) = open_tables(path, Wanted(by_channel=True))[:1]
+    values = load_columns(table, range(len(table.names)))
+    columns = {name or str(i): values[i] for i, name in enumerate(table.names)}
+    if len(columns) < len(table.names):
+        raise InputError(f"{path.name} has two columns of one name: leave one out")
+    return columns
 
 
 def _of_imu_utils(path: Path, unit: Any) -> tuple[Columns, Any]:
