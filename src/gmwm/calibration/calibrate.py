@@ -150,6 +150,7 @@ def _without_curves(
     if not covariates:
         return list(recordings), {}
     designs = designs_of(recordings, covariates)
+    lost = [nodes.notices for nodes in next(iter(designs.values())).nodes]
     left = [
         replace(
             each,
@@ -157,7 +158,7 @@ def _without_curves(
                 c if c.is_auxiliary or c.name not in designs else designs[c.name].without(c, place)
                 for c in each.channels
             ),
-            notices=(*each.notices, *_picked(each)),
+            notices=(*each.notices, *lost[place], *_picked(each)),
         )
         for place, each in enumerate(recordings)
     ]

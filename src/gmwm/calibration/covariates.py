@@ -24,7 +24,7 @@ from gmwm.calibration.scaling import Scaling, scaling
 from gmwm.errors import InputError
 from gmwm.estimate import Fit
 from gmwm.estimate.problem import pilot
-from gmwm.issues import Severity, notice
+from gmwm.issues import Notice, Severity, notice
 from gmwm.readers import Channel, Recording, block_means
 from gmwm.selection import penalty
 from gmwm.variance import RegressorPart, Regressors, WaveletVariance
@@ -104,11 +104,15 @@ class Nodes:
     time: (M,), s from its first sample.
     start: s of that since the recording began.
     rows: Name -> (M,).
+    lost: (M,), NaN where one of them is missing for too long to be interpolated, else zero.
+    notices: Which are.
     """
 
     time: FloatArray
     start: float
     rows: Mapping[str, FloatArray]
+    lost: FloatArray
+    notices: tuple[Notice, ...]
 
     @classmethod
     def of(cls, recording: Recording, names: Sequence[str], most: int = 0) -> Nodes:
@@ -117,6 +121,7 @@ class Nodes:
         step = recording.duration / max(parts, 1)
         time = np.asarray(step * (np.arange(parts) + 0.5), dtype=float)
         rows: dict[str, FloatArray] = {}
+        lost, notices = np.zeros(parts), list[Notice]()
         for name in names:
             channel = _channel_of(recording, name)
             when = recording.dt * np.arange(recording.n, dtype=float)
@@ -127,9 +132,20 @@ class Nodes:
             there = np.flatnonzero(~np.isnan(means))
             if there.size < 2:
                 raise InputError(f"{recording.source or 'the recording'}: {name} has no values")
-            rows[name] = np.interp(time, (there + 0.5) * size * dt, means[there])
+            known = (there + 0.5) * size * dt
+            rows[name] = np.interp(time, known, means[there])
+            after = np.searchsorted(known, time)
+            ends = known[np.clip([after - 1, after], 0, there.size - 1)]
+            longest = max(tuning.LONGEST_BRIDGE * recording.duration, 2.0 * size * dt)
+            away = np.ptp(ends, axis=0) > longest
+            beyond = np.abs(time - np.clip(time, known[0], known[-1]))
+            away |= beyond > max(step, size * dt)
+            if np.any(away):
+                lost[away] = np.nan
+                length = step * np.count_nonzero(away)
+                notices.append(notice("covariate-missing", "", {"length": length}, name=name))
         begun = [each.values["start"] for each in recording.notices if each.code == "part"]
-        return cls(time, float(sum(begun)), rows)
+        return cls(time, float(sum(begun)), rows, lost, tuple(notices))
 
     def columns(self, one: Regressor, scale: Mapping[str, Covariate]) -> FloatArray:
         """A regressor, (M,)."""
@@ -170,8 +186,9 @@ class Design:
     offset: float
 
     def without(self, channel: Channel, place: int) -> Channel:
-        """A channel of a recording less the first curve."""
-        return _less(channel, self.nodes[place].time, self.removed @ self.columns[place])
+        """A channel of a recording less the first curve, missing where that is not known."""
+        own = self.nodes[place]
+        return _less(channel, own.time, self.removed @ self.columns[place] + own.lost)
 
     def evened(self, channel: Channel, place: int, growth: Scaling | None) -> Channel:
         """A channel less its mean, over the growth of its noise: of one size if that is all."""
@@ -229,7 +246,8 @@ def compensated(
         return recording, {}
     scales = {one.name: one for curve in own.values() for one in curve.covariates}
     nodes = Nodes.of(recording, tuple(scales), int(recording.duration / tuning.NODE_STEP))
-    notices, noise, less = list(recording.notices), dict[str, float](), dict[str, Channel]()
+    notices = [*recording.notices, *(replace(n, hint="interpolated there") for n in nodes.notices)]
+    noise, less = dict[str, float](), dict[str, Channel]()
     for name, one in scales.items():
         channel = _channel_of(recording, name)
         if channel is not None and (channel.unit or "unit") != one.unit:
@@ -301,7 +319,8 @@ def _design(
     means = {}
     for place, channel in channels.items():
         size = max(channel.n // nodes[place].time.size, 1)
-        means[place] = block_means([channel.values], size)[: nodes[place].time.size, 0]
+        own_means = block_means([channel.values], size)[: nodes[place].time.size, 0]
+        means[place] = own_means + nodes[place].lost[: own_means.size]
     count = sum(channel.n for channel in channels.values())
     length = max(each.duration for each in recordings)
     tried: list[tuple[float, tuple[Regressor, ...], FloatArray]] = []

@@ -48,6 +48,27 @@ def off(curve, at):
     return value - curve(curve.main.centre) - true, error
 
 
+@pytest.mark.parametrize("gap", [slice(0, 150), slice(100, 300)])
+def test_where_the_temperature_is_missing_samples_are_left_out(gap):
+    temperature = warm_up()
+    temperature[gap] = np.nan
+    rec = recording()
+    cut = rec["gyro_x"].values.copy()
+    cut[gap] = np.nan
+    arrays = {"gyro_x": cut, "temperature": warm_up()}
+    units = {"gyro": "rad/s", "temperature": "degC"}
+    without_samples = calibrated(gmwm.Recording.from_arrays(arrays, 1.0 / DT, units))
+    arrays = {"gyro_x": rec["gyro_x"].values, "temperature": temperature}
+    found = calibrated(gmwm.Recording.from_arrays(arrays, 1.0 / DT, units))
+    (said,) = [each for each in found.notices if each.code == "covariate-missing"]
+    assert said.values["length"] == pytest.approx((gap.stop - gap.start) * DT, abs=8.0)
+    assert found["gyro_x"].valid
+    difference, error = off(found.curves["gyro_x"], np.array([38.0, 50.0, 60.0]))
+    assert np.all(np.abs(difference) < 2.5 * error)
+    fit, other = found["gyro_x"].params, without_samples["gyro_x"].params
+    assert fit["K"] == pytest.approx(other["K"], rel=0.3)
+
+
 def test_a_curve_is_found_with_its_noise(result):
     curve, fit = result.curves["gyro_x"], result["gyro_x"]
     at = np.linspace(curve.main.low, curve.main.high, 12)
