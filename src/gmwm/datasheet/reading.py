@@ -9,6 +9,8 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from gmwm._core import checks
 from gmwm._core.checks import shown
 from gmwm._core.documents import read_yaml
@@ -25,7 +27,13 @@ _WORDS = {
 _VALUE = re.compile(r"\s*([-+.\deE]+)\s+(\S.*?)(?:\s+\((.+)\))?\s*")
 _ABOUT = ("name", "document", "temperature")
 _HINT = "write it like 'N: 0.15 deg/sqrt(h)', 'B: 7 deg/h'"
-_ALIKE = (("N", "noise_density", 0.84), ("lowest_deviation", "B", 0.664))
+_RMS = "rms_noise with bandwidth"
+_ALIKE = (
+    ("N", "noise_density", 0.84),
+    ("N", _RMS, 0.63),
+    ("noise_density", _RMS, 0.9),
+    ("lowest_deviation", "B", 0.664),
+)
 """Two that say one thing, and the usual ratio of the first to the second."""
 _SHEETS = files("gmwm.datasheet").joinpath("sheets")
 
@@ -126,9 +134,12 @@ def _read(place: str, content: Any, channels: dict[str, str] | None) -> Datashee
         pages[name] = {key: page for key, _, page in found if page}
         if len(entries[name]) < len(found):
             raise InputError(f"{place}: {name} states a number twice: leave one out")
+        stated = dict(entries[name])
+        if {"rms_noise", "bandwidth"} <= {*stated}:
+            stated[_RMS] = stated["rms_noise"] / np.sqrt(stated["bandwidth"])
         for first, second, usual in _ALIKE:
-            ratio = entries[name].get(first, usual) / entries[name].get(second, 1.0) / usual
-            if {first, second} <= {*entries[name]} and not 0.5 <= ratio <= 2.0:
+            ratio = stated.get(first, usual) / stated.get(second, 1.0) / usual
+            if {first, second} <= {*stated} and not 0.5 <= ratio <= 2.0:
                 raise InputError(
                     f"{place}: {name}: {first} and {second} contradict each other by a factor of "
                     f"{max(ratio, 1.0 / ratio):.3g}: leave one out"

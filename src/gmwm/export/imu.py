@@ -42,6 +42,7 @@ class Axis:
     upper: Which of the numbers are upper limits of a term that was not found.
     notices: Those of its filter numbers.
     covers: The largest term that N or K covers beside the sensor's own; empty if there is none.
+    turn_on_sd: Of the turn-on bias that ``initial_sd`` contains, u.
     """
 
     name: str
@@ -55,6 +56,7 @@ class Axis:
     upper: frozenset[str] = frozenset()
     notices: tuple[Notice, ...] = ()
     covers: str = ""
+    turn_on_sd: float = 0.0
 
     @property
     def start_sd(self) -> float:
@@ -407,7 +409,8 @@ def axis_of(name: str, numbers: AxisFilterNumbers, rate: float, fitted: Fit | No
         rate = 1.0 / fitted.wv.dt
     limits = [key for n in numbers.notices if n.code == "upper-limit" for key in n.values]
     values = (numbers.N, numbers.K, sigma, tau, numbers.initial_sd, dict(numbers.nees), rate)
-    return Axis(name, *values, frozenset(limits), numbers.notices, _covered(numbers, fitted))
+    about = (frozenset(limits), numbers.notices, _covered(numbers, fitted), numbers.turn_on_sd)
+    return Axis(name, *values, *about)
 
 
 def _covered(numbers: AxisFilterNumbers, fitted: Fit | None) -> str:

@@ -87,6 +87,7 @@ def notes(imu: ImuNumbers, title: str, caution: str) -> list[str]:
     covers = "; ".join(f"{axis.name} {axis.covers}" for axis in slow if axis.covers)
     notices = [n for triad in imu.triads for axis in triad.axes for n in axis.notices]
     is_short = any(n.code == "short-horizon" for n in notices)
+    unlikely = dict.fromkeys(n.where for n in notices if n.code == "unlikely-sheet")
     lines = [
         f"{title}: {' and '.join(imu.sources)}",
         f"{purpose}; for details: gmwm export --explain",
@@ -95,6 +96,7 @@ def notes(imu: ImuNumbers, title: str, caution: str) -> list[str]:
         if imu.reserved
         else "",
         "do not use: within a second N and K follow the sensor's low-pass" if is_short else "",
+        f"unlikely, check the units of the sheet: {', '.join(unlikely)}" if unlikely else "",
         caution,
         _consistency(imu),
         _start(imu),
@@ -130,7 +132,9 @@ def _start(imu: ImuNumbers) -> str:
         for triad in imu.triads
         if triad.initial_sd
     ]
-    return f"start bias {', '.join(values)}, plus turn-on bias"
+    lacking = [t.quantity for t in imu.triads if not any(axis.turn_on_sd for axis in t.axes)]
+    which = f"{lacking[0]} turn-on" if len(lacking) == 1 else "turn-on bias"
+    return f"start bias {', '.join(values)}" + f", plus {which}" * bool(lacking)
 
 
 def _consistency(imu: ImuNumbers) -> str:

@@ -161,7 +161,7 @@ def bound_of(
         notices += covered_terms_notices(axis, target, model, problem.targets)
         notices += fit_notices(axis, level, horizon)
         about = (form, model, horizon, sd, "bound", found, tuple(notices), axis.quantity, stderr)
-        numbers.append(AxisFilterNumbers(*about))
+        numbers.append(AxisFilterNumbers(*about, turn_on_sd=axis.bias_sd))
     return tuple(numbers)
 
 

@@ -151,7 +151,7 @@ class _Search:
             notices += covered_terms_notices(axis, target, model, targets)
             notices += fit_notices(axis, None, longest)
             about = (self.form, model, longest, sd, "reduce", found, tuple(notices), axis.quantity)
-            numbers.append(AxisFilterNumbers(*about))
+            numbers.append(AxisFilterNumbers(*about, turn_on_sd=axis.bias_sd))
         return numbers
 
     def correlation_time(self, groups: Sequence[Sequence[AxisModel]]) -> float:

@@ -97,6 +97,8 @@ class AxisFilterNumbers(Document, InUnits):
     stderr : dict
         Standard errors of the N and K that bound a valid fit, from those of the fit; empty for
         other forms, for models, and where a level covers them.
+    turn_on_sd : float
+        Of the turn-on bias that ``initial_sd`` contains, u; zero if none was given.
     """
 
     SCHEMA: ClassVar[str] = "gmwm.axis-numbers"
@@ -111,6 +113,7 @@ class AxisFilterNumbers(Document, InUnits):
     notices: tuple[Notice, ...] = ()
     quantity: Text = ""
     stderr: Mapping[Text, NotNegative] = field(default_factory=dict)
+    turn_on_sd: NotNegative = 0.0
 
     def __post_init__(self) -> None:
         freeze(self, "stderr")

@@ -167,9 +167,25 @@ def test_installed_sheets_name_their_documents_and_pages():
 
 
 @pytest.mark.parametrize(
-    "second", ["noise_density: 2 deg/s/sqrt(Hz)", "lowest_deviation: 20 deg/h"]
+    "second",
+    [
+        "noise_density: 2 deg/s/sqrt(Hz)",
+        "lowest_deviation: 20 deg/h",
+        "rms_noise: 1 deg/s, bandwidth: 50 Hz",
+    ],
 )
 def test_numbers_that_contradict_each_other_are_rejected(tmp_path, second):
     (tmp_path / "s.yaml").write_text(f"gyro: {{N: 0.2 deg/sqrt(h), B: 8 deg/h, {second}}}")
     with pytest.raises(gmwm.InputError, match="contradict each other by a factor of"):
         gmwm.datasheet(tmp_path / "s.yaml")
+
+
+@pytest.mark.parametrize("turn_on", ["", ", turn_on_bias: 2 deg/s"])
+def test_a_file_says_whether_its_start_has_the_turn_on_bias_and_what_is_unlikely(turn_on):
+    text = "N: 150 deg/sqrt(h), B: 70 deg/h"
+    entry = dict(part.split(": ") for part in f"{text}{turn_on}".split(", "))
+    sheet = gmwm.datasheet({"gyro": entry, "accel": {"N": "100 ug/sqrt(Hz)", "B": "50 ug"}})
+    found = gmwm.export(sheet.numbers(rate=100.0), "kalibr")
+    assert ("plus accel turn-on\n" in found) == bool(turn_on)
+    assert ("plus turn-on bias" in found) == (not turn_on)
+    assert "unlikely, check the units of the sheet: gyro" in found
