@@ -117,10 +117,11 @@ def fit_shared(
     Raises
     ------
     InputError
-        If there are no parts, or a channel has the samples of another.
+        If there are no parts, two have one shape, or a channel has the samples of another.
     """
-    if not parts:
-        raise InputError("no parts to fit: give processes such as WhiteNoise(1)")
+    kinds = [type(part) for part in parts if not part.is_exponential]
+    if not parts or len(set(kinds)) < len(kinds):
+        raise InputError("give each part once, such as [WhiteNoise(1), RandomWalk(1)]")
     p, levels, (first, second) = len(data.names), data.tau.size, data.pairs
     alike = np.min(np.abs(data.correlation), axis=0) - np.eye(p) > tuning.SAME_SAMPLES
     if np.any(alike):

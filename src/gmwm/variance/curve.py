@@ -135,16 +135,9 @@ def curve(
     True
     """
     scale = _PER_WAVELET[checks.choice("kind", kind, tuple(_PER_WAVELET))]
-    times, given = (checks.real_numbers(each, "the curve") for each in (tau, values))
-    if times.ndim != 1 or times.shape != given.shape:
-        raise InputError(
-            f"a curve of {given.shape} values at {times.shape} averaging times: give one list of "
-            "each, of equal lengths"
-        )
-    if not np.all((times > 0.0) & np.isfinite(times) & (given > 0.0) & np.isfinite(given)):
-        raise InputError("a curve has an averaging time or value that is not positive: remove it")
-    order = np.argsort(times)
-    times, given = times[order], given[order]
+    times, given = _rising(tau, values)
+    if checks.plausible("error", error) >= 100.0:
+        raise InputError(f"error = {error:g} % of a deviation: give less than 100, such as 3")
     dt = checks.sampling_interval(float(times[0]) if rate is None else None, rate)
     kept = _apart(times / dt)
     times, given = times[kept], given[kept]
@@ -179,8 +172,25 @@ def curve(
         name=name,
         quantity=quantity,
         unit=own,
-        error=checks.plausible("error", error) / 100.0,
+        error=float(error) / 100.0,
     )
+
+
+def _rising(tau: Any, values: Any) -> tuple[FloatArray, FloatArray]:
+    """Averaging times and values in rising order, checked."""
+    times, given = (checks.real_numbers(each, "the curve") for each in (tau, values))
+    if times.ndim != 1 or times.shape != given.shape:
+        raise InputError(
+            f"a curve of {given.shape} values at {times.shape} averaging times: give one list of "
+            "each, of equal lengths"
+        )
+    if not np.all((times > 0.0) & np.isfinite(times) & (given > 0.0) & np.isfinite(given)):
+        raise InputError("a curve has an averaging time or value that is not positive: remove it")
+    order = np.argsort(times)
+    times, given = times[order], given[order]
+    if np.any((np.diff(times) == 0.0) & (np.abs(np.diff(np.log(given))) > tuning.SAME_VALUE)):
+        raise InputError("a curve has two values at one averaging time: leave one of them out")
+    return times, given
 
 
 def _apart(m: FloatArray) -> list[int]:

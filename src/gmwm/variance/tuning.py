@@ -32,6 +32,7 @@ HAAR_PEAK = 0.37  # the Haar gain of averaging time tau peaks at f = 0.37/tau
 
 # -- curves without samples -----------------------------------------------------------------------
 
+SAME_VALUE = 0.1  # by which two values at one averaging time may differ, as rounded times do
 LEAST_RATIO = 1.4  # of averaging times that are kept
 LEAST_TIMES = 4
 TIME_ROUNDING = 0.005  # relative, of averaging times that are whole numbers of samples as printed

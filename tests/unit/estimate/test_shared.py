@@ -80,6 +80,12 @@ def test_parts_of_models_are_merged_where_they_are_alike():
     assert [part.values.get("tau") for part in found] == pytest.approx([None, tau, 500.0, None])
 
 
+def test_parts_of_one_shape_are_rejected():
+    data = wavelet_covariance(channels(np.random.default_rng(5), 512))
+    with pytest.raises(InputError, match="give each part once"):
+        fit_shared([RandomWalk(1.0), RandomWalk(1.0)], data)
+
+
 def test_copies_are_rejected():
     one, other = channels(np.random.default_rng(5), 512)
     other.values[:] = -2.0 * one.values

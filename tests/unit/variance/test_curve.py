@@ -173,6 +173,8 @@ def test_what_needs_samples_says_so(use, words):
         (([1.0, 2.0, 4.0, 8.0], [1.0] * 4, {"unit": "m"}), "neither an angular rate nor"),
         (([1.0, 2.0, 4.0, 8.0], [1.0] * 4, {"kind": "adev"}), "kind = 'adev'"),
         (([1.0, 2.0, 4.0, 8.0], [1.0] * 4, {"error": -1.0}), "error = -1.0"),
+        (([1.0, 2.0, 4.0, 8.0], [1.0] * 4, {"error": 300.0}), "less than 100"),
+        (([1.0, 2.0, 4.0, 4.0, 8.0], [1.0, 0.7, 0.5, 0.3, 0.3]), "two values at one"),
         ((["a"] * 4, [1.0] * 4), "not a number"),
     ],
 )
