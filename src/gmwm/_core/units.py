@@ -39,10 +39,13 @@ def _registry() -> pint.UnitRegistry[Any]:
 _EXPONENT = r"(?:\^|\*\*|(?<=[a-z]))-?[123](?!\d|\s*\^|\s*\*\*)"
 _PLAIN = re.compile(rf"(?:1/)?(?:[A-Za-zµ/·()√²]|\s|\*(?=[A-Za-z])|{_EXPONENT})+")
 
+_ROOT = re.compile(r"\brt[- ]?\(?([A-Za-z]+)\)?|([A-Za-z]+)\^\(?(?:0?\.5|1/2)\)?")
+
 
 def _quantity(text: str) -> pint.Quantity[Any]:
     """Parse a unit such as ``deg/h/sqrt(Hz)`` or ``m/s2``."""
-    source = text.strip()
+    source = re.sub(r"[°º]", "deg", text.strip()).replace("μ", "µ")
+    source = _ROOT.sub(r"sqrt(\1\2)", source)
     expression = re.sub(r"sqrt\(([^()]*)\)|√\(?(\w+)\)?", r"((\1\2)**0.5)", source)
     expression = expression.replace("²", "**2").replace("^", "**").replace("·", "*")
     expression = re.sub(r"\b(s|sec)2\b", r"s**2", expression)
