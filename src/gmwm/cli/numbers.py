@@ -192,7 +192,7 @@ _IN_SI = {
     --reference FILE  Reference trajectory on which it is judged, a CSV of time, latitude,
         longitude, height, roll, pitch, yaw; a loiter or, with wheels, a car's drive by default.
     --motion NAME  Motion in which the errors below act: handheld, drone, car, fixed-wing, or a
-        recording of your own.
+        recording of your own. A motion.json: the numbers are judged in that motion too.
     --scale-error PERCENT  Scale error of both sensors.
     --misalignment DEG  Misalignment of the axes.
     --g-sensitivity DEG/S/G  g-sensitivity of the gyros.
@@ -240,7 +240,6 @@ def certify(
     from gmwm.calibration import Calibration
     from gmwm.filter_numbers import Imperfections, certify as run
     from gmwm.ins import Trajectory
-    from gmwm.readers import read
 
     calibration = _at(Calibration.load(file), temperature)
     imperfections = Imperfections(**{name: given[name] * unit for name, unit in _IN_SI.items()})
@@ -252,13 +251,23 @@ def certify(
         outages=seconds("--outages", given["outages"]),
         keyframe=given["keyframe"],
         imperfections=imperfections,
-        motion=read(motion) if motion is not None and Path(motion).is_file() else motion,
+        motion=_motion(motion),
         aiding=given["aiding"],
         reference=None if given["reference"] is None else Trajectory.read(given["reference"]),
     )
     if output is not None:
         found.save(output)
     print_result(found, output, text=found.text(units, verbose=verbose), as_json=as_json)
+
+
+def _motion(given: str | None) -> Any:
+    """A name, the motion of a recording, or a result of ``gmwm motion``."""
+    from gmwm.motion import InMotion
+    from gmwm.readers import read
+
+    if given is None or not Path(given).is_file():
+        return given
+    return InMotion.load(given) if given.endswith(".json") else read(given)
 
 
 def _numbers(

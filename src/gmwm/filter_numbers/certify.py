@@ -25,6 +25,7 @@ from gmwm.filter_numbers.result import AxisFilterNumbers, FilterNumbers, InUnits
 from gmwm.filter_numbers.spectra.dominance import KINDS
 from gmwm.ins import AIDINGS, SensorModels, Trajectory, covariance_analysis, loiter_with_outages
 from gmwm.issues import Notice, notice
+from gmwm.motion import HORIZON, INTERVAL, InMotion, between
 from gmwm.process import Model, Process, RandomWalk, WhiteNoise, as_model
 from gmwm.readers import Recording
 
@@ -48,11 +49,15 @@ CONSUMERS = {
     "odometry": "INS with visual or lidar odometry: way in a time without it",
     "wheels": "INS with wheel odometry: way in a time without it",
     "keyframes": "Relative pose between keyframes",
+    "motion": "Change of the mean rate in motion, from one such time to the next",
 }
 """Users of the numbers."""
 
-_MODEL, _ALL = "error model", "all together"
-"""Causes that numbers in use are judged by."""
+_MODEL, _ALL, _MOTION = "error model", "all together", "in motion"
+"""Causes that numbers in use are judged by; the last that is there counts."""
+
+_APART = ("keyframes", "motion")
+"""Consumers whose times are not those of outages."""
 
 _LOOSE = 0.5  # N and K that are needed over those in use, below which this is said
 
@@ -136,10 +141,10 @@ class Certificate(Document, InUnits):
 
     @property
     def _times(self) -> dict[str, list[float]]:
-        """Axis, or "horizontal" -> times of its checks, but those at keyframes, s."""
+        """Axis, or "horizontal" -> times of its checks in outages, s."""
         times: dict[str, list[float]] = {check.where: [] for check in self.checks}
         for check in self.checks:
-            times[check.where] += [check.time] if check.consumer != "keyframes" else []
+            times[check.where] += [check.time] if check.consumer not in _APART else []
         return times
 
     def of(self, consumer: str) -> tuple[Check, ...]:
@@ -169,6 +174,13 @@ class Certificate(Document, InUnits):
             f"true, predicted: 1 sigma after {longest:g} s. NEES per degree of freedom; 1: "
             f"consistent, above {tuning.INCONSISTENT:g}: overconfident"
         )
+        if moving := self.of("motion"):
+            times = dict.fromkeys(check.time for check in moving)
+            rows = [
+                [name, *(cell(c.nees, 3) for c in moving if c.where == name)]
+                for name in dict.fromkeys(check.where for check in moving)
+            ]
+            lines += ["", plain_table(["in motion", *(f"NEES\n{t:.3g} s" for t in times)], rows)]
         for quantity in dict.fromkeys(cause.quantity for cause in self.causes):
             lines += ["", self._covered(quantity, units)]
         notices = self.notices if verbose else self.notices[:_MOST_NOTICES]
@@ -197,16 +209,17 @@ class Certificate(Document, InUnits):
         if not wrong:
             where = "in the whole filter" if self._overconfident() else ""
         verdict = f"too small {where}: overconfident" if where else "safe on all axes"
+        source += " and those in motion" * bool(self.of("motion"))
         return f"The numbers in use are {verdict}, if the errors are those of {source}."
 
     def _errors(self, longest: float) -> str:
         """A row for each axis and for the whole filter: errors, and NEES by time."""
-        free = {check.time: None for check in self.checks if check.consumer != "keyframes"}
+        free = {check.time: None for check in self.checks if check.consumer not in _APART}
         rows = []
         for where in dict.fromkeys(check.where for check in self.checks):
             own = [check for check in self.checks if check.where == where]
-            last = next(c for c in own if c.time == longest and c.consumer != "keyframes")
-            nees = {c.time: cell(c.nees, 3) for c in own if c.consumer != "keyframes"}
+            last = next(c for c in own if c.time == longest and c.consumer not in _APART)
+            nees = {c.time: cell(c.nees, 3) for c in own if c.consumer not in _APART}
             pose = [cell(c.nees, 3) for c in own if c.consumer == "keyframes"]
             name = where if where in self.numbers else "whole filter"
             about = [name, f"{last.quantity} [{last.unit}]", cell(last.true), cell(last.believed)]
@@ -228,16 +241,19 @@ class Certificate(Document, InUnits):
 
     def _advice(self) -> list[str]:
         """What to do with the numbers in use: take others, or keep them."""
-        needed = {each.quantity: each for each in self.causes if each.name in (_MODEL, _ALL)}
-        row = f"the row '{_ALL if _ALL in {c.name for c in self.causes} else _MODEL}'"
+        name = [n for n in (_MODEL, _ALL, _MOTION) if n in {c.name for c in self.causes}][-1]
+        needed = {each.quantity: each for each in self.causes if each.name == name}
+        row = f"the row '{name}'"
         values = "; ".join(
             f"{quantity or 'axis'} N {each.N:.3g}, K {each.K:.3g}"
             for quantity, each in needed.items()
         )
         loose = [each for each in needed.values() if max(each.N_factor, each.K_factor) < _LOOSE]
         if self._overconfident():
-            time = f"{self.recommended.horizon:g} s"
-            text = f"take {row}, for outages of {time}: {values} (SI, as gmwm export writes them)"
+            time = HORIZON if name == _MOTION else self.recommended.horizon
+            text = (
+                f"take {row}, for outages of {time:g} s: {values} (SI, as gmwm export writes them)"
+            )
         elif loose:
             kinds = " and ".join(each.quantity or "axis" for each in loose)
             text = f"{kinds}: {row} is less than half of those in use, and as safe: {values} (SI)"
@@ -257,7 +273,7 @@ def certify(
     outages: Sequence[float] = (10.0, 60.0),
     keyframe: float = 1.0,
     imperfections: Imperfections | None = None,
-    motion: str | Motion | Recording | None = None,
+    motion: str | Motion | Recording | InMotion | None = None,
     aiding: str = "gnss",
     reference: Trajectory | None = None,
     bias_sd: Sd = 0.0,
@@ -278,8 +294,9 @@ def certify(
         Interval of keyframes or scans between which poses are related, s.
     imperfections : Imperfections, optional
         Errors that static data cannot show, as far as they are known.
-    motion : {"handheld", "drone", "car", "fixed-wing"}, Motion or Recording, optional
-        With which they come: a usual one, or that of a recording.
+    motion : {"handheld", "drone", "car", "fixed-wing"}, Motion, Recording or InMotion, optional
+        With which they come: a usual one, or that of a recording. With a result of `gmwm.motion`
+        the numbers are judged in that motion too, from 0.1 s to 1 s without updates.
     aiding : {"gnss", "pose", "odometry", "wheels"}, optional
         What aids the whole filter; see `gmwm.ins.loiter_with_outages`.
     reference : Trajectory, optional
@@ -315,7 +332,8 @@ def certify(
     axes.check_interval("keyframe", keyframe)
     axes.check_interval("outages", times[0])
     known = Imperfections() if imperfections is None else imperfections
-    moved = None if motion is None else Motion.of(motion)
+    measured = motion if isinstance(motion, InMotion) else None
+    moved = None if motion is None or isinstance(motion, InMotion) else Motion.of(motion)
     if known.needs_motion and moved is None:
         raise InputError("these imperfections have no effect at rest: give a motion too")
     horizon = times[-1]
@@ -335,7 +353,35 @@ def certify(
         rows, advice = _causes(group, own, horizon, known, moved)
         causes += rows
         notices += advice
+        if measured is not None:
+            more, row = _in_motion(measured, group, own)
+            found += more
+            causes.append(row)
+            notices = [each for each in notices if each.code != "other-units"]
     return Certificate(own, safe, (*found, *in_flight), tuple(causes), tuple(notices))
+
+
+def _in_motion(
+    measured: InMotion, group: Sequence[AxisModel], numbers: FilterNumbers
+) -> tuple[list[Check], Cause]:
+    """Errors in motion beside those that numbers predict, and the numbers that cover them."""
+    least, found = measured.numbers(), []
+    unit = SI_UNIT.get(group[0].quantity, "u")
+    for name in (axis.name for axis in group):
+        tau, variance = measured.envelope(name)
+        times = np.array([INTERVAL, *tau[(tau > INTERVAL) & (tau < HORIZON)], HORIZON])
+        true = between(tau, variance, times)
+        own = 2.0 * numbers[name].model.haar_variance(times, tau[0])
+        found += [
+            Check(
+                "motion", name, "rate", unit, float(t), float(np.sqrt(a)), float(np.sqrt(b)), a / b
+            )
+            for t, a, b in zip(times, true, own, strict=True)
+        ]
+    N, K = (max(float(least[a.name].params[k] or 0.0) for a in group) for k in "NK")
+    in_use = [max(getattr(numbers[axis.name], k) for axis in group) for k in "NK"]
+    factors = [_ratio(value, over) for value, over in zip((N, K), in_use, strict=True)]
+    return found, Cause(group[0].quantity, _MOTION, N, K, *factors)
 
 
 def _kind_of(given: Given, in_use: Mapping[str, AxisFilterNumbers]) -> dict[str, Any]:

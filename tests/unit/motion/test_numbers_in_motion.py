@@ -94,6 +94,32 @@ def test_filters_with_these_numbers_are_certified():
     assert min(nees(found.at("rest").numbers(0.1, 1.0))) > 100.0
 
 
+def test_numbers_in_use_are_judged_in_motion_beside_the_bench(run, tmp_path):
+    """A bounded angle Q has an Allan variance of 3 Q^2/t^2, N predicts N^2/t and K K^2 t/3."""
+    Q, N, K = 1e-3, 1e-4, 1e-5
+    found = in_motion([allan(QuantizationNoise(Q))])
+    bench = {name: WhiteNoise(N) + RandomWalk(K) for name in AXES}
+    judged = gmwm.certify(bench, {kind: (N, K) for kind in KINDS}, rate=1.0 / DT, motion=found)
+    for each in (check for check in judged.of("motion") if check.where == "gyro_x"):
+        expected = 3.0 * (Q / each.time) ** 2 / (N**2 / each.time + K**2 * each.time / 3.0)
+        assert each.nees == pytest.approx(expected, rel=0.02)
+    assert "overconfident" in judged.text()
+    assert "take the row 'in motion', for outages of 1 s" in " ".join(judged.text().split())
+    enough = {kind: (judged.causes[-1].N, judged.causes[-1].K) for kind in KINDS}
+    found.save(tmp_path / "motion.json")
+    units = {"gyro": "rad/s", "accel": "m/s^2"}
+    arrays = {name: model.simulate(2000, DT, k) for k, (name, model) in enumerate(bench.items())}
+    recording = gmwm.Recording.from_arrays(arrays, 1.0 / DT, units)
+    gmwm.calibrate(recording, "N+K", screening=()).save(tmp_path / "bench.json")
+    N, K = (",".join(str(enough[kind][k]) for kind in KINDS) for k in range(2))
+    flags = ("-N", N, "-K", K, "--motion", tmp_path / "motion.json")
+    code, out, _ = run("certify", tmp_path / "bench.json", *flags, "-o", "certificate.json")
+    assert code == 0
+    assert "safe on all axes" in out
+    kept = gmwm.load(tmp_path / "certificate.json")
+    assert max(each.nees for each in kept.of("motion")) == pytest.approx(1.0, abs=1e-3)
+
+
 def test_export_writes_the_numbers():
     truth = QuantizationNoise(2e-3) + WhiteNoise(1e-3)
     found = in_motion([allan(truth), 4.0 * allan(truth)])
