@@ -249,6 +249,12 @@ def _check_jumps(clock: Clock, found: Grid, seconds: float) -> None:
         usual = f"the usual one of {jumps.interval:.6g}, so that the sampling rate is not known"
         text = f"{off_grid:,} of {n:,} steps are not near a whole number of {usual}"
         raise clock.error(None, text)
+    early = 0
+    if found.uneven is not None:
+        early = int(np.count_nonzero(found.uneven.late < -tuning.ASTRAY - found.uneven.burst))
+    if early > tuning.MOST_OFF_GRID * n:  # a host that stalls makes stamps late, never early
+        text = f"{early:,} of {n:,} stamps are earlier than an even clock, so that it is not known"
+        raise clock.error(None, f"{text} how many rows are lost")
     if found.uneven is None and found.change is None and jumps.strays(clock.stamps):
         text = f"its steps differ at random from the usual one of {jumps.interval:.6g}, and the"
         text += " differences add up, as if rows were lost"

@@ -170,6 +170,22 @@ def test_rounded_stamps_of_an_even_clock_give_its_rate(recorded, rate):
     assert found.rate == pytest.approx(rate, rel=2e-5)
 
 
+@pytest.mark.parametrize("seed", range(8))
+def test_runs_of_lost_rows_beside_strong_jitter_are_counted_or_rejected(recorded, seed):
+    clock = Simulated(seed, 100.0)
+    clock.jitter(0.3)
+    there = np.ones(N, dtype=bool)
+    for start in clock.rng.integers(1, N - 13, size=120):
+        there[start : start + 12] = False
+    clock.number, clock.stamps = clock.number[there], clock.stamps[there]
+    try:
+        found = recorded(clock)[0]
+    except InputError as error:
+        assert "how many rows are lost" in str(error) or "not known" in str(error)
+    else:
+        assert found.rate == pytest.approx(100.0, rel=2e-4)
+
+
 @pytest.mark.parametrize("rate", [999.7, 998.5])
 def test_lost_rows_in_milliseconds_hide_a_rate_below_a_kilohertz(recorded, rate):
     """A limit that the documentation states: both are steps of 1 ms, and some of 2 ms."""
