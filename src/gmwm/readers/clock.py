@@ -252,7 +252,9 @@ def _check_jumps(clock: Clock, found: Grid, seconds: float) -> None:
     early = 0
     if found.uneven is not None:
         early = int(np.count_nonzero(found.uneven.late < -tuning.ASTRAY - found.uneven.burst))
-    if early > tuning.MOST_OFF_GRID * n:  # a host that stalls makes stamps late, never early
+    if early > max(
+        tuning.MOST_OFF_GRID * n, tuning.FEWEST_BESIDE
+    ):  # a host that stalls makes stamps late, never early
         text = f"{early:,} of {n:,} stamps are earlier than an even clock, so that it is not known"
         raise clock.error(None, f"{text} how many rows are lost")
     if found.uneven is None and found.change is None and jumps.strays(clock.stamps):
