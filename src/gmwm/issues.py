@@ -140,8 +140,11 @@ class Notice:
         if content["severity"] not in SEVERITIES:
             raise ValueError(f"severity = {str(content['severity'])[:20]!r}")
         found: dict[str, Any] = {name: str(content[name])[:10_000] for name in own}
-        if not all(isinstance(v, float | int | str | None) for v in content["values"].values()):
-            raise ValueError("values that are neither numbers nor text")
+        for each in content["values"].values():
+            if not isinstance(each, float | int | str | None) or (
+                isinstance(each, int) and abs(each) >= 1 << 64
+            ):
+                raise ValueError("values that are neither numbers nor text")
         found["values"] = _Stored(
             (str(name), float("nan") if value is None else value)
             for name, value in content["values"].items()

@@ -55,6 +55,7 @@ FOUND = [
     slow("odd", 42, 147),  # a deviation that may be none
     ("document", 41, 1335),  # an efficiency of next to nothing
     ("document", 4320, 1668),  # a certificate whose axes have checks at other times
+    ("document", 88001, 4693),  # a notice with a count of more digits than a number has
     ("document", 41, 4884),  # more degrees of freedom than numbers have digits
 ]
 
