@@ -241,19 +241,19 @@ class Certificate(Document, InUnits):
 
     def _advice(self) -> list[str]:
         """What to do with the numbers in use: take others, or keep them."""
-        name = [n for n in (_MODEL, _ALL, _MOTION) if n in {c.name for c in self.causes}][-1]
-        needed = {each.quantity: each for each in self.causes if each.name == name}
-        row = f"the row '{name}'"
+        # The last of these rows of each kind covers those before.
+        needed = {c.quantity: c for c in self.causes if c.name in (_MODEL, _ALL, _MOTION)}
+        names = dict.fromkeys(each.name for each in needed.values())
+        row = " and ".join(f"the row '{name}'" for name in names)
         values = "; ".join(
             f"{quantity or 'axis'} N {each.N:.3g}, K {each.K:.3g}"
             for quantity, each in needed.items()
         )
         loose = [each for each in needed.values() if max(each.N_factor, each.K_factor) < _LOOSE]
         if self._overconfident():
-            time = HORIZON if name == _MOTION else self.recommended.horizon
-            text = (
-                f"take {row}, for outages of {time:g} s: {values} (SI, as gmwm export writes them)"
-            )
+            times = f"{self.recommended.horizon:g} s"
+            times += f" at rest, {HORIZON:g} s in motion" * (_MOTION in names)
+            text = f"take {row}, for outages of {times}: {values} (SI, as gmwm export writes them)"
         elif loose:
             kinds = " and ".join(each.quantity or "axis" for each in loose)
             text = f"{kinds}: {row} is less than half of those in use, and as safe: {values} (SI)"
@@ -335,7 +335,9 @@ def certify(
     measured = motion if isinstance(motion, InMotion) else None
     moved = None if motion is None or isinstance(motion, InMotion) else Motion.of(motion)
     if known.needs_motion and moved is None:
-        raise InputError("these imperfections have no effect at rest: give a motion too")
+        raise InputError(
+            "these imperfections have no effect at rest: give a motion by name, or a recording"
+        )
     horizon = times[-1]
     in_use = {axis.name: _in_use(numbers, axis, horizon) for axis in axes.axes}
     items: Any = source if isinstance(source, Mapping) else {axes.axes[0].name: source}
@@ -354,20 +356,30 @@ def certify(
         causes += rows
         notices += advice
         if measured is not None:
-            more, row = _in_motion(measured, group, own)
+            more, row = _in_motion(measured, group, own, rows)
             found += more
-            causes.append(row)
+            causes += row
             notices = [each for each in notices if each.code != "other-units"]
+    if measured is not None and not any(each.consumer == "motion" for each in found):
+        seen = ", ".join(measured.numbers())
+        raise InputError(f"the motion shows {seen}: give models and numbers of some of these axes")
     return Certificate(own, safe, (*found, *in_flight), tuple(causes), tuple(notices))
 
 
 def _in_motion(
-    measured: InMotion, group: Sequence[AxisModel], numbers: FilterNumbers
-) -> tuple[list[Check], Cause]:
-    """Errors in motion beside those that numbers predict, and the numbers that cover them."""
+    measured: InMotion, group: Sequence[AxisModel], numbers: FilterNumbers, rows: Sequence[Cause]
+) -> tuple[list[Check], list[Cause]]:
+    """Errors in motion beside those that numbers predict, and the numbers that cover them.
+
+    rows: Causes at rest, which these numbers cover too. Axes that the motion does not show are
+    not judged in it.
+    """
     least, found = measured.numbers(), []
     unit = SI_UNIT.get(group[0].quantity, "u")
-    for name in (axis.name for axis in group):
+    names = [axis.name for axis in group if axis.name in least]
+    if not names:
+        return [], []
+    for name in names:
         tau, variance = measured.envelope(name)
         times = np.array([INTERVAL, *tau[(tau > INTERVAL) & (tau < HORIZON)], HORIZON])
         true = between(tau, variance, times)
@@ -378,10 +390,13 @@ def _in_motion(
             )
             for t, a, b in zip(times, true, own, strict=True)
         ]
-    N, K = (max(float(least[a.name].params[k] or 0.0) for a in group) for k in "NK")
+    at_rest = [each for each in rows if each.name in (_MODEL, _ALL)][-1]
+    N, K = (
+        max(getattr(at_rest, k), *(float(least[a].params[k] or 0.0) for a in names)) for k in "NK"
+    )
     in_use = [max(getattr(numbers[axis.name], k) for axis in group) for k in "NK"]
     factors = [_ratio(value, over) for value, over in zip((N, K), in_use, strict=True)]
-    return found, Cause(group[0].quantity, _MOTION, N, K, *factors)
+    return found, [Cause(group[0].quantity, _MOTION, N, K, *factors)]
 
 
 def _kind_of(given: Given, in_use: Mapping[str, AxisFilterNumbers]) -> dict[str, Any]:

@@ -155,7 +155,7 @@ class InMotion(Document, Printed):
         Number of the flight, time (s) and vibration (m/s^2 rms) of the first IMU, every second.
     """
 
-    SCHEMA: ClassVar[str] = "gmwm.in_motion"
+    SCHEMA: ClassVar[str] = "gmwm.motion"
 
     imus: tuple[Text, ...]
     durations: tuple[Positive, ...]

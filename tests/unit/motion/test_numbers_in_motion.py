@@ -1,6 +1,7 @@
 """Numbers for filters from curves in motion."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -104,7 +105,10 @@ def test_numbers_in_use_are_judged_in_motion_beside_the_bench(run, tmp_path):
         expected = 3.0 * (Q / each.time) ** 2 / (N**2 / each.time + K**2 * each.time / 3.0)
         assert each.nees == pytest.approx(expected, rel=0.02)
     assert "overconfident" in judged.text()
-    assert "take the row 'in motion', for outages of 1 s" in " ".join(judged.text().split())
+    assert (
+        "take the row 'in motion', for outages of 60 s at rest, 1 s in motion: gyro N"
+        in " ".join(judged.text().split())
+    )
     enough = {kind: (judged.causes[-1].N, judged.causes[-1].K) for kind in KINDS}
     found.save(tmp_path / "motion.json")
     units = {"gyro": "rad/s", "accel": "m/s^2"}
@@ -118,6 +122,33 @@ def test_numbers_in_use_are_judged_in_motion_beside_the_bench(run, tmp_path):
     assert "safe on all axes" in out
     kept = gmwm.load(tmp_path / "certificate.json")
     assert max(each.nees for each in kept.of("motion")) == pytest.approx(1.0, abs=1e-3)
+    code, _, error = run("certify", *flags[:4], tmp_path / "bench.json", "--motion", "bench.json")
+    assert (code, error.partition(":")[0]) == (2, "gmwm")
+    assert "bench.json: this is not a motion: give a file that was saved from one" in error
+
+
+@pytest.mark.parametrize("K", [1e-9, 1e-3])
+def test_numbers_that_suffice_in_motion_suffice_on_the_bench(K):
+    """Also where the walk at rest is above that of a flight; judged are axes that it shows."""
+    found = in_motion([allan(QuantizationNoise(1e-3))])
+    shown = replace(found, curves=tuple(c for c in found.curves if c.quantity == "gyro"))
+    bench = {name: WhiteNoise(1e-4) + RandomWalk(K) for name in AXES}
+
+    def judged(numbers):
+        return gmwm.certify(bench, numbers, outages=(60.0,), rate=1.0 / DT, motion=shown)
+
+    first = judged({kind: (1e-5, 1e-10) for kind in KINDS})
+    assert {each.where for each in first.of("motion")} == set(AXES[:3])
+    text = " ".join(first.text().split())
+    assert "take the row 'in motion' and the row 'error model'" in text
+    rows = {each.quantity: (each.N, each.K) for each in first.causes if each.name != "in use"}
+    assert max(each.nees for each in judged(rows).checks) == pytest.approx(1.0, abs=0.05)
+
+
+def test_motion_of_other_axes_is_rejected():
+    found = in_motion([allan(WhiteNoise(1e-3))])
+    with pytest.raises(gmwm.InputError, match="the motion shows gyro_x, gyro_y, gyro_z, accel_x"):
+        gmwm.certify(WhiteNoise(1e-4) + RandomWalk(1e-5), (1e-4, 1e-5), motion=found)
 
 
 def test_export_writes_the_numbers():
