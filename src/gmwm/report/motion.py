@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
+from itertools import cycle
 from pathlib import Path
 from typing import Any
 
@@ -61,15 +62,15 @@ def _curves(found: InMotion, channel: str) -> str:
     quantity = channel.partition("_")[0]
     unit, scale = customary_unit("u", quantity, "u")
     figure, ax = _axes(f"Allan deviation [{unit}]", channel)
-    for k, imu in enumerate(found.imus):
-        each, colour = found.curve(imu, channel), COMPONENT_COLOURS[k % len(COMPONENT_COLOURS)]
+    own = [found.curve(imu, channel) for imu in found.imus]
+    for each, colour in zip(own, cycle(COMPONENT_COLOURS), strict=False):
         seen = (each.variance > 0.0) & (each.lower > 0.0)
         low, mid, high = (scale * np.sqrt(v[seen]) for v in (each.lower, each.variance, each.upper))
         ax.fill_between(each.tau[seen], low, high, color=colour, alpha=0.25, linewidth=0.0)
-        ax.plot(each.tau[seen], mid, color=colour, marker="o", markersize=3.0, label=imu)
-        if k == 0 and np.any(np.isfinite(each.static)):
-            rest = scale * np.sqrt(each.static)
-            ax.plot(each.tau, rest, color=DATA_COLOUR, linestyle="--", label="at rest")
+        ax.plot(each.tau[seen], mid, color=colour, marker="o", markersize=3.0, label=each.imu)
+    if np.any(np.isfinite(own[0].static)):
+        rest = scale * np.sqrt(own[0].static)
+        ax.plot(own[0].tau, rest, color=DATA_COLOUR, linestyle="--", label="at rest")
     ax.legend(fontsize="small", framealpha=0.9)
     return svg(figure)
 
@@ -99,7 +100,7 @@ def _vibration(found: InMotion) -> str:
     import matplotlib.pyplot as plt
 
     flight, _, level = found.vibration.T
-    figure, ax = plt.subplots(figsize=(2.0 * _SIZE[0], _SIZE[1]), layout="constrained")
+    figure, ax = plt.subplots(figsize=(3.0 * _SIZE[0], _SIZE[1]), layout="constrained")
     second = np.arange(len(level))
     for k, each in enumerate(found.classes):
         own = (level >= each.low) & (level <= each.high)
