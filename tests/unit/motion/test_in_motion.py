@@ -1,5 +1,7 @@
 """Noise in motion: errors of known variance on IMUs that share a motion."""
 
+from itertools import product
+
 import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
@@ -198,6 +200,32 @@ def test_what_all_have_in_common_is_not_seen_and_that_is_said():
     variance = found.curve("imu 2", "gyro_z").variance
     assert variance[0] == pytest.approx(SIZE[2] ** 2, rel=0.2)
     assert [n.values for n in found.notices if n.code == "motion-common"] == [{"imus": 3}]
+
+
+@pytest.mark.parametrize("late", [(0.0, 0.0, 0.0), (0.0, 1 / 3, 2 / 3), (0.0, 0.5, 0.5)])
+def test_aliased_vibration_is_seen_as_far_as_imus_sample_apart(late):
+    """A line at 38 Hz is seen at 12 Hz, a turn later per sampling interval.
+
+    With phases p of the target and q, r of the others, the mean of products of differences is
+    that of the line times 1 - cos(p - q) - cos(p - r) + cos(q - r).
+    """
+    rng = np.random.default_rng(20)
+    body, size = motion_of(rng), 5.0 * SIZE
+
+    def shaken(time, order=0):
+        line = size * np.sin(2.0 * np.pi * 38.0 * time)[:, None]
+        return body(time, order) + (line if order == 0 else 0.0)
+
+    errors = white(rng, 3)
+    found = gmwm.motion([imu(shaken, e, offset=d * DT) for e, d in zip(errors, late, strict=True)])
+    seen = np.sin(2.0 * np.pi * 12.0 * DT * np.arange(errors.shape[1]))
+    for k, channel in product(range(3), AXES):
+        p, q, r = 2.0 * np.pi * np.roll(late, -k)
+        share = 1.0 - np.cos(p - q) - np.cos(p - r) + np.cos(q - r)
+        white_too = SIZE[AXES.index(channel)] ** 2
+        line = 25.0 * white_too * 0.5 * np.mean(np.diff(seen) ** 2)
+        variance = found.curve(f"imu {k + 1}", channel).variance[0]
+        assert variance == pytest.approx(share * line + white_too, rel=0.1, abs=0.03 * line)
 
 
 def test_glitches_and_lost_samples_cost_an_instant():
