@@ -73,7 +73,7 @@ def bag2(folder, samples):
     return write2(folder / "flight", topics)
 
 
-LOGS = {px4: "imu {}", ardupilot: "imu {}", bag1: "/imu{}", bag2: "/imu{}"}
+LOGS = {px4: "imu {}", bag1: "/imu{}", ardupilot: "imu {}", bag2: "/imu{}"}
 
 
 @pytest.mark.parametrize("write", every(2, LOGS))
