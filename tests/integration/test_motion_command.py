@@ -49,7 +49,10 @@ def test_command_takes_several_flights(run, files):
     assert code == 0
     assert "in motion: 2 flights" in out
     code, _, error = run("motion", *files, files[0], "--imus", 3)
-    assert (code, error) == (2, "gmwm: 4 files are no flights of 3 IMUs: give all of each\n")
+    assert (code, error) == (
+        2,
+        "gmwm: 4 files are not a multiple of 3 IMUs: give a file of each IMU for every flight\n",
+    )
 
 
 def px4(folder, samples):

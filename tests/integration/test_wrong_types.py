@@ -207,8 +207,8 @@ def test_a_channel_of_complex_numbers():
 def test_recordings_that_are_none():
     for entrance in (gmwm.select, lambda data: gmwm.fit(MODEL, data)):
         refused(lambda e=entrance: e([]), "no recordings given: give at least one")
-        refused(lambda e=entrance: e((WV, "a")), "'a' stands among the recordings")
-        refused(lambda e=entrance: e([WV, 2.0]), "2.0 stands among the recordings")
+        refused(lambda e=entrance: e((WV, "a")), "'a' is not a recording")
+        refused(lambda e=entrance: e([WV, 2.0]), "2.0 is not a recording")
 
 
 # -- models ---------------------------------------------------------------------------------------

@@ -271,7 +271,8 @@ def _on_cluster(work: Work[T, R], items: Sequence[T], address: str, lost: Work[T
             if not left:
                 return
         raise InputError(
-            f"the workers of the Dask cluster at {address!r} end before their work: see their logs"
+            f"the workers of the Dask cluster at {address!r} stopped before the work was done: "
+            "see their logs"
         )
 
 

@@ -341,7 +341,7 @@ def _check_together(recordings: Sequence[Recording]) -> None:
             raise InputError(
                 f"{one.source or 'a recording'} from {times[0]:.6g} s on and "
                 f"{other.source or 'another'} from {times[1]:.6g} s on have the same samples: "
-                "give each recording once, or cut off what both have"
+                "give each recording once, or cut off the shared part"
             )
 
 

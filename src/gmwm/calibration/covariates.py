@@ -65,7 +65,7 @@ class Wanted:
             else:
                 raise InputError(
                     f"covariates: {name!r}: {checks.shown(text)}: write auto, linear, quadratic, "
-                    f"cubic or a degree up to {MOST_POWER}, and lag, as in {_FORM}"
+                    f"cubic or a degree up to {MOST_POWER}, with or without lag, as in {_FORM}"
                 )
         if name == "settling":
             degrees = (0,)
@@ -93,7 +93,7 @@ def wanted(covariates: Mapping[str, str] | None) -> tuple[Wanted, ...]:
     if covariates is None:
         return ()
     if not isinstance(covariates, Mapping) or not covariates:
-        raise InputError(f"covariates = {checks.shown(covariates)}: give words by name, as {_FORM}")
+        raise InputError(f"covariates = {checks.shown(covariates)}: write it like {_FORM}")
     return tuple(Wanted.of(str(name), text) for name, text in covariates.items())
 
 
@@ -131,7 +131,9 @@ class Nodes:
             means = block_means([own], size, 0.0)[:, 0]
             there = np.flatnonzero(~np.isnan(means))
             if there.size < 2:
-                raise InputError(f"{recording.source or 'the recording'}: {name} has no values")
+                raise InputError(
+                    f"{recording.source or 'the recording'}: {name} has no values: leave it out"
+                )
             known = (there + 0.5) * size * dt
             rows[name] = np.interp(time, known, means[there])
             after = np.searchsorted(known, time)
@@ -253,7 +255,7 @@ def compensated(
         if channel is not None and (channel.unit or "unit") != one.unit:
             raise InputError(
                 f"{name} of {recording.source or 'the recording'} is in {channel.unit or 'no unit'}"
-                f", its curve in {one.unit}: name the column with it, such as {name} [{one.unit}]",
+                f", its curve in {one.unit}: convert it, and name the column {name} [{one.unit}]",
                 "no-covariate",
             )
         x, reach = nodes.rows[name], tuning.MARGIN * (one.high - one.low)

@@ -199,8 +199,8 @@ class BiasCurve(Document, Printed):
         """
         if self.scaling is None or not self.covariates:
             raise InputError(
-                f"{self.name}: the growth of the noise is not known: calibrate a recording with a "
-                "covariate that changes, for some minutes"
+                f"{self.name}: the growth of the noise is not known: calibrate some minutes in "
+                "which the covariate changes"
             )
         return self.scaling.factor(self._inside(np.asarray(x, dtype=float), self.covariates[0]))
 
@@ -217,7 +217,7 @@ class BiasCurve(Document, Printed):
         found = next((each for each in self.covariates if each.name == name), self.main)
         if found is None or name not in ("", found.name):
             known = ", ".join(each.name for each in self.covariates) or "time alone"
-            raise InputError(f"the curve of {self.name} depends on {known}, not on {name!r}")
+            raise InputError(f"{name!r} is not in the curve of {self.name}: choose from {known}")
         return found
 
     def __call__(self, x: FloatArray | float, of: str = "") -> FloatArray:

@@ -240,7 +240,7 @@ def upper_limit(fit: Fit, key: str) -> float:
     limit = _limit(fit, PROCESSES[key], key)
     if not np.isfinite(limit):
         raise InputError(
-            f"channel {fit.wv.name!r}: {key} cannot be limited by this record: record longer"
+            f"channel {fit.wv.name!r}: this record gives no upper limit of {key}: record longer"
         )
     return limit
 

@@ -42,8 +42,8 @@ class _Group(click.Group):
         except OSError as error:  # click takes a broken pipe for that of its output
             place = "" if error.filename is None else f"{error.filename}: "
             raise InputError(
-                f"{place}the system refuses a file or a process ({error.strerror or error}): "
-                "close other programs, or check the path"
+                f"{place}the system cannot open a file or start a process "
+                f"({error.strerror or error}): close other programs, or check the path"
             ) from error
 
 

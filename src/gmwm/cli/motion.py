@@ -85,7 +85,8 @@ def motion(
 
     count = imus or len(files)
     if len(files) % count:
-        raise InputError(f"{len(files)} files are no flights of {count} IMUs: give all of each")
+        text = f"{len(files)} files are not a multiple of {count} IMUs"
+        raise InputError(f"{text}: give a file of each IMU for every flight")
     levels = None if limits is None else numbers("--limits", limits, "two levels, e.g. 1,4", 2)
     at_rest = None if static is None else Calibration.load(static)
     flights: list[Any]

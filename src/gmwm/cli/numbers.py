@@ -141,7 +141,7 @@ def _at(given: Any, temperature: float | None) -> Any:
     if temperature is None:
         return given
     if not isinstance(given, Calibration):
-        raise InputError("--temperature needs a calibration.json, whose noise it changes")
+        raise InputError("--temperature needs a calibration.json")
     return given.at(temperature)
 
 
@@ -277,7 +277,7 @@ def _numbers(
     from gmwm.filter_numbers import FilterNumbers
 
     if (imu is None) == (white is None and walk is None):
-        raise InputError("the numbers in use: give --imu FILE, or -N GYRO,ACCEL and -K GYRO,ACCEL")
+        raise InputError("give the numbers in use: --imu FILE, or -N GYRO,ACCEL and -K GYRO,ACCEL")
     if imu is not None:
         is_json = imu.suffix.lower() == ".json"
         is_saved = is_json and b"gyro_noise_std" not in content_of(imu, 1 << 25)  # of Basalt
@@ -506,7 +506,7 @@ def _in_use(imu: Path, rate: float) -> Any:
 
     found = read_numbers(imu, rate)
     if not {"gyro", "accel"} & {*found}:
-        raise InputError(f"{imu}: has numbers by axis: judge one by gmwm certify, with a recording")
+        raise InputError(f"{imu} has numbers for each axis: use gmwm certify with a recording")
     return found
 
 

@@ -126,7 +126,7 @@ def _read(place: str, content: Any, channels: dict[str, str] | None) -> Datashee
                 f"{place}: {shown(name)} is not a sensor here: write one of {', '.join(known)}"
             )
         if not isinstance(values, dict):
-            raise InputError(f"{place}: {name} has no numbers with names: {_HINT}")
+            raise InputError(f"{place}: {name} needs numbers with names: {_HINT}")
         found = [
             _value(f"{place}: {name}", key, value, known[name]) for key, value in values.items()
         ]
@@ -167,5 +167,5 @@ def _value(where: str, key: Any, value: Any, quantity: str) -> tuple[str, float,
     except InputError as error:
         raise InputError(f"{where}: {key}: {error}") from None
     if not 0.0 < si <= checks.LARGEST:
-        raise InputError(f"{where}: {key} = {value[:40]}: give a positive number of usual size")
+        raise InputError(f"{where}: {key} = {value[:40]}: give a positive number of plausible size")
     return letter, si, found[3] or ""

@@ -231,7 +231,9 @@ class Datasheet(InUnits):
             If nothing is stated of the sensor, or no white or no slow noise.
         """
         if sensor not in self.entries:
-            raise InputError(f"{self.name} states nothing of {sensor!r}: {', '.join(self.entries)}")
+            raise InputError(
+                f"{self.name} has no {sensor!r}: choose from {', '.join(self.entries)}"
+            )
         if not checks.is_number(unit_spread) or not 1.0 <= unit_spread <= checks.LARGEST:
             raise InputError(f"unit_spread = {unit_spread}: give a factor of 1 or more")
         where = f"{self.name}: {sensor}"

@@ -115,8 +115,8 @@ def to_gauss_markov(arma: Fit | Process, dt: float | None = None) -> GaussMarkov
     p, q = process.orders
     if p < 1 or q not in (p - 1, p):
         raise InputError(
-            f"{process!r}: a sum of p Gauss-Markov processes is an ARMA(p, p - 1), with white "
-            "noise an ARMA(p, p)"
+            f"{process!r} is not a sum of Gauss-Markov processes: give an ARMA(p, p - 1), or an "
+            "ARMA(p, p), which has white noise too"
         )
     ar, ma = (np.array(each, dtype=float) for each in (process.ar, process.ma))
     roots = np.roots([1.0, *-ar]).astype(complex)

@@ -145,7 +145,7 @@ def bootstrap_test(
     at, root = fit.moments, _root(fit)
     designs = [Design(model, at.scales) for model in (_opened(fit), as_model(larger))]
     if designs[1].n_free <= designs[0].n_free:
-        raise InputError(f"{larger!r} is not larger than {fit.model.opened()!r}")
+        raise InputError(f"{larger!r}: give a model with more terms than {fit.model.opened()!r}")
 
     def gain(target: FloatArray) -> float:
         small, large = (search(Profile(design, target, root)).objective for design in designs)

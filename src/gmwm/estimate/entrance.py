@@ -166,8 +166,7 @@ def are_several(data: Data | Sequence[Data]) -> bool:
     if any(several) and not all(several):
         odd = data[several.index(False)]
         raise InputError(
-            f"{checks.shown(odd)} stands among the recordings: give wavelet variances, channels "
-            "or arrays"
+            f"{checks.shown(odd)} is not a recording: give wavelet variances, channels or arrays"
         )
     return all(several)
 

@@ -144,8 +144,7 @@ class AllanLines:
             slopes = ", ".join(slope_name(line.slope) for line in lines.values())
             raise InputError(
                 f"the Allan plot has no region of slope {slopes}: give the averaging times to read "
-                'from, e.g. AllanLines(regions={"N": (1, 10)}), or use method="gmwm", which needs '
-                "none"
+                'from, e.g. AllanLines(regions={"N": (1, 10)}), or use method="gmwm"'
             )
         keys = tuple(key for key in lines if key in runs)
         sizes, matrix = _coefficients(wv, [(lines[k], runs[k]) for k in keys], self.regression)
@@ -237,9 +236,9 @@ def _given_runs(
         levels = np.flatnonzero(inside & (wv.variance > 0.0))
         if levels.size == 0:
             raise InputError(
-                f"regions: no level lies between {first:g} and {last:g} s, where {key} is to be "
-                f"read: there are {wv.tau.size} from {wv.tau[0]:g} to {wv.tau[-1]:g} s, each twice "
-                "the one before"
+                f"regions: no averaging time lies between {first:g} and {last:g} s ({key}): there "
+                f"are {wv.tau.size}, from {wv.tau[0]:g} to {wv.tau[-1]:g} s, each twice the one "
+                "before"
             )
         runs[key] = _Run(int(levels[0]), int(levels[-1]))
     return runs

@@ -92,16 +92,16 @@ def _triads(curves: Curves) -> dict[str, tuple[list[BiasCurve], float, float]]:
         if not own:
             continue
         if missing := [letter for letter in _LETTERS if letter not in own]:
-            raise InputError(
-                f"{quantity}_{missing[0]} has no curve: the parameters hold all three axes"
-            )
+            raise InputError(f"{quantity}_{missing[0]} has no curve: calibrate all three axes")
         for each in own.values():
             if each.main is None or each.main.unit != "degC":
-                raise InputError(f"the curve of {each.name} is not one of a temperature in degC")
+                raise InputError(
+                    f"the curve of {each.name} is not one against a temperature in degC"
+                )
             if each.degree > _CUBIC:
                 raise InputError(
-                    f"the curve of {each.name} has degree {each.degree}, and the parameters hold "
-                    "a cubic: calibrate with degree 3"
+                    f"the curve of {each.name} has degree {each.degree}, above the 3 of these "
+                    "parameters: calibrate with degree 3"
                 )
         axes = [own[letter] for letter in _LETTERS]
         ranges = [each.main for each in axes if each.main is not None]

@@ -217,8 +217,8 @@ def numbers_of(
         )
     if given.form != form:
         raise InputError(
-            f"the numbers have the form {given.form}, the file holds {form}: make numbers of that "
-            "form, or export the calibration"
+            f"the numbers have the form {given.form}, but the file needs {form}: make numbers of "
+            "that form, or export the calibration"
         )
     if horizon is not None and horizon != given.horizon:
         raise InputError(
@@ -236,7 +236,7 @@ def in_motion(given: Iterable[Any], horizon: float | None, interval: float | Non
     """
     found = list(given)
     if interval is not None and not any(isinstance(each, InMotion) for each in found):
-        raise InputError("interval: only numbers of noise in motion depend on it, leave it out")
+        raise InputError("interval applies to noise in motion only: leave it out")
     end = MOTION_HORIZON if horizon is None else horizon
     start = min(INTERVAL, end) if interval is None else interval
     return [_bounding(each, start, end) if isinstance(each, InMotion) else each for each in found]
@@ -371,8 +371,8 @@ def _triad(quantity: str, own: Sequence[Axis], form: str) -> Triad:
     """The axes of a quantity; raises InputError if a file could not hold them."""
     if not own:
         raise InputError(
-            f"the file needs gyro and accelerometer, there is no {SENSORS[quantity]}: calibrate "
-            "both, or give a second file that has it"
+            f"the {SENSORS[quantity]} is missing, and the file needs both sensors: calibrate both, "
+            "or give a second file that has it"
         )
     if len(own) > len(LETTERS):
         raise InputError(

@@ -78,7 +78,7 @@ class WalkKeys(Keys):
 
     def read(self, values: Mapping[str, FloatArray], rate: float) -> list[list[Pair | Model]]:
         if self.needs_rate and not rate > 0.0:
-            raise InputError("its numbers depend on the rate of the IMU: give it in Hz")
+            raise InputError("its numbers depend on the IMU's rate: give the rate in Hz")
         own = [
             values[name] ** (1.0 / self.power) / self._scale(letter, rate)
             for name, letter in zip(self.names, "NKNK", strict=True)

@@ -282,7 +282,7 @@ class ImuFile(Target):
 
     def _imu(self, given: Sequence[Any], horizon: float | None, form: str | None) -> ImuNumbers:
         if form is not None and checks.choice("form", form, FORMS) != self.form:
-            raise InputError(f"form {form}: {self.title} holds {self.form} only")
+            raise InputError(f"form {form}: {self.title} takes {self.form} only")
         try:
             return imu_of(given, self.form, horizon, shared=self.shared, one_tau=self.one_tau)
         except InputError as error:

@@ -139,7 +139,7 @@ class SensorAxes:
         least = 2.0 * max(axis.dt for axis in self.axes)
         if least > shortest:
             raise InputError(
-                f"{name} = {shortest:g} s: give two sampling intervals or more, {least:g} s"
+                f"{name} = {shortest:g} s: give at least two sampling intervals, {least:g} s"
             )
         if shortest > checks.LONGEST_TIME:
             raise InputError(f"{name} = {shortest:g} s: give at most {checks.LONGEST_TIME:g} s")

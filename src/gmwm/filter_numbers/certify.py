@@ -134,10 +134,10 @@ class Certificate(Document, InUnits):
     def __post_init__(self) -> None:
         kinds = [cause.quantity for cause in self.causes]
         if any(kinds.count(kind) < 2 for kind in kinds):
-            raise InputError("causes begin with the numbers in use and the error model")
+            raise InputError("causes must begin with the numbers in use and the error model")
         times = [set(each) for each in self._times.values()]
         if not self.of("keyframes") or not times[0] or any(each != times[0] for each in times):
-            raise InputError("checks are not of the same times on all axes, and at keyframes")
+            raise InputError("checks need the same times on all axes, and keyframes")
 
     @property
     def _times(self) -> dict[str, list[float]]:

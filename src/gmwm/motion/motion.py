@@ -170,7 +170,9 @@ def _against(sources: Any, references: Any, static: Mapping[str, Any] | None) ->
         other = _Imu("reference", dt, {"gyro": rates}, gaps)
         clock = _joined(number, imu, other)
         if clock is None:
-            raise InputError(f"flight {number}: neither moves, or they are not of one motion")
+            raise InputError(
+                f"flight {number}: the reference does not move like the IMU: check both"
+            )
         found, mounted, count = _of_target(number, [imu, other], 0, [clock])
         clocks.append(clock)
         mountings += mounted
@@ -246,7 +248,9 @@ def _imu(where: str, label: str, given: Any) -> tuple[_Imu, int]:
         samples[sensor] = values
     filled = int(lost.sum())
     if filled > tuning.MOST_FILLED * recording.n:
-        raise InputError(f"{where}: {filled} of {recording.n} samples are missing: give whole ones")
+        raise InputError(
+            f"{where}: {filled} of {recording.n} samples are missing: give one without gaps"
+        )
     near = 2 * round(tuning.BESIDE_LOST / recording.dt) + 1
     lost = np.convolve(lost, np.ones(near), "same") > 0.5
     return _Imu(label, recording.dt, samples, lost), filled

@@ -195,7 +195,9 @@ def array(
     names = [c.name for c in shared[0].inertial if all(c.name in each for each in shared[1:])]
     names = [name for name in names if shared[0][name].quantity in _UNITS]
     if not names:
-        raise InputError("the recordings have no channel of a gyro or accelerometer in common")
+        raise InputError(
+            "the recordings have no gyro or accelerometer axis in common: check their channels"
+        )
     intervals = {each[name].dt for each in shared for name in names}
     least = max(intervals) * (1.0 if len(intervals) == 1 else tuning.FEWEST_OF_BLOCK)
     step, blocks = max(horizon / tuning.BLOCKS_OF_HORIZON, least), tuning.FEWEST_BLOCKS

@@ -166,7 +166,7 @@ class Equality:
             moved = np.abs(np.log(curve.tau[:levels] / tau[: curve.tau.size]))
             if np.any(moved > 2.0 * tuning.SAME_RATE):
                 raise InputError(
-                    "the curves have other averaging times: give them to gmwm.curve at the same"
+                    "the curves have different averaging times: give all at the same times"
                 )
         variance, share = np.full((2, len(curves), levels), np.nan)
         for row, part, curve in zip(variance, share, curves, strict=True):

@@ -123,7 +123,7 @@ class Task:
 
         if __version__ != self.version:
             raise InputError(
-                f"the worker has gmwm {__version__}, and numbers of {self.version} are asked for: "
+                f"the worker has gmwm {__version__}, but {self.version} is needed: "
                 "install the same version on all machines"
             )
         digest = digest_of(item.path)
@@ -295,7 +295,8 @@ class Store:
             return unit
         if origin.path != printable(item.path):
             raise InputError(
-                f"{path} is of {origin.path}, not of {item.path}: give another folder", "other-runs"
+                f"{path} belongs to {origin.path}, not {item.path}: give another folder",
+                "other-runs",
             )
         return None
 

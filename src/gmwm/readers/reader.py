@@ -307,8 +307,8 @@ def _load(
     if most < tuning.FEWEST_SAMPLES:
         of_any = "" if most == n else " of any channel"
         text = f"{table.source} has {most} samples{of_any}"
-        least = f"at least {tuning.FEWEST_SAMPLES} are needed"
-        raise InputError(f"{text} where {least}: record longer")
+        least = f"needs at least {tuning.FEWEST_SAMPLES}"
+        raise InputError(f"{text}, but {least}: record longer")
     return arrays, kept, notices
 
 

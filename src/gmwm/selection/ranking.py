@@ -192,7 +192,8 @@ def rank(wv: WaveletVariance, choices: Choices) -> tuple[list[Candidate], Coeffi
     if slope is None:
         if choices.has_ramp:
             raise InputError(
-                "a ramp needs one recording without gaps all over and no covariates: leave R out"
+                "a ramp needs a single recording with enough samples in a row, and no covariates: "
+                "leave R out"
             )
         found, rival = ([candidate for candidate, _ in each] for each in (plain, flicker))
         return _with_rival(found, rival), None

@@ -143,7 +143,7 @@ def curve(
     times, given = times[kept], given[kept]
     if times.size < tuning.LEAST_TIMES:
         raise InputError(
-            f"a curve of {times.size} averaging times between one sample, {dt:g} s, and the "
+            f"a curve has {times.size} averaging times between one sample, {dt:g} s, and the "
             f"longest: give at least {tuning.LEAST_TIMES}, half an octave apart"
         )
     m = np.rint(times / dt)
@@ -152,7 +152,7 @@ def curve(
     if length < shortest * (1.0 - tuning.TIME_ROUNDING):
         raise InputError(
             f"duration = {length:g} s is less than twice the longest averaging time, "
-            f"{times[-1]:g} s: give that of the recording"
+            f"{times[-1]:g} s: give the length of the recording"
         )
     quantity, own = None, unit
     if unit != "u":
@@ -282,7 +282,7 @@ def read_curves(
                 "give unit='deg/h'"
             )
         if axis and quantity_of(own) != axis.partition("_")[0]:
-            raise InputError(f"{path.name}: {own!r} is no unit of {name}")
+            raise InputError(f"{path.name}: {own!r} is not a unit of {name}: correct it")
         there = np.isfinite(columns[name])
         label = axis or bare(name)
         try:
@@ -316,14 +316,14 @@ def _of_imu_utils(path: Path, unit: Any) -> tuple[Columns, Any]:
     stem = path.name.removesuffix("_t.txt")
     sensor = stem.rpartition("_")[2]
     if sensor not in _IMU_UTILS:
-        raise InputError(f"{path.name} is not named data_NAME_gyr_t.txt or data_NAME_acc_t.txt")
+        raise InputError(f"{path.name} must be named data_NAME_gyr_t.txt or data_NAME_acc_t.txt")
     columns: Columns = {}
     for axis in ("t", *AXES):
         file = path.with_name(f"{stem}_{axis}.txt")
         (table,) = open_tables(file, Wanted(by_channel=True))
         columns["tau" if axis == "t" else f"{sensor}_{axis}"] = load_columns(table, [0])[0]
     if len({each.size for each in columns.values()}) > 1:
-        raise InputError(f"{path.name} and the files of the axes differ in length")
+        raise InputError(f"{path.name} and its x, y and z files differ in length: get whole copies")
     return columns, unit or _IMU_UTILS[sensor]
 
 

@@ -391,11 +391,11 @@ class PooledVariance(WaveletVariance):
             for name in ("dt", "unit", "wavelet", "efficiency"):
                 if getattr(part, name) != getattr(longest, name):
                     raise InputError(
-                        f"recordings do not belong together: {name} is {getattr(part, name)!r} "
-                        f"and {getattr(longest, name)!r}"
+                        f"recordings need the same {name}: it is {getattr(part, name)!r} and "
+                        f"{getattr(longest, name)!r}"
                     )
             if not np.array_equal(part.tau, longest.tau[: part.tau.size]):
-                raise InputError("recordings have other averaging times: fit curves one by one")
+                raise InputError("recordings have different averaging times: fit curves one by one")
         shares = _shares(parts, longest.tau.size)
 
         def mean_of(values: Sequence[FloatArray | None]) -> FloatArray | None:

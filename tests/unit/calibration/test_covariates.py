@@ -200,7 +200,7 @@ def test_soaks_have_one_curve():
 @pytest.mark.parametrize(
     ("covariates", "said"),
     [
-        ({}, "give words by name"),
+        ({}, "write it like"),
         ({"temperature": "round"}, "write auto, linear"),
         ({"pressure": "linear"}, "no channel 'pressure' as a covariate: it has temperature"),
         ({"settling": "cubic"}, "write auto, linear"),

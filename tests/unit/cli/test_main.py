@@ -58,7 +58,7 @@ def test_only_what_is_printed_is_trouble_with_the_output(tmp_path, number):
     command = [sys.executable, "run.py", "budget", "a.json"]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode == 2
-    assert "gmwm: the system refuses a file or a process (" in done.stderr
+    assert "gmwm: the system cannot open a file or start a process (" in done.stderr
     assert "output" not in done.stderr and "Traceback" not in done.stderr
 
 

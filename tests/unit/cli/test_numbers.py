@@ -126,7 +126,7 @@ def test_units_of_imperfections(run, calibration):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (("certify", "CAL"), "give --imu FILE, or -N GYRO,ACCEL and -K GYRO,ACCEL"),
+        (("certify", "CAL"), "--imu FILE, or -N GYRO,ACCEL and -K GYRO,ACCEL"),
         (("certify", "CAL", "-N", "1,1"), "-N and -K belong together"),
         (("certify", "CAL", "-N", "1", "-K", "1,1"), "-N 1: write a positive number for gyro and"),
         (("certify", "CAL", "-N", "1,x", "-K", "1,1"), "-N 1,x: write a positive number"),

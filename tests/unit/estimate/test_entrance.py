@@ -161,7 +161,7 @@ class TestWhatIsOff:
         ({"omega": "data!"}, "choose from model"),
         ({"weights": "data", "omega": "model"}, "are the same: give one"),
         ({"dt": None}, "sampling rate is missing"),
-        ({"model": gmwm.ARIMA(0, 2, 1)}, "d = 0 and 1"),
+        ({"model": gmwm.ARIMA(0, 2, 1)}, "d = 0 or 1"),
         ({"model": gmwm.AR([0.5, None])}, "fix all or none"),
     ],
 )

@@ -123,7 +123,7 @@ def test_kalibr_never_gets_a_zero():
 @pytest.mark.parametrize(("kept", "missing"), [("gyro", "accelerometer"), ("accel", "gyroscope")])
 def test_both_sensors_are_needed(calibration, tmp_path, kept, missing):
     fits = {name: fit for name, fit in calibration.fits.items() if name.startswith(kept)}
-    with pytest.raises(InputError, match=f"there is no {missing}: calibrate both"):
+    with pytest.raises(InputError, match=f"the {missing} is missing, .*: calibrate both"):
         gmwm.export(replace(calibration, fits=fits), "kalibr", path=tmp_path / "imu.yaml")
     assert list(tmp_path.iterdir()) == []
 
@@ -369,11 +369,11 @@ def test_consistency_that_saved_numbers_do_not_know(slow, form, target):
     ("given", "target", "options", "message"),
     [
         (None, "ros", {}, "target = 'ros': choose from kalibr, openvins"),
-        (None, "kalibr", {"form": "N+GM"}, r"form N\+GM: Kalibr holds N\+K only"),
+        (None, "kalibr", {"form": "N+GM"}, r"form N\+GM: Kalibr takes N\+K only"),
         (None, "kalibr", {"form": "N"}, "form = 'N': choose from"),
         (None, "kalibr", {"horizon": 0.0}, "horizon = 0.0: give a positive time"),
         (None, "kalibr", {"horizon": 1.0}, "the numbers are for 60 s: leave the horizon out"),
-        (None, "gazebo", {}, r"the numbers have the form N\+K, the file holds N\+GM"),
+        (None, "gazebo", {}, r"the numbers have the form N\+K, but the file needs N\+GM"),
         (
             [numbers("N+K"), numbers("N+K", quantities=("gyro",))],
             "kalibr",

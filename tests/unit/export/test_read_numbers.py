@@ -13,7 +13,7 @@ FASTLIO = "mapping:\n    acc_cov: 0.1\n    gyr_cov: 0.1\n    b_acc_cov: 1e-4\n  
 def test_numbers_that_depend_on_the_rate_need_one(tmp_path, text):
     path = tmp_path / "imu.yaml"
     path.write_text(text)
-    with pytest.raises(InputError, match="give it in Hz"):
+    with pytest.raises(InputError, match="give the rate in Hz"):
         read_numbers(path)
 
 

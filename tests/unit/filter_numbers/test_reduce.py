@@ -187,11 +187,11 @@ def test_a_turn_on_bias_is_part_of_the_start():
         ({"form": "N"}, r"form = 'N': choose from N\+K, N\+GM, N\+K\+GM, N\+2GM"),
         ({"outages": ()}, "outages is empty: give at least one"),
         ({"outages": (10.0, -1.0)}, r"outages = -1\.0"),
-        ({"outages": (10.0, 0.001)}, "outages = 0.001 s: give two sampling intervals or more"),
+        ({"outages": (10.0, 0.001)}, "outages = 0.001 s: give at least two sampling intervals"),
         ({"tau": 60.0}, r"tau needs a form with one Gauss-Markov process, not N\+K"),
         ({"form": "N+GM", "tau": "one"}, "tau = 'one'.*give a time in seconds, or 'shared'"),
         ({"form": "N+GM", "tau": -1.0}, r"tau = -1\.0: give a time in seconds, or 'shared'"),
-        ({"keyframe": 0.001}, "keyframe = 0.001 s: give two sampling intervals or more"),
+        ({"keyframe": 0.001}, "keyframe = 0.001 s: give at least two sampling intervals"),
         ({"bias_sd": float("nan")}, "bias_sd = nan"),
     ],
 )

@@ -179,7 +179,7 @@ def test_exports_are_for_the_interval_of_the_updates(run, tmp_path):
         densities.append(float(re.search(r"gyroscope_noise_density: (\S+)", out)[1]))
         assert "gyro_x" in gmwm.export(found, "state-space", **given)
     assert densities[0] / densities[1] == pytest.approx(np.sqrt(10.0), rel=0.02)
-    with pytest.raises(gmwm.InputError, match="only numbers of noise in motion depend on it"):
+    with pytest.raises(gmwm.InputError, match="applies to noise in motion only"):
         gmwm.export([], "kalibr", interval=1.0)
 
 

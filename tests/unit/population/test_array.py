@@ -85,7 +85,7 @@ def test_what_is_no_array_is_rejected():
     for given, message in (
         ([one], "two IMUs or more"),
         ([one, one], "have the same samples"),
-        ([one, accel], "no channel of a gyro or accelerometer in common"),
+        ([one, accel], "no gyro or accelerometer axis in common"),
         ([one, rotating], "not static"),
         ([one, one["gyro_x"].values], "not a recording"),
         ([one, other.part(0.0, 500.0)], "outages of 60 s need 960 s"),

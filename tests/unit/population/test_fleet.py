@@ -266,7 +266,7 @@ def test_another_recording_of_the_same_name_is_not_taken_for_it(record, tmp_path
     first, second = (record(tmp_path / each / "static.npz", seed) for seed, each in
                      enumerate("ab"))  # fmt: skip
     gmwm.fleet(first, folder=tmp_path / "out", **QUICK)
-    with pytest.raises(InputError, match=r"is of .*a/static.npz, not of .*b/static.npz"):
+    with pytest.raises(InputError, match=r"belongs to .*a/static.npz, not .*b/static.npz"):
         gmwm.fleet(second, folder=tmp_path / "out", resume=True, **QUICK)
     both = gmwm.fleet([first, second], folder=tmp_path / "both", **QUICK)
     assert [unit.name for unit in both.units.values()] == ["a-static.npz", "b-static.npz"]

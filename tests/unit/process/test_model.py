@@ -81,7 +81,7 @@ def test_moments_of_a_sum_are_sums_of_moments():
         (lambda: WhiteNoise(1.0).simulate(5, -1.0), "positive sampling interval"),
         (lambda: (WhiteNoise() + RandomWalk()).psd(np.ones(1), 1.0), "free parameters .N, K."),
         (lambda: (WhiteNoise() + RandomWalk()).with_params({"Z": 1.0}), "no parameter 'Z'"),
-        (lambda: ARIMA([0.1], 2, 0, 1.0).haar_variance(np.ones(1), 1.0), "d = 0 and 1"),
+        (lambda: ARIMA([0.1], 2, 0, 1.0).haar_variance(np.ones(1), 1.0), "d = 0 or 1"),
         (lambda: gmwm.simulate("noise", 5, 1.0), "'noise' is not a term"),
         (lambda: gmwm.simulate([WhiteNoise(1.0)], 5, 1.0), "not an error model: write one like"),
         (lambda: model_from_list([{"process": "Nonsense"}]), "unknown process 'Nonsense'"),

@@ -139,7 +139,7 @@ def test_entries_that_are_not_wanted_may_be_anything(save, samples):
         (np.float64(3.0), "shape ()"),
         (np.zeros((6, 80)), "shape (6, 80): samples run along the rows here, save array.T"),
         (np.zeros((80, 5)), "5 columns without names that are known"),
-        (np.zeros((63, 6)), "63 samples where at least 64 are needed"),
+        (np.zeros((63, 6)), "63 samples, but needs at least 64"),
         (np.zeros((0, 6)), "0 samples"),
         (np.zeros((80, 0)), "no column"),
         (np.zeros(80, [("gx", "f8", (2, 2))]), "column 'gx' has shape (80, 2, 2)"),

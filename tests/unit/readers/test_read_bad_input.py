@@ -165,7 +165,7 @@ def test_too_few_samples_are_there(write, samples):
     path = write(samples, HEADER)
     lines = path.read_text().split("\n")
     path.write_text("\n".join(lines[:64] + [",,,,,"] * 100))
-    assert "static.csv has 63 samples of any channel where at least 64" in problem(path)
+    assert "static.csv has 63 samples of any channel, but needs at least 64" in problem(path)
 
 
 @pytest.mark.parametrize("line", ["1 2 3 4 5", "1\t2 3 4  5 6 7"])
@@ -183,7 +183,7 @@ def test_first_line_is_the_ragged_one(write, samples):
 
 def test_too_few_samples(write, samples):
     message = problem(write(samples[:63], HEADER))
-    assert message == "static.csv has 63 samples where at least 64 are needed: record longer"
+    assert message == "static.csv has 63 samples, but needs at least 64: record longer"
     assert read(write(samples[:64], HEADER), rate=1, units=SI).n == 64
 
 

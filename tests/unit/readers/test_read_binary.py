@@ -102,7 +102,7 @@ def test_a_layout_in_which_gravity_does_not_show(tmp_path, own, other):
 def test_too_short(tmp_path):
     path = tmp_path / "imu.bin"
     path.write_bytes(records(LAYOUTS["LN200"]).tobytes()[:320])
-    with pytest.raises(InputError, match="10 records of 32, where at least 64"):
+    with pytest.raises(InputError, match="10 records of 32, but needs at least 64"):
         read(path, layout="LN200")
 
 

@@ -145,8 +145,8 @@ def test_rows_go_to_their_places(recorded, start, name, unit):
     assert recording.rate == pytest.approx(100, rel=1e-6)
     np.testing.assert_array_equal(recording["gyro_x"].values, np.where(keep, values, np.nan))
     assert texts(recording)[-2:] == (
-        "the clock jumps 4 times, at most by 0.5 s, 0.99 s after the start: 53 samples missing in "
-        "all",
+        "the clock jumps 4 times, the longest by 0.5 s at 0.99 s after the start: 53 samples "
+        "missing in all",
         "gyro_x: 53 of 400 samples missing, in 4 gaps, the longest 50 samples",
     )
 

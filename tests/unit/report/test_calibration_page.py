@@ -545,7 +545,7 @@ def test_models_that_tie_and_the_data_sheet_are_drawn(calibration, tmp_path):
         ("gyro: {N: -1 deg/sqrt(h)}", "positive number"),
         ("gyro: {Z: 1 deg}", "is not one of N, B, K"),
         ("magnetometer: {N: 1 deg}", "is not a sensor"),
-        ("gyro: 3", "has no numbers"),
+        ("gyro: 3", "needs numbers with names"),
         ("- 1", "holds no sensors"),
         ("{", "invalid YAML"),
     ],

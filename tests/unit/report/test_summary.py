@@ -207,7 +207,7 @@ def test_what_would_recur_leaves_a_reservation(two):
         with_notice(two, "departures-removed", "warning", tau=20.0, times="4.3", ratio=4.3)
     )
     assert "Usable with reservation (*): all axes" in text or "(*): gyro_z and accel_x" in text
-    assert re.search(r"^\d\. .*departures were subtracted", text, re.MULTILINE)
+    assert re.search(r"^\d\. .*steps and drifts were subtracted", text, re.MULTILINE)
 
 
 def test_intervals_of_filter_numbers_reach_to_models_that_fit_equally_well(two):

@@ -151,7 +151,7 @@ def test_curves_are_compared():
         (lambda c: gmwm.health(c), "not a recording of samples"),
         (lambda c: gmwm.find_still(c), "not a recording of samples"),
         (lambda c: gmwm.calibrate(c), "not a recording of samples"),
-        (lambda c: gmwm.compare([c, exact(tau=3 * c.tau)]), "other averaging times"),
+        (lambda c: gmwm.compare([c, exact(tau=3 * c.tau)]), "different averaging times"),
         (lambda c: gmwm.compare([c, 3]), "a calibration nor a recording"),
     ],
 )
@@ -237,10 +237,10 @@ def test_text_files_of_imu_utils(tmp_path):
     [
         ("a.csv", "a,gyro_x\n1,2\n2,3\n", "has no column of averaging times: name one tau"),
         ("a.csv", "tau,gyro_x\n1,2\n2,3\n", "unit of gyro_x: write it as in gyro_x [deg/h]"),
-        ("a.csv", "tau,gyro_x [deg/h]\n1,2\n2,3\n", "a.csv, gyro_x [deg/h]: a curve of 2"),
+        ("a.csv", "tau,gyro_x [deg/h]\n1,2\n2,3\n", "a.csv, gyro_x [deg/h]: a curve has 2"),
         ("a.json", "[1, 2]", "is not an object of lists of one length"),
         ("a.json", '{"tau": [1, 2], "gyro_x": [1]}', "is not an object of lists of one length"),
-        ("a_t.txt", "1\n2\n", "is not named data_NAME_gyr_t.txt"),
+        ("a_t.txt", "1\n2\n", "must be named data_NAME_gyr_t.txt"),
     ],
 )
 def test_files_that_are_no_curves(tmp_path, name, text, words):
@@ -267,7 +267,7 @@ def test_averaging_times_are_read_in_their_unit(tmp_path, head, scale):
         ("tau,gyro_x [deg/h],tau_y,gyro_y [deg/h]", "has 2 columns of averaging times"),
         ("tau,gyro_x [deg/h],gyro_x [deg/h]", "two columns of one name"),
         ("tau [furlong],gyro_x [deg/h]", "not a known unit of time"),
-        ("tau,gyro_x [ug]", "'ug' is no unit of gyro_x"),
+        ("tau,gyro_x [ug]", "'ug' is not a unit of gyro_x"),
     ],
 )
 def test_columns_that_contradict_are_rejected(tmp_path, head, message):

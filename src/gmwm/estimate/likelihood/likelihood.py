@@ -388,8 +388,8 @@ def _from_user(model: Model, start: Model, coordinates: Coordinates) -> tuple[Pr
     is_given = all(match and not match.is_open and _scale(match) > 0.0 for match in found)
     if not is_given or len(found) < sum(not term.is_drift for term in start.terms):
         raise InputError(
-            f"start = {start!r} does not give every term of {model!r} a value, or not a positive "
-            "one, or has another: repeat the model with numbers"
+            f"start = {start!r}: repeat the model {model!r} with a positive number for every "
+            "parameter"
         )
     return tuple(found)
 

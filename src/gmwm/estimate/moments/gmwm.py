@@ -224,8 +224,8 @@ def _started(start: Process | Model | float, coordinates: Coordinates) -> list[P
         given = as_model(cast("Model", start)).params
     if given.keys() != model.params.keys() or None in given.values():
         raise InputError(
-            f"start = {start!r} does not give every parameter of {model!r} a value, or has others: "
-            "repeat the model with numbers, or give one number for all"
+            f"start = {start!r}: repeat the model {model!r} with a number for every parameter, or "
+            "give one number for all"
         )
     keys, terms = keys_by_term(model), list(coordinates.noise)
     for i, name in coordinates.names:

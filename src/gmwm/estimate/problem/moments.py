@@ -181,7 +181,8 @@ class Moments:
         if wv.regressors is not None:
             if ramp is not None:
                 raise InputError(
-                    "a rate ramp beside a curve: leave R out, and make time a covariate"
+                    "with covariates the model cannot have a rate ramp: leave R out, and add the "
+                    "covariate time"
                 )
             size = wv.regressors.removed.size
             return cls(wv, Coefficients(np.zeros(size), np.zeros((size, size))), True, scales)

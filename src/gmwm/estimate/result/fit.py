@@ -477,7 +477,7 @@ class Fit(Document, Printed):
     def from_content(cls, content: Mapping[str, Any]) -> Self:
         found = super().from_content(content)
         if content["params"] != found.params:
-            raise InputError(f"its model {found.model!r} and its parameters do not belong together")
+            raise InputError(f"its parameters are not those of its model {found.model!r}")
         return found
 
 

@@ -107,8 +107,8 @@ def dominating(problem: Problem, form: str, tau: float | None = None) -> Model:
     """
     if "K" not in KINDS[form] and not all(target.is_stationary for target in problem.dominated):
         raise InputError(
-            f"{form} cannot dominate a model with a random walk: its spectrum rises without "
-            "limit towards zero frequency; use N+K or N+K+GM"
+            f"{form} cannot cover a random walk, whose spectrum rises without limit towards "
+            "zero frequency: use N+K or N+K+GM"
         )
     plain = _plain(form)
     if "G" not in KINDS[form]:
@@ -223,7 +223,7 @@ def _with_care(columns: FloatArray, least: FloatArray) -> FloatArray:
     )
     if found.x is None:
         raise InputError(
-            "no numbers of this form dominate the model to the precision of the computer: its "
+            "no numbers of this form cover the model within the computer's precision: its "
             "parameters are too far apart"
         )
     # Limits may lie below the tolerance of the program.

@@ -86,7 +86,7 @@ class RequiredSpectrum:
         if slope > tuning.STEEPEST:
             raise InputError(
                 f"the spectrum of {model!r} rises as f^-{slope:.2g} towards zero frequency, more "
-                "than a random walk: no form dominates it"
+                "than a random walk: no form covers it"
             )
         if not kept:
             raise InputError(

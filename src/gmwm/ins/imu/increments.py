@@ -268,8 +268,8 @@ def preintegrate(
         given = checks.real_numbers(start, "start")
         if given.shape != stationary.shape:
             raise InputError(
-                f"start has shape {given.shape}: the sensors have {m} states, give a "
-                "covariance of theirs"
+                f"start has shape {given.shape}: give the {m} x {m} covariance of the sensors' "
+                "states"
             )
         covariance[9:, 9:] = given
     jacobian = np.eye(9 + m)[:, 9:]

@@ -258,8 +258,8 @@ class Recorded:
         if abs(dt / self.dt - 1.0) > _RATE_TOLERANCE or n > len(self.stretches[run]):
             raise InputError(
                 f"{self.source}: stretches of {len(self.stretches[run])} samples at "
-                f"{1.0 / self.dt:g} Hz do not fit a trajectory of {n} at {1.0 / dt:g} Hz: cut them "
-                "for it"
+                f"{1.0 / self.dt:g} Hz do not fit a trajectory of {n} at {1.0 / dt:g} Hz: cut "
+                "stretches of that length and rate"
             )
         return SensorErrors(self.stretches[run][:n])
 

@@ -82,7 +82,7 @@ def align(measured: Measured) -> Alignment:
     raise InputError(
         f"the attitude cannot be known: the fixes of the first {tuning.SEARCHED:g} s show the "
         f"vehicle neither at rest nor at constant velocity for {tuning.STEADY_LEAST:g} s: give the "
-        "attitude, or begin the record where it is",
+        "attitude, or begin the record where the vehicle stands",
         "attitude-unknown",
     )
 
@@ -92,7 +92,9 @@ def _first_fix(measured: Measured, first: int = 0) -> tuple[int, int]:
     time, dt = positions_of(measured.aiding).time, measured.imu.dt
     fix = int(np.searchsorted(time, (first - 0.5) * dt))
     if fix == time.size:
-        raise InputError("there is no position fix once the IMU is steady: give later ones")
+        raise InputError(
+            "no position fix follows the first time at which the IMU is steady: give later fixes"
+        )
     return fix, int(np.rint(time[fix] / dt))
 
 

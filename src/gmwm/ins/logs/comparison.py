@@ -176,8 +176,7 @@ class Comparison:
         named, outages = rest.pop("compare"), rest.pop("outages", "auto")
         if not isinstance(named, Mapping) or len(named) < 2 or "sensors" in rest:
             raise InputError(
-                "compare: write two names or more, each with its sensor models, and no sensors "
-                "beside it"
+                "compare: write two names or more, each with its sensor models, in place of sensors"
             )
         models = {
             str(name): read_models(

@@ -247,7 +247,7 @@ def _first_stamp(
     if table is None or not found:
         return (start, []) if start is not None else (recording.dt, [notice("no-time-stamps")])
     if start is not None:
-        raise InputError(f"{recording.source} has time stamps: leave its start out")
+        raise InputError(f"{recording.source} has time stamps: leave out its start")
     stamps, dt = load_columns(table, found[:1])[found[0]], recording.dt
     elapsed = stamps - stamps[0]
     ratios = np.array(_UNITS_OF_CLOCKS) * elapsed[-1] / ((recording.n - 1) * dt)

@@ -379,7 +379,7 @@ def _within(aiding: Aiding, log: ImuLog, source: str) -> tuple[Aiding, list[Noti
             times = np.concatenate([each.time + log.start for each in aiding.fixes])
             spans = f"fixes from {np.min(times):.10g} s to {np.max(times):.10g} s"
         raise InputError(
-            f"{source} has {spans}, none in the time of {log.source}, {log.start:.10g} s to "
+            f"{source} has {spans}, but {log.source} lasts from {log.start:.10g} s to "
             f"{log.start + end:.10g} s: bring both to one clock"
         )
     notices = [notice("fixes-left-out", values={"count": left_out})] if left_out else []
@@ -399,8 +399,8 @@ def _with_barometer(
     near = np.abs(time - (np.nan if first is None else first.time[0])) <= tuning.CHORD
     if first is None or not np.any(near):
         raise InputError(
-            f"{source} has no height within {tuning.CHORD:g} s of the first position fix, to be "
-            "set to it: bring both to one clock"
+            f"{source} has no height within {tuning.CHORD:g} s of the first position fix: bring "
+            "both to one clock"
         )
     shift = float(first.value[0, 2] - np.mean(height[near]))
     value, sd = np.zeros((time.size, 3)), np.zeros((time.size, 3))

@@ -247,7 +247,7 @@ def difference(
         raise InputError(f"{a.size} and {b.size} runs cannot be paired: give runs of one study")
     alive = np.isfinite(a) & np.isfinite(b)
     if not np.any(alive):
-        raise InputError("one or the other filter diverged in every run: check their sensor models")
+        raise InputError("in every run one of the two filters diverged: check their sensor models")
     a, b = a[alive], b[alive]
     index = np.random.default_rng(seed).integers(a.size, size=(tuning.BOOTSTRAP_DRAWS, a.size))
 

@@ -211,7 +211,8 @@ class Validation:
 
         if not 0 <= outage < len(self.study.outages):
             raise InputError(
-                f"outage = {outage}: the experiment has {len(self.study.outages)} of them"
+                f"outage = {outage}: the experiment has {len(self.study.outages)} outages, "
+                "counted from 0"
             )
         span, panels = self.study.outages[outage], {}
         for name in self.names:

@@ -189,13 +189,13 @@ def _trajectory(spec: ExperimentSpec, folder: Path) -> Trajectory:
             "check the name"
         )
     if spec.rate is not None:
-        raise InputError("rate: a trajectory from a file has its own: leave it out")
+        raise InputError("rate: the trajectory file has its own rate: leave it out")
     trajectory = Trajectory.read(folder / name)
     if duration is None:
         return trajectory
     if duration > trajectory.duration + tuning.SAME_TIME:
         raise InputError(
-            f"duration = {duration:g} s: {name} has {trajectory.duration:g} s, give at most that"
+            f"duration = {duration:g} s: {name} has {trajectory.duration:g} s; give at most that"
         )
     return trajectory.segment(0.0, duration)
 

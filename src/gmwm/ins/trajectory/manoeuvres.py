@@ -307,7 +307,7 @@ def _attitude(
     if not level:
         if np.any((np.abs(climb) > 0.0) & ~(speed > 0.0)):
             raise InputError(
-                "manoeuvres climb at no speed: accelerate first, or give level=True for a body "
+                "manoeuvres climb at zero speed: accelerate first, or give level=True for a body "
                 "that stays level"
             )
         pitch = np.arctan2(climb, speed)
@@ -415,8 +415,8 @@ def through(
             )
         if rise and time < 2.0 * ramp:
             raise InputError(
-                f"waypoints {i} and {i + 1} leave {time:.4g} s to climb {rise:.4g} m: set them "
-                "farther apart, or at one height"
+                f"waypoints {i} and {i + 1} leave only {time:.4g} s to climb {rise:.4g} m: set "
+                "them farther apart, or at one height"
             )
         if rise:
             manoeuvres.append(Climb(rise, abs(rise) / (time - ramp)))

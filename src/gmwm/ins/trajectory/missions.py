@@ -76,7 +76,7 @@ def helicopter_mapping(
     widest = end_of_turn(0.0)[1]
     if spacing > widest:
         raise InputError(
-            f"spacing = {spacing:g}: at {speed:g} m/s turns are {widest:.0f} m wide, give at most "
+            f"spacing = {spacing:g}: turns at {speed:g} m/s are {widest:.0f} m wide; give at most "
             "that"
         )
     away = float(brentq(lambda angle: end_of_turn(angle)[1] - spacing, 0.0, 0.75 * math.pi))

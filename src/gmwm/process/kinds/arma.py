@@ -68,7 +68,7 @@ class ARIMA(Process):
     ) -> None:
         ar_values, ma_values = _coefficients(ar, "ar"), _coefficients(ma, "ma")
         if d not in (0, 1, 2):
-            raise InputError(f"{type(self).__name__}: d = {d!r}, it must be 0, 1 or 2")
+            raise InputError(f"{type(self).__name__}: d = {d!r}: give 0, 1 or 2")
         names = [f"ar_{i + 1}" for i in range(len(ar_values))]
         names += [f"ma_{i + 1}" for i in range(len(ma_values))]
         shapes = tuple(Parameter(name, "-", lower=-np.inf, meaning="coefficient") for name in names)
@@ -77,7 +77,9 @@ class ARIMA(Process):
         super().__init__(*ar_values, *ma_values, sigma2)
         for values, sign, what in ((self.ar, 1, "stationary"), (self.ma, -1, "invertible")):
             if None not in values and not _stable([sign * value for value in values]):
-                raise InputError(f"{self!r} is not {what}: its polynomial has a root within 1")
+                raise InputError(
+                    f"{self!r} is not {what}: its polynomial has a root inside the unit circle"
+                )
 
     @property
     def ar(self) -> tuple[Any, ...]:
@@ -141,10 +143,7 @@ class ARIMA(Process):
 
     def haar_variance(self, tau: FloatArray, dt: float) -> FloatArray:
         if self.d > 1:
-            raise InputError(
-                f"{self!r}: the Haar wavelet variance exists for d = 0 and 1 only, d = {self.d} "
-                "is more"
-            )
+            raise InputError(f"{self!r} has no Haar wavelet variance: give d = 0 or 1")
         tau = np.asarray(tau, dtype=float)
         m = np.rint(tau / dt)
         radius = float(np.max(np.abs(np.roots([1.0, *(-c for c in self.ar)])), initial=0.0))

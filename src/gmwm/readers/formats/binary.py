@@ -90,8 +90,8 @@ class BinaryTable(Table):
         count, rest = divmod(size, record)
         if count < tuning.FEWEST_SAMPLES:
             raise InputError(
-                f"{path.name} has {size:,} bytes, {count} records of {record}, where at least "
-                f"{tuning.FEWEST_SAMPLES} are needed: check the layout, or record longer",
+                f"{path.name} has {size:,} bytes, {count} records of {record}, but needs at least "
+                f"{tuning.FEWEST_SAMPLES} records: check the layout, or record longer",
                 "layout",
             )
         notices = [notice("partial-record", "", {"bytes": rest}, size=record)] if rest else []

@@ -70,7 +70,7 @@ def tried(opener: Callable[[Path], ArrayTable], path: Path) -> ArrayTable:
     with suppress(json.JSONDecodeError):
         found = json.loads(last)
     if "unread" not in found:
-        damage = "is damaged, so that its library fails or reads on for too long: save it again"
+        damage = "is damaged: its library fails or takes too long; save it again"
         raise InputError(**found) if found else InputError(f"{path.name} {damage}")
     table, unread = opener(path), found["unread"]
     arrays = [
@@ -143,7 +143,9 @@ def read_hdf5(path: Path) -> ArrayTable:
 
         def add(name: str, item: Any) -> None:
             if name.count("/") > _DEEPEST:
-                raise InputError(f"{path.name} has groups in groups, {_DEEPEST} deep: flatten it")
+                raise InputError(
+                    f"{path.name} has groups nested more than {_DEEPEST} deep: flatten it"
+                )
             # What MATLAB refers to, cells and structure arrays, hides in #refs#.
             if name.startswith("#") or not isinstance(item, h5py.Dataset):
                 return

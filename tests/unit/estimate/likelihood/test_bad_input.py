@@ -16,12 +16,12 @@ X = WhiteNoise(1.0).simulate(100, 1.0, 1)
 @pytest.mark.parametrize(
     ("start", "said"),
     [
-        (WhiteNoise(0.2), "does not give every term"),
-        (WhiteNoise(0.2) + RandomWalk(0.1), "does not give every term"),
-        (WhiteNoise(0.2) + GaussMarkov(0.5, 30.0), "does not give every term"),
-        (WhiteNoise(0.2) + GaussMarkov(0.5), "does not give every term"),
+        (WhiteNoise(0.2), "a positive number for every parameter"),
+        (WhiteNoise(0.2) + RandomWalk(0.1), "a positive number for every parameter"),
+        (WhiteNoise(0.2) + GaussMarkov(0.5, 30.0), "a positive number for every parameter"),
+        (WhiteNoise(0.2) + GaussMarkov(0.5), "a positive number for every parameter"),
         (WhiteNoise(0.2) + GaussMarkov(0.5, 20.0) + RandomWalk(0.1), "RandomWalk"),
-        (WhiteNoise(0.0) + GaussMarkov(0.5, 20.0), "does not give every term .* positive"),
+        (WhiteNoise(0.0) + GaussMarkov(0.5, 20.0), "a positive number for every parameter"),
         ("mle", "is not a term"),
         (3, "not an error model"),
     ],

@@ -129,7 +129,7 @@ def test_a_record_without_stamps_starts_when_its_start_says(log, as_it_is, tmp_p
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"imu": {"start": START}}, "has time stamps: leave its start out"),
+        ({"imu": {"start": START}}, "has time stamps: leave out its start"),
         ({"attitude": [0, 0, 0], "heading": 1.0}, "leave the heading out"),
     ],
 )

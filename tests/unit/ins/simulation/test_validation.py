@@ -71,7 +71,7 @@ def test_figures_need_an_outage(made_up):
     plt.close(found.plot_track())
     with pytest.raises(InputError, match="has no outage"):
         found.plot_growth()
-    with pytest.raises(InputError, match="has 0 of them"):
+    with pytest.raises(InputError, match="has 0 outages"):
         found.plot_errors()
-    with pytest.raises(InputError, match="has 2 of them"):
+    with pytest.raises(InputError, match="has 2 outages"):
         made_up().plot_errors(2)

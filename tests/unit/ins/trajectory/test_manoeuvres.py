@@ -115,7 +115,7 @@ def test_a_duration_cuts_or_goes_on() -> None:
         (lambda: perform([Straight(9.0)], start=START, speed=-1.0), "speed = -1"),
         (lambda: perform([Straight(9.0)], start=START, heading=math.nan), "heading = nan"),
         (lambda: perform([Straight(9.0)], start=START, ramp=0.0), "ramp = 0"),
-        (lambda: perform([Climb(9.0, 1.0)], start=START), "climb at no speed"),
+        (lambda: perform([Climb(9.0, 1.0)], start=START), "climb at zero speed"),
         (
             lambda: perform([Straight(1e4)], start=(1.55, 0.0, 0.0), speed=100.0, dt=1.0),
             "manoeuvres: latitude .* too near a pole",

@@ -49,7 +49,7 @@ def test_the_aircraft_circles_both_ways() -> None:
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"spacing": 600.0}, "at 30 m/s turns are 573 m wide"),
+        ({"spacing": 600.0}, "turns at 30 m/s are 573 m wide"),
         ({"spacing": 0.0}, "spacing = 0"),
         ({"strip": -1.0}, "strip = -1"),
         ({"speed": math.nan}, "speed = nan"),

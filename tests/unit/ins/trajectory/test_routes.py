@@ -59,7 +59,7 @@ def test_heights_change_between_corners() -> None:
         ([[0, 0, 0], [500, 0, 0], [500, 0, 9]], "waypoints 1 and 2 coincide"),
         ([[0, 0, 0], [5000, 0, 0], [0, 0, 0]], "path turns back at waypoint 1"),
         ([[0, 0, 0], [200, 0, 0], [200, 900, 0]], "waypoints 0 and 1 are 200 m apart where"),
-        ([[0, 0, 0], [90, 0, -20]], "waypoints 0 and 1 leave 3 s to climb 20 m"),
+        ([[0, 0, 0], [90, 0, -20]], "waypoints 0 and 1 leave only 3 s to climb 20 m"),
     ],
 )
 def test_impossible_routes_are_refused(corners: list[list[float]], message: str) -> None:
