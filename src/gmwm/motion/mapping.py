@@ -85,6 +85,13 @@ class Signals:
             found[:, :, _LAG + 1 :] = means(self.arms, size)
         return np.asarray(found - found.mean(axis=0))
 
+    def is_close(self, target: FloatArray, parameters: FloatArray) -> bool:
+        """Whether the rates (by the matrix), or the mean forces (gravity), agree as IMUs do."""
+        if self.arms is None:
+            return bool(np.abs(parameters[:_LAG]).max() < tuning.MOST_CORRECTED)
+        apart = np.linalg.norm((self.values - target).mean(axis=0))
+        return bool(apart < tuning.MOST_APART)
+
     def mapped(self, parameters: FloatArray) -> FloatArray:
         """(n, 3) as the target measures them, but for a constant."""
         matrix = np.eye(_AXES) + parameters[:_LAG].reshape(_AXES, _AXES)

@@ -213,6 +213,8 @@ def _flights(sources: Any) -> tuple[list[list[_Imu]], int]:
         flights.append([])
         for label, recording in own.items():
             imu, gone = _imu(f"flight {number}, {label}", label, recording)
+            if any(np.array_equal(imu.samples["gyro"], o.samples["gyro"]) for o in flights[-1]):
+                raise InputError(f"flight {number}: {label} is a copy: give each IMU once")
             flights[-1].append(imu)
             filled += gone
     with_accel = all("accel" in imu.samples for flight in flights for imu in flight)
@@ -298,6 +300,12 @@ def _of_target(
             if sensor == "gyro":
                 arms[j] = arms_of(values, slopes)
         mapped, parameters, errors, absorbed = map_onto(wanted, signals, good, target.dt)
+        for imu, signal, found_one in zip(others, signals, parameters, strict=True):
+            if not signal.is_close(wanted, found_one):
+                raise InputError(
+                    f"flight {flight}: {sensor} of {imu.label} and {target.label} differ by more "
+                    "than IMUs do: check units, and the order and signs of axes"
+                )
         if np.any(away := far_out(mapped, target.dt)):
             good = good & ~away
             events += int(np.count_nonzero(np.diff(away, prepend=False) & away))
@@ -375,26 +383,14 @@ def _classes(
 def _by_axis(
     label: str, sensor: str, curves: Curves, static: Mapping[str, Fit] | None
 ) -> list[MotionCurve]:
+    pairs, differences = (each.swapaxes(0, 1) for each in (curves.pairs, curves.differences))
+    parts = curves.variance, curves.lower, curves.upper, pairs, differences, curves.agree
     found = []
-    for axis, name in enumerate(_AXES):
+    for name, *own in zip(_AXES, *parts, strict=True):
         channel = f"{sensor}_{name}"
-        found.append(
-            MotionCurve(
-                imu=label,
-                channel=channel,
-                quantity=sensor,
-                tau=curves.tau,
-                variance=curves.variance[axis],
-                lower=curves.lower[axis],
-                upper=curves.upper[axis],
-                pairs=curves.pairs[:, axis],
-                differences=curves.differences[:, axis],
-                agree=curves.agree[axis],
-                static=static_variance(static, channel, curves.tau),
-                exponent=curves.exponent,
-                exponent_error=curves.exponent_error,
-            )
-        )
+        at_rest = static_variance(static, channel, curves.tau)
+        own += [at_rest, curves.exponent, curves.exponent_error]
+        found.append(MotionCurve(label, channel, sensor, curves.tau, *own))
     return found
 
 

@@ -378,14 +378,17 @@ class InMotion(Document, Printed):
         page: Path = pages.make("page", self, path)
         return page
 
+    @property
+    def _size(self) -> str:
+        count = len(self.durations)
+        return f"{count} flight{'s' * (count > 1)}, {sum(self.durations):.4g} s"
+
     def __repr__(self) -> str:
-        size = f"{len(self.durations)} flight{'s' * (len(self.durations) > 1)}"
-        return f"<InMotion: {', '.join(self.imus)}; {size}, {sum(self.durations):.4g} s>"
+        return f"<InMotion: {', '.join(self.imus)}; {self._size}>"
 
     def __str__(self) -> str:
         what = "both IMUs together" if len(self.imus) == 2 else "each IMU"
-        size = f"{len(self.durations)} flight{'s' * (len(self.durations) > 1)}"
-        lines = [f"Allan deviation of {what} in motion: {size}, {sum(self.durations):.4g} s"]
+        lines = [f"Allan deviation of {what} in motion: {self._size}"]
         lines += self._stand().splitlines() if self.clocks else []
         for sensor in self.sensors:
             lines += self._table(sensor).splitlines()
@@ -401,7 +404,8 @@ class InMotion(Document, Printed):
             gyros = [m for m in own if m.sensor == "gyro"]
             arms = [m for m in own if m.sensor == "accel"]
             angle = np.rad2deg(np.linalg.norm(np.mean([m.rotation for m in gyros], axis=0)))
-            tilt = np.rad2deg(max(_off_diagonal(m.correction_error).max() for m in gyros))
+            beside = [m.correction_error.reshape(3, 3)[~np.eye(3, dtype=bool)] for m in gyros]
+            tilt = np.rad2deg(np.max(beside))
             scale = max(np.abs(m.correction[::4]).max() for m in gyros)
             offsets = 1e3 * np.array([each.offset for each in clocks])
             drifts = 1e6 * np.array([each.drift for each in clocks])
@@ -426,7 +430,8 @@ class InMotion(Document, Printed):
         rows = []
         for imu in ("both",) if len(self.imus) == 2 else self.imus:
             mean = np.mean([c.variance for c in own if imu in (c.imu, "both")], axis=0)
-            rows.append((imu, *_texts(mean, scale, chosen)))
+            own_texts = (brief(scale * np.sqrt(mean[k])) if mean[k] > 0.0 else "-" for k in chosen)
+            rows.append((imu, *own_texts))
         reach = _median([np.sqrt(np.maximum(c.upper, 0.0)) / c.deviation for c in own])
         rows.append(("95 %", *(f"x/{reach[k]:.2f}" if reach[k] > 0.0 else "-" for k in chosen)))
         if len(self.imus) != 2:
@@ -470,8 +475,7 @@ class InMotion(Document, Printed):
 
     def factor(self, sensor: str) -> FloatArray:
         """(J,) Median over IMUs and axes of the deviation in motion over that at rest."""
-        own = [each.factor for each in self.curves if each.quantity == sensor]
-        return _median(own)
+        return _median([each.factor for each in self.curves if each.quantity == sensor])
 
 
 def _median(rows: Sequence[FloatArray]) -> FloatArray:
@@ -481,15 +485,6 @@ def _median(rows: Sequence[FloatArray]) -> FloatArray:
     found = np.full(known.shape, np.nan)
     found[known] = np.nanmedian(table[:, known], axis=0)
     return found
-
-
-def _off_diagonal(matrix: FloatArray) -> FloatArray:
-    return np.asarray(matrix.reshape(3, 3)[~np.eye(3, dtype=bool)])
-
-
-def _texts(variance: FloatArray, scale: float, chosen: Sequence[int]) -> list[str]:
-    own = (variance[k] for k in chosen)
-    return [brief(scale * np.sqrt(v)) if v > 0.0 else "-" for v in own]
 
 
 def _ends(values: FloatArray, digits: int) -> str:

@@ -18,6 +18,8 @@ PASSES, CLOSE = 12, 1e-7  # of the delay, s
 # Spread of what a mapping may correct after the rotation that gyros have in common. What the motion
 # does not determine stays at its usual value: hovering turns forces little, and scale is then open.
 SCALE_SPREAD, LAG_SPREAD, ARM_SPREAD = 0.03, 0.003, 0.3  # share, s, m
+# Share in rates (14 flights have up to 0.023), and m/s^2 of mean forces: more are wrong axes.
+MOST_CORRECTED, MOST_APART = 0.1, 3.0
 # Residuals of means are correlated: their variance counts so often against the spread.
 CORRELATION = 3.0
 MOST_ABSORBED = 0.5  # share of a variance that a fit may have taken and that is given back

@@ -257,6 +257,18 @@ def test_imus_on_different_bodies_are_rejected():
         gmwm.motion(others)
 
 
+@pytest.mark.parametrize("sensor", ["gyro", "accel"])
+@pytest.mark.parametrize("wrong", [-1.0, 1 / 9.81, 57.3])
+def test_other_units_and_signs_are_rejected(sensor, wrong):
+    """All IMUs have gravity, and the same rates but for their turn."""
+    recordings = imus(np.random.default_rng(21), 3)
+    values = np.stack([recordings[1][name].values for name in AXES], axis=1)
+    values[:, [name.startswith(sensor) for name in AXES]] *= wrong
+    recordings[1] = recording(values)
+    with pytest.raises(gmwm.InputError, match=f"{sensor} of imu 2 and imu 1 differ by more than"):
+        gmwm.motion(recordings)
+
+
 @pytest.mark.parametrize(
     ("sources", "message"),
     [
@@ -264,7 +276,8 @@ def test_imus_on_different_bodies_are_rejected():
         ([], "two IMUs"),
         ([recording(np.ones((200, 6)))], "two IMUs"),
         ([recording(np.ones((200, 6))), "imu.csv"], "read it first"),
-        ([recording(np.ones((200, 6))), recording(np.ones((200, 6)), 60.0)], "50 to 60 Hz"),
+        ([recording(np.ones((200, 6))), recording(np.zeros((200, 6)), 60.0)], "50 to 60 Hz"),
+        ([recording(np.ones((200, 6)))] * 2, "flight 1: imu 2 is a copy: give each IMU once"),
         ([[recording(np.ones((200, 6)))] * 2, [recording(np.ones((200, 6)))] * 3], "one order"),
     ],
 )
