@@ -513,7 +513,7 @@ def test_shared_numbers_stand_above_those_of_the_axes(calibration):
     assert row["name"] == "gyro"
     assert float(row["N"].split()[0]) == pytest.approx(shared["gyro_y"].N, rel=5e-3)
     assert float(row["K"].split()[0]) == pytest.approx(shared["gyro_y"].K, rel=5e-3)
-    assert "there is no accelerometer" in found["note"]
+    assert "the accelerometer is missing" in found["note"]
     assert [each["nees"][0] for each in found["by_axis"]] == ["1", "1"]
 
 

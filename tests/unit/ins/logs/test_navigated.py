@@ -347,7 +347,7 @@ def test_files_of_two_clocks_are_refused_with_both_spans(tmp_path):
     drive(tmp_path)
     path = tmp_path / "fixes.csv"
     path.write_text(path.read_text().replace("\n1", "\n9"))
-    with pytest.raises(InputError, match=r"none in the time of imu.csv, 1000 s to 1160 s"):
+    with pytest.raises(InputError, match=r"but imu.csv lasts from 1000 s to 1160 s"):
         Measured.of(content(), tmp_path)
 
 
