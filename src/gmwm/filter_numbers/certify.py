@@ -360,6 +360,7 @@ def certify(
             found += more
             causes += row
             notices = [each for each in notices if each.code != "other-units"]
+    notices += [each for each in measured.notices if each.severity == "warning"] if measured else []
     if measured is not None and not any(each.consumer == "motion" for each in found):
         seen = ", ".join(measured.numbers())
         raise InputError(f"the motion shows {seen}: give models and numbers of some of these axes")

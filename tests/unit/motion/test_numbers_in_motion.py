@@ -8,6 +8,7 @@ import pytest
 
 import gmwm
 from gmwm import QuantizationNoise, RandomWalk, WhiteNoise
+from gmwm.issues import notice
 from gmwm.motion import InMotion, MotionCurve
 
 DT = 0.008
@@ -104,6 +105,10 @@ def test_numbers_in_use_are_judged_in_motion_beside_the_bench(run, tmp_path):
     for each in (check for check in judged.of("motion") if check.where == "gyro_x"):
         expected = 3.0 * (Q / each.time) ** 2 / (N**2 / each.time + K**2 * each.time / 3.0)
         assert each.nees == pytest.approx(expected, rel=0.02)
+    of_two = replace(found, notices=(notice("motion-two-imus"),))
+    numbers = {kind: (N, K) for kind in KINDS}
+    again = gmwm.certify(bench, numbers, rate=1.0 / DT, motion=of_two)
+    assert "motion-two-imus" in [each.code for each in again.notices]
     assert "overconfident" in judged.text()
     assert (
         "take the row 'in motion', for outages of 60 s at rest, 1 s in motion: gyro N"
