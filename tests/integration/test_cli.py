@@ -631,7 +631,7 @@ def test_stretches_at_rest_of_a_log_that_moves(run, turned_file, no_pages):
     code, _, told = run("calibrate", "moving.csv", *RATE, *FIELD, "--model", "N")
     assert code == 2
     assert told.startswith("gmwm: moving.csv is not static, and its longest stretch at rest has ")
-    assert told.endswith("where 10 s are needed: give e.g. --all to take everything as static\n")
+    assert told.endswith("where 10 s are needed: give e.g. --all to treat everything as static\n")
 
 
 def test_exit_status_where_no_axis_is_valid(run, turned_file, no_pages):

@@ -60,7 +60,7 @@ def stretches_at_rest(recording: Recording) -> tuple[Recording, ...]:
             f"{recording.source or 'the recording'} is not static, and its longest stretch at rest "
             f"has {found.longest:.3g} s |{found.timeline}| where 10 s are needed",
             "no-rest",
-            "record at rest, or give still=False to take everything as static",
+            "record at rest, or give still=False to treat everything as static",
         )
     longest = sorted(found.stretches, key=lambda each: each[0] - each[1])
     used = sorted(longest[: tuning.MOST_STRETCHES])

@@ -57,16 +57,16 @@ def folder_of_results(default: str) -> dict[str, Any]:
     --estimating
     --remove-departures  Subtract steps, transients at the start and slow periods that are found,
         and calibrate what is left.
-    --temperature  Estimate the curve of each channel against the temperature channel, beside its
-        noise.
+    --temperature  Estimate the curve of each channel against the temperature channel, together
+        with its noise.
     --temperature-file FILE  The temperature by time, in seconds from the first sample, if it is not
         in the recording.
-    --degree N  Of that curve, 1 to 6; by default 1 to 3 is chosen.
+    --degree N  Degree of that curve, 1 to 6; by default the best of 1 to 3.
     --covariate NAME=WORDS  The same for another channel, 'time' or 'settling' at switch-on, such as
         'temperature=cubic,lag' or 'settling=300 s'; repeat.
     --export NAME  Also write the file of this program into the folder; see gmwm export --list.
     --datasheet
-    --jobs N  Processes at most; short recordings take one.
+    --jobs N  Largest number of processes; short recordings take one.
     -v --verbose  Print the error model of each axis and all notices too.
     --timings  Print where the time went, stage by stage.
     --memory
@@ -101,10 +101,10 @@ def calibrate(
     MAT, HDF5, Parquet or Feather; a bag of ROS 1 (.bag) or ROS 2 (folder, .mcap, .db3), or a log of
     PX4 (.ulg) or ArduPilot (.bin). Empty fields, NaN and rows that the time column jumps over are
     missing samples.
-    For each channel an error model is selected and estimated. The page printed has N, B and K of
-    each axis as data sheets do, N and K for a filter in SI units, and what to do; the files hold
-    everything. Several recordings of one sensor have one
-    model, with a test whether they agree; so have the stretches at rest of a log that moves.
+    For each channel an error model is selected and estimated. The printed page has N, B and K of
+    each axis as in a data sheet, N and K for a filter in SI units, and what to do; the files hold
+    everything. Several recordings of one sensor get one model, with a test whether they agree; so
+    do the stretches at rest of a log that moves.
 
     Exit status: 0 if a channel has a valid model, 1 if none has (the files are written all the
     same), 2 if the input cannot be used.

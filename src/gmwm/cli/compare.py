@@ -100,11 +100,11 @@ def array(
     quiet: bool,
     **reading: Any,
 ) -> None:
-    """Find weights for the IMUs of one board, whose sum has the least error.
+    """Find the weighted sum of IMUs on one board that has the least error.
 
-    IMU is the static recording of one IMU; all begin together, with aligned axes. The weights hold
-    for outages of one length: over seconds white noise decides, over minutes slow errors do, and
-    those that IMUs share do not average out. The second table compares them with the best IMU
+    IMU is the static recording of one IMU; all begin together, with aligned axes. The weights are
+    for outages of one length: over seconds white noise matters, over minutes slow errors do, and
+    errors that IMUs share do not average out. The second table compares them with the best IMU
     alone, the mean of all, and weights 1/N^2.
 
     \b
@@ -147,11 +147,11 @@ def fleet(
 ) -> None:
     """Calibrate many units of a sensor and tabulate their N, B and K.
 
-    PATTERN is the recording of a unit or, in quotes, a pattern such as 'lot-7/**/*.csv'; files
-    are those of gmwm calibrate. N, B and K of an axis come from one model for all units.
+    PATTERN is the recording of a unit or, in quotes, a pattern such as 'lot-7/**/*.csv'; it
+    takes the same files as gmwm calibrate. N, B and K of an axis come from one model for all units.
     fleet.html shows how units differ, which stand apart and what a data sheet can promise;
-    fleet.parquet and fleet.csv have every number; each unit has a calibration of its own. A file
-    that cannot be used is reported and costs the others nothing.
+    fleet.parquet and fleet.csv have every number; each unit has its own calibration. A file that
+    cannot be used is reported and does not affect the others.
 
     Exit status: 0 if all files were used and no limit is missed, 1 otherwise or if no unit has a
     valid model (the files are written all the same), 2 if no file can be used.

@@ -70,8 +70,8 @@ def motion(
     FILE is the recording of an IMU, all of the same motion, or one log with several instances: a
     bag, or a log of PX4 (vehicle_imu) or ArduPilot; clocks need not agree. Clocks, mounting
     and lever arms are estimated; what the IMUs do not have in common is their noise. The first
-    table says how they stand against the first IMU, the second one the Allan deviation of each in
-    motion, with --static also at rest and the factor between both. Two IMUs give only the sum of
+    table relates each IMU to the first one; the second has the Allan deviation of each in motion,
+    with --static also at rest and the factor between both. Two IMUs give only the sum of
     their errors.
 
     \b

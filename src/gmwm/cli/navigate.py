@@ -81,8 +81,8 @@ def _sensors(flag: str, texts: Sequence[str]) -> str | dict[str, str]:
     """
     --trajectory NAME  helicopter, car, loiter, or a CSV of time, latitude, longitude, height,
         roll, pitch, yaw.
-    --duration NUMBER  Of the trajectory, in seconds.
-    --truth FILE  calibration.json that sensor errors are drawn from.
+    --duration NUMBER  Duration of the trajectory, in seconds.
+    --truth FILE  calibration.json from which sensor errors are simulated.
     --filter NAME=FILE  A filter and its calibration.json, or numbers that gmwm bound or gmwm reduce
         saved; 'truth' for the true models; repeat. The others are compared with the first.
     --outage START:LENGTH  Seconds without GNSS; repeat.
@@ -100,20 +100,20 @@ def _sensors(flag: str, texts: Sequence[str]) -> str | dict[str, str]:
     --outages auto|SECONDS  Length of the outages that are cut into the log to compare sensors; auto
         is 30 s.  [default: auto]
     --lever-arm X,Y,Z  From the IMU to the antenna, metres: forward, right, down.
-    --heading NUMBER  Degrees, at the first fix; by default from GNSS once it moves.
-    --attitude ROLL,PITCH,YAW  Degrees, at the first fix, of a record that begins in motion; by
-        default from the data.
-    --imu-start S  Time of the first IMU sample, without time stamps, on the clock of the fixes.
+    --heading NUMBER  Heading at the first fix in degrees; by default from GNSS once it moves.
+    --attitude ROLL,PITCH,YAW  Attitude at the first fix in degrees, if the record begins in motion;
+        by default from the data.
+    --imu-start S  Time of the first IMU sample on the clock of the fixes, if it has no time stamps.
     --barometer FILE  Barometric heights: time, height.
     --zero-velocity VALUE  Use standstills that the IMU shows, to this accuracy, e.g. '0.02 m/s'.
-    --reference FILE  Compare the solution with a trajectory of the IMU that is known better: a CSV
-        of time, latitude, longitude, height, roll, pitch, yaw, on the IMU's clock.
+    --reference FILE  Compare the solution with a more accurate trajectory of the IMU: a CSV of
+        time, latitude, longitude, height, roll, pitch, yaw, on the IMU's clock.
     --gate NUMBER  Reject fixes whose innovation is less probable, e.g. 1e-5.
     --position-sd N[,E,D]  Standard deviations of fixes that have none, metres: north, east, down.
         [default: 1,1,1.5]
-    --velocity-sd N[,E,D]  The same of velocities, m/s.  [default: 0.1,0.1,0.15]
+    --velocity-sd N[,E,D]  The same for velocities, m/s.  [default: 0.1,0.1,0.15]
     --gyro-bias VALUE  Bias of a gyro at switch-on, 1 sigma.  [default: 0.1 deg/s]
-    --accel-bias VALUE  The same of an accelerometer.  [default: 0.1 m/s^2]
+    --accel-bias VALUE  The same for an accelerometer.  [default: 0.1 m/s^2]
     --json
     --reading
     """,
@@ -139,16 +139,16 @@ def navigate(
 ) -> None:
     """Prove sensor models by navigating, or filter your own data.
 
-    INS/GNSS filters, outages, Monte Carlo: errors of the sensors, drawn from the true models or
-    taken from real static recordings, are added to the error-free signals of a trajectory; every
-    filter navigates on the same errors. Printed are the errors at the end of the outages and
-    whether each filter is consistent. A YAML file can hold more than the options, which
-    override it; see docs/navigation.md and docs/own-log.md.
+    A study simulates INS/GNSS filters with outages (Monte Carlo). Sensor errors are drawn from the
+    true models or taken from real static recordings, and added to the error-free signals of a
+    trajectory; every filter navigates on the same errors. The command prints the errors at the end
+    of the outages and whether each filter is consistent. A YAML file can hold more settings than
+    the options, which override it; see docs/navigation.md and docs/own-log.md.
 
-    With --imu, --gnss and --sensors, real data are filtered: solution.csv and report.html are
-    written; whether the innovations agree with the sensor models is printed, and which fault of
-    the log explains them if they do not. Several --sensors are compared: outages are cut into the
-    log, and the errors after them, from a smoother of all fixes, show which model to take.
+    With --imu, --gnss and --sensors it filters real data and writes solution.csv and report.html.
+    It prints whether the innovations agree with the sensor models, and if not, which fault of the
+    log explains them. Several --sensors are compared: outages are cut into the log, and the errors
+    after them, against a smoother of all fixes, show which model to use.
 
     \b
     Examples:

@@ -26,8 +26,8 @@ _number_options = options(
     --form TEXT  N+K, N+GM or N+K+GM; for gmwm reduce N+2GM too.
     --shared  The same numbers for all axes of a sensor.
     --temperature
-    --tau S  Correlation time of the Gauss-Markov process in seconds; "shared": the one for all
-        axes that costs least. Each axis has its own by default.
+    --tau S  Correlation time of the Gauss-Markov process in seconds; "shared": the best one for
+        all axes. By default each axis has its own.
     --gyro-bias RAD/S  Standard deviation of the turn-on bias of a gyro.
     --accel-bias M/S^2  Standard deviation of the turn-on bias of an accelerometer.
     -o --output JSON  File to save the numbers in.
@@ -53,7 +53,7 @@ _number_options = options(
 @options(
     """
     --horizon S  Longest outage in seconds.
-    --level NUMBER  Cover the confidence region of this level, e.g. 0.95, and not the estimate
+    --level NUMBER  Cover the confidence region of this level, e.g. 0.95, instead of the estimate
         alone.
     """,
     horizon={"default": 60.0},
@@ -109,8 +109,8 @@ def reduce(file: Path, outages: str, temperature: float | None, **options: Any) 
 @options(
     """
     --times T,T,...  Outage lengths in seconds.
-    --unknown-start  Nothing is known of the errors at the start; by default the initial values of
-        the slow ones are, as after aiding.
+    --unknown-start  Slow errors are unknown at the start; by default they are known, as after
+        aiding.
     --temperature
     """,
     times={"default": "1,10,60,600"},
@@ -118,10 +118,10 @@ def reduce(file: Path, outages: str, temperature: float | None, **options: Any) 
 def budget(file: Path, times: str, unknown_start: bool, temperature: float | None) -> None:
     """Predict the error growth in outages.
 
-    FILE is a calibration.json. For each term of each channel's model: attitude (deg), velocity
-    (m/s) and position (m) errors, 1 sigma, after coasting level and without manoeuvres from exact
-    attitude, velocity and position. Valid up to 600 seconds or so. After fixes, which leave errors
-    of tilt and velocity too: gmwm certify.
+    FILE is a calibration.json. For each term of each channel's model it prints the errors of
+    attitude (deg), velocity (m/s) and position (m), 1 sigma, after an outage. The platform is level
+    and does not manoeuvre; attitude, velocity and position are exact at the start. Valid up to
+    about 600 seconds. For errors that remain after fixes see gmwm certify.
 
     \b
     Example:
@@ -187,18 +187,18 @@ _IN_SI = {
     -K GYRO,ACCEL  Random walk in use, with -N, rad/s^2/sqrt(Hz) and m/s^3/sqrt(Hz).
     --outages T,T,...  Lengths of outages in seconds.
     --keyframe S  Interval of keyframes or scans in seconds.
-    --aiding NAME  What aids the whole filter: gnss, pose (absolute poses at keyframes), odometry
+    --aiding NAME  Aiding of the whole filter: gnss, pose (absolute poses at keyframes), odometry
         (relative poses, visual or lidar) or wheels.
-    --reference FILE  Reference trajectory on which it is judged, a CSV of time, latitude,
-        longitude, height, roll, pitch, yaw; a loiter or, with wheels, a car's drive by default.
+    --reference FILE  Trajectory for the whole filter, a CSV of time, latitude, longitude, height,
+        roll, pitch, yaw; by default a loiter or, with wheels, a car's drive.
     --motion NAME  Motion in which the errors below act: handheld, drone, car, fixed-wing, or a
-        recording of your own. A motion.json: the numbers are judged in that motion too.
+        recording of your own. With a motion.json the numbers are judged in that motion too.
     --scale-error PERCENT  Scale error of both sensors.
     --misalignment DEG  Misalignment of the axes.
     --g-sensitivity DEG/S/G  g-sensitivity of the gyros.
-    --time-offset MS  Delay against what the IMU is fused with.
-    --vibration-rectification MG/G^2  Vibration rectification of the accelerometers, for the
-        vibration.
+    --time-offset MS  Delay of the IMU against the sensors that aid it.
+    --vibration-rectification MG/G^2  Vibration rectification of the accelerometers; needs
+        --vibration.
     --vibration G  Vibration, root mean square.
     --temperature
     -o --output JSON  File to save the certificate in.
@@ -226,9 +226,9 @@ def certify(
 ) -> None:
     """Predict how consistent a filter is with the numbers in use.
 
-    FILE is a calibration.json, taken for the truth. True errors beside those that the filter
-    predicts, for free inertial growth, an aided INS in outages and relative poses between
-    keyframes; then what N and K have to cover, cause by cause.
+    FILE is a calibration.json, which counts as the truth. The command prints true errors beside
+    those that the filter predicts: for one axis without aiding, an aided INS in outages, and
+    relative poses between keyframes. Then it prints what N and K have to cover, cause by cause.
 
     \b
     Examples:
@@ -301,7 +301,7 @@ def _numbers(
     --to NAME  The program; see --list.
     --horizon S  Longest outage that the numbers cover, in seconds; 60 by default, 1 in motion.
     --interval S  Shortest time between updates in seconds, for a motion.json; 0.1 by default.
-    --form FORM  N+K, N+GM, ...: most programs hold one; state-space holds any.
+    --form FORM  N+K, N+GM, ...: most programs take only one; state-space takes any.
     -o --output FILE  File to write instead of printing; .npz for state-space.
     --explain  Print what the numbers are, axis by axis, in place of the file.
     --temperature
@@ -326,10 +326,10 @@ def export(
 ) -> None:
     """Write numbers for a filter as the program wants them.
 
-    FILE is a calibration.json, numbers that gmwm bound or gmwm reduce saved, or a motion.json, then
-    for updates every --interval and outages up to --horizon. Several files make one IMU, such as
-    gyros and accelerometers of different rates. The numbers of a calibration are the smallest that
-    are not overconfident for its error models; --explain has the details.
+    FILE is a calibration.json, numbers that gmwm bound or gmwm reduce saved, or a motion.json (its
+    numbers are for updates every --interval and outages up to --horizon). Several files make one
+    IMU, e.g. gyros and accelerometers of different rates. The numbers of a calibration are the
+    smallest that are not overconfident for its error models; --explain has the details.
 
     Exit status: 0 if the numbers were written, 1 if an axis is not valid (nothing is written), 2 if
     the input cannot be used.
@@ -382,8 +382,8 @@ if TYPE_CHECKING:
     """
     --horizon S
     --form TEXT  N+K, N+GM or N+K+GM.
-    --unit-spread FACTOR  How many times as noisy as typical your unit may be.
-    --rate HZ  Sampling rate, for programs that want it beside the numbers.
+    --unit-spread FACTOR  How many times noisier than typical your unit may be.
+    --rate HZ  Sampling rate, for programs that need it with the numbers.
     --imu FILE  Numbers in use, to be judged: a file of Kalibr, OpenVINS, VINS or their like.
     --report HTML  Page to write: the models in the Allan plot, and the numbers.
     -o --output JSON  File to save the numbers in, for gmwm export.
@@ -414,10 +414,10 @@ def sheet(
     """Find numbers for a filter from a data sheet, where there is no recording.
 
     SHEET is a YAML file such as 'gyro: {N: 0.15 deg/sqrt(h), B: 7 deg/h}', or a sensor of --list.
-    Write lowest_deviation in place of B where the sheet calls the lowest point of the Allan plot
-    bias instability: many do. All keys: docs/data-sheets.md.
-    Two numbers leave much open: N and K are found for every kind of error model that agrees with
-    them; printed first is what covers them all. An hour of recording tells more.
+    Many sheets call the lowest point of the Allan plot bias instability: then write
+    lowest_deviation in place of B. All keys: docs/data-sheets.md.
+    Many error models agree with two numbers. The command finds N and K for every kind of them, and
+    prints first the N and K that cover them all. An hour of recording tells more.
 
     \b
     Examples:

@@ -130,20 +130,19 @@ _SHARED["reading"] = _group(
     --channel NAME=COLUMN  Role of a column by its name or 0-based number, e.g. gyro_x=wx or
         accel_z=5; repeat. By default roles are guessed from the column names.
     --time COLUMN  Time column by name or number; 'none' to ignore it.
-    --format NAME  What the file is, where its content and its name do not show it:
-        {", ".join(FORMATS)}.
-    --layout LAYOUT  Of a binary file without a header: IMAR, LN200, LN200IG, IXSEA, NAVCHIP_INT,
-        NAVCHIP_FLT, KF-GINS, or TYPE,GYRO_SCALE,ACCEL_SCALE[,rates][,little|big].
-    --damaged  Use the readable part of a text or a flight log that is cut off or damaged; it is
-        rejected otherwise.
+    --format NAME  File format, if content and name do not show it: {", ".join(FORMATS)}.
+    --layout LAYOUT  Layout of a binary file without a header: IMAR, LN200, LN200IG, IXSEA,
+        NAVCHIP_INT, NAVCHIP_FLT, KF-GINS, or TYPE,GYRO_SCALE,ACCEL_SCALE[,rates][,little|big].
+    --damaged  Use the readable part of a text or a flight log that is cut off or damaged; by
+        default it is rejected.
     """,
     {"channel": {"multiple": True}, "format": {"type": click.Choice(FORMATS)}},
 )
 _SHARED["part"] = _group(
     """
-    --topic NAME  Topic of a bag or a flight log; needed where several have an IMU. Repeat for gyros
-        and accelerometers in topics of their own.
-    --clock  Stamps of messages: of their headers, or when they were recorded.
+    --topic NAME  Topic of a bag or a flight log; needed if several have an IMU. Repeat it if gyros
+        and accelerometers have separate topics.
+    --clock  Time stamps to use: those in the message headers, or the times of recording.
     --channels NAME,...  Only these channels: gyro_x,accel_z, or gyro for all of them.
     --start S  Leave out samples before this time, in seconds.
     --stop S  Leave out samples after this time, in seconds.
@@ -158,10 +157,9 @@ _SHARED["estimating"] = _group(  # named as arguments of `gmwm.calibrate`
     """
     --model [NAME=]MODEL  Fit this model instead of selecting one: terms {terms}, e.g.
         'N + K + 2 GM'; or 'gyro=N + 2 GM' for a sensor or channel; repeat.
-    --leave WHAT  Leave events, lines, resonances, outliers or all as they are: samples of shocks
-        are masked otherwise, lines and resonances are terms that a model may have, outliers all
-        over it make the variances robust; repeat.
-    --all  Take everything as static; by default only the stretches at rest of a log that moves are
+    --leave WHAT  Leave events, lines, resonances, outliers or all as they are; repeat. By default
+        shocks and outliers are masked, and lines and resonances become terms if needed.
+    --all  Treat everything as static; by default only the stretches at rest of a log that moves are
         used.
     """,
     {
@@ -184,16 +182,16 @@ _SHARED["estimating"] = _group(  # named as arguments of `gmwm.calibrate`
 )
 _SHARED |= _declared(
     """
-    --jobs N  Processes; one a core by default.
+    --jobs N  Number of processes; by default one for each core.
     --cluster ADDRESS  Dask scheduler that does the work, e.g. tcp://10.0.0.1:8786.
-    --resume  Go on with what the folder holds.
+    --resume  Continue the interrupted run in the folder.
     --horizon S  Longest outage that the filter numbers cover, in seconds.
-    --temperature NUMBER  With the noise that the calibration has at this temperature, or value of
-        another covariate; by default the average of the recording.
+    --temperature NUMBER  Use the noise at this temperature, or at this value of another covariate;
+        by default the average of the recording.
     --datasheet YAML  N, B and K by sensor or channel, each with its unit, to be drawn over the
         curves of the report: 'gyro: {N: 0.15 deg/sqrt(h), B: 7 deg/h}'.
-    --memory GB  For the samples: those of a longer file are kept on disk, in TMPDIR, and about
-        three times one channel is in memory. By default 1 GB.
+    --memory GB  Memory for the samples, by default 1 GB. A longer file is kept on disk, in TMPDIR;
+        memory then holds about three times one channel.
     --units  Units of the table; files and JSON are in SI.
     --json  Print the result as JSON, in SI units.
     -q --quiet  Print nothing but errors.
