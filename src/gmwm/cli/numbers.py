@@ -197,8 +197,8 @@ _IN_SI = {
     --misalignment DEG  Misalignment of the axes.
     --g-sensitivity DEG/S/G  g-sensitivity of the gyros.
     --time-offset MS  Delay of the IMU against the sensors that aid it.
-    --vibration-rectification MG/G^2  Vibration rectification of the accelerometers; needs
-        --vibration.
+    --vibration-rectification MG/G^2  Vibration rectification of the accelerometers; give
+        the --vibration too.
     --vibration G  Vibration, root mean square.
     --temperature
     -o --output JSON  File to save the certificate in.
