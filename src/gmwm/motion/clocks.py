@@ -57,13 +57,8 @@ def join(
     """
     lag = _coarse(rates, dt)
     if lag is None:
-        if (
-            max(
-                float(np.std(means(r, _block(own)), axis=0).max())
-                for r, own in zip(rates, dt, strict=True)
-            )
-            > tuning.MOVING
-        ):
+        spreads = [np.std(means(r, _block(own)), axis=0) for r, own in zip(rates, dt, strict=True)]
+        if np.max(spreads) > tuning.MOVING:
             raise InputError(
                 f"flight {flight}: the rates of {imu} and of the first IMU do not correlate: give "
                 "recordings of one motion, on one rigid body"
@@ -128,14 +123,10 @@ def _check_steady(
 ) -> None:
     """Raise InputError if delays of parts explain much of what the line leaves."""
     part = np.minimum(((at - at[0]) / tuning.PART).astype(int), int((at[-1] - at[0]) / tuning.PART))
-    explained, delays = 0.0, []
-    for each in range(part[-1] + 1):
-        own, along = residual[part == each], slope[part == each]
-        power = float(np.sum(along**2))
-        delay = float(np.sum(own * along)) / power if power > 0.0 else 0.0
-        explained += delay**2 * power
-        delays.append(delay)
-    if explained > tuning.WANDER * float(np.sum(residual**2)):
+    power = np.bincount(part, np.sum(slope**2, axis=1))
+    along = np.bincount(part, np.sum(residual * slope, axis=1))
+    delays = along / np.maximum(power, np.finfo(float).tiny)
+    if delays**2 @ power > tuning.WANDER * float(np.sum(residual**2)):
         raise InputError(
             f"flight {flight}: the clock of {imu} wanders against the first one by "
             f"{1e3 * np.std(delays):.2g} ms around a steady drift: give recordings with stamps of "

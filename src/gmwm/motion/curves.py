@@ -16,16 +16,11 @@ from gmwm.motion import tuning
 
 @dataclass(frozen=True)
 class Curves:
-    """Allan variances of the three axes of a sensor.
+    """Those of `MotionCurve` for the three axes of a sensor.
 
-    tau: (J,), s.
-    variance, lower, upper: (3, J), u^2, with the ends of 95 % intervals; of two IMUs that of the
-        difference. A variance can be negative by chance; its lower end is zero then.
-    pairs: (P, 3, J), from each pair of others.
-    differences: (K - 1, 3, J), of the difference to each other.
-    agree: (3, J), p-value of the equality of the pairs; NaN where there is one.
-    exponent, exponent_error: (J,), of the vibration to which deviations are proportional, over
-        blocks and the axes together, with half of its 95 % interval; NaN where it is not known.
+    variance, lower, upper, agree: (3, J). The lower end of a negative variance is zero.
+    pairs, differences: (P, 3, J) and (K - 1, 3, J).
+    exponent, exponent_error: (J,), of the axes together.
     """
 
     tau: FloatArray

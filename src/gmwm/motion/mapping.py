@@ -85,10 +85,12 @@ class Signals:
             found[:, :, _LAG + 1 :] = means(self.arms, size)
         return np.asarray(found - found.mean(axis=0))
 
-    def is_close(self, target: FloatArray, parameters: FloatArray) -> bool:
-        """Whether the rates (by the matrix), or the mean forces (gravity), agree as IMUs do."""
+    def is_close(self, target: FloatArray, parameters: FloatArray, size: int) -> bool:
+        """Whether the rates, or the mean forces (gravity), agree as IMUs do."""
         if self.arms is None:
-            return bool(np.abs(parameters[:_LAG]).max() < tuning.MOST_CORRECTED)
+            left = means(target - self.mapped(parameters), size).var(axis=0).sum()
+            is_explained = left < tuning.MOST_LEFT * means(target, size).var(axis=0).sum()
+            return bool(is_explained and np.abs(parameters[:_LAG]).max() < tuning.MOST_CORRECTED)
         apart = np.linalg.norm((self.values - target).mean(axis=0))
         return bool(apart < tuning.MOST_APART)
 

@@ -31,7 +31,7 @@ from gmwm.motion.mapping import (
     rotation_to,
     vibration_of,
 )
-from gmwm.motion.reference import rates_of, read_attitude, without_reference
+from gmwm.motion.reference import over_samples, rates_of, read_attitude, without_reference
 from gmwm.motion.result import InMotion, MotionCurve, VibrationClass, static_variance
 from gmwm.readers import Recording, require_recording
 
@@ -158,9 +158,8 @@ def _against(sources: Any, references: Any, static: Mapping[str, Any] | None) ->
     single = isinstance(sources, Recording)
     recordings, attitudes = ([each] if single else list(each) for each in (sources, references))
     if not recordings or len(recordings) != len(attitudes):
-        raise InputError(
-            f"{len(recordings)} recordings and {len(attitudes)} references: give one for each"
-        )
+        counts = f"{len(recordings)} recordings and {len(attitudes)} references"
+        raise InputError(f"{counts}: give one for each")
     clocks, mountings, own, durations, intervals, events = [], [], [], [], [], 0
     for number, (recording, given) in enumerate(zip(recordings, attitudes, strict=True), start=1):
         imu, _ = _imu(f"flight {number}", "imu", recording)
@@ -168,25 +167,34 @@ def _against(sources: Any, references: Any, static: Mapping[str, Any] | None) ->
         attitude = read_attitude(given) if isinstance(given, str | os.PathLike) else given
         dt, rates, gaps = rates_of(*map(np.asarray, attitude))
         other = _Imu("reference", dt, {"gyro": rates}, gaps)
+        times = max(1, round(dt / imu.dt))
+        imu = replace(imu, samples={"gyro": over_samples(imu.samples["gyro"], times, imu.dt)})
         clock = _joined(number, imu, other)
         if clock is None:
             raise InputError(
                 f"flight {number}: the reference does not move like the IMU: check both"
             )
         found, mounted, count = _of_target(number, [imu, other], 0, [clock])
-        clocks.append(clock)
         mountings += mounted
+        step = imu.dt
+        if times > 1:
+            found, mounted, count = _of_target(number, [imu, other], 1, [clock])
+            back, step = Rotation.from_rotvec(-mounted[0].rotation), dt
+            seen = [back.apply(each) for each in found["gyro"].differences]
+            found["gyro"] = replace(found["gyro"], differences=seen)
+        # Of an even number of samples, the middle is between two.
+        clocks.append(replace(clock, offset=clock.offset - 0.5 * (1 - times % 2) * imu.dt))
         own.append(found["gyro"])
         durations.append(float(imu.time[-1]))
         intervals.append(dt)
         events += count
-    sums = curves_of(own, imu.dt, max(len(each.vibration) for each in own))
+    sums = curves_of(own, step, max(len(each.vibration) for each in own))
     curves, angle = without_reference(sums, max(intervals), "the gyros")
     notices = [notice("motion-reference", values={"angle": 1e3 * angle})]
     notices += [notice("motion-events", values={"events": events})] if events else []
-    by_axis = _by_axis("imu", "gyro", curves, static)
     joints = tuple(clocks), tuple(mountings), tuple(notices)
-    return InMotion(("imu",), tuple(durations), tuple(by_axis), *joints)
+    by_axis = tuple(_by_axis("imu", "gyro", curves, static))
+    return InMotion(("imu",), tuple(durations), by_axis, *joints)
 
 
 def _flights(sources: Any) -> tuple[list[list[_Imu]], int]:
@@ -292,7 +300,8 @@ def _of_target(
             # Of fourth order: the second order takes 2 % of a lever arm at a fifteenth of the rate.
             slopes = (8.0 * (ahead - behind) - ahead2 + behind2) / (12.0 * imu.dt)
             if sensor == "gyro":
-                turns.append(rotation_to(means(wanted, size), means(values, size)))
+                sure = means(good.astype(float), size) == 1.0
+                turns.append(rotation_to(means(wanted, size)[sure], means(values, size)[sure]))
             values, slopes = values @ turns[j].T, slopes @ turns[j].T
             # A lag times the slopes of vibration, beyond the means that give it, would be noise.
             steady = uniform_filter1d(slopes, size, axis=0)
@@ -301,7 +310,7 @@ def _of_target(
                 arms[j] = arms_of(values, slopes)
         mapped, parameters, errors, absorbed = map_onto(wanted, signals, good, target.dt)
         for imu, signal, found_one in zip(others, signals, parameters, strict=True):
-            if not signal.is_close(wanted, found_one):
+            if not signal.is_close(wanted, found_one, size):
                 raise InputError(
                     f"flight {flight}: {sensor} of {imu.label} and {target.label} differ by more "
                     "than IMUs do: check units, and the order and signs of axes"

@@ -38,11 +38,6 @@ def read_attitude(path: str | os.PathLike[str]) -> tuple[FloatArray, FloatArray]
     columns = load_columns(table, wanted)
     rows = np.stack([columns[i] for i in wanted], axis=1)
     rows = rows[np.all(np.isfinite(rows), axis=1)]
-    lengths = np.linalg.norm(rows[:, 1:], axis=1)
-    if len(rows) < 2 or np.any(np.abs(lengths - 1.0) > tuning.UNIT_LENGTH):
-        raise InputError(
-            f"{table.source}: quaternions do not have a length of 1: check the columns"
-        )
     seconds = (rows[:, 0] - rows[0, 0]) * (meaning(table.names[time]).seconds or 1.0)
     return seconds, rows[:, 1:]
 
@@ -52,7 +47,10 @@ def rates_of(time: FloatArray, quaternions: FloatArray) -> tuple[float, FloatArr
 
     quaternions: Of rotations from the body to a fixed frame.
     """
-    time, first = np.unique(time - time[0], return_index=True)
+    good = quaternions.shape == (len(time), 4) and np.all(np.isfinite(time))
+    if not good or not np.all(abs(np.linalg.norm(quaternions, axis=1) - 1.0) < tuning.UNIT_LENGTH):
+        raise InputError("the reference: quaternions do not have a length of 1: check the columns")
+    time, first = np.unique(time - time.min(), return_index=True)
     steps = np.diff(time)
     if steps.size < 20:
         raise InputError("the reference has fewer than 20 attitudes: record longer")
@@ -62,7 +60,19 @@ def rates_of(time: FloatArray, quaternions: FloatArray) -> tuple[float, FloatArr
     grid = np.arange(int(time[-1] / dt)) * dt
     turned = Slerp(time, Rotation.from_quat(quaternions[first]))(grid)
     gap = steps[np.clip(np.searchsorted(time, grid, "right") - 1, 0, steps.size - 1)] > 1.5 * dt
+    if gap.mean() > tuning.MOST_FILLED:
+        raise InputError(f"the reference has gaps of {gap.sum() * dt:.3g} s: give a part without")
     return dt, (turned[:-1].inv() * turned[1:]).as_rotvec() / dt, gap[1:]
+
+
+def over_samples(rates: FloatArray, times: int, dt: float) -> FloatArray:
+    """(n, 3) Rotations over so many samples by their time: all that a slow reference has too."""
+    steps, count = Rotation.from_rotvec(rates * dt), len(rates) - times + 1
+    turned, found = steps[:count], rates.copy()
+    for k in range(1, times):
+        turned = turned * steps[k : k + count]
+    found[(times - 1) // 2 :][:count] = turned.as_rotvec() / (times * dt)
+    return found
 
 
 def without_reference(curves: Curves, dt: float, where: str) -> tuple[Curves, float]:

@@ -336,10 +336,6 @@ class InMotion(Document, Printed):
         ----------
         channel : str, optional
         ax : matplotlib Axes, optional
-
-        Returns
-        -------
-        matplotlib Axes
         """
         own = [self.curve(imu, channel) for imu in self.imus]
         unit, scale = _shown(own[0].quantity)
@@ -365,10 +361,6 @@ class InMotion(Document, Printed):
         Parameters
         ----------
         path : path-like
-
-        Returns
-        -------
-        Path
 
         Raises
         ------

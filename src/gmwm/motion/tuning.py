@@ -20,6 +20,7 @@ PASSES, CLOSE = 12, 1e-7  # of the delay, s
 SCALE_SPREAD, LAG_SPREAD, ARM_SPREAD = 0.03, 0.003, 0.3  # share, s, m
 # Share in rates (14 flights have up to 0.023), and m/s^2 of mean forces: more are wrong axes.
 MOST_CORRECTED, MOST_APART = 0.1, 3.0
+MOST_LEFT = 0.3  # share of the variance of rates that a mapping may leave: flights have 0.001
 # Residuals of means are correlated: their variance counts so often against the spread.
 CORRELATION = 3.0
 MOST_ABSORBED = 0.5  # share of a variance that a fit may have taken and that is given back
@@ -29,8 +30,7 @@ ERROR_PART = 2.0  # s: parts whose sums give the errors of a mapping
 # -- curves ---------------------------------------------------------------------------------------
 
 WINDOWS = 10  # averaging times that a flight needs to hold
-# Averaging times, and s, of a block whose means are taken as independent: vibration comes and goes
-# with the motion.
+# Averaging times, and s, of a block whose mean is independent: vibration comes and goes.
 BLOCK_LEVELS, BLOCK_LEAST = 4.0, 1.0
 FEWEST_BLOCKS = 20  # that show how a deviation depends on vibration
 FEWEST_FLIGHTS = 5  # from so many on, flights are the unit, of which blocks are not independent

@@ -64,6 +64,39 @@ def test_noise_of_gyros_is_told_from_that_of_the_reference():
         assert float(text) == pytest.approx((own / (own + other)) ** 2, abs=0.06)
 
 
+@pytest.mark.parametrize("step", [4, 10])
+def test_a_slow_reference_has_the_rotations_of_its_intervals(step):
+    """At 25 and 10 Hz, of a motion up to 2 Hz: interpolated rates would be far off."""
+    recording, (times, quaternions) = flight(3)
+    found = gmwm.motion(recording, reference=(times[::step], quaternions[::step]))
+    ratios = [
+        (curve.variance * curve.tau / N**2)[(curve.tau > 0.2) & (curve.tau < 2.0)]
+        for curve in found.curves
+    ]
+    assert np.mean(ratios) == pytest.approx(1.0, abs=0.1)
+    assert found.clocks[0].offset == pytest.approx(-0.25 - 0.005 * step, abs=5e-4)
+
+
+@pytest.mark.parametrize(
+    ("spoil", "message"),
+    [
+        (lambda t, q: (t, q[:, [3, 0, 1, 2]]), "gyro of reference and imu differ by more than"),
+        (lambda t, q: (t, q * [-1, -1, -1, 1]), "gyro of reference and imu differ by more than"),
+        (lambda t, q: (t, np.where(t[:, None] == t[9], np.nan, q)), "do not have a length of 1"),
+        (lambda t, q: (t, 2.0 * q), "do not have a length of 1"),
+        (lambda t, q: (t[:-1], q), "do not have a length of 1"),
+        (
+            lambda t, q: (np.where(t > t[9], t + 4.0, t), q),
+            "has gaps of 4.01 s: give a part without",
+        ),
+    ],
+)
+def test_a_reference_that_is_no_attitude_is_rejected(spoil, message):
+    recording, attitude = flight(3)
+    with pytest.raises(gmwm.InputError, match=message):
+        gmwm.motion(recording, reference=spoil(*attitude))
+
+
 def test_a_reference_that_dominates_is_rejected():
     recording, attitude = flight(4, angle=3e-3)
     message = r"noise of the reference's angle, .* dominates .*: .* at 0.02 s, 0 % at 0.04 s, "
