@@ -279,9 +279,9 @@ def _ambiguity(name: str, selection: Selection) -> Notice:
     models = [fitted.model.title() for fitted in (selection.fit, *selection.rivals)]
     better, also = selection.surpassed_by, ""
     if better is not None and better.model.title() in models:
-        also = f" (best is that with bias instability, of {better.n_parameters} parameters)"
+        also = f" (the one with bias instability fits best, {better.n_parameters} parameters)"
     if wider := wider_ranges(selection.fit, selection.ranges()):
-        also += f". If none of them is ruled out: {', '.join(wider)}"
+        also += f". Ranges over all of them: {', '.join(wider)}"
     values = {"models": len(models)}
     return notice(AMBIGUITY, name, values, titles="; ".join(models), also=also)
 

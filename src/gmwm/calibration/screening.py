@@ -173,13 +173,13 @@ def _treated(
             if found.code == "event":
                 hint += f", {found.values['samples']:,.0f} samples"
         elif found.where in robust:
-            hint = "kept: robust wavelet variances bound their influence, at 1.3 times the errors"
+            hint = "kept: robust wavelet variances limit their influence, with 1.3 times the errors"
         if loss is not None and found.code == "event":
             values["taken_at"], values["taken"] = loss
             if is_left_out:
                 hint += (
                     f"; with them the deviation at {loss[0]:.3g} s is {loss[1]:.2g} times as "
-                    "large: if they are the sensor's own noise, leave them in"
+                    "large: if they are the sensor's own noise, keep them"
                 )
         return replace(found, hint=hint, values=values)
     if found.code == "rows-copied":

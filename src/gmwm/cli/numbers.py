@@ -464,7 +464,7 @@ def _for_filter(name: str, numbers: FilterNumbers, unit_spread: float) -> str:
     from gmwm.report import filter_key
 
     is_usual = numbers.form == "N+K"
-    what = "keys of Kalibr, OpenVINS" if is_usual else f"of the form {numbers.form}: all its terms"
+    what = "keys of Kalibr, OpenVINS" if is_usual else f"all terms of the form {numbers.form}"
     title = (
         f"{name}, for your filter ({what}): covers all models that agree with the sheet, units up "
         f"to {unit_spread:g} times as noisy, outages up to {numbers.horizon:g} s"

@@ -42,9 +42,9 @@ _UNITS = {
 
 _HOW = {
     "bound": "the smallest that are never overconfident for the error models",
-    "reduce": "by gmwm.reduce, consistent on average, since no N+GM bounds a random walk",
+    "reduce": "by gmwm.reduce, consistent on average, since no N+GM covers a random walk",
     "given": "given, not from a recording",
-    "motion": "with them errors in motion grow at most as predicted between updates",
+    "motion": "with them errors in motion grow no faster than predicted between updates",
 }
 
 
@@ -95,7 +95,7 @@ def notes(imu: ImuNumbers, title: str, caution: str) -> list[str]:
         f"with reservation, steps or drifts may recur: {', '.join(imu.reserved)}"
         if imu.reserved
         else "",
-        "do not use: within a second N and K follow the sensor's low-pass" if is_short else "",
+        "do not use: below a second N and K describe the sensor's low-pass" if is_short else "",
         f"unlikely, check the units of the sheet: {', '.join(unlikely)}" if unlikely else "",
         caution,
         _consistency(imu),

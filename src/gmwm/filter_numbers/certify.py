@@ -45,9 +45,9 @@ _SHOWN = {
 CONSUMERS = {
     "free": f"Without aiding, after {tuning.SETTLING:g} s of fixes every {tuning.FIX_INTERVAL:g} s",
     "outage": "INS/GNSS filter, at the end of an outage",
-    "pose": "INS with absolute poses at keyframes, at the end of a time without them",
-    "odometry": "INS with visual or lidar odometry: way in a time without it",
-    "wheels": "INS with wheel odometry: way in a time without it",
+    "pose": "INS with absolute poses at keyframes, at the end of an outage",
+    "odometry": "INS with visual or lidar odometry: distance in an outage",
+    "wheels": "INS with wheel odometry: distance in an outage",
     "keyframes": "Relative pose between keyframes",
     "motion": "Change of the mean rate in motion, from one such time to the next",
 }

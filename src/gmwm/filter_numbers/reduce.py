@@ -245,9 +245,9 @@ def _overconfidence(found: Sequence[Predicted], longest: float) -> list[Notice]:
     worst = max(high, key=lambda each: (each.time <= longest, each.nees))
     values = {"nees": worst.nees, "time": worst.time}
     if worst.time > longest:
-        hint = "give that time among the outages if there are such"
+        hint = "if your outages are that long, add that time to the outages"
         return [notice("optimistic", "", values, severity="note", variant="beyond", hint=hint)]
-    hint = "use gmwm.bound, a form with more terms, or own numbers of each axis"
+    hint = "use gmwm.bound, a form with more terms, or separate numbers for each axis"
     return [notice("optimistic", "", values, variant="reduce", hint=hint)]
 
 

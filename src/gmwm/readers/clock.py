@@ -231,7 +231,7 @@ def _check_jumps(clock: Clock, found: Grid, seconds: float) -> None:
     if found.is_lattice:
         half = np.abs(jumps.steps - 1.0 - jumps.missing) > tuning.HALF_WAY
         if np.count_nonzero(half) >= tuning.FEWEST_IN_RHYTHM:
-            text = f"steps are half-way between multiples of {jumps.interval:.6g} here and again"
+            text = f"steps are half-way between multiples of {jumps.interval:.6g} here and later"
             row = int(jumps.rows[half][0])
             raise clock.error(row, f"{text}, as if the stamps were rounded too coarsely")
         return
@@ -255,20 +255,22 @@ def _check_jumps(clock: Clock, found: Grid, seconds: float) -> None:
     if early > max(
         tuning.MOST_OFF_GRID * n, tuning.FEWEST_BESIDE
     ):  # a host that stalls makes stamps late, never early
-        text = f"{early:,} of {n:,} stamps are earlier than an even clock, so that it is not known"
-        raise clock.error(None, f"{text} how many rows are lost")
+        text = (
+            f"{early:,} of {n:,} stamps are earlier than an even clock allows: the number of lost"
+        )
+        raise clock.error(None, f"{text} rows is unknown")
     if found.uneven is None and found.change is None and jumps.strays(clock.stamps):
         text = f"its steps differ at random from the usual one of {jumps.interval:.6g}, and the"
-        text += " differences add up, as if rows were lost"
+        text += " differences add up as if rows were lost"
         raise clock.error(None, text)
     if jumps.are_bursts:
         text = f"every {jumps.rows[1] - jumps.rows[0]} rows the clock steps by {jumps.steps[0]:.3g}"
-        why = "rows come in bursts, and stamps say when they were written, not when"
-        raise clock.error(None, f"{text} of the usual steps: {why} they were sampled")
+        why = "rows are written in bursts, and stamps are times of writing, not of"
+        raise clock.error(None, f"{text} of the usual steps: {why} sampling")
     if jumps.total > n:
         longest = int(np.argmax(jumps.missing))
         text = f"the clock jumps by {jumps.missing[longest]:,.6g} sampling intervals, and in all"
-        text += f" {jumps.total:,.6g} samples are missing where there are {n:,}, more than half of"
+        text += f" {jumps.total:,.6g} samples are missing, with {n:,} present: more than half of"
         text += " the recording"
         hint = f"use the part before or after, or, {_WAY_OUT}"
         raise clock.error(int(jumps.rows[longest]), text, hint)

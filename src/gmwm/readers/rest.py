@@ -238,8 +238,8 @@ def _swapped(
     if not units or _gravity_units(other) or rate.scatter > tuning.GRAVITY_NOISE * rate.size:
         return ()
     text = (
-        f"the mean of the gyro columns is {in_file:.4g} long, which is gravity in {units[0]}; the "
-        f"mean of the accelerometer columns, {other:.4g}, is not: the two are swapped"
+        f"the mean of the gyro columns is {in_file:.4g}, gravity in {units[0]}, but the mean of "
+        f"the accelerometer columns is {other:.4g}: the two are swapped"
     )
     if not are_columns_given:
         hint = 'give the columns, e.g. channels={"accel_x": 0, "gyro_x": 3}'

@@ -331,7 +331,7 @@ def test_a_walk_without_a_place_for_it_is_reduced_and_the_file_says_so(calibrati
     text = gmwm.export(calibration, "kfgins", horizon=6.0)
     assert "# N+GM for outages up to 6 s (reduce)" in text
     joined = " ".join(explained(calibration, "kfgins", 6.0).split())
-    assert "consistent on average, since no N+GM bounds a random walk" in joined
+    assert "consistent on average, since no N+GM covers a random walk" in joined
     found = reduce(calibration, "N+GM", [1.0, 3.0, 6.0], tau="shared")
     content = yaml.safe_load(text)["imunoise"]
     assert np.radians(content["arw"][0]) / 60.0 == pytest.approx(found["gyro_x"].N, rel=1e-5)

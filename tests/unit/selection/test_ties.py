@@ -199,7 +199,7 @@ class TestFlicker:
         x = FLICKER.simulate(360_000, 0.01, seed=26_002)
         rec = gmwm.Recording.from_arrays({"gyro_x": x}, 100.0, {"gyro": "rad/s"})
         (told,) = [n for n in gmwm.calibrate(rec).notices if n.code == "ambiguity"]
-        assert "best is that with bias instability, of 2 parameters" in told.text
+        assert "the one with bias instability fits best, 2 parameters" in told.text
 
     def test_it_is_no_rival_of_a_walk_that_is_resolved(self):
         truth = WhiteNoise(1e-4) + RandomWalk(1e-5)
