@@ -201,7 +201,7 @@ def _flights(sources: Any) -> tuple[list[list[_Imu]], int]:
     """The IMUs of each flight, and the number of samples that were filled."""
     if isinstance(sources, Recording | str) or not isinstance(sources, Sequence | Mapping):
         raise InputError(
-            f"{checks.shown(sources)} is not a list of recordings: give those of two IMUs or more"
+            f"{checks.shown(sources)} is not a list of recordings: give two IMUs or more"
         )
     single = isinstance(sources, Mapping) or not sources or isinstance(sources[0], Recording | str)
     given = [sources] if single else list(sources)
