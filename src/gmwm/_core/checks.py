@@ -20,7 +20,7 @@ LONGEST_TIME = 1e9
 """Without aiding, s: 30 years."""
 
 LARGEST = 1e20
-"""Of numbers of a filter, SI, and times, s: beyond, powers of them leave the range of floats."""
+"""Largest filter numbers, SI, and times, s, whose powers stay in the range of floats."""
 
 MOST_SAMPLES = 10**11
 """800 GB."""

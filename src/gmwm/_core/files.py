@@ -20,7 +20,7 @@ from typing import Any, TextIO
 from gmwm.errors import InputError
 
 _PREFIX = f".gmwm-{re.sub('[^A-Za-z0-9]', '', platform.node())}-"
-"""Of temporary files and folders of this machine; the number of their process follows."""
+"""Prefix of temporary files and folders of this machine; the number of their process follows."""
 
 
 def _own_prefix(folder: Path) -> str:

@@ -318,7 +318,7 @@ def one_blas_thread() -> Iterator[None]:
 
 @cache
 def _controller() -> Any:
-    """Of all that is loaded; looking for it takes milliseconds."""
+    """Controller of all loaded thread pools; looking for it takes milliseconds."""
     from threadpoolctl import ThreadpoolController
 
     import_module("scipy.linalg")  # has a BLAS of its own, found only once it is loaded

@@ -16,7 +16,7 @@ from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 
 ROWS = 1 << 16
-"""Of a window: half a MB a column."""
+"""Rows of a window: half a MB a column."""
 
 _LEFT_FREE = 64 << 20  # bytes of the disk: other programs need some
 

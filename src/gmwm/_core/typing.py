@@ -18,7 +18,7 @@ Progress = Callable[[int, int, str], None]
 """Called with how many are done, of how many, and what is being worked on (may be empty)."""
 
 QUARTILE = 0.6744897501960817
-"""Of the standard normal: its median absolute value. `scipy.special` takes 0.2 s to import."""
+"""Median absolute value of the standard normal. `scipy.special` takes 0.2 s to import."""
 
 
 def inner(a: npt.NDArray[Any], b: npt.NDArray[Any]) -> float:

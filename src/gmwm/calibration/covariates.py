@@ -193,7 +193,7 @@ class Design:
         return _less(channel, own.time, self.removed @ self.columns[place] + own.lost)
 
     def evened(self, channel: Channel, place: int, growth: Scaling | None) -> Channel:
-        """A channel less its mean, over the growth of its noise: of one size if that is all."""
+        """A channel less its mean, over the growth of its noise: its noise is then constant."""
         if growth is None:
             return channel
         nodes = self.nodes[place]

@@ -261,7 +261,7 @@ class BiasCurve(Document, Printed):
 
     @property
     def degree(self) -> int:
-        """Of the polynomial; 0 if there is none."""
+        """Degree of the polynomial; 0 if there is none."""
         return max((each.power for each in self.regressors), default=0)
 
     def span(self) -> tuple[float, float]:

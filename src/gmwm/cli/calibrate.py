@@ -274,7 +274,7 @@ def _all_notices(result: Calibration) -> list[str]:
 
 
 def _hashes(files: Iterable[Path]) -> dict[str, str]:
-    """Of each file, and of those in a folder, as a bag is one."""
+    """Hash of each file, also of those in a folder, such as a bag."""
     found = {}
     for file in files:
         for one in sorted(file.rglob("*")) if file.is_dir() else [file]:

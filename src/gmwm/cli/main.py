@@ -32,7 +32,7 @@ _EXIT_INPUT, _EXIT_INTERRUPTED, _EXIT_PIPE = 2, 130, 141  # the latter two as sh
 
 
 class _Group(click.Group):
-    """Commands, of which the system may refuse a file or a process."""
+    """Commands for which the system may refuse a file or a process."""
 
     def invoke(self, context: click.Context) -> object:
         try:

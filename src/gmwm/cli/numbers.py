@@ -518,7 +518,7 @@ def _judged(nees: dict[str, tuple[float, float]], imu: Path) -> str:
 
 
 def _verdict(least: float, largest: float) -> str:
-    """Of the NEES in typical and in noisy units."""
+    """Verdict on the NEES in typical and in noisy units."""
     if largest > 1.0:
         return "overconfident" if least > 1.0 else "overconfident where the sensor is noisier"
     return "cautious" if largest < _CAUTIOUS else "consistent"

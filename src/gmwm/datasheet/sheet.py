@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 _FLICKER = float(np.sqrt(2.0 * np.log(2.0) / np.pi))
 """Plateau of the Allan deviation over B, 0.664 (IEEE Std 952-1997, C.1.3)."""
 _PEAK_TIME, _PEAK = 1.89, 0.617
-"""Of the Allan deviation of a Gauss-Markov process, over tau and sigma (the same, C.1.5)."""
+"""Peak of the Allan deviation of a Gauss-Markov process, over tau and sigma (the same, C.1.5)."""
 
 
 def agreeing(where: str, values: Mapping[str, float], N: float) -> dict[str, Model]:
@@ -137,7 +137,7 @@ def _size(base: FloatArray, unit: FloatArray, tau: FloatArray, target: float) ->
 
 
 UNITS = {"N": "u/sqrt(Hz)", "B": "u", "K": "u/s/sqrt(Hz)"}
-"""Of the numbers that most data sheets state."""
+"""Units of the numbers that most data sheets state."""
 
 KEYS = {
     **UNITS,
@@ -374,7 +374,7 @@ class Datasheet(InUnits):
         return f"<Datasheet of {self.name}: {', '.join(self.entries)}>"
 
     def text(self, units: str = "field", form: str = "N+K", horizon: float = HORIZON) -> str:
-        """Of each kind of model that agrees with the sheet, N and K that a filter needs."""
+        """N and K that a filter needs for each kind of model that agrees with the sheet."""
         about = f"{self.name} ({self.document})" if self.document else self.name
         kinds = "Models that agree with it, and N and K that a filter needs for each"
         title = f"{about}: typical values of a data sheet. {kinds}, outages up to {horizon:g} s:"

@@ -3,7 +3,7 @@
 Outliers are left out one by one. White noise of heavy tails (Laplace, Student) stays: a robust
 variance of it would be too small at fine levels only, which looks like a Gauss-Markov process. The
 body of the distribution tells them apart: the better of Student's t and the exponential power law
-is compared, by likelihood in bins, with Gaussian noise of which a part has a larger deviation.
+is compared, by likelihood in bins, with Gaussian noise, part of which has a larger deviation.
 """
 
 from __future__ import annotations

@@ -17,7 +17,7 @@ _SMALLEST = 1e-9  # of the range: what is smaller is the rounding of floating po
 
 
 def step_size(values: FloatArray) -> float:
-    """Largest step of which all differences between samples are multiples; 0 if there is none.
+    """Largest step that divides all differences between samples; 0 if there is none.
 
     Text holds steps rounded to some decimals (0.00333, 0.00667, 0.01): places may be off the
     lattice by a tenth of a step (root mean square). No sample may be missing.

@@ -60,7 +60,7 @@ class Axis:
 
     @property
     def start_sd(self) -> float:
-        """Of the bias at the start with the Gauss-Markov process, u."""
+        """Standard deviation of the start bias with the Gauss-Markov process, u."""
         return float(np.hypot(self.sigma, self.initial_sd))
 
     def moved(self, tau: float) -> Axis:

@@ -290,7 +290,7 @@ class ImuFile(Target):
 
 
 def _rate(imu: ImuNumbers) -> str:
-    """Of the IMU, Hz: with a point, since OpenCV distinguishes whole numbers from others."""
+    """Rate of the IMU, Hz, with a point, since OpenCV distinguishes whole numbers from others."""
     shown = f"{imu.rate:.9g}"
     return shown if "." in shown or "e" in shown else f"{shown}.0"
 

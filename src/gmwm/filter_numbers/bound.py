@@ -51,7 +51,7 @@ def bound(
         White noise with a random walk, a Gauss-Markov process, or both.
     horizon : float, optional
         Time without aiding for which they are to be small, s; they dominate at any time. The
-        interval of fixes or keyframes is no horizon: see docs/filter-numbers.md.
+        interval of fixes or keyframes is not a horizon: see docs/filter-numbers.md.
     level : float, optional
         Of the confidence region of a fit, e.g. 0.95: all models in it are dominated, those of a
         calibration that fit equally well, and one more Gauss-Markov process that the data leave

@@ -62,7 +62,7 @@ _APART = ("keyframes", "motion")
 _LOOSE = 0.5  # N and K that are needed over those in use, below which this is said
 
 _MOST_NOTICES = 3
-"""Of the text of a certificate that is not verbose."""
+"""Most notices in the short text of a certificate."""
 
 _OrNaN = Annotated[NotNegative, NoneIs(float("nan"))]
 
@@ -198,7 +198,7 @@ class Certificate(Document, InUnits):
         return "\n".join([*lines, "", "Recommended: " + self.recommended.text(units)])
 
     def _overconfident(self) -> list[str]:
-        """Axes, or "horizontal", of which a NEES is too large."""
+        """Axes, or "horizontal", whose NEES is too large."""
         found = (each.where for each in self.checks if each.nees > tuning.INCONSISTENT)
         return list(dict.fromkeys(found))
 

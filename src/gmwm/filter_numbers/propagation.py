@@ -4,7 +4,7 @@ The error of a sensor is integrated once (heading), twice (velocity, position) o
 velocity, position). A filter with given numbers estimates it from fixes of the last integral, and
 goes on without them. Transitions and noise over any number of samples are those of the sampled
 processes, exactly. Truth and filter are propagated jointly, as in `gmwm.ins.covariance_analysis`,
-of which this is the time-invariant case. The error of a process without states is integrated by its
+whose time-invariant case this is. The error of a process without states is integrated by its
 spectrum.
 """
 

@@ -126,7 +126,7 @@ class AxisFilterNumbers(Document, InUnits):
 
     @property
     def unit(self) -> str:
-        """Of the axis, SI; "u" if the quantity is unknown."""
+        """SI unit of the axis; "u" if the quantity is unknown."""
         return SI_UNIT.get(self.quantity, "u")
 
     @property

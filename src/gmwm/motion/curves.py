@@ -128,7 +128,7 @@ class _Blocks:
         return np.asarray(np.sqrt(variance))
 
     def exponent(self, variance: FloatArray) -> tuple[float, float]:
-        """Of the vibration in the deviation, and half of its 95 % interval.
+        """Exponent of the vibration in the deviation, and half of its 95 % interval.
 
         Least squares in logarithms, by flights where there are many: blocks of one share a level.
         """

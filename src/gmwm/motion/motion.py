@@ -353,7 +353,7 @@ def _curves(
     static: Mapping[str, Any] | None,
     within: tuple[float, float] | None = None,
 ) -> tuple[MotionCurve, ...]:
-    """Of each IMU and sensor, at instants of any vibration, or of one within limits."""
+    """Curve of each IMU and sensor, at all instants, or those with vibration within limits."""
     longest = min(max(len(each.vibration) for each in own) for own in differences.values())
     found = []
     for (label, sensor), own in differences.items():

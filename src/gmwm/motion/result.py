@@ -471,7 +471,7 @@ class InMotion(Document, Printed):
 
 
 def _median(rows: Sequence[FloatArray]) -> FloatArray:
-    """Of each column; NaN where nothing is known."""
+    """Median of each column; NaN where nothing is known."""
     table = np.array(rows)
     known = np.any(np.isfinite(table), axis=0)
     found = np.full(known.shape, np.nan)

@@ -208,7 +208,7 @@ def _legend_above(
 
 
 def _legend_of_errors(figure: Figure, ax: Axes, predicted: str) -> None:
-    """Of lines of errors, and of the dashed ones with what was predicted."""
+    """Legend of the errors, and of the dashed predictions."""
     style: dict[str, Any] = {"color": DATA_COLOUR, "marker": "o", "markerfacecolor": "w"}
     ax.plot([], [], linestyle=_PREDICTED, linewidth=0.9, label=predicted, **style)
     _legend_above(figure, *ax.get_legend_handles_labels())

@@ -218,7 +218,7 @@ class Recording(Mapping[str, Channel], Printed):
         return max(self.inertial or self.channels, key=lambda channel: channel.n)
 
     def by_rate(self) -> tuple[Recording, ...]:
-        """Recordings of one sampling rate each, of which this one is made; itself, most often.
+        """The recordings of one sampling rate each that make up this one; usually itself.
 
         The auxiliary channels, which explain the others, are in all of them.
         """

@@ -174,7 +174,7 @@ def _numbers(axis: AxisComparison, letter: str, sheet: Datasheet | None) -> dict
 
 
 def _nees(axis: AxisComparison, horizon: float) -> str:
-    """Of the covering numbers, in the recordings."""
+    """NEES of the covering numbers in the recordings."""
     known = [x for each in axis.covering.values() if np.isfinite(x := each.nees[horizon])]
     ends = [f"{each:.2g}" for each in known and (min(known), max(known))]
     return " to ".join(dict.fromkeys(ends))

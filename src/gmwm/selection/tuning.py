@@ -10,8 +10,8 @@ TIE = 2.0
 Burnham & Anderson 2002, *Model Selection and Multimodel Inference*, sec. 2.6)."""
 
 RAMP_MARGIN = 6.0
-"""Of the criterion, by which a rate ramp must win: a straight line passes through any slow drift
-that is seen only once."""
+"""Gain in the criterion by which a rate ramp must win: a straight line passes through any slow
+drift that is seen only once."""
 
 RAMP_P = 0.002  # level of the test that an unresolved random walk explains a slope
 RAMP_PLAUSIBLE = 2.0  # squared slope over its variance, below which no ramp is tried

@@ -53,7 +53,7 @@ DEMO = sensor_models(
     },
     "demo",
 )
-"""Of the order of a good MEMS IMU: an hour determines every parameter."""
+"""A good MEMS IMU: an hour determines every parameter."""
 
 
 def simulated_imu(

@@ -79,7 +79,7 @@ class Rotation:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Of the filters; the others are compared with the first."""
+        """Names of the filters; the others are compared with the first."""
         return self.turns[0].names
 
     # -- numbers; with one recording calibrated (``turn``) or, by default, over all turns ----------

@@ -41,7 +41,7 @@ _STEPS = (
     "2, its wavelet variance $\\hat\\nu^2$, half the Allan variance",
     "3 and 4, $\\nu^2(\\theta)$ calibrated to it",
 )
-"""Of the paper's Figure 1."""
+"""Steps of the paper's Figure 1."""
 _NOTES = {
     "table5": "paper: tuned by hand until the filter worked. Others: gmwm.reduce to the same form, "
     "for outages of 60 s.",

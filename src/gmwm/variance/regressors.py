@@ -102,7 +102,7 @@ class Regressors:
 
     @classmethod
     def pooled(cls, each: Sequence[Regressors], shares: FloatArray, tau: FloatArray) -> Regressors:
-        """Of several recordings, weighted by their shares, (recordings, J)."""
+        """Regressors of several recordings, weighted by their shares, (recordings, J)."""
         parts = (
             replace(own, weight=share)
             for one, share in zip(each, shares, strict=True)
@@ -130,6 +130,6 @@ class Regressors:
 
     @cached_property
     def responses(self) -> list[FloatArray]:
-        """Of each recording, with the differences of its neighbouring blocks, (J, p, B - 1)."""
+        """Responses of each recording to differences of neighbouring blocks, (J, p, B - 1)."""
         pairs = zip(self.parts, self._seen, strict=True)
         return [part.weight[:, None, None] * seen[2] for part, seen in pairs]

@@ -33,7 +33,7 @@ class Design:
     model: With open parameters.
     terms: The noise terms.
     linear: Noise terms of free amplitude.
-    shaped: Noise terms of which some shape parameter is free.
+    shaped: Noise terms with a free shape parameter.
     owners: For each element of z, the term it belongs to.
     Raises InputError if the model has no noise, or a process that cannot be fitted in part is fixed
         in part.

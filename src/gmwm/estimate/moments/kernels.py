@@ -181,7 +181,7 @@ def linearized(
     """Free amplitudes, weighted residuals and their Jacobian (J, z) at coordinates z.
 
     bounds: Lowest and highest coordinates, between which z is brought.
-    shapes: (S, 3), shapes of the shaped terms, of which the fixed parameters count.
+    shapes: (S, 3), shapes of the shaped terms; only the fixed parameters count.
     fixed: (J, terms), curves of the other terms.
     Returns: first of all whether the curves are known in compiled form.
     """

@@ -206,7 +206,7 @@ _LOOSE = 100.0  # times the largest variance: the error of a level that has no w
 TEXTBOOK = tuple(
     kind() for kind in sorted(CATALOGUE, key=lambda kind: not kind.is_white) if kind.is_candidate
 )
-"""Processes of which the mixture is made, with open parameters, white noise first."""
+"""Processes of the mixture, with open parameters, white noise first."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -253,7 +253,7 @@ def dictionary_fit(
 def dictionary(
     scales: Scales, extra: tuple[Process, ...] = ()
 ) -> tuple[Design, list[tuple[int, Shape]], FloatArray]:
-    """Processes of which almost any wavelet variance is a sum.
+    """Processes whose sums describe almost any wavelet variance.
 
     Returns: design; atoms, term of the design and its shape; matrix (J, A), wavelet variance of
         each at unit amplitude.

@@ -232,7 +232,7 @@ class Walks:
         return min(low, value), max(high, value)
 
     def slope_interval(self, value: float, level: float) -> tuple[float, float]:
-        """Of the slope, to both sides of its estimate alike, u/s."""
+        """Symmetric interval of the slope, u/s."""
         _, slopes, errors, weight = self._averaged
         away, tail = slopes - value, 1.0 - level
 

@@ -1,4 +1,4 @@
-"""Regression beside the noise: ``X beta + noise``, of which a rate ramp is the case X = t.
+"""Regression together with the noise: ``X beta + noise``; a rate ramp is the case X = t.
 
 The coefficients are those of generalized least squares of differences between means of neighbouring
 blocks. They are stationary whatever the noise, and their Toeplitz covariance S is known from the
@@ -46,12 +46,12 @@ class Coefficients:
 
     @property
     def value(self) -> float:
-        """Of a single regressor."""
+        """Coefficient of a single regressor."""
         return float(self.values[0])
 
     @property
     def variance(self) -> float:
-        """Of a single regressor's coefficient."""
+        """Variance of a single regressor's coefficient."""
         return float(self.covariance[0, 0])
 
     def towards(self, new: Coefficients, part: float) -> Coefficients:

@@ -111,7 +111,7 @@ class Estimate:
         return InUnit(self.value, self.lower, self.upper, self.unit)
 
     def cells(self, units: str = "field") -> tuple[str, ...]:
-        """Of the table of ``print(fit)``: key, estimate, standard error, 95 % interval and unit."""
+        """Row of ``print(fit)``: key, estimate, standard error, 95 % interval and unit."""
         shown, error = self.in_units(units), ""
         value = f"{shown.value:.5g}"
         if self.kind == "undefined":

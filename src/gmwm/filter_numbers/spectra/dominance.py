@@ -202,7 +202,7 @@ def solved(problem: Problem, columns: FloatArray, is_walking: bool = True) -> Fl
 
 
 def limits(problem: Problem, m: int, is_walking: bool) -> FloatArray:
-    """Least shares of m processes, of which white noise comes first, a walk second."""
+    """Least shares of m processes, white noise first, random walk second."""
     least = np.zeros(m)
     least[0] = problem.cost(WhiteNoise(1.0)) * max(target.white for target in problem.dominated)
     walk = max(target.walk for target in problem.dominated)

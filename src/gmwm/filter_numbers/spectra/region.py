@@ -30,7 +30,7 @@ class Estimated:
 
     @classmethod
     def of(cls, fit: Fit) -> Estimated:
-        """Of a fit: amplitudes at upper limits and rate ramps count as known."""
+        """The parameters of a fit: amplitudes at upper limits and rate ramps count as known."""
         drifts = {p.key for p in fit.model.parameters if fit.model.terms[p.term].is_drift}
         known = drifts | set(fit.upper_bounds)
         free = [i for i, key in enumerate(fit.keys) if key not in known]

@@ -24,7 +24,7 @@ _HIGHEST_LATITUDE = math.radians(89.0)  # beyond, north-east-down axes turn too 
 
 
 def unwrapped_longitudes(lla: FloatArray) -> FloatArray:
-    """Positions of which the longitude does not jump at the date line, shape (n + 1, 3)."""
+    """Positions whose longitude does not jump at the date line, shape (n + 1, 3)."""
     result = np.array(lla, dtype=float)
     result[:, 1] = np.unwrap(result[:, 1])
     return result

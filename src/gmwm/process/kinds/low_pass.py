@@ -132,7 +132,7 @@ class LowPassNoise(_Filtered):
 
 
 class AveragedNoise(_Filtered):
-    """White noise of which each sample is the mean over a window: a moving average.
+    """White noise averaged over a window: a moving average.
 
     Parameters
     ----------
@@ -187,7 +187,7 @@ class AveragedNoise(_Filtered):
 def _gain(
     bandwidth: float, order: float, damping: float, log_tangent: FloatArray, dt: float
 ) -> FloatArray:
-    """|H|^2 of the low-pass at frequencies (K,) of which log tan(pi f dt) is given."""
+    """|H|^2 of the low-pass at frequencies (K,), given as log tan(pi f dt)."""
     result = np.ones(log_tangent.size)
     if bandwidth * dt >= 0.5:
         return result

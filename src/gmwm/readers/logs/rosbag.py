@@ -267,7 +267,7 @@ def _messages(reader: Any, topic: str, start: int | None = None) -> Iterator[_Re
 
 
 def _sensors(reader: Any, topic: str, bag: _Bag, head: Sequence[_Record]) -> frozenset[str]:
-    """Sensors of which a topic holds something else than zeros, at its start and in its middle."""
+    """Sensors whose values in a topic are not all zero, at its start and in its middle."""
     found: set[str] = set()
     middle = (reader.start_time + reader.end_time) // 2
     place = f"{bag.path.name}, a message of {topic}"

@@ -105,7 +105,7 @@ def seconds_of(found: re.Match[str]) -> float:
 
 
 def _day(text: str) -> date:
-    """Of the month, of the year (2026-123) or of the week (2026-W12-3), with marks or without."""
+    """Date by month, day of the year (2026-123) or week (2026-W12-3), with or without marks."""
     if "W" in text:
         return date.fromisoformat(text)
     if "-" in text and text[-8:-5] in _MONTHS:

@@ -336,9 +336,9 @@ def _date(cell: str, zoned: bool) -> tuple[float | None, str]:
     if found is not None and (found[9] is not None) is not zoned:
         return None, f"has {'no' if zoned else 'a'} zone, unlike the dates before it"
     try:
-        return (cells.seconds_of(found), "") if found else (None, "is no date")
+        return (cells.seconds_of(found), "") if found else (None, "is not a date")
     except ValueError:
-        return None, "is no date that exists"
+        return None, "is not a date that exists"
 
 
 def open_text(path: Path, wanted: Wanted) -> tuple[CsvTable, ...]:
