@@ -61,16 +61,16 @@ def calibrate(
 ) -> Calibration:
     """Error model of every channel of a static recording, or of several of one sensor.
 
-    The recording is examined first: samples of shocks and spikes are left out, periodic lines and
-    resonances are terms that a selected model may have, and the wavelet variances of a channel
-    with outliers all over the record are robust; a channel of which each sample is written several
-    times is taken at its own rate. Fits of a recording that was not static, or whose rate changed,
-    are not valid, nor those of an accelerometer that was tilted. Notices report what was found and
-    done. A channel that is constant, or of which more than half of the samples are missing, is
-    skipped; auxiliary channels (temperature, voltage, clock) have no model. After the fit, steps,
-    transients at the start and slow periods are looked for beside its noise
-    (`gmwm.calibration.departures`); a fit of which one makes more than a tenth of the deviation at
-    some averaging time, with an evidence of 1,000 or more, is not valid.
+    The recording is examined first. Samples of shocks and spikes are left out, and a selected model
+    may have periodic lines and resonances. If outliers are spread over the record, they are left
+    out or the wavelet variances are robust. A channel whose samples are each written several times
+    is used at its own rate. Fits are not valid if the recording was not static or its rate changed;
+    those of accelerometers are not valid if the sensor was tilted. Notices report what was found
+    and done. A channel is skipped if it is constant or more than half of its samples are missing.
+    Auxiliary channels (temperature, voltage, clock) have no model. After the fit, steps, transients
+    at the start and slow periods are tested against its noise (`gmwm.calibration.departures`). A
+    fit is not valid if one of them makes up more than a tenth of the deviation at some averaging
+    time, with an evidence of 1,000 or more.
 
     Parameters
     ----------
@@ -86,20 +86,20 @@ def calibrate(
         unexamined.
     still : bool, optional
         Whether only the stretches at rest of a log that is not static are used, as several
-        recordings of one sensor (`gmwm.find_still`); else everything is taken as static.
+        recordings of one sensor (`gmwm.find_still`); else everything counts as static.
     remove_departures : bool, optional
-        Whether evident steps, transients at the start and slow periods are subtracted, the samples
-        at which a step may be left out, and what is left is fitted again, three times at most; what
-        their estimated sizes take of the noise is given back to the wavelet variances.
+        Whether evident steps, transients at the start and slow periods are subtracted and the rest
+        is fitted again, three times at most. Samples around a step are left out. The noise that the
+        estimated sizes remove is added back to the wavelet variances.
     covariates : mapping, optional
         What the bias depends on: ``{"temperature": "cubic, lag", "settling": "auto"}``. The name of
         a channel of the recording, "time" or "settling" (at switch-on, when the recording begins)
         -> words: "auto" (degree 1 to 3), "linear", "quadratic", "cubic" or a degree; "lag", or
-        "lag 120 s", adds its values of some time before. The curve of each channel is estimated
-        beside its noise, which gets back what that takes (`Calibration.curves`).
+        "lag 120 s", adds its delayed values. The curve of each channel is estimated together with
+        its noise; the noise that this removes is added back (`Calibration.curves`).
     jobs : int, optional
-        Processes that share the work at most, by default two, -1 one per core; there are never
-        more than cores or channels, and short recordings are worked on by this one alone.
+        Largest number of processes, by default two; -1: one per core. There are never more than
+        cores or channels, and short recordings use this process alone.
     progress : callable, optional
         Called as ``progress(done, total, channel)`` when work on a channel begins, and at the end.
 

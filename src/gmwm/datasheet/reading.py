@@ -65,7 +65,7 @@ def datasheet(source: str | os.PathLike[str] | Mapping[str, Any]) -> Datasheet:
         turn_on_bias
             1 sigma.
 
-        Beside the sensors may stand texts: name, document, temperature (such as "-40 to 85 degC").
+        The content can also have texts: name, document, temperature (such as "-40 to 85 degC").
 
     Returns
     -------

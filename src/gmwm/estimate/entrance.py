@@ -49,8 +49,8 @@ def fit(
     Parameters
     ----------
     model : Process, Model or str
-        Parameters that are given stay as they are, open ones are estimated, all of a text such as
-        "N + K + 2 GM". No starting values are needed.
+        Given parameters stay as they are, open ones are estimated; a text such as "N + K + 2 GM"
+        has only open ones. No starting values are needed.
     data : WaveletVariance, Channel or (n,) array_like, or a list of them
         Missing samples are NaN. The methods "mle", "whittle" and "em" need the samples, "whittle"
         all of them. Several recordings are fitted jointly by "gmwm" and "simulated", see

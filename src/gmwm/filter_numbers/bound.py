@@ -50,20 +50,20 @@ def bound(
     form : {"N+K", "N+GM", "N+K+GM"}
         White noise with a random walk, a Gauss-Markov process, or both.
     horizon : float, optional
-        Time without aiding for which they are to be small, s; they dominate at any time. The
-        interval of fixes or keyframes is not a horizon: see docs/filter-numbers.md.
+        Outage for which the numbers are as small as possible, s; they are never overconfident at
+        any time. The interval of fixes or keyframes is not a horizon: see docs/filter-numbers.md.
     level : float, optional
-        Of the confidence region of a fit, e.g. 0.95: all models in it are dominated, those of a
-        calibration that fit equally well, and one more Gauss-Markov process that the data leave
-        open (`Fit.deviation_interval`). By default only the estimate is.
+        Level of the confidence region of a fit, e.g. 0.95. The numbers then cover all models in it,
+        those of a calibration that fit equally well, and one more Gauss-Markov process that the
+        data leave open (`Fit.deviation_interval`). By default they cover the estimate only.
     bias_sd : float or mapping, optional
         Standard deviation of a constant bias, such as the turn-on bias, in u; by axis or kind
         ("gyro", "accel") if a mapping.
     shared : bool, optional
         Whether axes of a kind have the same numbers.
     tau : float or "shared", optional
-        Correlation time of the Gauss-Markov process, s; "shared": the one for all axes that costs
-        least over them. By default each has its own.
+        Correlation time of the Gauss-Markov process, s; "shared": the best one for all axes. By
+        default each axis has its own.
     dt, rate : float, optional
         Sampling interval (s) or rate (Hz) of models that are not fitted; 100 Hz by default.
 
@@ -75,20 +75,20 @@ def bound(
     Raises
     ------
     InputError
-        If a parameter is free, a term is known by simulation only, the form cannot dominate the
-        model, ``level`` is given without a fit, or ``tau`` without one Gauss-Markov process.
+        If a parameter is free, a term can only be simulated, the form cannot cover the model,
+        ``level`` is given without a fit, or ``tau`` without one Gauss-Markov process.
 
     Notes
     -----
     S_b(f) >= S(f) at every frequency f > 0, with the limits K_b >= K and N_b >= N; among those, the
     mean of AVAR_b(t)/AVAR(t) over t from a tenth of the horizon to the horizon is least. The
     covariance of the predicted error is then at least that of the true one, for any linear filter.
-    That is a theorem for N+GM, stationary; with K it also takes the start of the walk, whose
-    variance is ``bias_sd^2`` and twice that of the slow terms, as measured on many models
-    (docs/filter-numbers.md). It covers neither nonlinearity nor errors that are not in the model.
-    Quantization noise and resonances above ten over the horizon count by their density at low
-    frequencies (resonances not far above by a part of their peak too), lines not at all, and a ramp
-    R is a constant of standard deviation ``|R| horizon``; notices report them.
+    That is a theorem for N+GM, which is stationary. With K it also needs the start of the random
+    walk, whose variance is ``bias_sd^2`` plus twice that of the slow terms, as measured on many
+    models (docs/filter-numbers.md). It covers neither nonlinearity nor errors that are not in the
+    model. Quantization noise and resonances above ten over the horizon count by their density at
+    low frequencies (resonances not far above by a part of their peak too), lines not at all, and a
+    ramp R is a constant of standard deviation ``|R| horizon``; notices report them.
     """
     form = checks.choice("form", str(form).replace(" ", ""), list(KINDS))
     tau = given_tau(form, tau)

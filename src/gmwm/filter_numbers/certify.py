@@ -287,7 +287,8 @@ def certify(
     source : Process, Model, Fit, Calibration or mapping
         The truth.
     numbers : AxisFilterNumbers, FilterNumbers or mapping
-        In use; a mapping has (N, K), a model or the numbers of an axis by axis or kind ("gyro").
+        The numbers in use; a mapping has (N, K), a model or the numbers of an axis, by axis or kind
+        ("gyro").
     outages : sequence of float, optional
         Times without aiding, s.
     keyframe : float, optional
@@ -295,13 +296,13 @@ def certify(
     imperfections : Imperfections, optional
         Errors that static data cannot show, as far as they are known.
     motion : {"handheld", "drone", "car", "fixed-wing"}, Motion, Recording or InMotion, optional
-        With which they come: a usual one, or that of a recording. With a result of `gmwm.motion`
-        the numbers are judged in that motion too, from 0.1 s to 1 s without updates.
+        Motion that causes these errors: a usual one, or that of a recording. With a result of
+        `gmwm.motion` the numbers are judged in that motion too, from 0.1 s to 1 s without updates.
     aiding : {"gnss", "pose", "odometry", "wheels"}, optional
-        What aids the whole filter; see `gmwm.ins.loiter_with_outages`.
+        Aiding of the whole filter; see `gmwm.ins.loiter_with_outages`.
     reference : Trajectory, optional
-        Reference trajectory on which it is judged, at its own sampling interval, in place of a
-        loiter or, with wheels, of a car's drive.
+        Trajectory for the whole filter, at its own sampling interval, in place of a loiter or, with
+        wheels, of a car's drive.
     bias_sd : float or mapping, optional
         Standard deviation of a constant bias, such as the turn-on bias, in u; by axis or kind.
     dt, rate : float, optional
@@ -323,8 +324,8 @@ def certify(
     its last integral every second, then none; of a heading, the angle gained since if that is
     worse), of each axis between keyframes (the pose starts anew at each, the bias goes on), and of
     a whole aided filter on a trajectory, where all six axes are known. Odometry does not fix the
-    position: judged is the way since its last keyframe, in body axes then. It covers neither
-    nonlinearity nor errors that are not in the models.
+    position, so the distance since its last keyframe is judged, in the body axes of that keyframe.
+    It covers neither nonlinearity nor errors that are not in the models.
     """
     times = given_times("outages", outages)
     keyframe = checks.positive("keyframe", keyframe, "give the interval of keyframes in seconds")

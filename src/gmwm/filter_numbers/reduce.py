@@ -72,10 +72,9 @@ def reduce(
     form : {"N+K", "N+GM", "N+K+GM", "N+2GM"}
         White noise with a random walk, with Gauss-Markov processes, or both.
     outages : sequence of float, optional
-        Times without aiding for which they shall be good, s.
+        Outages for which the numbers are consistent, s.
     keyframe : float, optional
-        Interval of keyframes or scans between which poses are related, s, for which they shall be
-        good in place of outages.
+        Interval of keyframes or scans between which poses are related, s, in place of outages.
     bias_sd, shared, tau, dt, rate : optional
         As in `gmwm.bound`.
     progress : callable, optional
@@ -96,11 +95,11 @@ def reduce(
     Notes
     -----
     They minimise the expected negative logarithm of the predicted density at the true error of the
-    integrals at the end of the outages: a proper score, which punishes a covariance that is too
-    small as it does one that is too large. The squared logarithm of the NEES at each of them is
-    added, so that one outage cannot make up for another. The expectation is exact for the truth
-    given, in the filter of `gmwm.filter_numbers.Chain`; of a heading it is that of the angle gained
-    since the last fix too, as `gmwm.certify` judges both.
+    integrals at the end of the outages: a proper score, which penalizes a covariance that is too
+    small as well as one that is too large. The squared logarithm of the NEES of each outage is
+    added, so that one outage cannot compensate for another. The expectation is exact for the given
+    truth, in the filter of `gmwm.filter_numbers.Chain`. For a heading the angle gained since the
+    last fix counts too; `gmwm.certify` judges both.
     """
     form = checks.choice("form", str(form).replace(" ", ""), FORMS)
     tau = given_tau(form, tau)

@@ -104,11 +104,11 @@ def motion(
 
     Notes
     -----
-    With instruments in place of least squares, mapped noise shrinks nothing, and what the fits
-    take is given back: on simulated errors over real flights the variances are within 1.3 % of the
-    truth, for three and four IMUs (`benchmarks/motion.py`). Errors that all IMUs have in common
-    are not seen. A three-cornered hat would take mapped sensors, whose
-    noise a mapping may filter, for targets.
+    Instruments in place of least squares keep noise from biasing the mapping, and the noise that
+    the fits remove is added back: on simulated errors over real flights the variances are within
+    1.3 % of the truth, for three and four IMUs (`benchmarks/motion.py`). Errors common to all IMUs
+    are not measured. A three-cornered hat would use mapped sensors as targets, whose noise the
+    mapping may filter.
     """
     if reference is not None:
         return _against(sources, reference, static)

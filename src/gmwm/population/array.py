@@ -174,9 +174,9 @@ def array(
     Parameters
     ----------
     recordings : sequence or mapping of str to Recording
-        Two or more, at rest, of one time, with aligned axes: cut to what their time stamps have
-        in common; without stamps they begin together. Rates may differ: means over a 32nd of the
-        horizon are compared. Shocks and spikes are left out.
+        Two or more, at rest, recorded together, with aligned axes. They are cut to their common
+        time; without stamps they begin together. Rates may differ: means over a 32nd of the horizon
+        are compared. Shocks and spikes are left out.
     horizon : float, optional
         Length of the outages, s.
     progress : callable, optional

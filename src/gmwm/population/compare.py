@@ -41,10 +41,10 @@ def compare(
 ) -> SensorComparison:
     """Compare calibrations of a sensor on several days, or of several units of a kind.
 
-    Structures of models differ between recordings of one sensor far more than curves do. So curves
+    Between recordings of one sensor the selected models differ far more than the curves. So curves
     are tested for equality, level by level with their covariances; N, B and K come from one
-    structure for all recordings, as in `gmwm.fleet`; and `gmwm.bound` gives N and K for a
-    filter, whatever the structure.
+    structure for all recordings, as in `gmwm.fleet`; and `gmwm.bound` gives N and K for a filter,
+    whatever the structure.
 
     Parameters
     ----------

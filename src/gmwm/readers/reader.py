@@ -50,7 +50,7 @@ def read(
     path : str, path, DataFrame or Arrow table
         Delimited text (plain or gzip, with or without a header), NPY or NPZ, a bag of ROS 1 or 2,
         a log of PX4 (ULog) or ArduPilot (binary), MAT, HDF5, Parquet or Feather; or a table in
-        memory of pandas, polars or Arrow. What a file is shows in its first bytes.
+        memory of pandas, polars or Arrow. The first bytes of a file show its format.
     rate : float, optional
         Sampling rate, Hz. Not needed if the file has time stamps.
     units : mapping of str to str, optional
@@ -60,8 +60,8 @@ def read(
         Channel name -> column (name, or index counted from 0), e.g. ``{"gyro_x": "col3"}``; or
         names alone, of those found by default, or ``"gyro"`` for all of them. Only these are read,
         and the auxiliary ones (temperature, voltage, clock);
-        a bag or a flight log without one of the two sensors is refused unless they are given.
-        A name that begins with ``gyro`` or ``accel`` states what the column measures; for any other
+        a bag or a flight log without one of the two sensors is rejected unless they are given. A
+        name that begins with ``gyro`` or ``accel`` states what the column measures; for any other
         its unit does (``"temp": "T1"`` in degC or K is auxiliary). By default columns are known by
         their names; without names, six are gyro and accelerometer x, y, z, seven have time before
         them, one or three (with time: four) belong to the only sensor in ``units``.
@@ -78,12 +78,12 @@ def read(
         Of a bag or a flight log, the topic to read, or one of gyros and one of accelerometers;
         needed where there are several.
     clock : {"header", "log"}, optional
-        Stamps of messages: those of their headers, or the times at which they were recorded.
+        Time stamps to use: those in the message headers, or the times of recording.
     format : str, optional
         What the file is, where its first bytes and its name do not show it: one of FORMATS.
     damaged : bool, optional
-        Use what is left of a text or a flight log that is cut off or damaged in places; it is
-        rejected otherwise. Damaged files of other formats cannot be read.
+        Use the readable part of a text or a flight log that is cut off or damaged in places; by
+        default it is rejected. Damaged files of other formats cannot be read.
 
     Returns
     -------
@@ -96,9 +96,10 @@ def read(
 
     Notes
     -----
-    Columns that would need more than 1 GB, with what is made of them, are kept in temporary files
-    (in ``TMPDIR``) and mapped, a channel at a time is worked on, and its wavelet variance needs at
-    most about three times its memory. The environment variable ``GMWM_MEMORY`` sets another limit.
+    If the columns and the arrays made from them would need more than 1 GB, they are kept in
+    temporary files (in ``TMPDIR``) and mapped. Then one channel is processed at a time, and its
+    wavelet variance needs at most about three times its memory. The environment variable
+    ``GMWM_MEMORY`` sets another limit.
 
     Raises
     ------

@@ -229,9 +229,9 @@ def select(
         Further terms that a model may have, of given shape and open amplitude, such as
         ``Sinusoid(frequency=0.565)`` or ``BiasInstability()``.
     rule : {"criterion", "merge"}, optional
-        "merge" is the way of Stebler et al. (2012): white noise (and ``extra``) with as many
-        Gauss-Markov processes as allowed, one less while two do not differ significantly or one is
-        redundant. The ranking then holds the models on that way, each under its own weights.
+        "merge" is the rule of Stebler et al. (2012): white noise (and ``extra``) with as many
+        Gauss-Markov processes as allowed, then one less as long as two do not differ significantly
+        or one is redundant. The ranking then has these models, each under its own weights.
     candidates : sequence of Process, Model or str, optional
         Rank only these models, such as ``["N + K", "N + GM"]``.
 
@@ -249,9 +249,9 @@ def select(
     All candidates are compared under the weights of a rich mixture fitted to the wavelet variances,
     by their chi-square with the penalty ``3 p ln ln n`` of Hannan & Quinn (1979, *JRSS B* 41,
     190-195), consistent for moment selection (Andrews 1999, *Econometrica* 67, 543-564). Models
-    within 2 of the best fit equally well, and the smallest of them wins. The first is chosen whose
-    own fit finds all of its terms identifiable and misses no averaging time by far. What rate
-    ramps, flicker noise and low-passes need is in docs/method.md, "Which model".
+    within 2 of the best fit equally well, and the smallest of them wins. The chosen model is the
+    first whose own fit finds all of its terms identifiable and describes every averaging time. For
+    the rules of rate ramps, flicker noise and low-passes see docs/method.md, "Which model".
     """
     extra = _listed("extra", extra, "[Sinusoid(frequency=0.5)]")
     listed = _listed("candidates", candidates, '["N + K", "N + GM"]')

@@ -98,15 +98,15 @@ def curve(
     Parameters
     ----------
     tau : (J,) array_like
-        Averaging times, s, in any order and at any distances. At most two an octave are kept:
-        others say hardly more.
+        Averaging times, s, in any order and at any distances. At most two an octave are kept: more
+        would add little.
     values : (J,) array_like
         The curve, in ``unit`` or its square.
     kind : {"deviation", "variance", "wavelet"}, optional
         Overlapping Allan deviation, Allan variance, or Haar wavelet variance.
     duration : float, optional
-        Length of the recording, s, which decides how certain the values are; by default the
-        shortest that has such a curve, twice the longest averaging time.
+        Length of the recording, s, which determines how accurate the values are; by default the
+        shortest possible, twice the longest averaging time.
     rate : float, optional
         Sampling rate, Hz; by default one sample in the shortest averaging time.
     error : float, optional
