@@ -32,6 +32,7 @@ from gmwm.ins.filter.records import (
     SensorTable,
     Settings,
     new_transition,
+    set_matrix,
 )
 from gmwm.ins.geometry import gravity
 
@@ -92,14 +93,11 @@ class KeptCovariances(NamedTuple):
 
 
 @compiled()
-def update_jointly(
-    J: FloatArray, h: FloatArray, n: int, estimate: int, truth: int, variance: float,
-    gain: FloatArray,
-) -> None:  # fmt: skip
+def update_jointly(J: FloatArray, h: FloatArray, n: int, variance: float, gain: FloatArray) -> None:
     """Update the joint second moments by a scalar measurement with a given gain, in place.
 
-    h: Row of the n integrals, and of states whose estimates are their errors with the sign turned.
-    estimate, truth: Places of the estimated and the true slow noise of the measurement, or -1.
+    h: Row of the n integrals, and of states whose estimates are their errors with the sign turned;
+        with -1 for the estimated and 1 for the true slow noise of the measurement.
     variance: Of the measurement's white noise.
     gain: (n + q,), the filter's.
     """
@@ -111,13 +109,11 @@ def update_jointly(
             for j in range(size):
                 a[j] += factor * J[i, j]
     # Feedback: the integrals are corrected, and the estimates take what their errors lose.
-    k[:n], k[n : gain.size] = gain[:n], -gain[n:]
-    if estimate >= 0:
-        for j in range(size):
-            a[j] += J[estimate, j] - J[truth, j]
-    s = variance + np.sum(h[:n] * a[:n]) - np.sum(h[n:] * a[n : h.size])
-    if estimate >= 0:
-        s += a[estimate] - a[truth]
+    for i in range(gain.size):
+        k[i] = gain[i] if i < n else -gain[i]
+    s = variance
+    for i in range(h.size):
+        s += h[i] * a[i] if i < n else -h[i] * a[i]
     for i in range(size):
         for j in range(i, size):
             J[i, j] += s * k[i] * k[j] - k[i] * a[j] - a[i] * k[j]
@@ -155,24 +151,27 @@ def aid_jointly(
     Returns: P and J after the last fix.
     """
     last = n - 1
-    h, gain = np.zeros(n), np.zeros(P.shape[0])
+    h, gain, x = np.zeros(n), np.zeros(P.shape[0]), np.zeros(P.shape[0])
     h[last] = 1.0
     for fix in range(fixes):
         P = _propagated(P, step.A, step.Q)
         J = _propagated(J, step.B, step.R)
-        total = P[last, last] + variance
-        gain[:] = P[:, last] / total
-        for i in range(gain.size):
-            for j in range(i, gain.size):
-                P[i, j] -= gain[i] * gain[j] * total
-                P[j, i] = P[i, j]
-        update_jointly(J, h, n, -1, -1, variance, gain)
+        measurement_update(P, h, variance, 0.0, x, gain)
+        update_jointly(J, h, n, variance, gain)
         if is_relative:
-            P[last] = P[:, last] = 0.0
-            J[last] = J[:, last] = 0.0
+            P[last] = P[:, last] = J[last] = J[:, last] = 0.0
         if fix < out_P.shape[0]:
-            out_P[fix], out_J[fix] = P[:n, :n], J[:n, :n]
+            set_matrix(out_P[fix], P)
+            set_matrix(out_J[fix], J)
     return P, J
+
+
+@compiled()
+def _keep(kept: KeptCovariances, out: int, P: FloatArray, J: FloatArray) -> int:
+    """Keep P and J; returns the next place."""
+    set_matrix(kept.P[out], P)
+    set_matrix(kept.J[out], J)
+    return out + 1
 
 
 @compiled()
@@ -181,9 +180,9 @@ def run_jointly(
     kept: KeptCovariances,
 ) -> None:  # fmt: skip
     """Propagate P and J of a navigation filter along a trajectory."""
-    change, h, settings, since = new_transition(), np.zeros(9), about.settings, about.since
-    row = np.zeros(P.shape[0])
-    gain, x = np.zeros(P.shape[0]), np.zeros(P.shape[0])
+    change, h, settings, since = new_transition(), np.zeros(J.shape[0]), about.settings, about.since
+    m, n = P.shape[0], change.A.shape[0]  # a number written here would be compiled for anew
+    gain, x = np.zeros(m), np.zeros(m)
     event = out = 0
     gathered = j_gathered = 0.0
     for s in range(track.epoch.size):
@@ -199,8 +198,7 @@ def run_jointly(
                 gathered = tilt_squared(P, g, step, gathered)
                 j_gathered = tilt_squared(J, g, step, j_gathered)
         while out < kept.epoch.size and kept.epoch[out] == epoch and kept.before[out] == 1:
-            kept.P[out], kept.J[out] = P, J
-            out += 1
+            out = _keep(kept, out, P, J)
         attitude = P[6, 6] + P[7, 7] + P[8, 8] if settings.second_order else 0.0
         j_attitude = J[6, 6] + J[7, 7] + J[8, 8] if settings.second_order else 0.0
         end, is_keyframe = Kinematics(track.end.C[s], track.end.v[s], track.end.lla[s]), False
@@ -210,16 +208,18 @@ def run_jointly(
                 sd = events.sd[event, component]
                 if not sd > 0.0:
                     continue
+                expected = actual = sd * sd
                 if IS_RELATIVE[kind]:
-                    observe_since(kind, component, value, end, since, row)
-                    measurement_update(P, row, -1, sd * sd, 0.0, x, gain)
-                    update_jointly(J, row, 9, -1, -1, sd * sd, gain)
-                    continue
-                observe(kind, component, value, end, track.rate[s], settings.lever, h)
-                estimate, truth = about.estimate[kind, component], about.truth[kind, component]
-                expected = sd * sd + excess(P, h, attitude)
-                measurement_update(P, h, estimate, expected, 0.0, x, gain)
-                update_jointly(J, h, 9, estimate, truth, sd * sd + excess(J, h, j_attitude), gain)
+                    observe_since(kind, component, value, end, since, h)
+                else:
+                    observe(kind, component, value, end, track.rate[s], settings.lever, h)
+                    if about.estimate[kind, component] >= 0:
+                        h[about.estimate[kind, component]] = -1.0
+                        h[about.truth[kind, component]] = 1.0
+                    expected += excess(P, h, attitude)
+                    actual += excess(J, h, j_attitude)
+                measurement_update(P, h[:m], expected, 0.0, x, gain)
+                update_jointly(J, h, n, actual, gain)
             if IS_GNSS[kind]:
                 gathered = j_gathered = 0.0
             is_keyframe |= IS_RELATIVE[kind]
@@ -228,5 +228,4 @@ def run_jointly(
             new_keyframe(P, end, since, 1.0)
             new_keyframe(J, end, since, -1.0)
         while out < kept.epoch.size and kept.epoch[out] == epoch:
-            kept.P[out], kept.J[out] = P, J
-            out += 1
+            out = _keep(kept, out, P, J)

@@ -243,19 +243,12 @@ def excess(P: FloatArray, h: FloatArray, attitude: float) -> float:
 
 @compiled(fastmath=_FAST)
 def measurement_update(
-    P: FloatArray,
-    h: FloatArray,
-    state: int,
-    variance: float,
-    z: float,
-    x: FloatArray,
-    K: FloatArray,
+    P: FloatArray, h: FloatArray, variance: float, z: float, x: FloatArray, K: FloatArray
 ) -> tuple[float, float]:
-    """Update by one scalar measurement ``z = h x - x[state] + noise``, in place.
+    """Update by one scalar measurement ``z = h x + noise``, in place.
 
     P: (n, n).
-    h: (9,) of the navigation errors, or (n,).
-    state: Index in ``x`` of a state of coloured measurement noise; -1 for none.
+    h: (n,), with -1 for a state of coloured measurement noise.
     variance: Of the white noise of the measurement.
     z: Estimate less measurement.
     x: (n,), errors estimated so far at this epoch.
@@ -269,17 +262,11 @@ def measurement_update(
         if factor != 0.0:
             for j in range(n):
                 K[j] += factor * P[i, j]
-    if state >= 0:
-        for j in range(n):
-            K[j] -= P[state, j]
     total = variance
     innovation = z
     for i in range(h.size):
         total += h[i] * K[i]
         innovation -= h[i] * x[i]
-    if state >= 0:
-        total -= K[state]
-        innovation += x[state]
     # By its root, so that the product of two gains is the same both ways: P stays symmetric.
     # Joseph's form costs twice as much and adds nothing: rounding errors are 1e-16 of the variance
     # before, and after a long time without fixes `excess` keeps that after it far above them.

@@ -37,6 +37,9 @@ from gmwm.ins.filter.records import (
     Settings,
     Transition,
     new_transition,
+    set_kinematics,
+    set_matrix,
+    set_vector,
 )
 from gmwm.ins.geometry import (
     RATE,
@@ -139,7 +142,9 @@ def _run(
         step(at, now, now if i == 0 else before, samples.dt)
         if (i + 1) % _CLEAN_EVERY == 0:
             orthonormalise(at.C)
-        lla[i + 1], velocity[i + 1], C[i + 1] = at.lla, at.v, at.C
+        set_vector(lla[i + 1], at.lla)
+        set_vector(velocity[i + 1], at.v)
+        set_matrix(C[i + 1], at.C)
 
 
 def integrate(imu: Imu, initial: NavState) -> Trajectory:
@@ -210,7 +215,8 @@ def run(
     lla, table, carry = at.lla, settings.table, where.carry
     n, dt = samples.rotation.shape[0], samples.dt
     change, middle = new_transition(), Kinematics(np.zeros((3, 3)), np.zeros(3), np.zeros(3))
-    epoch, event, out, steps = where.place[0], where.place[1], where.place[2], where.place[3]
+    place = where.place
+    epoch, event, out, steps = place[0], place[1], place[2], place[3]
     while True:
         # What is asked for at this epoch: results before, measurements, results after.
         while out < kept.epoch.size and kept.epoch[out] == epoch and kept.before[out] == 1:
@@ -246,7 +252,7 @@ def run(
         ):
             return epoch
         if last <= epoch < n:
-            where.place[:] = epoch, event, out, steps
+            place[0], place[1], place[2], place[3] = epoch, event, out, steps
             return PAUSED
 
 
@@ -265,8 +271,8 @@ def _aid(
     epoch, n, rejected = events.epoch[event], samples.rotation.shape[0], where.rejected
     attitude = P[6, 6] + P[7, 7] + P[8, 8] if settings.second_order else 0.0
     errors, gain = np.zeros(P.shape[0]), np.zeros(P.shape[0])
-    h, rate, change, since = np.zeros(9), np.empty(3), new_transition(), where.since
-    row, is_keyframe = np.zeros(P.shape[0]), False
+    h, rate, change, since = np.zeros(P.shape[0]), np.empty(3), new_transition(), where.since
+    is_keyframe = False
     for i in range(3):
         turned = where.carry[i] if epoch > 0 or n == 0 else samples.rotation[0, i]
         rate[i] = turned / samples.dt
@@ -282,37 +288,49 @@ def _aid(
             sd = events.sd[event, component]
             if not sd > 0.0:
                 continue
-            value, own = events.value[event], settings.noise_states[kind, component]
+            value, variance = events.value[event], sd * sd
             if IS_RELATIVE[kind]:
-                z = observe_since(kind, component, value, at, since, row)
-                # What is known of the errors at the keyframe since it was taken.
-                z -= np.sum(row[9:] * x)
-                found, variance = measurement_update(P, row, -1, sd * sd, z, errors, gain)
+                z = observe_since(kind, component, value, at, since, h)
             else:
                 z = observe(kind, component, value, seen, seen_rate, settings.lever, h)
                 if moved:
-                    h[:] = np.sum(change.A * h[:, None], axis=0)
+                    _moved(h, change.A)
+                own = settings.noise_states[kind, component]
                 if own >= 0:
-                    z += x[own]
-                    own += 9
-                variance = sd * sd + excess(P, h, attitude)
-                found, variance = measurement_update(P, h, own, variance, z, errors, gain)
+                    h[9 + own] = -1.0
+                variance += excess(P, h, attitude)
+            # What is known of slow noise, and of the errors at the keyframe since it was taken.
+            for i in range(x.size):
+                z -= h[9 + i] * x[i]
+            found, variance = measurement_update(P, h, variance, z, errors, gain)
             innovated.value[event, component] = found
             innovated.sd[event, component] = math.sqrt(variance)
             squares += found * found / variance
         if not _is_accepted(squares, gate, gated, kind, rejected):
             innovated.used[event] = False
-            P[:], errors[:] = P_before, errors_before
+            set_matrix(P, P_before)
+            set_vector(errors, errors_before)
         elif IS_GNSS[kind]:
             where.carry[6] = 0.0
         is_keyframe |= IS_RELATIVE[kind]
         event += 1
-    x += errors[9:]
+    for i in range(x.size):
+        x[i] += errors[9 + i]
     correct(at, errors)
     if is_keyframe:
         new_keyframe(P, at, since, 1.0)
         x[since.first - 9 : since.first - 3] = 0.0
     return event
+
+
+@compiled()
+def _moved(h: FloatArray, A: FloatArray) -> None:
+    """Turn a row of the errors at another time into that of those now, by a transition there."""
+    there = h[:9].copy()
+    for j in range(9):
+        h[j] = 0.0
+        for i in range(9):
+            h[j] += A[i, j] * there[i]
 
 
 @compiled()
@@ -328,8 +346,9 @@ def _look(
     at, _, x = estimate
     i = min(max(epoch if offset > 0.0 else epoch - 1, 0), samples.rotation.shape[0] - 1)
     sensed = np.empty(6)
-    sensed[:3] = samples.rotation[i] / samples.dt
-    sensed[3:] = samples.velocity[i] / samples.dt
+    for k in range(3):
+        sensed[k] = samples.rotation[i, k] / samples.dt
+        sensed[3 + k] = samples.velocity[i, k] / samples.dt
     for k in range(x.size):
         if table.axis[k] >= 0:
             sensed[table.axis[k]] -= table.output[k] * x[k]
@@ -382,7 +401,7 @@ def _advance(
     now = Increments(carry[0], carry[1], carry[2], carry[3], carry[4], carry[5])
     for i in range(epoch, stop):
         if i - epoch == count // 2:
-            middle.C[:], middle.v[:], middle.lla[:] = at.C, at.v, at.lla
+            set_kinematics(middle, at, 1.0)
         error[:] = 0.0
         for k in range(x.size):
             if axis[k] >= 0:
@@ -401,9 +420,7 @@ def _advance(
         step(at, now, now if i == 0 else before, dt)
         if 2 * (i - epoch) + 1 == count:
             # The middle of the step lies within this sample.
-            middle.C[:] = 0.5 * (middle.C + at.C)
-            middle.v[:] = 0.5 * (middle.v + at.v)
-            middle.lla[:] = 0.5 * (middle.lla + at.lla)
+            set_kinematics(middle, at, 0.5)
     for a in range(6):
         carry[a] = now[a]
 
@@ -411,8 +428,10 @@ def _advance(
 @compiled()
 def _keep(k: int, estimate: FilterState, table: SensorTable, kept: Kept) -> None:
     at, P, x = estimate
-    kept.nav[k, :3], kept.nav[k, 3:] = at.lla, at.v
-    kept.C[k], kept.P[k] = at.C, P[:9, :9]
+    set_vector(kept.nav[k, :3], at.lla)
+    set_vector(kept.nav[k, 3:], at.v)
+    set_matrix(kept.C[k], at.C)
+    set_matrix(kept.P[k], P)
     for i in range(x.size):
         for j in range(x.size):
             a, b = table.axis[i], table.axis[j]

@@ -14,7 +14,7 @@ import numpy as np
 from gmwm._core.compiled import compiled
 from gmwm._core.typing import FloatArray, IntArray
 from gmwm.errors import InputError
-from gmwm.ins.filter.records import Keyframe, Kinematics
+from gmwm.ins.filter.records import Keyframe, Kinematics, set_kinematics
 from gmwm.ins.geometry import (
     matrix_from_rotation_vector,
     matrix_from_rpy,
@@ -90,17 +90,17 @@ def observe_position(
 ) -> float:
     """Latitude, longitude and height of the antenna, as metres to the north, east and down."""
     lla = at.lla
-    a, b, c = _to_navigation(at.C, lever[0], lever[1], lever[2])
+    arm = _to_navigation(at.C, lever[0], lever[1], lever[2])
     h[component] = 1.0
-    _add_turned(component, a, b, c, h)
+    _add_turned(component, arm, h)
     if component == 2:
-        return c - (lla[2] - value[2])
+        return arm[2] - (lla[2] - value[2])
     meridian, transverse = radii_at(math.sin(lla[0]))
     if component == 0:
-        return (meridian + lla[2]) * (lla[0] - value[0]) + a
+        return (meridian + lla[2]) * (lla[0] - value[0]) + arm[0]
     east = lla[1] - value[1]
     east -= 2.0 * math.pi * math.floor(east / (2.0 * math.pi) + 0.5)
-    return (transverse + lla[2]) * math.cos(lla[0]) * east + b
+    return (transverse + lla[2]) * math.cos(lla[0]) * east + arm[1]
 
 
 class Position(Measurement):
@@ -138,10 +138,10 @@ def observe_velocity(
     y = rate[2] * lever[0] - rate[0] * lever[2]
     z = rate[0] * lever[1] - rate[1] * lever[0]
     a, b, c = _to_navigation(at.C, x, y, z)
-    a, b, c = at.v[0] + a, at.v[1] + b, at.v[2] + c
+    v = (at.v[0] + a, at.v[1] + b, at.v[2] + c)
     h[3 + component] = 1.0
-    _add_turned(component, a, b, c, h)
-    return (a if component == 0 else b if component == 1 else c) - value[component]
+    _add_turned(component, v, h)
+    return v[component] - value[component]
 
 
 class Velocity(Measurement):
@@ -298,13 +298,15 @@ def observe_since(
 @compiled()
 def new_keyframe(P: FloatArray, at: Kinematics, since: Keyframe, sign: float) -> None:
     """Make a pose the keyframe: its states are copies of the navigation errors, times a sign."""
-    since.pose.C[:], since.pose.lla[:] = at.C, at.lla
+    set_kinematics(since.pose, at, 1.0)
     for i in range(6):
         own = i if i < 3 else i + 3
-        P[since.first + i] = sign * P[own]
+        for j in range(P.shape[0]):
+            P[since.first + i, j] = sign * P[own, j]
     for i in range(6):
         own = i if i < 3 else i + 3
-        P[:, since.first + i] = sign * P[:, own]
+        for j in range(P.shape[0]):
+            P[j, since.first + i] = sign * P[j, own]
 
 
 @compiled()
@@ -316,14 +318,10 @@ def _to_navigation(C: FloatArray, x: float, y: float, z: float) -> tuple[float, 
 
 
 @compiled()
-def _add_turned(component: int, a: float, b: float, c: float, h: FloatArray) -> None:
-    """Add the effect of an attitude error phi on a vector, which it moves by (a, b, c) x phi."""
-    if component == 0:
-        h[7], h[8] = -c, b
-    elif component == 1:
-        h[6], h[8] = c, -a
-    else:
-        h[6], h[7] = -b, a
+def _add_turned(component: int, v: tuple[float, float, float], h: FloatArray) -> None:
+    """Add the effect of an attitude error phi on a vector, which it moves by v x phi."""
+    i, j = (component + 1) % 3, (component + 2) % 3
+    h[6 + i], h[6 + j] = -v[j], v[i]
 
 
 # -- table of all kinds ----------------------------------------------------------------------------

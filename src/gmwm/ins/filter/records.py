@@ -10,12 +10,38 @@ from gmwm._core.compiled import compiled
 from gmwm._core.typing import BoolArray, FloatArray, IntArray
 
 
+@compiled()
+def set_vector(into: FloatArray, of: FloatArray) -> None:
+    """Copy the first elements; numba takes seconds to compile assignments of arrays."""
+    for i in range(into.size):
+        into[i] = of[i]
+
+
+@compiled()
+def set_matrix(into: FloatArray, of: FloatArray) -> None:
+    """Copy the upper left corner."""
+    for i in range(into.shape[0]):
+        for j in range(into.shape[1]):
+            into[i, j] = of[i, j]
+
+
 class Kinematics(NamedTuple):
     """Attitude C_bn (3, 3), velocity (3,) and position (3,): latitude, longitude, height."""
 
     C: FloatArray
     v: FloatArray
     lla: FloatArray
+
+
+@compiled()
+def set_kinematics(into: Kinematics, of: Kinematics, share: float) -> None:
+    """Go a share of the way from one to another, in place."""
+    rest = 1.0 - share
+    for i in range(3):
+        into.v[i] = rest * into.v[i] + share * of.v[i]
+        into.lla[i] = rest * into.lla[i] + share * of.lla[i]
+        for j in range(3):
+            into.C[i, j] = rest * into.C[i, j] + share * of.C[i, j]
 
 
 class Keyframe(NamedTuple):

@@ -14,6 +14,7 @@ from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.ins import tuning
 from gmwm.ins.filter.aiding import Aiding, Fixes
+from gmwm.ins.filter.records import set_matrix
 from gmwm.ins.geometry import RATE, matrix_from_rpy, ned_difference, rpy_from_matrix, turn_body
 from gmwm.ins.imu.increments import Imu
 
@@ -176,7 +177,7 @@ def _carry(C: FloatArray, rotation: FloatArray, kept: FloatArray) -> None:
     for i in range(rotation.shape[0]):
         turn_body(C, rotation[i, 0], rotation[i, 1], rotation[i, 2])
         if i < kept.shape[0]:
-            kept[i] = C
+            set_matrix(kept[i], C)
 
 
 def heading_from_course(

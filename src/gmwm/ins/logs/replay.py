@@ -369,17 +369,15 @@ class _Forward:
             value, sd = innovations.value[event, component], self.events.sd[event, component]
             if not (np.isfinite(value) and innovations.used[event]):
                 continue
-            h, row, gain = np.zeros(NAVIGATION), np.zeros(n), np.zeros(n)
+            row, gain = np.zeros(n), np.zeros(n)
             lever = np.asarray(self.replay.aiding.lever_arm)
-            observe(kind, component, self.events.value[event], at, rate, lever, h)
-            row[:NAVIGATION] = h
+            observe(kind, component, self.events.value[event], at, rate, lever, row)
             state = int(self.ready.settings.noise_states[kind, component])
             if state >= 0:
-                state += NAVIGATION
-                row[state] = -1.0
+                row[NAVIGATION + state] = -1.0
             # The filter's own variance, which allows for more than the noise of the fix.
             predicted = float(row @ self.P @ row)
             noise = max(float(innovations.sd[event, component] ** 2) - predicted, float(sd**2))
-            _, variance = measurement_update(self.P, h, state, noise, 0.0, np.zeros(n), gain)
+            _, variance = measurement_update(self.P, row, noise, 0.0, np.zeros(n), gain)
             found.append(_Update(row, gain, float(value), float(variance)))
         return found

@@ -259,8 +259,8 @@ def perform(
     if not 1 <= n <= _LONGEST:
         raise InputError(f"a trajectory of {n:,} steps of {dt:g} s: give 1 to {_LONGEST:,} steps")
     course = _course(plans, 0.5 * dt * np.arange(2 * n + 1, dtype=float), speed, heading)
-    lla = np.empty((n + 1, 3))
-    _walk(course.speed, course.heading, course.climb, dt, origin, lla)
+    lla = np.tile(origin, (n + 1, 1))
+    _walk(course.speed, course.heading, course.climb, dt, lla)
     check_latitudes(lla, "manoeuvres")
     return Trajectory.from_arrays(dt, lla, _attitude(course, lla, **body))
 
@@ -325,15 +325,9 @@ def _attitude(
 
 @compiled()
 def _walk(
-    speed: FloatArray,
-    heading: FloatArray,
-    climb: FloatArray,
-    dt: float,
-    start: FloatArray,
-    lla: FloatArray,
+    speed: FloatArray, heading: FloatArray, climb: FloatArray, dt: float, lla: FloatArray
 ) -> None:
     """Integrate the way by the fourth-order Runge-Kutta rule; inputs at epochs and half-way."""
-    lla[0] = start
     for i in range(lla.shape[0] - 1):
         a, b, c = 2 * i, 2 * i + 1, 2 * i + 2
         h = lla[i, 2]
