@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 
@@ -146,18 +147,9 @@ def bound_of(
             values = {"tightness": found[0].tightness, "with_state": best.tightness}
             is_worth = best.tightness <= found[0].tightness / tuning.WORTH_A_STATE
             hint = f"use {TIGHTEST} where the filter has a state for it" if is_worth else ""
-            variant, time = "tightest" if form == TIGHTEST else "", found[0].time
-            notices.append(
-                notice(
-                    "loose-form",
-                    "",
-                    values,
-                    variant=variant,
-                    hint=hint,
-                    time=time,
-                    tightest=TIGHTEST,
-                )
-            )
+            words: dict[str, Any] = {"time": found[0].time, "tightest": TIGHTEST}
+            variant = "tightest" if form == TIGHTEST else ""
+            notices.append(notice("loose-form", "", values, variant=variant, hint=hint, **words))
         notices += covered_terms_notices(axis, target, model, problem.targets)
         notices += fit_notices(axis, level, horizon)
         about = (form, model, horizon, sd, "bound", found, tuple(notices), axis.quantity, stderr)

@@ -478,10 +478,7 @@ def _in_flight(
             {axis.name: axis.model for axis in axes.axes},
             {axis.name: axis.bias_sd for axis in axes.axes},
         )
-        believed = SensorModels.of(
-            {name: each.model for name, each in numbers.items()},
-            {name: each.initial_sd for name, each in numbers.items()},
-        )
+        believed = SensorModels.of(numbers)
         scenario = loiter_with_outages(times, axes.axes[0].dt, *aided)
         analysis = covariance_analysis(scenario, truth, believed)
     except InputError as error:

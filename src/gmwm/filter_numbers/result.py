@@ -43,13 +43,7 @@ class InUnits(Printed, ABC):
 
     @abstractmethod
     def text(self, units: str = "field") -> str:
-        """The text of `print`, in data-sheet units or, with ``"si"``, in SI.
-
-        Raises
-        ------
-        InputError
-            If the units are neither.
-        """
+        """The text of `print`, in data-sheet units or, with ``"si"``, in SI."""
 
     def __str__(self) -> str:
         return self.text()

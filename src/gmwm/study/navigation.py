@@ -65,10 +65,8 @@ TEN = 10.0  # the folk rule
 _HELICOPTER: tuple[Outage, ...] = (Outage(600.0, 60.0), Outage(1100.0, 60.0), Outage(1500.0, 60.0))
 _CAR = (Outage(500.0, 60.0), Outage(900.0, 60.0))
 _PAPER_CAR = (Outage(360.0, 50.0), Outage(1080.0, 40.0))
-_FROM, _TO = (
-    115.0,
-    1335.0,
-)  # s of a drive; then the first outage is straight on, the second a corner
+# s of a drive: the first outage is then straight on, the second one a corner
+_FROM, _TO = 115.0, 1335.0
 
 
 @dataclass(frozen=True, eq=False)

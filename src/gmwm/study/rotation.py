@@ -394,8 +394,6 @@ def _filters(
         ("N+K+GM bound", "bound-N+K+GM", lambda: bound(calibration, "N+K+GM", horizon)),
         ("N+K reduced", "reduce-N+K", lambda: reduce(calibration, "N+K", [horizon])),
     ):
-        numbers = kept(FilterNumbers, f"{what}-{horizon:g}", make)
-        models = {axis: numbers[axis].model for axis in AXES}
-        filters[name] = SensorModels(models, {axis: numbers[axis].initial_sd for axis in AXES})
+        filters[name] = SensorModels.of(kept(FilterNumbers, f"{what}-{horizon:g}", make))
     axes = found.lineless()
     return filters, [notice("no-line", "", {"axes": ", ".join(axes)})] if axes else []
