@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -263,26 +263,19 @@ def gnss(
     imu : Imu, optional
         Error-free, for the antenna's velocity about the IMU; needed with a lever arm and velocity.
     """
-    arm, given = (
-        three_numbers("lever_arm", lever_arm),
-        {"position": position_sd, "velocity": velocity_sd},
-    )
-    fixes = tuple(
-        _along(kind, trajectory, interval, sd, arm, imu)
-        for kind, sd in given.items()
-        if sd is not None
-    )
-    return Aiding(fixes, arm, coloured_sd, coloured_tau)
+    given = {"position": position_sd, "velocity": velocity_sd}
+    found = _along(trajectory, interval, given, lever_arm, imu)
+    return replace(found, coloured_sd=coloured_sd, coloured_tau=coloured_tau)
 
 
 def barometer(trajectory: Trajectory, interval: float = 1.0, sd: float = 1.0) -> Aiding:
     """Error-free heights along a trajectory; see `gnss`."""
-    return Aiding((_along("height", trajectory, interval, sd),))
+    return _along(trajectory, interval, {"height": sd})
 
 
 def standstills(trajectory: Trajectory, interval: float = 1.0, sd: float = 0.01) -> Aiding:
     """Zero-velocity updates wherever a trajectory stands still; see `gnss`."""
-    fixes = _along("standstill", trajectory, interval, sd)
+    (fixes,) = _along(trajectory, interval, {"standstill": sd}).fixes
     index = np.rint(fixes.time / trajectory.dt).astype(int)
     speed = np.linalg.norm(trajectory.velocity[index], axis=1)
     return Aiding((fixes.part(speed < _STANDSTILL),))
@@ -296,8 +289,7 @@ def poses(
     attitude_sd: float | Sequence[float] = tuning.POSE_SD[1],
 ) -> Aiding:
     """Error-free absolute poses, as of a lidar in a map; m and rad; see `gnss`."""
-    given = {"position": position_sd, "attitude": attitude_sd}
-    return Aiding(tuple(_along(kind, trajectory, interval, sd) for kind, sd in given.items()))
+    return _along(trajectory, interval, {"position": position_sd, "attitude": attitude_sd})
 
 
 def odometry(
@@ -308,8 +300,7 @@ def odometry(
     turn_sd: float | Sequence[float] = tuning.ODOMETRY_SD[1],
 ) -> Aiding:
     """Error-free relative poses between keyframes, of cameras or a lidar; m, rad; see `gnss`."""
-    given = {"displacement": way_sd, "rotation": turn_sd}
-    return Aiding(tuple(_along(kind, trajectory, interval, sd) for kind, sd in given.items()))
+    return _along(trajectory, interval, {"displacement": way_sd, "rotation": turn_sd})
 
 
 def wheels(
@@ -318,29 +309,32 @@ def wheels(
     sd: float | Sequence[float] = tuning.WHEEL_SD,
 ) -> Aiding:
     """Error-free velocities forward, right and down of a car that does not slip; see `gnss`."""
-    return Aiding((_along("odometer", trajectory, interval, sd),))
+    return _along(trajectory, interval, {"odometer": sd})
 
 
 def _along(
-    kind: str,
     trajectory: Trajectory,
     interval: float,
-    sd: float | Sequence[float],
-    arm: Sequence[float] | FloatArray = (0.0, 0.0, 0.0),
+    given: Mapping[str, float | Sequence[float] | None],
+    arm: Sequence[float] = (0.0, 0.0, 0.0),
     imu: Imu | None = None,
-) -> Fixes:
-    """Error-free fixes of a kind, every ``interval`` (s) after the first epoch."""
+) -> Aiding:
+    """Error-free fixes every ``interval`` (s) after the first epoch, by kinds and deviations."""
     # Beyond the end there are no fixes, however far.
     stride = min(checks.positive("interval", interval) / trajectory.dt, trajectory.n + 1.0)
     if abs(stride - round(stride)) > 1e-6 or round(stride) < 1:
         raise InputError(
             f"interval = {interval:g} s: give a multiple of the trajectory's {trajectory.dt:g} s"
         )
-    given = checks.real_numbers(sd, "standard deviation")
-    each = three_numbers("standard deviation", np.full(3, given) if given.ndim == 0 else given)
-    if np.any(each <= 0.0):
-        raise InputError(f"standard deviation = {checks.shown(sd)}: give positive numbers")
     index = np.arange(round(stride), trajectory.n + 1, round(stride))
-    where = Instrument(trajectory, index, np.asarray(arm), imu)
-    value = MEASUREMENTS[KINDS[kind]].along(where)
-    return Fixes(kind, trajectory.time[index], value, np.tile(each, (index.size, 1)))
+    where, fixes = Instrument(trajectory, index, three_numbers("lever_arm", arm), imu), []
+    for kind, sd in given.items():
+        if sd is None:
+            continue
+        own = checks.real_numbers(sd, "standard deviation")
+        each = three_numbers("standard deviation", np.full(3, own) if own.ndim == 0 else own)
+        if np.any(each <= 0.0):
+            raise InputError(f"standard deviation = {checks.shown(sd)}: give positive numbers")
+        value = MEASUREMENTS[KINDS[kind]].along(where)
+        fixes.append(Fixes(kind, trajectory.time[index], value, np.tile(each, (index.size, 1))))
+    return Aiding(tuple(fixes), where.arm)

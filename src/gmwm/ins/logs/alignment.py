@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gmwm._core.spool import Spool, is_spooled, release, windows
+from gmwm._core.spool import alike, release, windows
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.ins import tuning
@@ -218,13 +218,10 @@ def started(measured: Measured, alignment: Alignment) -> tuple[Imu, Aiding]:
         shifted = replace(each, time=each.time - first * imu.dt)
         # Fixes of the first epoch made the initial state.
         fixes.append(shifted.part(shifted.time > 0.5 * imu.dt))
-    rotation = imu.rotation[first:]
-    if is_spooled(rotation):
-        spool = Spool(3)
-        for part in windows(len(rotation)):
-            spool.append(rotation[part] - bias)
-            release(rotation)
-        rotation = spool.array()
-    else:
-        rotation = rotation - bias
+    given = imu.rotation[first:]
+    rotation = alike(given, given.size).reshape(-1, 3)
+    for part in windows(len(given)):
+        rotation[part] = given[part] - bias
+        release(given)
+        release(rotation)
     return Imu(imu.dt, rotation, imu.velocity[first:]), replace(aiding, fixes=tuple(fixes))

@@ -12,7 +12,7 @@ import numpy as np
 
 from gmwm._core.distributions import binom
 from gmwm._core.files import existing_file
-from gmwm._core.spool import Spool, is_spooled, release, windows
+from gmwm._core.spool import alike, release, windows
 from gmwm._core.typing import FloatArray
 from gmwm._core.units import SI_UNIT
 from gmwm.calibration import BiasCurve, compensated
@@ -154,14 +154,12 @@ def _joined(recording: Recording, axes: tuple[str, ...], reversed_axes: set[str]
     """Samples of three axes, (n, 3); on disk if the recording is."""
     series = [recording[axis].values for axis in axes]
     sign = np.array([-1.0 if axis in reversed_axes else 1.0 for axis in axes])
-    if not is_spooled(series[0]):
-        return np.column_stack(series) * sign
-    spool = Spool(3)
-    for part in windows(series[0].size):
-        spool.append(np.column_stack([each[part] for each in series]) * sign)
-        for each in series:
+    found = alike(series[0], 3 * series[0].size).reshape(-1, 3)
+    for part in windows(len(found)):
+        found[part] = np.column_stack([each[part] for each in series]) * sign
+        for each in (*series, found):
             release(each)
-    return spool.array()
+    return found
 
 
 def _fill(source: str, dt: float, *triads: FloatArray) -> list[Notice]:
