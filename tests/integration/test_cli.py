@@ -5,11 +5,9 @@ import json
 import os
 import re
 import shlex
-import shutil
 import subprocess
 import sys
 from contextlib import redirect_stderr, redirect_stdout
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -18,13 +16,7 @@ import yaml
 from click.testing import CliRunner
 
 import gmwm
-from gmwm import Calibration, GaussMarkov, RandomWalk, WaveletVariance, WhiteNoise, cli
-from gmwm._core.units import SI_UNIT
-from gmwm.cli.calibrate import show
-from gmwm.cli.console import progress_bar
-from gmwm.cli.demo import show_truth
-from gmwm.estimate import Fit
-from gmwm.issues import Notice
+from gmwm import GaussMarkov, RandomWalk, WhiteNoise, cli
 from gmwm.process import as_model
 from marks import slow
 from places import GOLDEN
@@ -106,12 +98,6 @@ def test_help_of_each_command_has_units_and_an_example(command):
     assert max(map(len, shown.output.splitlines())) <= WIDTH
 
 
-def test_help_of_calibrate_names_units():
-    shown = CliRunner().invoke(cli.cli, ["calibrate", "--help"]).output
-    for words in ("--rate NUMBER", "in Hz", "rad/s, deg/s, deg/h", "m/s^2, g, mg", "NAME=COLUMN"):
-        assert words in shown
-
-
 def test_example_of_calibrate_works(run, tmp_path, no_pages):
     # The very line that the help shows, on a file of that name.
     rng = np.random.default_rng(0)
@@ -131,10 +117,6 @@ def test_example_of_calibrate_works(run, tmp_path, no_pages):
         assert code == 0, told
         assert ("2 recordings" in printed) == ("b.csv" in line)
         assert "calibration.json" in printed
-
-
-def test_version(run):
-    assert run("--version") == (0, f"gmwm, version {gmwm.__version__}\n", "")
 
 
 def test_help_answers_at_once():
@@ -209,108 +191,6 @@ def test_calibrate(calibrated):
 
 def test_nothing_but_results_where_there_is_no_terminal(calibrated):
     assert calibrated[1] == ""
-
-
-def test_every_step_is_printed(capsys):
-    """Of notices with one code only the last one was, and none beside a worse one; in -v."""
-    x = WhiteNoise(1e-4).simulate(3600, 1.0, seed=1)
-    fit = gmwm.fit(WhiteNoise(), x, 1.0)
-    severities = ("bad", "bad", "warning")
-    notices = [Notice("step", each, "", f"step {k}") for k, each in enumerate(severities)]
-    fits = {"gyro_x": replace(fit, notices=(*fit.notices, *notices))}
-    show(Calibration(fits=fits, skipped={}, source="p.csv", rate=1.0, n=3600), verbose=True)
-    printed = capsys.readouterr().out
-    assert [f"gyro_x: step {k}" in printed for k in range(3)] == [True] * 3
-
-
-def test_a_second_run_replaces_the_files(run, good_file, calibrated, tmp_path, no_pages):
-    folder = shutil.copytree(calibrated[2], tmp_path / "out")
-    before = (folder / "calibration.json").read_bytes()
-    (folder / "calibration.json").write_text("old")
-    code, _, _ = run("calibrate", good_file, *RATE, *FIELD, "-o", folder, "--jobs", "1")
-    assert code == 0
-    assert (folder / "calibration.json").read_bytes() == before
-
-
-def test_without_both_sensors_there_is_no_imu_yaml(run, good_file, tmp_path, no_pages):
-    arguments = ("--channel", "gyro_z=gyro_x", "--gyro-unit", "deg/s", "-o", "one")
-    code, printed, _ = run("calibrate", good_file, *RATE, *arguments)
-    assert code == 0
-    assert "imu.yaml" not in printed
-    assert re.search(
-        r"^gyroscope_random_walk +filter K ", printed, re.MULTILINE
-    )  # the filter's numbers
-    assert sorted(p.name for p in (tmp_path / "one").iterdir()) == [
-        "calibration.json",
-        "report.html",
-    ]
-    assert list(gmwm.load(tmp_path / "one" / "calibration.json")) == ["gyro_z"]
-
-
-def test_columns_by_number_and_time_by_name(run, tmp_path, no_pages):
-    rng = np.random.default_rng(0)
-    columns = {"a": np.arange(200) * 0.02, "b": rng.normal(size=200), "c": rng.normal(size=200)}
-    write_csv(tmp_path / "f.csv", columns)
-    arguments = ("--channel", "gyro_x=1", "--channel", "accel_x=c", "--time", "a")
-    code, printed, told = run("calibrate", "f.csv", *arguments, *SI, "-o", "out")
-    assert code == 0, told
-    calibration = gmwm.load(tmp_path / "out" / "calibration.json")
-    assert calibration.rate == pytest.approx(50.0)
-    assert list(calibration) == ["gyro_x", "accel_x"]
-    assert "f.csv: 4 s at 50 Hz." in printed
-    # The same columns, time left aside.
-    code, printed, told = run(
-        "calibrate", "f.csv", *arguments[:4], *SI, "--time", "none", *RATE, "-o", "out"
-    )
-    assert code == 0, told
-    assert "at 100 Hz" in printed
-
-
-def test_timings_are_printed_stage_by_stage(run, good_file):
-    arguments = ("calibrate", good_file, *RATE, *SI, "--channels", "gyro_x", "--model", "N")
-    code, printed, told = run(*arguments, "--json", "--timings")
-    assert code < 2, told  # whether the model is valid is no matter here
-    json.loads(printed)
-    stages = [line.split()[0] for line in told.splitlines()[1:]]
-    assert stages[:4] == ["read", "health", "variance", "model"]
-    assert {"departures", "report", "exports", "all"} <= set(stages)
-    assert all(len(line) <= 80 for line in told.splitlines())
-
-
-def test_the_shortest_recordings_are_calibrated(run, tmp_path):
-    # With this seed the one coefficient of the coarsest level happens to be small.
-    rng = np.random.default_rng(6)
-    columns = {name: rng.normal(size=64) for name in ("gyro_x", "accel_x")}
-    write_csv(tmp_path / "f.csv", columns)
-    code, _, told = run("calibrate", "f.csv", *RATE, *SI, "-o", "out")
-    assert code == 0, told
-    assert (tmp_path / "out" / "calibration.json").exists()
-    assert (tmp_path / "out" / "report.html").exists()
-
-
-def test_gaps_are_told_and_do_no_harm(run, tmp_path):
-    rng = np.random.default_rng(7)
-    n = 3000
-    rows = [
-        f"{t:.2f},{x:.5f},{y:.5f},"
-        for t, x, y in zip(np.arange(n) / 100, *rng.normal(size=(2, n)), strict=True)
-    ]
-    rows[70] = "0.70,,NA,"
-    del rows[1201:1451]
-    (tmp_path / "f.csv").write_text("\n".join(["time_s,gyro_x,accel_x,accel_y", *rows, ""]))
-    code, printed, told = run("calibrate", "f.csv", *SI, "-o", "out", "-v")
-    assert code == 0, told
-    said = " ".join(printed.split())
-    assert "the clock jumps by 2.5 s, 12 s after the start: 250 samples missing" in said
-    assert "gyro_x, accel_x: each 251 of 3,000 samples missing, in 2 gaps, the longest 250" in said
-    assert "accel_y: no model, all samples missing" in said
-    assert "3,000 samples at 100 Hz" in said
-    calibration = gmwm.load(tmp_path / "out" / "calibration.json")
-    for fit in calibration.fits.values():
-        low, high = fit.interval(0.999)["N"]
-        assert low < 0.1 < high
-    html = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
-    assert "The clock jumps by 2.5 s, 12 s after the start" in html
 
 
 # -- bad input ------------------------------------------------------------------------------------
@@ -418,24 +298,6 @@ def test_bad_input_leaves_earlier_results_alone(run, tmp_path, what):
     assert (tmp_path / "calibration.json").read_text() == "old"
 
 
-def test_a_folder_or_a_picture_for_a_file(run, tmp_path):
-    assert_refused(*run("calibrate", ".", *ALL, "-o", "out"), ("is a directory",))
-    (tmp_path / "f.csv").write_bytes(b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR")
-    assert_refused(*run("calibrate", "f.csv", *ALL, "-o", "out"), ("f.csv",))
-
-
-@pytest.mark.parametrize("command", ["calibrate", "demo"])
-@pytest.mark.parametrize("output", ["taken", "taken/under"])
-def test_output_folder_that_cannot_be(run, tmp_path, command, output):
-    (tmp_path / "taken").write_text("mine")
-    (tmp_path / "f.csv").write_text("\n".join(good_lines()))
-    arguments = ("f.csv", *ALL) if command == "calibrate" else ()
-    words = (f"{Path(output)}: cannot be written (", "choose another place with -o")
-    assert_refused(*run(command, *arguments, "-o", output), words)
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["f.csv", "taken"]
-    assert (tmp_path / "taken").read_text() == "mine"
-
-
 @pytest.mark.parametrize(
     ("arguments", "culprit"),
     [
@@ -496,35 +358,6 @@ def test_who_stops_reading_does_not_lose_the_results(tmp_path):
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == files
 
 
-@pytest.mark.parametrize(
-    ("arguments", "what"),
-    [(("--help",), "closed"), (("--help",), "full"), (("--help",), "head"),
-     slow(("health", "f.csv"), "head")],
-)  # fmt: skip
-def test_output_that_nobody_takes(tmp_path, arguments, what):
-    (tmp_path / "f.csv").write_text("\n".join(good_lines()))
-    if arguments[0] == "health":
-        arguments = (*arguments, *ALL)
-    command = shlex.join([sys.executable, "-m", "gmwm", *arguments])
-    if what == "full" and not Path("/dev/full").exists():
-        pytest.skip("there is no /dev/full here")
-    ends = {"closed": " >&-", "full": " >/dev/full", "head": " | true"}
-    done = subprocess.run(
-        ["bash", "-c", f"set -o pipefail; {command}{ends[what]}"],
-        cwd=tmp_path, capture_output=True, text=True, timeout=120,
-    )  # fmt: skip
-    assert "Traceback" not in done.stderr
-    assert "Exception ignored" not in done.stderr
-    if what == "full":
-        assert done.returncode == 2
-        assert done.stderr.startswith("gmwm: the output cannot be written (")
-        assert done.stderr.count("\n") == 1
-    else:
-        # The pipe may be read to its end before it is closed.
-        assert done.returncode in ((0,) if what == "closed" else (0, 141))
-        assert done.stderr == ""
-
-
 # -- what is calibrated, how it is printed, how it ends -------------------------------------------
 
 
@@ -544,21 +377,6 @@ def test_what_is_missing_is_asked_for_at_once(run, tmp_path, no_pages):
     # The line that it asks for is enough.
     command = re.search(r"give e.g. (.*)$", run("calibrate", "f.csv")[2])[1]
     assert run("calibrate", "f.csv", *command.split())[0] == 0
-
-
-def test_channels_and_a_stretch(run, good_file, no_pages):
-    code, printed, told = run(
-        "calibrate", good_file, *RATE, *FIELD, "--channels", "accel_z,gyro_x",
-        "--start", "50", "--stop", "120.5", "-o", "out", "-v",
-    )  # fmt: skip
-    assert (code, told) == (0, "")
-    calibration = gmwm.load("out/calibration.json")
-    assert list(calibration) == ["gyro_x", "accel_z"]
-    assert calibration.n == 7050
-    assert "the part from 50 to 120.5 s is used; times count from its start" in printed
-    code, printed, told = run("health", good_file, *RATE, *FIELD, "--channels", "gyro", "--json")
-    assert (code, told) == (0, "")
-    assert list(json.loads(printed)["channels"]) == ["gyro_x", "gyro_y"]
 
 
 @pytest.mark.parametrize(
@@ -586,14 +404,6 @@ def test_channels_and_a_stretch(run, good_file, no_pages):
 def test_choices_that_cannot_be(run, good_file, tmp_path, arguments, words):
     assert_refused(*run("calibrate", good_file, *RATE, *FIELD, *arguments), (words,))
     assert list(tmp_path.iterdir()) == []
-
-
-def test_a_model_is_fitted_in_place_of_a_selection(run, good_file, no_pages):
-    models = ("--model", "gyro_x=2*GM + WhiteNoise", "--model", "gyro=B", "--model", "Q+N")
-    run("calibrate", good_file, *RATE, *FIELD, *models, "--quiet")
-    fits = gmwm.load("gmwm-out/calibration.json")
-    assert set(fits["gyro_x"].params) == {"N", "sigma_1", "tau_1", "sigma_2", "tau_2"}
-    assert set(fits["accel_z"].params) == {"Q", "N"}
 
 
 def test_json_and_quiet(run, good_file, tmp_path, no_pages):
@@ -690,16 +500,6 @@ def test_every_command_that_is_advised_works(run, tmp_path, no_pages, what, give
     assert run(*command)[0] == 0
 
 
-def test_the_bar_names_the_channel(monkeypatch, capsys):
-    for name in ("TERM", "FORCE_COLOR"):
-        monkeypatch.setenv(name, {"TERM": "xterm", "FORCE_COLOR": "1"}[name])
-    monkeypatch.setenv("COLUMNS", "80")
-    with progress_bar("calibrating", "channels") as advance:
-        advance(1, 6, "gyro_y")
-    shown = re.sub(r"\x1b\[[0-9;?]*[a-zA-Z]", "", capsys.readouterr().err)
-    assert re.search(r"calibrating .* 1/6 channels gyro_y", shown)
-
-
 # -- health ---------------------------------------------------------------------------------------
 
 
@@ -730,46 +530,6 @@ def test_health_says_what_is_wrong(run, tmp_path):
     ((start, stop),) = content["channels"]["gyro_x"]["events"]
     assert start <= 4000 < 4003 <= stop
     assert words.endswith("wrote health.json")
-
-
-def test_health_finds_a_channel_that_follows_the_temperature(run, tmp_path):
-    rng = np.random.default_rng(7)
-    n = 20_000
-    warm = 25.0 + 0.02 * rng.normal(size=n).cumsum()
-    gyro = 0.3 * rng.normal(size=n) + 0.2 * warm
-    slow = np.where(np.arange(n) % 50 == 0, warm, np.nan)  # sampled at 2 Hz
-    columns = {"gyro_x": gyro, "gyro_y": 0.3 * rng.normal(size=n), "temp [degC]": slow}
-    write_csv(tmp_path / "static.csv", columns)
-    code, printed, told = run("health", "static.csv", *RATE, "--gyro-unit", "deg/s")
-    assert (code, told) == (0, "")
-    words = " ".join(printed.split())
-    assert re.search(r"warning follows temp by 0\.(19|2)\d* deg/s per degC", words)
-    assert words.count("follows temp") == 1
-    assert "note auxiliary channels: 'temp' (temperature)" in words
-
-
-def test_health_writes_nothing_unless_asked(run, tmp_path):
-    shaken_csv(tmp_path / "static.csv")
-    code, _, _ = run("health", "static.csv", *RATE, *SI)
-    assert code == 0
-    assert [path.name for path in tmp_path.iterdir()] == ["static.csv"]
-
-
-def test_health_refuses_what_it_cannot_use(run, tmp_path):
-    shaken_csv(tmp_path / "static.csv")
-    (tmp_path / "taken").mkdir()
-    for arguments, words in (
-        (("absent.csv", *RATE, *SI), "absent.csv does not exist"),
-        (("static.csv", *SI), "--rate 100"),
-        (("static.csv", *RATE, *SI, "-o", "taken"), "a folder of that name is in the way"),
-        (("static.csv", *RATE, *SI, "-o", "no/where.json"), "cannot be written"),
-        (("static.csv", *RATE, *SI, "--channel", "gyro_x"), "write NAME=COLUMN"),
-    ):
-        code, printed, told = run("health", *arguments)
-        assert (code, printed) == (2, ""), arguments
-        assert words in told
-        assert told.count("\n") == 1
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["static.csv", "taken"]
 
 
 # -- demo -----------------------------------------------------------------------------------------
@@ -813,16 +573,6 @@ def test_demo_runs(demo):
     assert list(gmwm.load(folder / "calibration.json")) == axes
 
 
-def test_demo_prints_the_page_and_a_line_of_truth(demo):
-    printed = demo[0][1]
-    assert printed.startswith("simulated IMU, seed 1: 3 min at 100 Hz. ")
-    assert max(map(len, printed.splitlines())) <= WIDTH
-    (truth,) = re.findall(r"truth: (.*?)\nwrote", printed, re.DOTALL)
-    assert " ".join(truth.split()) == (
-        "gyro N 0.2 deg/sqrt(h), sigma 25 deg/h, tau 20 s; accel N 80 ug/sqrt(Hz), K 120 ug/sqrt(h)"
-    )
-
-
 def test_demo_finds_the_white_noise_of_every_axis(demo):
     # Three minutes tell it to a per cent.
     for sensor, truth in (("gyro", 0.2), ("accel", 80.0)):
@@ -833,106 +583,7 @@ def test_demo_finds_the_white_noise_of_every_axis(demo):
             assert abs(value - truth) < 2.0 * error
 
 
-def test_demo_has_truth_beside_estimate_for_those_who_ask(demo):
-    table = demo[0][1].partition("Truth and estimate")[2]
-    counted = re.search(r"(\d+) of (\d+) parameters are determined by this record; (\d+)", table)
-    determined, parameters, covered = map(int, counted.groups())
-    assert parameters == 3 * (1 + 2) + 3 * (1 + 1)
-    assert covered <= determined == parameters - table.count("too short to tell")
-
-
 # -- tables of results made by hand ---------------------------------------------------------------
-
-
-def made_up(name, model, stderr, bounds=None, notices=()):
-    """A fit that says what we like."""
-    quantity = name.split("_")[0]
-    tau = 0.01 * 2.0 ** np.arange(10)
-    wv = WaveletVariance(
-        tau=tau, variance=1.0 / tau, mean=0.0 * tau, blocks=np.zeros(4), block=500, n=2000,
-        dt=0.01, name=name, quantity=quantity, unit=SI_UNIT[quantity],
-    )  # fmt: skip
-    return Fit(
-        model=as_model(model), wv=wv, keys=tuple(stderr), upper_bounds=bounds or {},
-        covariance=np.diag(np.square(list(stderr.values()))), objective=7.0, dof=8,
-        chi_square=7.344, chi_square_allowed=7.344, discrepancy=0.0, method="gmwm", weights="model",
-        notices=tuple(notices),
-    )  # fmt: skip
-
-
-def made_up_calibration(*fits, **options):
-    options = {"skipped": {}, "source": "static.csv", "rate": 100.0, "n": 2000} | options
-    return Calibration(fits={fit.wv.name: fit for fit in fits}, **options)
-
-
-MISFIT = Notice(
-    "misfit", "bad", "", "the model differs from the data by more than their statistical errors"
-)
-
-
-def test_page_and_models_of_every_kind_of_parameter(capsys):
-    gyro = made_up("gyro_x", WhiteNoise(4e-4) + RandomWalk(0.0), {"N": 4e-6}, {"K": 2e-4})
-    accel = made_up(
-        "accel_x",
-        WhiteNoise(1e-3) + GaussMarkov(2e-3, 30.0),
-        {"N": 2e-5, "sigma": 5e-4},
-        notices=[MISFIT],
-    )
-    found = made_up_calibration(
-        gyro,
-        accel,
-        skipped={"gyro_y": Notice("constant", "bad", "gyro_y", "constant at 0 rad/s")},
-        notices=(Notice("columns-not-used", "note", "", "column not used: 'temp'"),),
-    )
-    show(found, verbose=True)
-    assert_like(capsys.readouterr().out, "cli_page.txt")
-
-
-DEMO_TRUTH = WhiteNoise(7e-4) + GaussMarkov(1e-3, 0.1) + GaussMarkov(3e-4, 20.0)
-
-
-def test_table_of_truth_beside_estimate(capsys):
-    values = {"N": 6.9e-4, "sigma_1": 1.3e-3, "tau_1": 0.11, "sigma_2": 3e-4, "tau_2": 15.0}
-    errors = {"N": 1e-5, "sigma_1": 1e-4, "tau_1": 0.02, "sigma_2": 2e-4, "tau_2": 40.0}
-    gyro = made_up("gyro_x", DEMO_TRUTH.with_params(values), errors)
-    nil = values | {"sigma_2": 0.0}
-    other = {key: errors[key] for key in ("N", "sigma_1", "tau_1")}
-    bound = made_up("gyro_y", DEMO_TRUTH.with_params(nil), other, {"sigma_2": 5e-4})
-    truth = dict.fromkeys(("gyro_x", "gyro_y"), DEMO_TRUTH)
-    show_truth(made_up_calibration(gyro, bound), truth)
-    assert stripped(capsys.readouterr().out) == golden("cli_truth.txt")
-
-
-def test_no_number_or_name_is_cut_off(capsys):
-    # The widest that a table has to hold: small numbers with all their digits, and a star.
-    values = {"N": 6.9e-4, "sigma_1": 1.3e-3, "tau_1": 1.8131e-3, "sigma_2": 3e-4, "tau_2": 1234.0}
-    errors = {"N": 1e-4, "sigma_1": 1e-4, "tau_1": 1e-3, "sigma_2": 1e-5, "tau_2": 200.0}
-    names = [f"accel_{axis}" for axis in "xyz"]
-    fits = [
-        made_up(name, DEMO_TRUTH.with_params(values), errors, notices=[MISFIT]) for name in names
-    ]
-    show_truth(made_up_calibration(*fits), dict.fromkeys(names, DEMO_TRUTH))
-    truth = capsys.readouterr().out
-    show(made_up_calibration(*fits), verbose=True)
-    table = capsys.readouterr().out
-    for printed in (truth, table):
-        assert "…" not in printed
-        for name in names:
-            assert re.search(rf"^{name}\b", printed, re.MULTILINE)
-    for text in ("0.001813", "71.38", "0.0004836 .. 0.006797"):
-        assert text in truth
-
-
-def test_a_long_channel_name_takes_nothing_from_the_numbers(run, tmp_path, no_pages):
-    (tmp_path / "f.csv").write_text("\n".join(good_lines()))
-    name = "accel_of_the_left_front_wheel_x"
-    code, printed, told = run(
-        "calibrate", "f.csv", *RATE, "--channel", f"{name}=accel_x", *SI[2:], "-o", "out"
-    )
-    assert code == 0, told
-    axis = gmwm.load(tmp_path / "out" / "calibration.json").numbers[name]
-    row = rf"^{name[:6]}\.\.\.{name[-9:]} +{re.escape(axis.text('N'))} "
-    assert re.search(row, printed, re.MULTILINE)
 
 
 def test_json_of_the_command_line_is_strict(calibrated):
@@ -991,33 +642,6 @@ def test_reproduce_refuses_in_one_sentence(run, arguments, words):
     assert "Traceback" not in told
 
 
-@pytest.mark.parametrize("option", [("--method", "FOO"), ("--cluster", "tcp://x:1"), ("--resume",)])
-def test_appendix_has_no_options_of_a_table(run, tmp_path, option):
-    code, _, told = run("reproduce", "appendix-a", *option, "-o", "s")
-    assert code == 2
-    assert f"appendix-a has no option {option[0]}: leave it out" in told
-    assert not (tmp_path / "s").exists()
-
-
-@pytest.mark.parametrize(
-    ("arguments", "option"),
-    [
-        (("table2", "--rotate"), "--rotate"),
-        (("fig7", "--rotate"), "--rotate"),
-        (("fig5", "--resume"), "--resume"),
-        (("fig9", "--rotate", "--method", "AV"), "--method"),
-    ],
-)
-def test_recordings_are_rotated_for_two_figures_only(run, tmp_path, arguments, option):
-    code, _, told = run("reproduce", *arguments, "-o", "s")
-    assert code == 2
-    assert f"{arguments[0]} has no option {option}: leave it out" in told
-    code, _, told = run("reproduce", "fig9", "--rotate", "-o", "s")
-    assert code == 2
-    assert "give two recordings or more" in told
-    assert not (tmp_path / "s").exists()
-
-
 @pytest.mark.parametrize(
     "arguments",
     [
@@ -1036,10 +660,3 @@ def test_a_failed_command_leaves_no_empty_folder(run, tmp_path, arguments):
     (tmp_path / "mine").mkdir()
     run(*arguments, "-o", "mine")
     assert list((tmp_path / "mine").iterdir()) == []
-
-
-def test_experiments_are_not_broken_in_the_help(run):
-    _, printed, _ = run("reproduce", "--help")
-    assert "[OPTIONS] EXPERIMENT" in printed
-    for name in ("table2", "table4", "five-gm", "fig4", "appendix-a", "weights4"):
-        assert name in printed

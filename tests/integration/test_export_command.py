@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import yaml
 
 import gmwm
 from gmwm import Channel, GaussMarkov, Recording, WhiteNoise, bound
@@ -53,20 +52,6 @@ def test_horizon_and_form(run, file, calibration):
     assert printed == gmwm.export(calibration, "state-space", form="N+K+GM")
 
 
-def test_numbers_and_two_files(run, tmp_path):
-    for q, rate in (("gyro", 400.0), ("accel", 100.0)):
-        numbers("N+K", quantities=(q,), rate=rate).save(tmp_path / f"{q}.json")
-    code, printed, _ = run("export", "gyro.json", "accel.json", "--to", "kalibr")
-    assert code == 0
-    assert yaml.safe_load(printed)["update_rate"] == 400.0
-
-
-def test_arrays(run, file, tmp_path):
-    code, _, _ = run("export", file, "--to", "state-space", "-o", "model.npz")
-    assert code == 0
-    assert "gyro_x/discrete/F" in np.load(tmp_path / "model.npz")
-
-
 def test_the_list_has_every_program(run):
     code, printed, _ = run("export", "--list")
     assert code == 0
@@ -97,27 +82,6 @@ def test_an_axis_that_is_not_valid_is_exported_by_force_only(run, calibration, t
     replace(calibration, fits=fits).save(tmp_path / "bad.json")
     said = run("export", "bad.json", "--to", "kalibr")[2]
     assert said.endswith("; gyro_x: give the unit; accel_x: cut it off, or add --force\n")
-
-
-def test_the_explanation_is_printed_in_place_of_the_file(run, file, calibration):
-    code, printed, _ = run("export", file, "--to", "vins", "--explain")
-    assert code == 0
-    assert printed == TARGETS["vins"].explain([calibration])
-
-
-def test_calibrate_writes_the_same_file(run, tmp_path):
-    rng = np.random.default_rng(7)
-    rows = rng.normal(size=(3000, 2)) * [1e-3, 1e-2]
-    lines = ["gyro_x,accel_x", *(f"{a:.9g},{b:.9g}" for a, b in rows), ""]
-    (tmp_path / "bench.csv").write_text("\n".join(lines))
-    units = ("--gyro-unit", "rad/s", "--accel-unit", "m/s^2")
-    code, _, _ = run("calibrate", "bench.csv", "--rate", "100", *units, "-o", "out")
-    assert code == 0
-    code, printed, _ = run("export", "out/calibration.json", "--to", "kalibr")
-    assert code == 0
-    *same, run_line = (tmp_path / "out" / "imu.yaml").read_text().splitlines()
-    assert same == printed.splitlines()
-    assert run_line.startswith("# run: calibration.json sha256 ")
 
 
 def test_files_of_two_runs_in_one_folder_are_reported(run, tmp_path):

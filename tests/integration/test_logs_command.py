@@ -5,7 +5,7 @@ import pytest
 import yaml
 
 pytest.importorskip("rosbags")  # where the lowest versions are tested, the extras are absent
-from bags import ROS1, ROS2, at_rest, imu_topic, write1, write2
+from bags import ROS1, at_rest, imu_topic, write1
 
 X = at_rest(2000)
 
@@ -22,28 +22,6 @@ def test_bag_to_kalibr(run, no_pages, tmp_path):
     assert code == 2
     assert "--export" in told and "kalibr" in told
     assert not (tmp_path / "new").exists()
-
-
-def test_a_bag_that_is_a_folder(run, tmp_path):
-    """All was computed, and then a folder has no digest: nothing was written."""
-    write2(tmp_path / "bag", {"/imu": imu_topic(ROS2, X)})
-    code, _, told = run("calibrate", "bag", "--model", "N", "--leave", "all", "-q", "-o", "out")
-    assert (code, told) == (0, "")
-    assert "sha256 of bag/metadata.yaml" in (tmp_path / "out" / "report.html").read_text()
-
-
-def test_accelerometer_alone(run, no_pages, tmp_path):
-    accel = X.copy()
-    accel[:, :3] = 0.0
-    write1(tmp_path / "a.bag", {"/accel": imu_topic(ROS1, accel)})
-    code, _, told = run("health", "a.bag")
-    assert code == 2
-    assert told.count("\n") == 1 and "no angular rates" in told and "--channels accel" in told
-    fixed = ("--channels", "accel", "--model", "N", "--leave", "all", "-q")
-    assert run("calibrate", "a.bag", *fixed)[0] == 0
-    code, _, told = run("calibrate", "a.bag", "--export", "kalibr", *fixed)
-    assert code == 2
-    assert told.count("\n") == 1 and "gyro" in told
 
 
 def test_unit_gate(run, no_pages, tmp_path):

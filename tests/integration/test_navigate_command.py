@@ -3,7 +3,6 @@
 import re
 import shutil
 from functools import partial
-from html.parser import HTMLParser
 from pathlib import Path
 
 import numpy as np
@@ -79,21 +78,6 @@ def test_a_study_prints_tables_and_writes_a_report(studied):
     assert "&lt;b&gt;big" in page
 
 
-def test_the_same_seed_gives_the_same_files(run, studied):
-    written()
-    shutil.copytree(studied[1], "a")
-    run("study.yaml", "-o", "a", "--jobs", 1)
-    for path in (Path("a/validation.txt"), Path("a/validation.html")):
-        assert path.stat().st_mtime_ns > (studied[1] / path.name).stat().st_mtime_ns
-        assert path.read_bytes() == (studied[1] / path.name).read_bytes()
-
-
-def test_another_seed_gives_another_table(run, studied, no_pages):
-    run(written(), "-o", "a", "--jobs", 1, "--seed", 4)
-    rows = [(f / "validation.txt").read_text().splitlines()[1:] for f in (Path("a"), studied[1])]
-    assert rows[0] != rows[1]
-
-
 def test_resume_takes_finished_runs_and_refuses_those_of_another_study(run, studied, no_pages):
     first, folder = studied
     written()
@@ -108,25 +92,6 @@ def test_resume_takes_finished_runs_and_refuses_those_of_another_study(run, stud
     assert "another study" in told
     # The table of the first study is left as it was.
     assert Path("a/validation.txt").read_text() == without_time(first) + "\n"
-
-
-def test_options_go_before_the_file(run, no_pages):
-    written(runs=50, duration=4000)
-    code, printed, _ = run("study.yaml", "--jobs", 1, "--runs", 1, "--duration", 20, "--seed", 7,
-                           "--outage", "8:4", "--filter", "only=truth", "--trajectory",
-                           "loiter")  # fmt: skip
-    assert code == 0
-    assert printed.startswith("loiter: 20 s at 20 Hz, 1 run, seed 7\n")
-    assert "Errors after 4 s without GNSS, at 12 s" in printed
-    assert "big" not in printed
-
-
-def test_a_rate_is_that_of_the_trajectory_and_units_need_an_imu(run, no_pages):
-    code, printed, _ = run(written(rate=None), "--rate", 10, "--runs", 1, "--jobs", 1)
-    assert code == 0
-    assert printed.startswith("car: 30 s at 10 Hz")
-    code, _, told = run("study.yaml", "--gyro-unit", "deg/s")
-    assert (code, "--gyro-unit needs your own data" in told) == (2, True)
 
 
 def test_paths_in_the_file_are_relative_to_it_and_those_of_options_to_here(run, no_pages):
@@ -149,25 +114,6 @@ def test_a_study_from_options_alone(run, no_pages):
                            "--filter", "A=truth", "--runs", 1, "--jobs", 1)  # fmt: skip
     assert code == 0
     assert printed.startswith("car: 15 s at 100 Hz, 1 run, seed 0\n")
-
-
-def test_a_logged_trajectory(run, no_pages):
-    t = np.arange(0.0, 30.1, 0.1)
-    rows = np.stack([t, 46 + 1e-4 * t, 7 + 0 * t, 400 + 0 * t, 0 * t, 0 * t, 0 * t], axis=-1)
-    header = "time_s,latitude_deg,longitude_deg,height_m,roll_deg,pitch_deg,yaw_deg"
-    lines = [header, *(",".join(f"{x:.12g}" for x in row) for row in rows)]
-    Path("log.csv").write_text("\n".join(lines))
-    written(trajectory="log.csv", rate=None, duration=None)
-    code, printed, _ = run("study.yaml", "--jobs", 1)
-    assert code == 0
-    assert printed.startswith("log.csv: 30 s at 10 Hz")
-    code, _, told = run("study.yaml", "--duration", 31)
-    assert (code, "give at most that" in told) == (2, True)
-    # A latitude in degrees that claims to be in radians.
-    Path("log.csv").write_text("\n".join(lines).replace("latitude_deg", "latitude_rad"))
-    code, _, told = run("study.yaml", "--jobs", 1)
-    assert code == 2
-    assert "check the unit in the header" in told
 
 
 BAD = {
@@ -309,14 +255,6 @@ def test_options_that_cannot_be_used(run, arguments, message):
     refused(run(*arguments), message)
 
 
-def test_a_calibration_that_lacks_an_axis(run):
-    calibration(Path("five.json"), AXES[:5])
-    refused(run(written(truth="five.json")), "truth, five.json: sensor models: accel_z has none")
-    refused(
-        run(written(filters={"A": "five.json"})), "filters, A, five.json: sensor models: accel_z"
-    )
-
-
 def test_a_place_that_cannot_be_written_is_refused_before_any_run(run):
     written()
     Path("out/validation.html").mkdir(parents=True)
@@ -330,47 +268,3 @@ def test_a_place_that_cannot_be_written_is_refused_before_any_run(run):
     assert Path("taken/runs").read_text() == "mine"
     code, _, told = run("study.yaml", "-o", "study.yaml", "--jobs", 1)
     assert (code, "cannot be written" in told) == (2, True)
-
-
-def test_real_errors_of_another_rate_are_refused_before_any_run(run):
-    rng = np.random.default_rng(2)
-    rows = np.column_stack([1e-3 * rng.standard_normal((4000, 6))])
-    header = "gyro_x,gyro_y,gyro_z,accel_x,accel_y,accel_z"
-    lines = [header, *(",".join(f"{x:.6g}" for x in row) for row in rows)]
-    Path("static.csv").write_text("\n".join(lines))
-    truth = {"recordings": "static.csv", "rate": 100, "units": {"gyro": "rad/s", "accel": "m/s^2"}}
-    filters = {"A": MODELS}
-    refused(run(written(truth=truth, filters=filters)), "has 100 Hz and the trajectory 20 Hz")
-    truth["rate"] = "20 Hz"
-    refused(run(written(truth=truth)), "real errors have no true model")
-    written(truth=truth, filters=filters, outages=None)
-    code, printed, _ = run("study.yaml", "--jobs", 1, "--runs", 9)
-    assert code == 0
-    assert "6 runs instead of 9" in " ".join(printed.split())
-
-
-class _References(HTMLParser):
-    def __init__(self):
-        super().__init__()
-        self.found = []
-
-    def handle_starttag(self, tag, attrs):
-        self.found += [
-            value for name, value in attrs if name in ("src", "href", "xlink:href", "action")
-        ]
-
-
-def test_the_report_needs_no_network(studied):
-    text = (studied[1] / "validation.html").read_text()
-    page = _References()
-    page.feed(text)
-    assert all(each.startswith("#") for each in page.found)
-    assert "@import" not in text
-    assert "<script" not in text
-
-
-def test_help_shows_the_units_and_an_example(run):
-    code, printed, _ = run("--help")
-    assert code == 0
-    assert "gmwm navigate study.yaml" in printed
-    assert max(map(len, printed.splitlines())) <= 80

@@ -66,25 +66,3 @@ def test_a_data_sheet_and_an_exported_file(report, run, tmp_path):
         [line for line in html.unescape(text).splitlines() if line[:1] not in ("", "#")]
         for text in copied
     ]
-
-
-def test_channels_and_a_stretch(report):
-    text, page = report("--channels", "gyro", "--start", "5", "--stop", "25", "--leave", "all")
-    assert "static.csv: 20 s (5 to 25 s) at 100 Hz." in text
-    assert " 2,000 samples a channel" in text
-    assert "the part from 5 to 25 s is used" in text
-    assert 'id="gyro_y"' in page and 'id="accel_z"' not in page
-
-
-def test_a_file_that_is_kept_on_disk_has_a_report_like_others(report):
-    text, page = report("--memory", "0.0001")
-    assert "the bias stepped" in text
-    assert "plot-series-1" in page
-
-
-def test_several_recordings(report, file, tmp_path):
-    head, *rows = file.read_text().splitlines()
-    (tmp_path / "other.csv").write_text("\n".join([head, *rows[::-1], ""]))
-    text, _ = report("other.csv", "--leave", "all", "--channels", "accel")
-    assert "static.csv and 1 more: 100 s at 100 Hz in 2 recordings." in text
-    assert text.count("sha256 of static.csv") == text.count("sha256 of other.csv") == 1

@@ -46,13 +46,6 @@ def test_page_and_json(run, sheet, tmp_path):
     assert "gyroscope_random_walk" in page
 
 
-def test_the_default_spread_is_that_of_the_interface(run, sheet):
-    code, printed, _ = run("sheet", "sheet.yaml", "--json")
-    assert code == 0
-    found = json.loads(printed)["channels"]["gyro"]["model"]
-    assert found == gmwm.datasheet(sheet).numbers().to_dict()["channels"]["gyro"]["model"]
-
-
 def test_list_and_what_is_missing(run):
     code, printed, _ = run("sheet", "--list")
     assert (code, bool(printed)) == (0, True)
@@ -61,24 +54,3 @@ def test_list_and_what_is_missing(run):
     code, _, said = run("sheet", printed.split()[0], "--unit-spread", "0.5")
     assert code == 2
     assert "give a factor of 1 or more" in said
-
-
-def test_a_sheet_without_slow_noise_tells_its_white_noise(run, tmp_path):
-    (tmp_path / "white.yaml").write_text("gyro: {noise_density: 0.005 deg/s/sqrt(Hz)}")
-    code, printed, _ = run("sheet", "white.yaml")
-    assert code == 0
-    assert "gyro: N 0.212 to 0.3 deg/sqrt(h) or 6.17e-05 to 8.73e-05 rad/s" in printed
-    assert "leaves K open" in printed
-    code, _, said = run("sheet", "white.yaml", "-o", "numbers.json")
-    assert (code, "leaves K open" in said) == (2, True)
-    assert not (tmp_path / "numbers.json").exists()
-
-
-def test_a_sheet_of_one_axis_and_a_larger_form_are_printed_whole(run, tmp_path):
-    sheet = tmp_path / "one.yaml"
-    sheet.write_text("gyro_x: {N: 0.2 deg/sqrt(h), B: 8 deg/h}\n")
-    code, out, _ = run("sheet", sheet)
-    assert code == 0 and "gyro_x                       N 1.17e-04" in out
-    code, out, _ = run("sheet", "stim300", "--form", "N+K+GM")
-    assert code == 0 and out.count("  Gauss-Markov ") == 2
-    assert "gyroscope_random_walk" not in out  # K alone is not the answer

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import pytest
 
-from gmwm.cli.main import cli
 from marks import slow
 from places import REPOSITORY
 
@@ -54,27 +53,6 @@ def test_the_first_page_is_short():
     assert len((REPOSITORY / "README.md").read_text().splitlines()) <= 120
 
 
-def test_a_block_that_fails_is_named(tmp_path):
-    page = tmp_path / "a.md"
-    page.write_text("# Page\n\n```python\nx = 1\n```\n\n```python\nx + y\n```\n")
-    with pytest.raises(AssertionError, match=r"a\.md:7: NameError"):
-        pages.Runner(tmp_path).run(page)
-
-
-@pytest.mark.parametrize(
-    ("text", "problem"),
-    [
-        ("```sh\nrm -rf x\n```\n", "not run: WHY"),
-        ("```sh\ngmwm health nowhere.csv\n```\n", "does not exist"),
-    ],
-)
-def test_commands_are_run(tmp_path, text, problem):
-    page = tmp_path / "page.md"
-    page.write_text(text)
-    with pytest.raises(AssertionError, match=problem):
-        pages.Runner(tmp_path).run(page)
-
-
 def _anchors(text):
     """As GitHub and the site make them of headings."""
     titles = HEADING.findall(CODE.sub("", text))
@@ -111,11 +89,3 @@ def test_files_of_the_source_are_called_so(name):
 def test_every_page_is_on_the_site():
     listed = set(re.findall(r"^[\w-]+$", (DOCS / "index.md").read_text(), re.MULTILINE))
     assert {page.stem for page in DOCS.glob("*.md")} - {"index"} <= listed
-
-
-def test_experiments_on_the_page_of_the_paper_exist():
-    known = next(p for p in cli.commands["reproduce"].params if p.name == "experiment").type.choices
-    text = (DOCS / "the-paper.md").read_text(encoding="utf-8")
-    spans = re.findall(r"`((?:table|fig|em|starts|arma|indirect|appendix)[\w-]*)(?: [^`]*)?`", text)
-    assert set(spans) <= set(known)
-    assert len(set(spans)) > 10

@@ -84,21 +84,3 @@ def test_a_shell_completes_commands_and_options(shell, monkeypatch):
     )
     assert shown.exit_code == 0
     assert "--gyro-unit" in shown.output
-
-
-def test_completion_ends_as_done(monkeypatch, capsys):
-    monkeypatch.setenv("_GMWM_COMPLETE", "zsh_source")
-    with pytest.raises(SystemExit) as stop:
-        cli.main()
-    assert stop.value.code == 0
-    assert "compdef" in capsys.readouterr().out
-
-
-def test_the_command_alone_shows_what_there_is(monkeypatch, capsys):
-    monkeypatch.setattr("sys.argv", ["gmwm"])
-    with pytest.raises(SystemExit) as stop:
-        cli.main()
-    printed, refused = capsys.readouterr()
-    assert (stop.value.code, refused) == (0, "")
-    assert printed.count("\n") > 10
-    assert printed.startswith("Usage: gmwm [OPTIONS]")

@@ -2,14 +2,12 @@
 
 import copy
 import json
-import os
 
 import numpy as np
 import pytest
 
 import gmwm
 from gmwm import InputError
-from gmwm._core import memory
 
 RNG = np.random.default_rng(3)
 X = RNG.normal(size=700) + np.cumsum(0.05 * RNG.normal(size=700))
@@ -128,38 +126,3 @@ def test_what_is_nested_deeply_is_refused(tmp_path, depth):
     path = tmp_path / "deep.json"
     path.write_text('{"schema": "gmwm.calibration", "channels": ' + "[" * depth + "]" * depth + "}")
     assert "is not JSON" in refusal(path)
-
-
-def test_a_file_that_no_result_has_is_not_read(stored, tmp_path, monkeypatch):
-    monkeypatch.setenv(memory.VARIABLE, "1e-5")
-    path = stored["calibration"].save(tmp_path / "stored.json")
-    assert "of memory, and 1e-05 GB may be used" in refusal(path)
-
-
-def test_a_long_value_is_not_quoted_whole(stored, tmp_path):
-    path = tmp_path / "stored.json"
-    content = stored["calibration"].to_dict() | {"rate_hz": "x" * 5000}
-    path.write_text(json.dumps(content))
-    assert "rate_hz = 'xxx" in refusal(path)
-    path.write_text(json.dumps(content | {"schema_version": ["x" * 5000]}))
-    assert "schema version" in refusal(path)
-
-
-def test_texts_of_a_file_keep_to_one_line(stored, tmp_path):
-    content = json.loads(json.dumps(stored["calibration"].to_dict()))
-    content["source"] = "a\nb\x1b[31m\u202e"
-    content["channels"]["c\nd"] = content["channels"].pop("gyro_x")
-    path = tmp_path / "stored.json"
-    path.write_text(json.dumps(content))
-    again = gmwm.load(path)
-    assert again.source == "a b\\x1b[31m\\u202e"
-    assert "c d" in again
-
-
-def test_a_pipe_is_refused_before_it_is_opened(tmp_path):
-    path = tmp_path / "pipe"
-    os.mkfifo(path)
-    with pytest.raises(InputError, match="pipe is a pipe or a device: write its content to a file"):
-        gmwm.load(path)
-    with pytest.raises(InputError, match="pipe is a pipe or a device: write its content to a file"):
-        gmwm.read(path)

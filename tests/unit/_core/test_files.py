@@ -2,11 +2,10 @@
 
 import errno
 import os
-import shutil
 
 import pytest
 
-from gmwm._core.files import folder_to_fill, moved_together, one_writer, written
+from gmwm._core.files import folder_to_fill, moved_together, written
 from gmwm.errors import InputError
 
 
@@ -59,16 +58,6 @@ def test_permissions_are_those_of_any_new_file(tmp_path):
     assert (tmp_path / "out.txt").stat().st_mode & 0o777 == 0o640
 
 
-def test_missing_folder(tmp_path):
-    path = tmp_path / "nowhere" / "out.txt"
-    with pytest.raises(InputError) as caught, written(path) as stream:
-        stream.write("x")
-    message = str(caught.value)
-    assert message.startswith(f"{path}: cannot be written (")
-    assert ": choose another place" in message
-    assert names(tmp_path) == []
-
-
 def test_a_file_for_a_folder_and_a_folder_for_a_file(tmp_path):
     (tmp_path / "file").write_text("x")
     (tmp_path / "folder").mkdir()
@@ -79,35 +68,7 @@ def test_a_file_for_a_folder_and_a_folder_for_a_file(tmp_path):
     assert names(tmp_path) == ["file", "folder"]
 
 
-@pytest.mark.skipif(os.name != "posix" or os.geteuid() == 0, reason="root may write anywhere")
-def test_folder_without_permission(tmp_path):
-    folder = tmp_path / "locked"
-    folder.mkdir(mode=0o500)
-    with pytest.raises(InputError, match="Permission denied"), written(folder / "out.txt"):
-        pass
-    with pytest.raises(InputError, match="Permission denied"), folder_to_fill(folder):
-        pass
-
-
 # -- folders --------------------------------------------------------------------------------------
-
-
-def test_a_folder_is_made_with_its_parents_and_keeps_what_is_there(tmp_path):
-    with folder_to_fill(tmp_path / "a" / "b") as folder:
-        assert folder == tmp_path / "a" / "b"
-        (folder / "calibration.json").write_text("old")
-    with folder_to_fill(str(folder)):
-        assert names(folder) == ["calibration.json"]
-    assert (folder / "calibration.json").read_text() == "old"
-
-
-def test_a_file_in_the_way_of_a_folder(tmp_path):
-    (tmp_path / "file").write_text("x")
-    for path in (tmp_path / "file", tmp_path / "file" / "under"):
-        with pytest.raises(InputError) as caught, folder_to_fill(path):
-            pass
-        assert str(caught.value).startswith(f"{path}: cannot be written (")
-    assert (tmp_path / "file").read_text() == "x"
 
 
 def test_a_folder_is_tried_before_any_work(tmp_path, monkeypatch):
@@ -134,11 +95,3 @@ def test_files_of_one_run_stand_together(tmp_path):
     assert {path.name: path.read_text() for path in tmp_path.iterdir()} == dict.fromkeys(
         "abc", "new"
     )
-
-
-def test_a_folder_that_was_removed_meanwhile_hides_no_error(tmp_path):
-    folder = tmp_path / "out"
-    folder.mkdir()
-    with pytest.raises(InputError, match="cannot be written"), one_writer(folder):
-        shutil.rmtree(folder)
-        raise InputError("cannot be written")

@@ -1,6 +1,5 @@
 """Runs of a study: the same whoever does them, kept when interrupted, never mixed up."""
 
-import json
 import logging
 import os
 import signal
@@ -14,7 +13,6 @@ import numpy as np
 import pytest
 
 from gmwm import InputError
-from gmwm._core import runs as engine
 from gmwm._core.runs import do_runs
 
 STUDY = {"name": "squares", "seed": 1}
@@ -42,16 +40,6 @@ def test_runs_are_stacked_in_order():
     assert found["rows"].shape == (12, 2, 3)
 
 
-def test_processes_give_what_one_gives():
-    same(do_runs(squares, 12, STUDY, jobs=2), do_runs(squares, 12, STUDY))
-
-
-def test_progress_counts_finished_runs():
-    seen = []
-    do_runs(squares, 3, STUDY, progress=lambda *state: seen.append(state))
-    assert seen == [(done, 3, "") for done in range(4)]
-
-
 def test_an_interrupted_study_goes_on_where_it_stopped(tmp_path):
     made = []
 
@@ -69,13 +57,6 @@ def test_an_interrupted_study_goes_on_where_it_stopped(tmp_path):
     assert seen == [3, 4, 5, 6]
     same(again, do_runs(squares, 6, STUDY))
     assert parts(tmp_path) == ["part-00000.npz", "part-00001.npz"]
-
-
-def test_runs_are_kept_every_few_seconds(tmp_path, monkeypatch):
-    monkeypatch.setattr(engine, "_SECONDS_PER_PART", -1.0)
-    do_runs(squares, 3, STUDY, folder=tmp_path)
-    assert len(parts(tmp_path)) == 3
-    same(do_runs(None, 3, STUDY, folder=tmp_path), do_runs(squares, 3, STUDY))
 
 
 def test_fewer_runs_are_taken_from_more_and_more_are_added(tmp_path):
@@ -102,13 +83,6 @@ def test_runs_of_another_study_are_not_mixed_in(tmp_path, change, other):
         do_runs(squares, 3, STUDY | change, folder=tmp_path)
     assert caught.value.code == "other-runs"
     assert parts(tmp_path) == ["part-00000.npz"]
-
-
-def test_nor_those_of_another_version(tmp_path, monkeypatch):
-    do_runs(squares, 2, STUDY, folder=tmp_path)
-    monkeypatch.setattr("gmwm._core.__version__", "0.0.0")
-    with pytest.raises(InputError, match=r"other version"):
-        do_runs(squares, 2, STUDY, folder=tmp_path)
 
 
 @pytest.mark.parametrize("damage", ["empty", "cut", "text", "bits", "other", "no array"])
@@ -139,13 +113,6 @@ def test_runs_of_a_damaged_file_are_done_again(tmp_path, damage, caplog):
     same(do_runs(None, 5, STUDY, folder=tmp_path), found)
 
 
-def test_a_file_says_what_it_holds(tmp_path):
-    do_runs(squares, 2, STUDY, folder=tmp_path)
-    with np.load(tmp_path / "part-00000.npz") as content:
-        assert json.loads(str(content["study"])).items() >= STUDY.items()
-        assert content["run"].tolist() == [0, 1]
-
-
 def test_a_folder_has_one_writer(tmp_path):
     def second(run):
         with pytest.raises(InputError, match="is in use") as caught:
@@ -155,19 +122,6 @@ def test_a_folder_has_one_writer(tmp_path):
 
     do_runs(second, 1, STUDY, folder=tmp_path)
     do_runs(squares, 2, STUDY, folder=tmp_path)
-
-
-def test_failed_work_leaves_no_empty_folder(tmp_path):
-    with pytest.raises(ZeroDivisionError):
-        do_runs(lambda run: 1 / run, 2, STUDY, folder=tmp_path / "new" / "runs")
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_a_file_is_no_folder(tmp_path):
-    path = tmp_path / "file"
-    path.write_text("something")
-    with pytest.raises(InputError, match="cannot be written"):
-        do_runs(squares, 1, STUDY, folder=path)
 
 
 # ---- Processes that end ----

@@ -4,7 +4,6 @@ from math import pi, sqrt
 
 import pytest
 
-from gmwm._core import units
 from gmwm._core.units import SI_UNIT, factor, field_units, quantity_of, si_parameter_unit as spelled
 from gmwm.errors import InputError
 from gmwm.process import CATALOGUE
@@ -90,40 +89,9 @@ def test_unknown_unit_is_refused_with_examples(unit):
     assert "\n" not in message
 
 
-@pytest.mark.parametrize(
-    ("unit", "si_unit"),
-    [
-        ("g", "rad/s"),
-        ("deg/s", "m/s^2"),
-        ("deg", "rad/s"),
-        ("Hz", "rad/s"),  # the angle is a dimension: a frequency is no angular rate
-        ("m/s", "m/s^2"),
-        ("deg/s", "rad/s/sqrt(Hz)"),
-    ],
-)
-def test_unit_of_another_kind_is_refused(unit, si_unit):
-    with pytest.raises(InputError) as caught:
-        factor(unit, si_unit)
-    message = str(caught.value)
-    assert repr(unit) in message
-    assert si_unit in message
-    assert "use a unit of that kind" in message
-
-
 def test_quantity_of():
     assert {quantity_of(unit) for unit in ("rad/s", "deg/s", "deg/h", "mdeg/s")} == {"gyro"}
     assert {quantity_of(unit) for unit in ("m/s^2", "g", "mg", "ug")} == {"accel"}
-
-
-@pytest.mark.parametrize(
-    ("unit", "words"),
-    [(unit, "use one such as deg/s or g") for unit in ("m", "deg", "Hz", "deg/sqrt(h)")]
-    + [("furlong", "unknown unit 'furlong'")],
-)
-def test_a_unit_of_no_sensor_is_refused_with_the_hint(unit, words):
-    with pytest.raises(InputError, match=words) as caught:
-        quantity_of(unit)
-    assert repr(unit) in str(caught.value)
 
 
 @pytest.mark.parametrize(
@@ -153,19 +121,6 @@ def test_field_units(quantity, parameter_unit, expected):
         assert item.per_si == pytest.approx(per_si, rel=1e-12, abs=0.0)
 
 
-@pytest.mark.parametrize(
-    ("quantity", "base", "rate"),
-    [("gyro", "rad/s", "rad/s^2"), ("accel", "m/s^2", "m/s^3"), (None, "u", "u/s")],
-)
-def test_si_parameter_unit(quantity, base, rate):
-    for unit in ("u", "u s", "u/sqrt(Hz)"):
-        assert spelled(unit, quantity) == base + unit[1:]
-    for unit in ("u/s", "u/s/sqrt(Hz)"):
-        assert spelled(unit, quantity) == rate + unit[3:]
-    for unit in ("s", "Hz", "-"):
-        assert spelled(unit, quantity) == unit
-
-
 @pytest.mark.parametrize("quantity", ["gyro", "accel"])
 @pytest.mark.parametrize("unit", [unit for unit in PARAMETER_UNITS if unit.startswith("u")])
 def test_spelled_units_of_all_processes_measure_what_they_say(unit, quantity):
@@ -179,14 +134,3 @@ def test_first_order_parameters_of_all_processes_have_a_field_unit(quantity):
     for unit in PARAMETER_UNITS:
         expected = unit.startswith("u") and unit != "u^2"
         assert bool(field_units(unit, quantity)) is expected, unit
-
-
-def test_usual_units_are_as_pint_has_them(monkeypatch):
-    usual = dict(units._USUAL)
-    for si_unit in usual:
-        monkeypatch.setitem(units._USUAL, si_unit, {})
-    for si_unit, known in usual.items():
-        for unit, expected in known.items():
-            assert factor.__wrapped__(unit, si_unit) == expected
-    for quantity, si_unit in SI_UNIT.items():
-        assert {quantity_of.__wrapped__(unit) for unit in usual[si_unit]} == {quantity}

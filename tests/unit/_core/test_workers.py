@@ -9,7 +9,7 @@ import pytest
 
 from gmwm import InputError
 from gmwm._core import jobs
-from gmwm._core.jobs import extra_workers, results, shared, worker_pool
+from gmwm._core.jobs import results, shared, worker_pool
 
 
 class Square:
@@ -34,11 +34,6 @@ def test_what_a_killed_process_was_at_is_done_again(tmp_path):
     assert sorted(found) == [(n, -4 if n == 4 else n**2) for n in range(8)]
     assert jobs.ENDED <= len(list(tmp_path.glob("4-*"))) <= 2 + jobs.ENDED
     assert str(os.getpid()) not in {path.name.partition("-")[2] for path in tmp_path.iterdir()}
-
-
-def test_one_job_does_the_work_itself(tmp_path):
-    assert dict(results(Square(tmp_path), (3, 2))) == {3: 9, 2: 4}
-    assert {path.name.partition("-")[2] for path in tmp_path.iterdir()} == {str(os.getpid())}
 
 
 def test_a_lost_item_is_an_error_by_default(tmp_path, monkeypatch):
@@ -112,11 +107,3 @@ def test_no_thread_that_gives_semaphores_back_is_left_for_the_end_of_this_proces
         with worker_pool(1, "os:getpid"):
             assert dict(shared(abs, [-1, 2])) == {-1: 1, 2: 2}
         assert set(threading.enumerate()) <= before
-
-
-def test_there_are_never_more_processes_than_cores_or_items(monkeypatch):
-    monkeypatch.setattr(os, "cpu_count", lambda: 4)
-    assert [extra_workers(jobs, 3) for jobs in (1, 2, 9, -1)] == [0, 1, 2, 2]
-    assert extra_workers(9, 8) == 3
-    with pytest.raises(InputError, match="jobs = 0"):
-        extra_workers(0, 3)

@@ -4,9 +4,7 @@ import subprocess
 import sys
 
 import pytest
-from click.testing import CliRunner
 
-import gmwm
 from gmwm.cli.main import _run, cli
 
 
@@ -60,17 +58,3 @@ def test_only_what_is_printed_is_trouble_with_the_output(tmp_path, number):
     assert done.returncode == 2
     assert "gmwm: the system cannot open a file or start a process (" in done.stderr
     assert "output" not in done.stderr and "Traceback" not in done.stderr
-
-
-def test_help_and_errors_name_every_term_that_a_model_may_have():
-    from gmwm.cli.options import written_models
-    from gmwm.process import CATALOGUE
-
-    names = [kind.short_name for kind in CATALOGUE]
-    assert [type(written_models([each])[""].terms[0]) for each in names] == list(CATALOGUE)
-    with pytest.raises(gmwm.InputError) as error:
-        written_models(["low-pass noise"])
-    listed = str(error.value).partition(": write ")[2].partition(" with +")[0].split(", ")
-    assert {*names} <= {*listed}  # and processes that other tests define
-    shown = " ".join(CliRunner().invoke(cli, ["calibrate", "--help"]).output.split())
-    assert ", ".join(name for name in listed if name in names) in shown

@@ -6,7 +6,6 @@ import pytest
 
 import gmwm
 from gmwm import FilterNumbers, GaussMarkov, WhiteNoise
-from gmwm.cli.numbers import _numbers
 
 MODELS = {
     "gyro_x": WhiteNoise(1e-4) + GaussMarkov(2e-3, 3.0),
@@ -49,20 +48,6 @@ def test_options_reach_the_bound(run, calibration):
     assert found["gyro_x"].tau == (2.5,)
     assert found["gyro_x"].initial_sd >= 0.01 > found["accel_x"].initial_sd
     assert not any(n.code == "uncertainty-not-covered" for n in found.notices)
-
-
-def test_one_correlation_time_may_be_asked_for(run, calibration):
-    _, printed, _ = run("bound", calibration, "--form", "N+GM", "--tau", "shared", "--json")
-    found = FilterNumbers.from_dict(json.loads(printed))
-    assert found["gyro_x"].tau == found["accel_x"].tau
-    code, _, error = run("bound", calibration, "--form", "N+GM", "--tau", "one")
-    assert code == 2
-    assert "--tau one: write seconds" in error
-
-
-def test_the_bias_at_switch_on_is_asked_for(run, calibration):
-    for given, asked in (((), True), (("--gyro-bias", 0.01, "--accel-bias", 0.1), False)):
-        assert ("--gyro-bias and --accel-bias" in run("bound", calibration, *given)[1]) == asked
 
 
 def test_reduce(run, calibration):
@@ -150,9 +135,3 @@ def test_bad_input_is_one_sentence(run, calibration, arguments, message):
     assert printed == ""
     assert message in told
     assert told.count("\n") == 1
-
-
-def test_numbers_of_one_kind_of_sensor_are_single(calibration):
-    found = gmwm.load(calibration)
-    gyros = gmwm.Calibration({"gyro_x": found["gyro_x"]}, {}, "", 10.0, 3000)
-    assert _numbers(None, "1e-4", "1e-6", gyros) == {"gyro": (1e-4, 1e-6)}

@@ -33,38 +33,11 @@ def drawn_deviation(**options):
     return plot.deviation(TAU, VALUE, 0.5 * VALUE, 3.0 * VALUE, unit="m/s^2", **options)
 
 
-def test_deviation_is_log_log_with_units_on_both_axes():
-    axes = drawn_deviation(title="accel_x")
-    assert (axes.get_xscale(), axes.get_yscale()) == ("log", "log")
-    assert axes.get_xlabel() == "averaging time [s]"
-    assert axes.get_ylabel() == "Allan deviation [m/s^2]"
-    assert axes.get_title() == "accel_x"
-
-
-def test_deviation_draws_the_data_and_their_intervals():
-    (container,) = drawn_deviation().containers
-    points, _, (bars,) = container.lines
-    np.testing.assert_array_equal(points.get_xdata(), TAU)
-    np.testing.assert_array_equal(points.get_ydata(), VALUE)
-    ends = np.array([segment[:, 1] for segment in bars.get_segments()])
-    np.testing.assert_allclose(ends, np.column_stack([0.5 * VALUE, 3.0 * VALUE]))
-    assert container.get_label() == "data, 95 % interval"
-
-
 def test_an_interval_beside_its_value_does_no_harm():
     axes = plot.deviation(TAU, VALUE, 1.1 * VALUE, 1.2 * VALUE, unit="u")
     axes.figure.canvas.draw()
     (bars,) = axes.containers[0].lines[2]
     assert min(segment[:, 1].min() for segment in bars.get_segments()) >= VALUE.min()
-
-
-def test_given_axes_are_drawn_into_and_returned():
-    _, mine = plt.subplots()
-    count = len(plt.get_fignums())
-    assert drawn_deviation(ax=mine) is mine
-    assert len(mine.containers) == 1
-    assert len(plt.get_fignums()) == count
-    assert drawn_deviation() is not mine
 
 
 def test_results_draw_into_given_axes(fit):
@@ -108,15 +81,6 @@ def test_units_of_the_field_or_si(fit):
             result.plot(units="imperial")
 
 
-def test_components_of_zero_are_left_out(fit):
-    series = WhiteNoise(1.0).simulate(3000, 1.0, 4)
-    flat = gmwm.fit(WhiteNoise() + RandomWalk(), series, dt=1.0)
-    assert flat.params["K"] == 0.0
-    texts = [text.get_text() for text in flat.plot().get_legend().get_texts()]
-    assert "random walk" not in texts
-    assert "white noise" in texts
-
-
 def test_a_kind_has_one_colour_whatever_is_drawn_with_it():
     first = dict(zip(labels := ["white noise", "Gauss-Markov"], plot.styles(labels), strict=True))
     labels = ["Gauss-Markov 1", "own process", "Gauss-Markov 2", "random walk", "white noise"]
@@ -148,17 +112,6 @@ def test_sensor_numbers_are_read_at_one_and_three_seconds():
     assert plot.sensor_lines({"N": ("", 0.0), "K": ("", np.inf)}, 8.0) == {}
 
 
-def test_axis_hides_negligible_components_but_not_the_model():
-    low, high = plot.deviation_range(VALUE)
-    assert low < VALUE.min()
-    assert high > VALUE.max()
-    axes = drawn_deviation()
-    plot.curves(axes, TAU, VALUE, {"negligible": 1e-6 * VALUE})
-    bottom, top = axes.get_ylim()
-    assert 1e-2 * VALUE.min() < bottom < VALUE.min()
-    assert VALUE.max() < top < 1e2 * VALUE.max()
-
-
 def test_data_stay_in_view_where_the_model_misses_them():
     fitted = gmwm.fit(RandomWalk(), WhiteNoise(1.0).simulate(4000, 1.0, 2), dt=1.0)
     deviation = fitted.wv.allan_deviation
@@ -166,12 +119,3 @@ def test_data_stay_in_view_where_the_model_misses_them():
     bottom, top = fitted.plot().get_ylim()
     assert bottom < deviation.min()
     assert deviation.max() < top
-
-
-def test_a_box_much_narrower_than_the_others_does_not_cut_them_off():
-    rng = np.random.default_rng(1)
-    wide = {name: rng.normal(10.0, 1.0, 200) for name in ("a", "b", "c")}
-    figure = plot.boxes({"x": {**wide, "narrow": rng.normal(1.0, 0.01, 200)}}, {"x": 10.0})
-    low, high = figure.axes[0].get_ylim()
-    assert low < 1.0 < 12.0 < high
-    plt.close(figure)

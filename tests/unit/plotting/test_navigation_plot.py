@@ -19,18 +19,6 @@ def panel(scale=1.0, n=50):
     return time, RNG.standard_normal((n, 3)), sd
 
 
-def test_names_are_shown_as_they_are_written():
-    names = ["_x", "a$b$c", r"$\foo$", "<b>", "x" * 60, "truth"]
-    path = np.column_stack([np.arange(5.0), np.arange(5.0)])
-    figure = navigation_plot.track(path, {"run 1": path}, {name: [path] for name in names})
-    figure.canvas.draw()
-    shown = [text.get_text() for text in figure.legends[0].get_texts()][3:]
-    assert len(shown) == len(names)
-    assert shown[0] == " _x"
-    assert shown[1] == r"a\$b\$c"
-    assert len(shown[4]) == 24
-
-
 def test_errors_have_a_panel_a_component_with_all_filters():
     figure = navigation_plot.errors(
         {str(i): panel() for i in range(4)}, [(10.0, 20.0)], title="run 1"
@@ -54,21 +42,3 @@ def test_a_timid_filter_does_not_hide_the_errors_of_the_others():
     low, high = ax.get_ylim()
     assert low == 0.0
     assert 9.0 < high < 30.0
-
-
-def test_a_large_error_is_in_view():
-    time, error, sd = panel()
-    error[30, 0] = 1e4
-    figure = navigation_plot.errors({"bold": (time, error, sd)})
-    assert figure.axes[0].get_ylim()[1] > 1e4
-
-
-def test_what_never_was_is_drawn_as_nothing():
-    nothing = np.zeros((0, 2))
-    path = np.column_stack([np.arange(5.0), np.arange(5.0)])
-    navigation_plot.track(path, {"outage": path}, {"diverged": [nothing]}).canvas.draw()
-    empty = np.zeros(0), np.zeros((0, 3)), np.zeros((0, 3))
-    navigation_plot.errors({"diverged": empty, "usual": panel()}).canvas.draw()
-    navigation_plot.track(path, {}, {}).canvas.draw()
-    navigation_plot.measured_track(path, path, nothing).canvas.draw()
-    navigation_plot.innovations({"position [m]": panel()}).canvas.draw()

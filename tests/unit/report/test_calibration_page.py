@@ -8,30 +8,22 @@ from hashlib import sha256
 from html import escape
 from html.parser import HTMLParser
 
-import matplotlib.pyplot as plt
 import numpy as np
 import pytest
-import yaml
 
 import gmwm
-from gmwm import Channel, InputError, Process, RandomWalk, WhiteNoise, parameter
-from gmwm.calibration import axis_numbers
-from gmwm.cli.console import in_options
+from gmwm import InputError, WhiteNoise
 from gmwm.datasheet import read_datasheet
 from gmwm.issues import Notice
-from gmwm.plotting import COMPONENT_COLOURS
-from gmwm.report import figure as figures, write_report
-from gmwm.report.calibration import _needed as needed, first_screen, page
+from gmwm.report import write_report
+from gmwm.report.calibration import first_screen, page
 from gmwm.report.figure import (
     density_figure,
-    deviation_figure,
     leftover_figures,
-    residual_figure,
     series_figure,
 )
-from gmwm.report.health import health, trust
-from gmwm.report.numbers import certified, navigation
-from gmwm.report.page import duration_text, resource
+from gmwm.report.health import health
+from gmwm.report.numbers import certified
 
 VOID = {"meta", "wbr", "link", "br", "img", "input", "hr"}
 NAVIGATION = "plot-navigation"
@@ -178,27 +170,6 @@ def test_every_channel_is_there(parsed, calibration):
     assert drawn == plots
 
 
-def test_the_page_says_what_was_found(parsed, calibration):
-    fit = calibration["gyro_x"]
-    notices = [notice for fit in calibration.fits.values() for notice in fit.notices]
-    notes = gmwm.error_budget(calibration).notes
-    assert notices and notes, "the fixture must have some"
-    for words in (
-        "80 s at 100 Hz. Usable: gyro_x and voltage. Not valid: accel_x. No model: gyro_y.",
-        "8,000 samples a channel",
-        f"gmwm {gmwm.__version__}, numpy",
-        "Column not used: 'temp'",
-        f"objective {fit.objective:.4g} on {fit.dof} degrees of freedom",
-        *(notice.sentence for notice in notices),
-        *(f"{note[0].upper()}{note[1:]}." for note in notes),
-    ):
-        assert words in parsed.text
-    assert ["gyro_y", "no model: constant at 0 rad/s"] in parsed.cells
-    # What is not valid is said before the headline.
-    warned = parsed.text.index("The model of accel_x is not valid: read the notices first.")
-    assert warned < parsed.text.index("After a 60 s outage")
-
-
 def test_the_sensor_table_has_the_numbers_of_the_calibration(parsed, calibration):
     rows = {row[0]: row[1:] for row in reversed(parsed.cells) if row}
     for name, axis in calibration.numbers.items():
@@ -215,45 +186,6 @@ def test_the_sensor_table_has_the_numbers_of_the_calibration(parsed, calibration
         "B, bias instabilitydeg/hrad/s",
         "K, rate random walkdeg/h/sqrt(h)rad/s^2/sqrt(Hz)",
     ]
-
-
-def test_numbers_that_are_not_valid_are_marked(calibration):
-    assert not calibration["accel_x"].valid
-    found = certified(calibration)
-    warnings = [row["warning"] for row in first_screen(calibration, found)["filter"]]
-    short = "use N alone: too short for 60 s"
-    assert warnings == [short, "do not use yet: accel_x is not valid"]
-    fits = {name: replace(fit, notices=()) for name, fit in calibration.items()}
-    right = first_screen(right := replace(calibration, fits=fits), certified(right))
-    assert [row["warning"] for row in right["filter"]] == [short, short]
-    assert all(row["why"] == "" for table in right["sensors"] for row in table["rows"])
-    as_yaml, as_python = (found.texts[f"{each}, axis by axis"] for each in ("YAML", "Python"))
-    for text in (as_yaml, as_python):
-        (line,) = [line for line in text.splitlines() if "# the fit failed" in line]
-        assert "accel_x" in line
-    spaces = {}
-    exec(compile(as_python, "text", "exec"), spaces)
-    assert yaml.safe_load(as_yaml) == spaces["imu_noise"]
-
-
-def test_how_well_a_curve_fits_is_said_of_the_levels_that_tell(calibration):
-    fit = calibration["gyro_x"]
-    at = fit.goodness
-    known = at.tau[at.dof > 30.0]
-    assert at.known_to == known[-1] < fit.wv.tau[-1]
-    share = 100.0 * np.max(np.abs(at.misfit[at.dof > 30.0]))
-    assert trust("gyro_x", fit, calibration)[1] == (
-        f"within {share:.2g} % of the data up to {known[-1]:.2g} s"
-    )
-
-
-def test_one_p_value_and_one_misfit(calibration):
-    misfit = Notice("misfit", "note", "", "describes the Allan deviation to 7 %")
-    fit = replace(calibration["gyro_x"], discrepancy=0.01, notices=(misfit,))
-    shown = Page(page(replace(calibration, fits={"gyro_x": fit})))
-    assert shown.text.count("p = ") == 1
-    assert f"p = {fit.p_value_allowed:.2g} with a model error of 1 % of the variance" in shown.text
-    assert "to 7 %" not in shown.text
 
 
 def test_parameters_in_si_and_in_the_units_of_the_field(parsed, calibration):
@@ -276,30 +208,6 @@ def test_parameters_in_si_and_in_the_units_of_the_field(parsed, calibration):
         ), unit
 
 
-def test_interval_error_and_length_of_a_parameter(parsed, calibration):
-    fit = calibration["gyro_x"]
-    (row,) = [row for row in parsed.cells if row[4:5] == ["rad/s/sqrt(Hz)"]]
-    found = [float(text) for text in row[3].split(" to ")]
-    assert found == pytest.approx(fit.interval()["N"], rel=1e-3)
-    first = next(row for row in parsed.cells if row[4:5] == ["deg/sqrt(h)"])
-    assert first[:2] == ["N", "white noise"]
-    assert first[5:] == [f"{100 * fit.stderr['N'] / fit.params['N']:.2g} %", "long enough"]
-    bounded = next(row for row in parsed.cells if row[0] == "K" and row[2].startswith("<"))
-    assert bounded[5:] == ["", "not identified"]
-
-
-def test_upper_bounds_are_shown_as_such(parsed, calibration):
-    bounds = calibration["accel_x"].upper_bounds
-    assert bounds, "the fixture must have one"
-    shown = [row for row in parsed.cells if row[3:4] == ["95 % upper limit"]]
-    for key in bounds:
-        row = next(row for row in shown if row[0] == key)
-        assert row[2].startswith("< ")
-        assert float(row[2][2:].replace(",", "")) == pytest.approx(
-            calibration["accel_x"][key].usual.upper, rel=1e-3
-        )
-
-
 # -- what it means for navigation -----------------------------------------------------------------
 
 
@@ -318,66 +226,6 @@ def test_the_error_budget_is_in_the_report(parsed, calibration):
         assert re.fullmatch(r"gyro_x .*, \d+ %", row[6])
     head = next(row for row in parsed.cells if row[0] == "error after an outage of (1 sigma)")
     assert head[1:5] == ["1 s", "10 s", "60 s", "600 s"]
-
-
-def test_every_term_of_the_error_budget_is_listed(parsed, calibration):
-    budget = gmwm.error_budget(calibration)
-    shown = [
-        tuple(row[:3]) for row in parsed.cells if len(row) == 8 and row[0].split()[0] in calibration
-    ]
-    marks = {name: "" if fit.valid else " not valid" for name, fit in calibration.items()}
-    assert shown == [
-        (r.channel + marks[r.channel], r.component, r.quantity)
-        for r in budget.rows
-        if any(r.values)
-    ]
-
-
-def test_the_headline_of_a_minute(parsed, calibration):
-    budgets = [gmwm.error_budget(calibration, [60.0], calibrated=c) for c in (True, False)]
-    metres = [budget.total()["position"][0] for budget in budgets]
-    sentence = re.search(r"After a 60 s outage from exact .*? unknown\.", parsed.text).group()
-    found = re.findall(r"([\d.,]+) m of horizontal position", sentence)
-    assert [float(text.replace(",", "")) for text in found] == pytest.approx(metres, rel=6e-3)
-
-
-def test_the_growth_figure(parsed, calibration):
-    figure = parsed.navigation_figure()
-    names = [trace["name"] for trace in figure["data"]]
-    assert names == ["gyro_x", "accel_x", "total, slow errors known", "total, nothing known"]
-    assert figure["layout"]["yaxis"]["title"]["text"] == "Horizontal position [m]"
-    for trace, calibrated in zip(figure["data"][2:], (True, False), strict=True):
-        total = gmwm.error_budget(calibration, calibrated=calibrated).total()["position"]
-        assert [trace["y"][0], trace["y"][-1]] == pytest.approx(total[[0, -1]], rel=1e-4)
-
-
-def test_without_inertial_sensors_nothing_is_said_of_navigation(calibration):
-    fits = {"voltage": calibration["voltage"]}
-    shown = Page(page(replace(calibration, fits=fits)))
-    headings = [a.get("id") for t, a in shown.elements if t == "h2"]
-    assert headings[-3:] == ["health", "by-axis", "voltage"]
-
-
-def test_a_channel_without_an_axis_has_rows_of_its_own(calibration):
-    fits = {"gyro": calibration["gyro_x"]}
-    shown = Page(page(replace(calibration, fits=fits)))
-    names = [row[0] for row in shown.cells if row[:1] and row[0].startswith("gyro ")]
-    assert names[:3] == ["gyro attitude", "gyro velocity", "gyro position"]
-    assert "After a 60 s outage" not in shown.text
-
-
-def test_a_term_without_a_budget_is_told(calibration):
-    fit = calibration["gyro_x"]
-    odd = replace(fit, model=fit.model + OnlySimulated(1.0))
-    content = navigation(replace(calibration, fits={"gyro_x": odd}))
-    assert content["problem"].startswith("OnlySimulated can only be simulated")
-
-
-class OnlySimulated(Process):
-    level: float = parameter("u")
-
-    def draw(self, n, dt, rng):
-        return self.level * rng.standard_normal(n)
 
 
 # -- figures --------------------------------------------------------------------------------------
@@ -433,88 +281,12 @@ def test_marks_are_the_sensor_numbers_and_the_curve_is_that_of_the_filter(parsed
     assert float(own["nees"]) == pytest.approx(numbers.nees[60.0], rel=0.05)
 
 
-def test_the_band_is_the_interval_of_the_curve(parsed, calibration):
-    fit = calibration["gyro_x"]
-    low, high = parsed.figures()[0]["data"][:2]
-    per_si = 180.0 / np.pi * 3600.0
-    _, *ends = fit.deviation_interval(np.array(low["x"]), rivals=())
-    for trace, end in zip((low, high), ends, strict=True):
-        assert trace["y"] == pytest.approx(per_si * end, rel=1e-3)
-
-
-def test_a_kind_of_term_has_one_colour_on_every_figure(calibration):
-    noise = gmwm.LowPassNoise(3e-4, bandwidth=20.0, order=1.0, damping=0.7071)
-    models = (
-        WhiteNoise(4e-4) + RandomWalk(3e-4) + gmwm.GaussMarkov(1e-3, 3.0),
-        RandomWalk(3e-4) + gmwm.GaussMarkov(1e-3, 1.0) + gmwm.GaussMarkov(1e-3, 30.0) + noise,
-    )
-    seen = {}
-    for model in models:
-        fit = replace(calibration["gyro_x"], model=model, keys=(), covariance=np.zeros((0, 0)))
-        drawn = {label: line.get_color() for label, line in lines_of(fit.plot()).items()}
-        for trace in deviation_figure(fit, calibration.numbers["gyro_x"])["data"]:
-            label = trace["name"]
-            if label in model.term_labels():
-                assert trace["line"]["color"] == drawn[label]
-                seen.setdefault(label.rstrip(" 12"), set()).add(drawn[label])
-    assert all(len(colours) == 1 for colours in seen.values())
-    assert len(set.union(*seen.values())) == len(seen) == 4
-
-
-def lines_of(axes):
-    found = {line.get_label(): line for line in axes.get_lines()}
-    plt.close(axes.figure)
-    return found
-
-
-def test_white_noise_behind_a_low_pass_is_one_row(calibration):
-    truth = WhiteNoise(3e-4) + gmwm.LowPassNoise(4e-4, bandwidth=15.0, order=1.0, damping=0.7071)
-    samples = Channel("gyro_x", truth.simulate(60_000, 0.01, 5), 0.01, "gyro", "rad/s")
-    fit = gmwm.fit(truth.opened().with_params({"lowpass_order": 1.0, "lowpass_damping": 0.7071}),
-                   gmwm.wavelet_variance(samples))  # fmt: skip
-    shown = Page(page(replace(calibration, fits={"gyro_x": fit}, rivals={})))
-    row = next(row for row in shown.cells if row[0] == "N, bandwidth")
-    assert float(row[2]) == pytest.approx(np.degrees(5e-4) * 60.0, rel=0.02)
-    low, high = (float(each) for each in row[3].split(" to "))
-    assert low < float(row[2]) < high
-    assert re.fullmatch(r"white noise: \d+ % of its power has a bandwidth of 1\d(\.\d)? Hz", row[1])
-    assert not any(row[0].startswith("lowpass") or row[0] == "N" for row in shown.cells if row)
-
-
 def test_what_is_copied_is_what_is_exported(calibration):
     inertial = {name: fit for name, fit in calibration.items() if fit.wv.quantity}
     found = certified(calibration)
     for title, target in (("YAML, Kalibr", "kalibr"), ("Python, GTSAM", "gtsam")):
         expected = gmwm.export(replace(calibration, fits=inertial), target, horizon=60.0)
         assert found.texts[title] == expected
-
-
-def test_what_filter_numbers_cover_is_said(calibration):
-    truth = WhiteNoise(2e-4) + gmwm.GaussMarkov(1e-3, 20.0)
-    samples = Channel("gyro_x", truth.simulate(40_000, 0.01, 5), 0.01, "gyro", "rad/s")
-    fit = gmwm.fit(truth.opened(), gmwm.wavelet_variance(samples))
-    one = replace(calibration, fits={"gyro_x": fit}, rivals={})
-    found = first_screen(one, certified(one))
-    assert re.fullmatch(
-        r"gyro K also carries Gauss-Markov \d+ deg/h, \d+ s \(gyro_x\)",
-        found["filter"][0]["covers"],
-    )
-    assert found["by_axis"][0]["covers"] in found["filter"][0]["covers"]
-
-
-def test_shared_numbers_stand_above_those_of_the_axes(calibration):
-    quiet = WhiteNoise(2e-4) + RandomWalk(1e-4)
-    samples = Channel("gyro_y", quiet.simulate(8000, 0.01, 5), 0.01, "gyro", "rad/s")
-    other = gmwm.fit(quiet.opened(), gmwm.wavelet_variance(samples))
-    both = replace(calibration, fits={"gyro_x": calibration["gyro_x"], "gyro_y": other})
-    shared = gmwm.bound(both, horizon=60.0, shared=True)
-    found = first_screen(both, certified(both))
-    (row,) = found["filter"]  # without accelerometers too
-    assert row["name"] == "gyro"
-    assert float(row["N"].split()[0]) == pytest.approx(shared["gyro_y"].N, rel=5e-3)
-    assert float(row["K"].split()[0]) == pytest.approx(shared["gyro_y"].K, rel=5e-3)
-    assert "the accelerometer is missing" in found["note"]
-    assert [each["nees"][0] for each in found["by_axis"]] == ["1", "1"]
 
 
 def test_models_that_tie_and_the_data_sheet_are_drawn(calibration, tmp_path):
@@ -576,42 +348,6 @@ def test_series_and_spectrum_leave_out_what_was_masked(calibration, recording):
                                            / 9.80665e-6, rel=1e-3)  # fmt: skip
 
 
-def test_axes_are_logarithmic_and_have_units(parsed):
-    units = []
-    for figure in parsed.figures():
-        x, y = figure["layout"]["xaxis"], figure["layout"]["yaxis"]
-        assert x["type"] == y["type"] == "log"
-        assert x["title"]["text"] == "averaging time [s]"
-        units.append(y["title"]["text"])
-        data = next(trace for trace in figure["data"] if trace["name"] == DATA)
-        low, high = y["range"]
-        assert low < np.log10(min(data["y"])) <= np.log10(max(data["y"])) < high
-    assert units == [f"Allan deviation [{unit}]" for unit in ("deg/h", "ug", "V")]
-
-
-def test_a_component_of_zero_is_not_drawn(calibration):
-    fit = calibration["gyro_x"]
-    nil = replace(fit, model=fit.model.with_params({"K": 0.0}))
-    numbers = calibration.numbers["gyro_x"]
-    names = [[t["name"] for t in deviation_figure(each, numbers)["data"]] for each in (fit, nil)]
-    assert names[0][2:4] == ["white noise", "random walk"]
-    assert "random walk" not in names[1]
-
-
-def test_an_interval_without_an_upper_end_leaves_the_figure_in_numbers():
-    """White noise whose only coefficient at the coarsest level happens to be small."""
-    odd = Channel("gyro_x", np.random.default_rng(14).normal(size=64), 0.01, "gyro", "rad/s")
-    fit = gmwm.fit(WhiteNoise() + RandomWalk(), odd)
-    json.dumps(deviation_figure(fit, axis_numbers(fit)), allow_nan=False)
-
-
-def test_a_pattern_that_averages_out_is_not_noise():
-    """Averages over its period of four samples and more do not change at all."""
-    odd = Channel("gyro_x", (np.arange(2000) % 4 < 2) * 1e-3, 0.01, "gyro", "rad/s")
-    with pytest.raises(gmwm.InputError, match="not noise that these processes describe"):
-        gmwm.fit(WhiteNoise() + RandomWalk(), odd)
-
-
 def test_residuals_are_in_per_cent_of_the_deviation(parsed, calibration):
     for fit, figure in zip(calibration.fits.values(), parsed.residual_figures(), strict=True):
         at = fit.goodness
@@ -624,36 +360,6 @@ def test_residuals_are_in_per_cent_of_the_deviation(parsed, calibration):
         assert low == -high
 
 
-@pytest.mark.parametrize("last", [400.0, 0.09])
-def test_residuals_are_within_the_axis_or_triangles_at_its_edge(calibration, last):
-    fit = calibration["gyro_x"]
-    wv = replace(fit.wv, variance=fit.wv.variance * np.r_[np.ones(fit.wv.tau.size - 1), last])
-    figure = residual_figure(replace(fit, wv=wv))
-    (points,) = figure["data"]
-    misfit, (low, high) = points["customdata"][-1][0], figure["layout"]["yaxis"]["range"]
-    beyond = not low < misfit < high
-    assert beyond == (last > 1.0) and (beyond or misfit < -60.0)
-    assert points["marker"]["symbol"][-1] == ("triangle-up" if beyond else "circle")
-    assert points["text"][-1] == (f"{misfit:+.0f} %" if beyond else "")
-    assert (points["marker"]["symbol"][0], points["text"][0]) == ("circle", "")
-
-
-def test_lines_are_seen_on_white_and_on_dark_screens():
-    def light(colour, brighter=1.0):
-        parts = np.array([int(colour[i : i + 2], 16) for i in (1, 3, 5)]) / 255.0
-        parts = np.minimum(brighter * parts, 1.0)
-        parts = np.where(parts <= 0.03928, parts / 12.92, ((parts + 0.055) / 1.055) ** 2.4)
-        return parts @ [0.2126, 0.7152, 0.0722]
-
-    style = resource("report.css")
-    dark = style[style.index("prefers-color-scheme: dark") :]
-    ground = light(re.search(r"--page: (#\w+)", dark)[1])
-    brighter = float(re.search(r"brightness\((.*?)\)", dark)[1])
-    for colour in (*COMPONENT_COLOURS, figures._FILTER, figures._SHEET):
-        assert 1.05 / (light(colour) + 0.05) >= 3.0, colour
-        assert (light(colour, brighter) + 0.05) / (ground + 0.05) >= 4.5, colour
-
-
 # -- health and length ----------------------------------------------------------------------------
 
 
@@ -662,22 +368,6 @@ LENGTH = Notice("length", "good", "", "an hour")  # which every examined recordi
 
 def issue(severity, text, where="gyro_x", **more):
     return Notice("drift", severity, where, text, hint=f"done about {text}", **more)
-
-
-def test_a_step_that_spoils_a_fit_is_the_first_finding(calibration):
-    values = {"evident": True, "removable": True, "time_lower": 28.36, "time_upper": 30.32}
-    hint = (
-        "calibrate only the part before or after the step, or subtract it (remove_departures=True)"
-    )
-    step = Notice("step", "bad", "", "a step of +2.7 mg at 29.3 s", values, hint)
-    fits = {**calibration.fits, "accel_x": replace(calibration["accel_x"], notices=(step,))}
-    crosstalk = issue("warning", "correlated noise", "")
-    spoilt = in_options(replace(calibration, fits=fits, notices=(LENGTH, crosstalk)))
-    first, second = health(spoilt)["rows"]
-    assert (first.severity, first.where) == ("bad", "accel_x")
-    assert first.text == "a step of +2.7 mg at 29.3 s"
-    assert first.hint == "rerun with --remove-departures: keeps about 78 s of 80 s"
-    assert second.severity == "warning"
 
 
 def test_every_reason_why_a_channel_is_not_valid_is_a_finding(calibration):
@@ -721,49 +411,6 @@ def test_health_is_in_the_first_lines_and_findings_worst_first(calibration):
     assert ["warning", "gyro_x Shaken", "Done about shaken"] in shown.cells
 
 
-def test_notices_of_several_recordings_say_which(calibration):
-    found = [issue("warning", f"moved {k} times", source=f"run{k}.csv") for k in (1, 2)]
-    notices = (LENGTH, *found)
-    shown = Page(page(replace(calibration, notices=notices)))
-    rows = [row[1] for row in shown.cells if row[0] == "warning"]
-    assert rows == ["gyro_x, run1.csv Moved 1 times", "gyro_x, run2.csv Moved 2 times"]
-    assert "2 warnings." in shown.text
-
-
-def test_what_was_not_examined_says_so(calibration):
-    notices = tuple(n for n in calibration.notices if n.code == "columns-not-used")
-    shown = Page(page(replace(calibration, notices=notices)))
-    assert "was not checked for defects" in shown.text
-    assert "column not used: 'temp'" in shown.text
-    fits = {name: fit for name, fit in calibration.items() if fit.valid}
-    harmless = replace(calibration, fits=fits, notices=(LENGTH, issue("good", "fine")))
-    harmless = Page(page(harmless))
-    assert "No defect found." in harmless.text
-
-
-def test_an_ambiguous_choice_is_reported_with_the_channel(calibration):
-    tie = Notice("ambiguity", "note", "gyro_x", "2 models describe the data equally well")
-    shown = Page(page(replace(calibration, notices=(tie,))))
-    assert shown.text.index("gyro_x: white noise") < shown.text.index("2 models describe")
-    assert shown.text.index("2 models describe") < shown.text.index("accel_x: white noise")
-
-
-@pytest.mark.parametrize(
-    ("seconds", "words"),
-    [
-        (None, ""),
-        (80.0, "long enough"),
-        (81.0, "needs 81 s"),
-        (7 * 86400.0, "needs 7 days"),
-        (3 * 365.25 * 86400.0, "needs 3 years"),
-        (1e12, "centuries"),
-        (float("inf"), "not identified"),
-    ],
-)
-def test_needed_length_in_words(seconds, words):
-    assert needed(seconds, 80.0) == words
-
-
 # -- safe -----------------------------------------------------------------------------------------
 
 
@@ -798,23 +445,6 @@ def test_names_are_text_not_markup(calibration):
     assert [row[0] for row in shown.cells if row[-1:] == ["deg"]][-1] == f"{HOSTILE} not valid"
 
 
-def test_provenance_is_printable_text(calibration):
-    given = {f"hash of {HOSTILE}\udcff": "\x1b[31m\udcff"}
-    shown = Page(page(calibration, provenance=given))
-    assert f"hash of {HOSTILE}\\udcff: \\x1b[31m\\udcff" in shown.text
-
-
-def test_units_are_text_not_markup(calibration):
-    fit = calibration["voltage"]
-    hostile = replace(fit, wv=replace(fit.wv, unit=HOSTILE))
-    shown = Page(page(replace(calibration, fits={"voltage": hostile}, skipped={})))
-    assert len(shown.scripts) == 5
-    (figure,) = shown.figures()
-    # Plotly knows a little markup of its own, which does no harm.
-    assert "alert" in figure["layout"]["yaxis"]["title"]["text"]
-    assert f"{HOSTILE}/sqrt(Hz)" in shown.text
-
-
 # -- files ----------------------------------------------------------------------------------------
 
 
@@ -847,22 +477,6 @@ def test_a_place_that_cannot_be_written_is_refused_before_the_work(write, tmp_pa
 
 
 # -- words ----------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("seconds", "words"),
-    [
-        (40.0, "40 s"),
-        (119.4, "119 s"),
-        (120.0, "2 min"),
-        (35 * 60.0, "35 min"),
-        (3599.0, "1 h"),
-        (3600.0 * 2 + 46 * 60.0, "2 h 46 min"),
-        (3600.0 * 100, "100 h"),
-    ],
-)
-def test_duration(seconds, words):
-    assert duration_text(seconds) == words
 
 
 def test_what_a_curve_leaves_is_drawn_against_the_temperature():

@@ -109,15 +109,6 @@ def test_nothing_is_cut_off(tab, path, width, is_opened):
         tab.size(1300)
 
 
-def test_a_box_hides_its_curve_and_shows_it_again(tab):
-    box = "document.querySelector('[data-legend=plot-1] input[data-trace=\"2\"]').click()"
-    assert trace(tab, "white noise") is not None
-    tab.run(box)
-    assert trace(tab, "white noise") is None
-    tab.run(box)
-    assert trace(tab, "white noise") is not None
-
-
 def test_units_change_the_curves_and_the_axis(tab, calibration):
     def choose(value):
         tab.run(
@@ -198,23 +189,6 @@ def test_copy_buttons_give_yaml_and_python(tab, calibration):
     assert "gyroparams(" in copied(tab, "MATLAB")
 
 
-def test_csv_holds_every_curve(tab, shown):
-    tab.run("window.kept = []; var old = URL.createObjectURL;"
-            "URL.createObjectURL = function (b) { kept.push(b); return old.call(URL, b); };"
-            "document.querySelector('[data-csv=plot-1]').click()")  # fmt: skip
-    lines = tab.run("kept[0].text()").splitlines()
-    assert lines[:2] == [
-        "# x: averaging time [s]; y: Allan deviation [deg/h]", "curve,x,y,lower,upper",
-    ]  # fmt: skip
-    names = {line.split('"')[1] for line in lines[2:]}
-    band = "95 % band of the models that fit equally well"
-    assert {"model", "white noise", "random walk", "data sheet", "N, B, K of the sensor",
-            band, "data, 95 % interval", "filter N and K"} <= names  # fmt: skip
-    data = [line.split(",")[2:] for line in lines if line.startswith('"data')]
-    low = [float(row[2]) for row in data if row[2]]
-    assert len(low) == shown["gyro_x"].wv.tau.size
-
-
 CONTRAST = """
 (function () {
   function light(c) {
@@ -243,57 +217,6 @@ CONTRAST = """
   return worst;
 }())
 """
-
-
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_text_can_be_read(tab, scheme):
-    try:
-        tab.scheme(scheme)
-        ratio, where = tab.run(CONTRAST)
-        assert ratio >= 4.5, where
-    finally:
-        tab.scheme("light")
-
-
-def test_words_of_figures_are_whole_on_paper_and_notes_are_there(tab):
-    cut = """Array.from(document.querySelectorAll('.plot')).filter(function (p) {
-      var box = p.querySelector('svg.main-svg').getBoundingClientRect();
-      return Array.from(p.querySelectorAll('svg text')).some(function (t) {
-        var r = t.getBoundingClientRect();
-        return t.textContent && (r.top < box.top - 1 || r.bottom > box.bottom + 1 ||
-          r.left < box.left - 1 || r.right > box.right + 1); });
-    }).map(function (p) { return p.id; })"""
-    notes = (
-        "Array.from(document.querySelectorAll('.run > *')).filter(function (s) {"
-        " return s.getClientRects().length; }).map(function (s) { return s.innerText; })"
-    )
-    try:
-        tab.run("dispatchEvent(new Event('beforeprint'))")
-        assert tab.run(cut) == []
-        closed = "Array.from(document.querySelectorAll('details.printed:not([open])')).length"
-        assert tab.run(closed) == 0
-        tab.call("Emulation.setEmulatedMedia", media="print")
-        assert "Column not used: 'temp'." in tab.run(notes)
-    finally:
-        tab.run("dispatchEvent(new Event('afterprint'))")
-        tab.call("Emulation.setEmulatedMedia", media="")
-
-
-def test_dashed_lines_have_dashed_marks(tab):
-    kinds = tab.run(
-        "Array.from(document.querySelectorAll('[data-legend=plot-1] .swatch')).map("
-        "function (s) { return [s.nextSibling.textContent, s.className]; })"
-    )
-    marks = dict(kinds)
-    assert "dashed" in marks["white noise"]
-    assert marks["model"].strip() == "swatch"
-    assert "dotted" in marks["filter N and K"]
-
-
-def test_paper(tab):
-    pages = len(re.findall(rb"/Type\s*/Page\b", tab.pdf()))
-    assert 2 <= pages <= 6
-    assert trace(tab, "model") is not None
 
 
 def test_six_axes_with_much_to_say_take_eight_pages(tab, tmp_path):

@@ -95,12 +95,6 @@ def test_a_page_has_thirty_lines_of_eighty_columns(calibrated, change):
     assert not re.search(r"\bnan\b|\binf\b|None|…|\n\n\n", text)
 
 
-def test_all_axes_of_one_imu_are_shown_beside_a_long_path(calibrated):
-    text = summary_text(calibrated, [*FILES, *(f"in {'folder/' * 9}" for _ in range(6))])
-    if len(calibrated) <= 6:
-        assert all(re.search(rf"^{name}", text, re.MULTILINE) for name in calibrated)
-
-
 def test_every_sensor_has_filter_numbers(calibrated):
     text = summary_text(calibrated)
     for quantity in UNITS:
@@ -176,38 +170,6 @@ def test_the_verdict_counts_the_axes(two):
     assert "Usable: gyro_z. Usable with reservation (*): accel_x." in " ".join(text.split())
     assert re.search(r"^accel_x\* ", text, re.MULTILINE)
     assert len(re.findall(r"^accelerometer_noise.* \*$", text, re.MULTILINE)) == 1
-
-
-def test_departures_come_first_and_once(two):
-    lines = summary_text(with_defects(two)).partition("What to do")[2].splitlines()[1:]
-    assert lines[0].startswith("1. bias steps: gyro_z and accel_x; ")
-    assert sum("bias step" in line for line in lines) == 1
-
-
-def with_notice(calibration, code, severity, **words):
-    values = {key: words[key] for key in ("removable", "ratio", "alike") if key in words}
-    found = gmwm.issues.notice(code, "", values, severity=severity, **words)
-    fits = {n: replace(f, notices=(found, *f.notices)) for n, f in calibration.items()}
-    return replace(calibration, fits=fits)
-
-
-def test_a_wrong_unit_comes_before_steps():
-    cal = gmwm.calibrate(of(*axes()[:1]), {"": WALK.opened()})
-    unit = with_notice(with_defects(cal), "gyro-unit", "bad", variant="noise", size=2.1,
-                       alike="deg/s", explained="")  # fmt: skip
-    text = printed(unit)
-    assert "No axis is usable." in text
-    assert re.search(r"^gyro_x +not valid: likely another gyro unit", text, re.MULTILINE)
-    (first,) = re.findall(r"^1\. (.*\n.*)", text, re.MULTILINE)
-    assert "use --gyro-unit deg/s" in " ".join(first.split())
-
-
-def test_what_would_recur_leaves_a_reservation(two):
-    text = printed(
-        with_notice(two, "departures-removed", "warning", tau=20.0, times="4.3", ratio=4.3)
-    )
-    assert "Usable with reservation (*): all axes" in text or "(*): gyro_z and accel_x" in text
-    assert re.search(r"^\d\. .*steps and drifts were subtracted", text, re.MULTILINE)
 
 
 def test_intervals_of_filter_numbers_reach_to_models_that_fit_equally_well(two):

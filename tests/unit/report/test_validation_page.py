@@ -28,22 +28,6 @@ def test_the_page_needs_no_network_and_is_the_same_each_time(tmp_path, made_up):
         assert needle not in first
 
 
-def test_sentences_name_overconfident_and_conservative_filters(tmp_path, made_up):
-    found = made_up(outages=((20, 10),), runs=150)
-    text = text_of(write_validation_report(found, tmp_path / "a.html"))
-    assert "At the end of the outage, right is consistent in position" in text
-    assert "bold is overconfident in position" in text
-    assert "timid is conservative in position" in text
-    assert "the horizontal error with bold is larger than with right: 3 times" in text
-
-
-def test_few_runs_tell_nothing(tmp_path, made_up):
-    found = made_up({"A": 1.0}, outages=((20, 10),), runs=1)
-    text = text_of(write_validation_report(found, tmp_path / "a.html"))
-    assert "At the end of the outage, A has too few runs for a verdict" in text
-    assert "nan %" not in text
-
-
 @pytest.mark.parametrize(
     ("outages", "dead"),
     [((), ("bold",)), slow(((20, 10),), ("right",)), (((20, 10),), ("right", "bold"))],

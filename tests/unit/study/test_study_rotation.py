@@ -58,24 +58,6 @@ def test_the_numbers_are_those_of_all_turns(found):
     assert one.lower < one.value < one.upper
 
 
-def test_the_words_fit_the_screen_and_name_every_recording(found):
-    text = str(found)
-    for word in (*found.sources, *FACTORS, "NEES vertical", "1 calibrated", "3 calibrated"):
-        assert word in text
-    assert max(map(len, text.splitlines())) <= 80
-    rows = found.markdown().splitlines()
-    assert len(rows) == 2 + len(FACTORS)
-    assert len({row.count("|") for row in rows}) == 1
-    figure = found.plot()
-    assert len(figure.axes) == 2
-
-
-def test_a_filter_that_diverged_everywhere_has_no_numbers(made_up):
-    found = turned(made_up, dead=("lines",))
-    assert np.isnan(found.ratio("lines", "horizontal").value)
-    assert "-" in found.markdown().splitlines()[-1]
-
-
 def test_a_draw_takes_each_recording_and_stretch_once_for_all_its_runs():
     weights = crossed_weights((3, 5, 4), None, 4000, 1)
     assert not np.any(weights[:, np.arange(3), np.arange(3)])

@@ -54,28 +54,6 @@ def test_runs_of_another_study_are_not_mixed_in(tmp_path, change):
         run_study(SMALL, tmp_path, runs=3, resume=True, **change)
 
 
-def test_a_method_without_an_answer_is_a_row_without_numbers(tmp_path):
-    # In so short a record of this mixture the Allan plot has no straight parts.
-    table = run_study(SMALL, tmp_path, runs=4, methods=["AV"])
-    absent = np.isnan(table["rate"].to_numpy())
-    assert np.all(absent)
-    assert not any(table["valid"].to_pylist())
-    assert all(table["message"].to_pylist())
-
-
-def test_interval_of_an_inverse_is_in_order(tmp_path):
-    table = run_study(SMALL, tmp_path, runs=3, methods=["GMWM"])
-    lower, value, upper = (table["rate" + end].to_numpy() for end in ("_lower", "", "_upper"))
-    assert np.all(lower < value) and np.all(value < upper)
-
-
-def test_unknown_method_and_no_runs(tmp_path):
-    with pytest.raises(InputError, match="it has GMWM, AV"):
-        run_study(SMALL, tmp_path, runs=2, methods=["EM"])
-    with pytest.raises(InputError, match="runs = 0"):
-        run_study(SMALL, tmp_path, runs=0)
-
-
 LONG = {
     "arma4",
     "five-gm",

@@ -6,7 +6,7 @@ import pytest
 
 from gmwm import Model, WhiteNoise, cramer_rao
 from gmwm.study.studies import FIGURES, STUDIES, Estimation, Quantity, Study
-from gmwm.study.summary import boxplots, summarise
+from gmwm.study.summary import summarise
 
 WHITE = Study(
     name="white",
@@ -61,22 +61,6 @@ def test_scores(table):
     assert summary.bounds == {"sigma2_WN": pytest.approx(bound)}
 
 
-def test_printed_table(table):
-    title, scores, times, legend = str(summarise(WHITE, table, 3)).split("\n\n")
-    assert title == "White noise\n4 runs of 1,000 samples at 1 Hz, seed 3"
-    assert [line.split() for line in scores.splitlines()[1:]] == [
-        ["sigma2_WN", "A", "0.004", "0.1", "2.23", "0.0%", "100.0%"],
-        ["sigma2_WN", "B", "0.008", "0.2", "4.47", "20.0%", "0.0%", "0.05", "1"],
-        ["sigma2_WN", "bound", "0.00179", "0.0447", "1.00"],
-        ["sigma2_WN", "moments", "0.00179", "0.0448", "1.00"],
-    ]
-    assert [line.split() for line in times.splitlines()[1:]] == [
-        ["A", "0", "0.5", "s"],
-        ["B", "1", "0.5", "s"],
-    ]
-    assert legend.endswith("the eightieth column of the\n  terminal.")
-
-
 def test_table_in_the_layout_of_the_paper(table):
     assert summarise(WHITE, table, 0).markdown() == (
         "|  | A | B | Cramer-Rao bound |\n"
@@ -84,14 +68,6 @@ def test_table_in_the_layout_of_the_paper(table):
         "| sigma2_WN | 0.004 (0.1) | 0.008 (0.2) | 0.00179 (0.0447) |\n"
         "| sigma2_WN, paper | - | 0.002 (0.05) |  |"
     )
-
-
-def test_boxplots_are_written_whole(table, tmp_path):
-    paths = boxplots(WHITE, table, tmp_path / "white")
-    assert [path.name for path in paths] == ["white.png", "white.svg"]
-    assert paths[0].read_bytes()[:4] == b"\x89PNG"
-    assert "<svg" in paths[1].read_text()
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["white.png", "white.svg"]
 
 
 def test_scenarios_are_those_of_the_paper():
