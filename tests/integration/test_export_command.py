@@ -111,10 +111,10 @@ def test_files_of_two_runs_in_one_folder_are_reported(run, tmp_path):
         (("calibration.json", "--to", "rosbag"), "choose from kalibr, openvins"),
         (("nowhere.json", "--to", "kalibr"), "cannot be read"),
         (("calibration.json", "--to", "kalibr", "--horizon", "0"), "give a positive time"),
-        (("calibration.json", "--to", "kalibr", "--form", "N+GM"), r"holds N+K only"),
+        (("calibration.json", "--to", "kalibr", "--form", "N+GM"), r"takes N+K only"),
         (("calibration.json", "calibration.json", "--to", "vins"), "is given twice"),
         (("calibration.json", "--to", "vins", "-o", "no/a.yaml"), "cannot be written"),
-        (("gyro.json", "--to", "vins"), "there is no accelerometer"),
+        (("gyro.json", "--to", "vins"), "the accelerometer is missing"),
         (("fit.json", "--to", "vins"), "has no numbers to export"),
     ],
 )

@@ -258,7 +258,7 @@ def test_half_may_be_missing_but_no_more(recorded):
         read(path, units=GYRO)
     message = str(caught.value)
     assert message.startswith("static.csv, column 't', line 62: the clock jumps by 100 sampling")
-    assert "in all 210 samples are missing where there are 190, more than half" in message
+    assert "in all 210 samples are missing, with 190 present: more than half" in message
 
 
 @pytest.mark.parametrize("far", [4.02, 1e6, 1e9])
