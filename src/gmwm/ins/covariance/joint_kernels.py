@@ -167,14 +167,6 @@ def aid_jointly(
 
 
 @compiled()
-def _keep(kept: KeptCovariances, out: int, P: FloatArray, J: FloatArray) -> int:
-    """Keep P and J; returns the next place."""
-    set_matrix(kept.P[out], P)
-    set_matrix(kept.J[out], J)
-    return out + 1
-
-
-@compiled()
 def run_jointly(
     track: Track, events: Events, about: JointFilter, P: FloatArray, J: FloatArray,
     kept: KeptCovariances,
@@ -198,7 +190,9 @@ def run_jointly(
                 gathered = tilt_squared(P, g, step, gathered)
                 j_gathered = tilt_squared(J, g, step, j_gathered)
         while out < kept.epoch.size and kept.epoch[out] == epoch and kept.before[out] == 1:
-            out = _keep(kept, out, P, J)
+            set_matrix(kept.P[out], P)
+            set_matrix(kept.J[out], J)
+            out += 1
         attitude = P[6, 6] + P[7, 7] + P[8, 8] if settings.second_order else 0.0
         j_attitude = J[6, 6] + J[7, 7] + J[8, 8] if settings.second_order else 0.0
         end, is_keyframe = Kinematics(track.end.C[s], track.end.v[s], track.end.lla[s]), False
@@ -228,4 +222,6 @@ def run_jointly(
             new_keyframe(P, end, since, 1.0)
             new_keyframe(J, end, since, -1.0)
         while out < kept.epoch.size and kept.epoch[out] == epoch:
-            out = _keep(kept, out, P, J)
+            set_matrix(kept.P[out], P)
+            set_matrix(kept.J[out], J)
+            out += 1
