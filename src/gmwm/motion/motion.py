@@ -106,7 +106,7 @@ def motion(
     -----
     Instruments in place of least squares keep noise from biasing the mapping, and the noise that
     the fits remove is added back: on simulated errors over real flights the variances are within
-    1.3 % of the truth, for three and four IMUs (`benchmarks/motion.py`). Errors common to all IMUs
+    1.8 % of the truth, for three and four IMUs (`benchmarks/motion.py`). Errors common to all IMUs
     are not measured. A three-cornered hat would use mapped sensors as targets, whose noise the
     mapping may filter.
     """
