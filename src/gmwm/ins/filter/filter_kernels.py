@@ -325,7 +325,7 @@ def _aid(
 
 @compiled()
 def _moved(h: FloatArray, A: FloatArray) -> None:
-    """Turn a row of the errors at another time into that of those now, by a transition there."""
+    """Map a row for the errors at another time to the errors now, by a transition to that time."""
     there = h[:9].copy()
     for j in range(9):
         h[j] = 0.0
