@@ -57,6 +57,7 @@ def reworded(monkeypatch):
     monkeypatch.setattr(Notice, "__init__", changed)
 
 
+@pytest.mark.slow
 def test_no_number_depends_on_the_words(request):
     before = results()
     request.getfixturevalue("reworded")

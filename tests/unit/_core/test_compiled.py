@@ -35,6 +35,7 @@ def _installed_read_only(folder: Path) -> Path:
     return folder
 
 
+@pytest.mark.slow
 def test_a_package_that_cannot_be_written_and_no_home(tmp_path):
     nowhere = tmp_path / "file"
     nowhere.write_text("")

@@ -190,6 +190,7 @@ def killed_once(folder, run):
     return squares(run)
 
 
+@pytest.mark.slow
 def test_a_dask_cluster_of_processes_gives_what_this_process_gives(tmp_path):
     """Also if a worker ends in the middle, even the only one, with all that it was sent."""
     distributed = pytest.importorskip("distributed")

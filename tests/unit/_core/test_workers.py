@@ -27,6 +27,7 @@ class Square:
         return number**2
 
 
+@pytest.mark.slow
 def test_what_a_killed_process_was_at_is_done_again(tmp_path):
     """And an item at which every process ends is reported, not tried for ever."""
     work = Square(tmp_path, once=(1,), always=(4,))

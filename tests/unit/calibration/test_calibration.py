@@ -1,16 +1,14 @@
 """The main job, its file format, and what happens to bad channels and bad files."""
 
 import json
-import re
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 import gmwm
 from gmwm import Calibration, GaussMarkov, InputError, RandomWalk, RateRamp, Recording, WhiteNoise
-from gmwm.calibration import Stopwatch, stage, tuning
+from gmwm.calibration import Stopwatch, tuning
 from gmwm.issues import Notice
 from marks import slow
 from places import SHARED
@@ -82,15 +80,6 @@ def test_every_live_channel_has_a_fit_that_holds_the_truth(calibration):
     assert low < 2e-4 < high
 
 
-def test_what_it_says_of_the_recording(calibration):
-    assert calibration.source == "bench.csv"
-    assert calibration.n == 10_000
-    assert calibration.rate == pytest.approx(100.0)
-    assert calibration.duration == pytest.approx(100.0)
-    assert calibration.notices[0] == UNUSED
-    assert calibration.is_examined
-
-
 def test_dead_channel_is_named_and_skipped(calibration):
     (notice,) = calibration.skipped.values()
     assert (notice.code, notice.where, notice.severity) == ("constant", "gyro_y", "bad")
@@ -100,19 +89,6 @@ def test_dead_channel_is_named_and_skipped(calibration):
     with pytest.raises(InputError, match=r"'gyro_y': constant at 0\.25 rad/s"):
         calibration["gyro_y"]
     assert "gyro_y" not in calibration
-
-
-def test_print_is_short_and_html_escapes(calibration):
-    text = str(calibration)
-    assert text.startswith("bench.csv: 100 s at 100 Hz, 10,000 samples a channel\n")
-    assert len(text.splitlines()) <= 3 * (len(calibration) + 2)
-    assert max(map(len, text.splitlines())) <= 80
-    for name, fit in calibration.items():
-        number = calibration.numbers[name].text("N") if fit.valid else "not valid"
-        assert re.search(rf"^{name} +{re.escape(number)} ", f"{text} ", re.M)
-    shown = replace(calibration, source="<i>x")._repr_html_()
-    assert "&lt;i&gt;x" in shown and "<i>" not in shown
-    assert all(f'<th scope="row">{name}</th>' in shown for name in calibration)
 
 
 def test_files_keep_rivals_and_what_was_left_out(calibration, tmp_path):
@@ -126,14 +102,6 @@ def test_files_keep_rivals_and_what_was_left_out(calibration, tmp_path):
     del stored["rivals"], stored["left_out"]
     again = Calibration.from_dict(stored)
     assert again.rivals == again.left_out == {}
-
-
-def test_unknown_channel_lists_those_there_are(calibration):
-    with pytest.raises(InputError, match="'gyro_w': it has gyro_x, accel_x, accel_y"):
-        calibration["gyro_w"]
-    with pytest.raises(KeyError):
-        calibration["gyro_w"]
-    assert calibration.get("gyro_w") is None
 
 
 def test_valid_only_if_every_fit_is(calibration):
@@ -154,29 +122,6 @@ def test_all_channels_dead():
         gmwm.calibrate(rec)
 
 
-@pytest.mark.parametrize("given", ["own.csv", ["own.csv"], Path("own.csv")])
-def test_a_path_is_to_be_read_first(given):
-    for entrance in (gmwm.calibrate, *(() if isinstance(given, list) else (gmwm.health,))):
-        with pytest.raises(
-            InputError, match=r"^'own.csv' is a path: read it first, gmwm\.read\('o"
-        ):
-            entrance(given)
-
-
-def test_channels_are_drawn_with_their_models(calibration):
-    import matplotlib.pyplot as plt
-
-    figure = calibration.plot()
-    assert len(figure.axes) == len(calibration)
-    assert [ax.get_title() for ax in figure.axes] == [fit.wv.name for fit in calibration.values()]
-    assert len(calibration.plot(["gyro_x"], units="si").axes) == 1
-    plt.close("all")
-    with pytest.raises(InputError, match="no model of channel 'mag_x'"):
-        calibration.plot(["mag_x"])
-    with pytest.raises(InputError, match="no channel was selected: choose from gyro_x"):
-        calibration.plot([])
-
-
 def test_too_short_a_recording():
     rec = Recording((channel("gyro_x", np.arange(7.0)),))
     with pytest.raises(InputError, match=r"^7 samples are too few: record at least 8"):
@@ -191,14 +136,6 @@ def test_an_infinite_sample_stops_no_other_channel(recording):
     assert list(result) == ["gyro_x"]
     assert "'accel_y' has 1 " in result.skipped["accel_y"].text
     assert "index 17" in result.skipped["accel_y"].text
-
-
-def test_missing_samples_are_passed_over(recording):
-    values = recording["accel_y"].values.copy()
-    values[2000:3000] = values[17] = np.nan
-    result = gmwm.calibrate(Recording((channel("accel_y", values),)), WhiteNoise())
-    low, high = result["accel_y"].interval(0.999)["N"]
-    assert low < gmwm.process.as_model(ACCEL).params["N"] < high
 
 
 @pytest.mark.parametrize("lost", [0.6, 1.0])
@@ -274,23 +211,6 @@ def test_a_mapping_must_have_every_live_channel(recording):
     models = dict.fromkeys(("gyro_x", "gyro_y", "accel_x"), WhiteNoise())
     with pytest.raises(InputError, match="no model is given for channel 'accel_y': add one"):
         gmwm.calibrate(recording, models)
-
-
-def test_progress_hears_of_every_channel_once(recording):
-    heard = []
-    result = gmwm.calibrate(recording, MODELS, progress=lambda *told: heard.append(told))
-    assert sorted(name for *_, name in heard[:-1]) == sorted(result.fits)
-    assert heard[-1] == (len(result.fits), len(result.fits), "")
-
-
-def test_stages_are_counted_by_a_watch_that_runs(recording):
-    with Stopwatch().running() as watch:
-        gmwm.calibrate(recording, WhiteNoise())
-    assert set(watch.elapsed) == set(watch.worked) == {"health", "variance", "model", "departures"}
-    assert all(each > 0.0 for each in watch.elapsed.values())
-    with stage("not counted"):
-        pass
-    assert "not counted" not in watch.elapsed
 
 
 @pytest.mark.slow
@@ -379,25 +299,6 @@ def refused(path):
 def test_missing_file_and_folder(tmp_path):
     assert "cannot be read" in refused(tmp_path / "nowhere.json")
     assert "cannot be read" in refused(tmp_path)
-
-
-@pytest.mark.parametrize(
-    ("content", "words"),
-    [
-        (b"", "is not JSON"),
-        (b"time,gyro_x\n0,1\n", "is not JSON"),
-        (b'{"schema": "gmwm.calibration", "schema_ver', "is not JSON"),
-        (b"\xff\xfe\x00\x93NUMPY", "is not JSON"),
-        (b"[1, 2, 3]", "is not a result of gmwm"),
-        (b"null", "is not a result of gmwm"),
-        (b'{"type": "FeatureCollection"}', "is not a result of gmwm"),
-        (b'{"schema": "gmwm.calibration"}', "schema version None"),
-    ],
-)
-def test_foreign_files(tmp_path, content, words):
-    path = tmp_path / "cal.json"
-    path.write_bytes(content)
-    assert words in refused(path)
 
 
 @pytest.mark.parametrize("version", [0, 1, "2", None])

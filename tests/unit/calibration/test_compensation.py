@@ -48,6 +48,7 @@ def drawn(cal, temperature, seed=2):
     return SensorModels.of(cal).simulate(SIZE, DT, rng, {"temperature": temperature}).total
 
 
+@pytest.mark.slow
 def test_what_is_simulated_from_a_calibration_is_calibrated_alike(first):
     temperature = cycles(27.0, 63.0)
     again = calibrated(recording(drawn(first, temperature), temperature))

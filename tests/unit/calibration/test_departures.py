@@ -261,22 +261,6 @@ def test_a_calibration_takes_it_off_on_request_and_reports_that():
     assert low < 2e-6 < high
 
 
-@pytest.mark.parametrize(
-    "curve",
-    [
-        np.exp(-TIME / 600.0),
-        np.maximum(1.0 - TIME / 900.0, 0.0),
-        np.sin(2.0 * np.pi * TIME / 1500.0 + 1.0),
-    ],
-    ids=["transient", "drift-at-start", "slow-period"],
-)
-def test_what_is_taken_off_is_what_was_found(curve):
-    rec = recording(noise(12) + 2.0 * SAMPLE * curve)
-    fits = gmwm.calibrate(rec, WhiteNoise() + RandomWalk())
-    left = gmwm.without_departures(rec, fits)["gyro_x"].values - noise(12)
-    assert np.std(left) < 0.25 * np.std(2.0 * SAMPLE * curve)
-
-
 def test_of_several_recordings_it_is_named_which():
     first, second = recording(noise(13)), recording(noise(14) + SAMPLE * STEP)
     both = [Recording(first.channels, "a.csv"), Recording(second.channels, "b.csv")]

@@ -1,27 +1,13 @@
 """Which terms are offered for what a recording shows, and what is said of them."""
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 
 from gmwm import Channel, Recording, Resonance, Sinusoid, WhiteNoise
 from gmwm.calibration import tuning
-from gmwm.calibration.screening import offered_terms, screened, stretches_at_rest, with_outcomes
+from gmwm.calibration.screening import screened, stretches_at_rest, with_outcomes
 from gmwm.issues import Notice
 from gmwm.process import as_model
-
-LINES = [(10.0 + k, 1.0 - 0.1 * k) for k in range(tuning.MOST_TERMS + 2)]
-BUMPS = [(50.0, 0.1), (70.0, 0.2)]
-FOUND = SimpleNamespace(lines=lambda _: LINES, resonances=lambda _: BUMPS)
-
-
-@pytest.mark.parametrize("chosen", [(), ("lines",), ("resonances",), ("lines", "resonances")])
-def test_terms_are_offered_for_what_is_chosen(chosen):
-    lines = [Sinusoid(frequency=f) for f, _ in LINES] if "lines" in chosen else []
-    bumps = [Resonance(frequency=f, damping=d) for f, d in BUMPS] if "resonances" in chosen else []
-    expected = [*bumps[:1], *lines, *bumps[1:]][: tuning.MOST_TERMS]
-    assert offered_terms(FOUND, "gyro_x", chosen) == tuple(expected)
 
 
 @pytest.mark.parametrize(("off", "near"), [(0.99, True), (1.01, False), (-0.99, True)])

@@ -157,23 +157,3 @@ def test_sound_channels_are_not_called_spoilt(kind):
         values = values.simulate(N, 0.01, 1)
     rec = gmwm.Recording.from_arrays({"gyro_x": values}, 100.0, {"gyro": "rad/s"})
     assert not [n for n in gmwm.health(rec).notices if n.severity == "bad"]
-
-
-def test_the_command_line_names_the_channel_once(tmp_path):
-    from click.testing import CliRunner
-
-    from gmwm.cli.main import cli
-
-    np.savetxt(
-        tmp_path / "s.csv", np.column_stack([zeros(0.3), clean(3)]), delimiter=",", comments="",
-        header="gyro_x [rad/s],gyro_y [rad/s]", fmt="%.9g",
-    )  # fmt: skip
-    done = CliRunner().invoke(
-        cli, ["calibrate", str(tmp_path / "s.csv"), "--rate", "100", "--model", "N",
-               "-o", str(tmp_path / "out")],
-    )  # fmt: skip
-    assert done.exit_code == 0, done.output
-    text = " ".join(done.output.split())
-    assert text.count("one value too frequent") == 1
-    assert "not valid" in text
-    assert "one value too frequent" in (tmp_path / "out" / "report.html").read_text()

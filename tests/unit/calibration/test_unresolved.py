@@ -5,7 +5,7 @@ import pytest
 
 import gmwm
 from gmwm import GaussMarkov, RandomWalk, WhiteNoise
-from gmwm.calibration.channel import UNRESOLVED, unresolved_notice, with_largest_walk
+from gmwm.calibration.channel import UNRESOLVED, with_largest_walk
 from marks import every
 
 N, RATE = 1e-4, 100.0
@@ -66,10 +66,3 @@ def test_nothing_is_told_where_a_walk_is_known_or_would_not_matter():
     assert with_largest_walk(gmwm.fit(WhiteNoise(), long)) is None
     ramp = gmwm.fit(WhiteNoise() + gmwm.RateRamp(), long)
     assert with_largest_walk(ramp) is None
-
-
-def test_of_a_channel_without_a_quantity_the_unit_is_that_of_its_samples():
-    wv = gmwm.wavelet_variance(WhiteNoise(N).simulate(50_000, 0.01, seed=3), 0.01)
-    fit = gmwm.fit(WhiteNoise(), wv)
-    largest = with_largest_walk(fit)
-    assert "u/s/sqrt(Hz) (95 %)" in unresolved_notice("x", fit, largest).text

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 import gmwm
-from gmwm.datasheet import sheets
 from gmwm.filter_numbers import Chain
 
 SHEET = {"gyro": {"N": "0.2 deg/sqrt(h)", "B": "8 deg/h"}}
@@ -101,11 +100,6 @@ def test_a_noise_density_a_thousand_times_off_is_said(factor, is_said):
         assert ("unlikely-sheet" in codes) == is_said
 
 
-def test_a_temperature_range_is_printed():
-    sheet = {"temperature": "-40 to 85 degC", "gyro": {"N": "1 deg/sqrt(h)", "B": "8 deg/h"}}
-    assert "stated for -40 to 85 degC" in gmwm.datasheet(sheet).text()
-
-
 def test_numbers_in_use_are_judged():
     sheet = with_lines()
     least, largest = sheet.judged({"gyro": (N, 1e-9)})["gyro"]
@@ -151,19 +145,6 @@ def test_one_sensor_may_have_too_little():
     sheet = gmwm.datasheet({**SHEET, "accel": {"N": "80 ug/sqrt(Hz)"}})
     assert list(sheet.numbers()) == ["gyro"]
     assert "accel: no slow noise is stated" in str(sheet)
-
-
-def test_installed_sheets_name_their_documents_and_pages():
-    assert len(sheets()) > 10
-    for name in sheets():
-        sheet = gmwm.datasheet(name)
-        assert sheet.document, name
-        assert {"gyro", "accel"} >= set(sheet.entries), name
-        for sensor, values in sheet.entries.items():
-            assert set(sheet.pages[sensor]) == set(values), (name, sensor)
-        if not sheet.leaves_K_open:
-            assert all(sheet.models(sensor) for sensor in sheet.entries), name
-        assert all(letters["N"] for letters in sheet.letters.values()), name
 
 
 @pytest.mark.parametrize(

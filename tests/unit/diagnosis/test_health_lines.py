@@ -7,7 +7,6 @@ from hypothesis import given, settings, strategies as st
 from scipy.signal import butter, periodogram, sosfilt
 from scipy.stats import binom
 
-import gmwm
 from gmwm import GaussMarkov, Resonance, Sinusoid, WhiteNoise
 from gmwm.diagnosis import gathered
 from gmwm.diagnosis.lines import find_lines, line_notices
@@ -86,11 +85,6 @@ def test_what_a_filter_leaves_beyond_its_band_has_no_lines(order):
         assert found.amplitude == pytest.approx(1e-4, rel=0.1)
 
 
-def test_long_noise_has_no_lines():
-    for seed in range(3):
-        assert not lines(simulated(NOISES["white on walk"], 300_000, seed))
-
-
 def test_a_weak_line_in_a_long_record():
     # Half a per cent of the power of the noise; 100 times the noise within its own bins.
     n = 200_000
@@ -159,18 +153,6 @@ def test_gaps_do_not_hide_or_make_lines():
     (line,) = lines(noise + 0.5 * np.sin(2 * np.pi * 3.3 * DT * np.arange(n)))
     assert line.frequency == pytest.approx(3.3, abs=0.002)
     assert line.amplitude == pytest.approx(0.5, rel=0.1)
-
-
-def test_health_gives_lines_to_programs(record):
-    n = 30_000
-    x = np.random.default_rng(8).normal(size=n) * 0.02
-    x += 0.01 * np.sin(2 * np.pi * 0.565 * DT * np.arange(n))
-    found = gmwm.health(record(accel_x=x))
-    ((frequency, amplitude),) = found.lines("accel_x")
-    assert frequency == pytest.approx(0.565, abs=0.001)
-    assert amplitude == pytest.approx(0.01, rel=0.1)
-    (notice,) = found.of("accel_x", "line")
-    assert "a periodic line at 0.565 Hz, amplitude 1." in notice.text  # mg
 
 
 def test_a_line_of_three_axes_is_reported_once():

@@ -108,12 +108,6 @@ def test_health_names_the_stretch_that_calibrate_uses():
     assert (moves.values["start"], moves.values["stop"]) == stretch
 
 
-@pytest.mark.parametrize("seed", range(3))
-def test_what_is_static_is_left_whole(seed):
-    recording, _ = log(("rest", 120.0), seed=seed)
-    assert rest_of(recording) is None
-
-
 def vibrating(size, *stretches, seconds=300.0, seed=1, axes=range(6), line=True):
     """A recording at rest that vibrates in some stretches, in standard deviations of the noise."""
     recording, _ = log(("rest", seconds), seed=seed)
@@ -227,20 +221,6 @@ def test_they_are_calibrated_jointly():
     assert notice.values["longest"] == pytest.approx(40.0, abs=1.0)
     assert notice.values["total"] == pytest.approx(sum(b - a for a, b in rest), abs=3.0)
     assert cal.n * recording.dt == pytest.approx(notice.values["total"], abs=0.1)
-
-
-def test_what_only_vibrates_is_calibrated_on_its_stretches_at_rest():
-    recording = vibrating(3.0, (40.0, 70.0), seconds=110.0)
-    recording = replace(recording, channels=recording.channels[2::3])
-    cal = gmwm.calibrate(recording, WhiteNoise())
-    for name, fit in cal.items():
-        low, high = fit.interval(0.999)["N"]
-        assert low < (GYRO if name.startswith("gyro") else ACCEL) < high
-    (notice,) = [each for each in cal.notices if each.code == "still-stretches"]
-    assert notice.values["stretches"] == 2
-    found = [each for each in gmwm.health(recording).notices if each.code == "vibration"]
-    assert found[0].values["total"] == pytest.approx(30.0, abs=1.0)
-    assert 2.5 < found[0].values["ratio"] < 4.0
 
 
 def test_a_log_without_rest_is_refused_with_the_longest_stretch():

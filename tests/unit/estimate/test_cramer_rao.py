@@ -5,7 +5,6 @@ import pytest
 
 import gmwm
 from gmwm import BiasInstability, GaussMarkov, RandomWalk, RateRamp, WhiteNoise, cramer_rao
-from gmwm.estimate import CramerRao
 from gmwm.estimate.problem import Coordinates, spectral_information
 
 MODELS = {
@@ -213,19 +212,6 @@ def test_flicker_noise_and_own_spectra_take_the_spectral_way():
     own = cramer_rao(Own(level=3.0), 1000, 1.0)
     assert not own.exact
     assert own.stderr["level"] == pytest.approx(3.0 / np.sqrt(2000.0), rel=2e-3)
-
-
-def test_text_is_readable_at_80_columns():
-    bound = cramer_rao(WhiteNoise(0.8) + GaussMarkov(0.5, 125.0) + RateRamp(0.001), 6000, 1.0)
-    assert isinstance(bound, CramerRao)
-    assert str(bound).splitlines()[:5] == [
-        "white noise + Gauss-Markov + rate ramp",
-        "6,000 samples at 1 Hz; exact Gaussian information",
-        "",
-        "parameter  value  Cramer-Rao  wavelet var.  ratio",
-        "N            0.8     0.956 %       0.956 %  1.000",
-    ]
-    assert max(map(len, str(bound).splitlines())) <= 80
 
 
 @pytest.mark.parametrize(

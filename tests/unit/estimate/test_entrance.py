@@ -2,14 +2,12 @@
 
 import json
 
-import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
 import gmwm
 from gmwm import GaussMarkov, QuantizationNoise, RandomWalk, RateRamp, Resonance, WhiteNoise
 from marks import slow
-from places import GOLDEN
 
 
 def inside(fit, truth, level=0.999):
@@ -176,10 +174,6 @@ def example_fit():
     return gmwm.fit(truth.opened(), gmwm.simulate(truth, 20_000, 1.0, 1), dt=1.0)
 
 
-def test_printed_table():
-    assert str(example_fit()) == (GOLDEN / "fit.txt").read_text().rstrip("\n")
-
-
 def test_round_trip_through_json():
     fit = example_fit()
     again = gmwm.Fit.from_dict(json.loads(json.dumps(fit.to_dict(), allow_nan=False)))
@@ -215,22 +209,6 @@ def test_the_interval_of_a_deviation_reaches_over_models_that_tie():
     both = fit.deviation_interval(tau, rivals=[double])
     expected = np.sqrt(2.0 * double.haar_variance(tau, fit.wv.dt)) * high / value
     np.testing.assert_allclose(both, [value, low, expected], rtol=1e-9)
-
-
-def test_plot_shows_data_model_and_components():
-    axes = example_fit().plot()
-    labels = [text.get_text() for text in axes.get_legend().get_texts()]
-    assert labels == [
-        "white noise",
-        "Gauss-Markov",
-        "rate ramp",
-        "model",
-        "95 % band",
-        "data, 95 % interval",
-    ]
-    assert axes.get_xscale() == axes.get_yscale() == "log"
-    assert axes.get_xlabel() == "averaging time [s]"
-    plt.close(axes.figure)
 
 
 @pytest.mark.parametrize("weights", ["model", slow("diagonal"), slow("identity")])

@@ -6,7 +6,6 @@ import matplotlib
 
 matplotlib.use("Agg")
 
-import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 from scipy.stats import chi2
@@ -200,11 +199,6 @@ def test_standard_errors_follow_from_the_covariance_by_differences(corner):
     assert np.isnan(fit.p_value)
 
 
-def test_one_level_is_enough_where_the_user_says_so(corner):
-    fit = gmwm.fit(WhiteNoise(), corner, method=gmwm.AllanLines(regions={"N": (2, 2)}))
-    assert fit.params["N"] == pytest.approx(corner.allan_deviation[1] * np.sqrt(2.0))
-
-
 def test_regions_take_times_as_people_write_them():
     x = as_model(WhiteNoise(0.2)).simulate(5000, 0.1, 1)
     fit = gmwm.fit(
@@ -262,15 +256,6 @@ def test_bad_regions_are_refused(corner, regions, words):
     assert "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize(
-    "region",
-    [(8, 1), (-4, -1), (1,), (1, 2, 3), 8, "18", None, (1, float("nan")), (1, float("inf"))],
-)
-def test_a_bad_region_is_refused_before_there_are_data(region):
-    with pytest.raises(InputError, match=r"regions\['K'\] = .*: give first and last"):
-        gmwm.AllanLines(regions={"N": (1, 8), "K": region})
-
-
 @pytest.mark.parametrize("option", ["omega", "weights"])
 def test_weights_of_a_method_that_has_none_are_refused(corner, option):
     for method in ("allan", gmwm.AllanLines(), "em", gmwm.MLE()):
@@ -295,34 +280,6 @@ def test_the_result_comes_back_from_a_file(drifting):
     assert str(again) == str(fit)
     assert again.regions == fit.regions
     np.testing.assert_array_equal(again.covariance, fit.covariance)
-
-
-def test_the_table_says_how_and_fits_a_terminal(drifting):
-    text = str(drifting[0])
-    assert "slopes of the Allan deviation" in text
-    assert "NOT VALID\n- Q: the Allan plot has no region of slope -1, so" in text
-    assert max(map(len, text.splitlines())) <= 80
-
-
-def test_the_picture_shows_lines_across_it_and_regions_on_top(corner):
-    fit = gmwm.fit(WhiteNoise() + RandomWalk(), corner, method="allan")
-    axes = fit.plot()
-    texts = [text.get_text() for text in axes.get_legend().get_texts()]
-    assert f"N = {fit.params['N']:.3g} u/sqrt(Hz) (slope -1/2)" in texts
-    assert f"K = {fit.params['K']:.3g} u/s/sqrt(Hz) (slope +1/2)" in texts
-    thick = {line.get_label(): line for line in axes.lines if line.get_linewidth() > 4.0}
-    assert len(thick) == 2
-    for region in fit.regions:
-        line = next(line for label, line in thick.items() if label.startswith(region.key))
-        ends = np.array([region.tau_min, region.tau_max])
-        np.testing.assert_allclose(line.get_xdata(), ends)
-        np.testing.assert_allclose(line.get_ydata(), region.coefficient * ends**region.slope)
-    dashed = [line for line in axes.lines if line.get_linestyle() == "--"]
-    assert all(tuple(line.get_xdata()) == axes.get_xlim() for line in dashed)
-    bottom, top = axes.get_ylim()
-    assert bottom < corner.allan_deviation.min()
-    assert corner.allan_deviation.max() < top
-    plt.close("all")
 
 
 @pytest.mark.parametrize("wavelet", ["db2", "sym4"])

@@ -1,7 +1,6 @@
 """Files of calibrations: the numbers of `gmwm.bound`, and files that programs can use."""
 
 import json
-import re
 import xml.etree.ElementTree as ElementTree
 from dataclasses import replace
 
@@ -12,8 +11,7 @@ import yaml
 import gmwm
 import marks
 from gmwm import Channel, GaussMarkov, InputError, RandomWalk, Recording, WhiteNoise, bound, reduce
-from gmwm._core.text import brief
-from gmwm.export import TARGETS, axis_of, refusal
+from gmwm.export import TARGETS
 from gmwm.filter_numbers import usable
 from gmwm.issues import Notice
 from imu_numbers import numbers
@@ -47,10 +45,6 @@ def kalibr_text(calibration):
 
 def explained(given, target, horizon=None):
     return TARGETS[target].explain([given], horizon)
-
-
-def comments_of(text):
-    return [line for line in text.splitlines() if line.startswith("#")]
 
 
 def walk_where_it_is(name):
@@ -100,12 +94,6 @@ def test_noise_density_is_that_of_the_noisiest_axis(calibration, content):
         assert low < value < high
 
 
-def test_terms_that_were_not_found_are_called_upper_limits(text):
-    # Only where the model has no slow term.
-    (line,) = [line for line in comments_of(text) if "upper limit" in line]
-    assert line.endswith("no such term was found: accel K")
-
-
 @pytest.mark.parametrize("seed", [0, marks.slow(1), marks.slow(2)])
 def test_bounds_of_pure_white_noise_are_numbers(seed):
     # Six axes: where one of them leaves K all but undetermined, the file must still be usable.
@@ -126,13 +114,6 @@ def test_both_sensors_are_needed(calibration, tmp_path, kept, missing):
     with pytest.raises(InputError, match=f"the {missing} is missing, .*: calibrate both"):
         gmwm.export(replace(calibration, fits=fits), "kalibr", path=tmp_path / "imu.yaml")
     assert list(tmp_path.iterdir()) == []
-
-
-def test_the_file(calibration, text, tmp_path):
-    path = tmp_path / "imu.yaml"
-    assert gmwm.export(calibration, "kalibr", path=path) == text
-    assert path.read_text() == text
-    assert text.startswith("# Kalibr: bench.csv, 100 s recorded\n# N+K for outages up to 60 s")
 
 
 @pytest.mark.parametrize("source", ["", "two\nlines: of name", "a # b: {c", "x\u2028y\x00\x1b[3m"])
@@ -205,30 +186,6 @@ def test_slow_terms_count_as_a_random_walk(slow, horizon):
     assert "upper limit" not in text
 
 
-def test_comments_hold_the_consistency_and_what_n_and_k_cover(slow):
-    lines = comments_of(gmwm.export(slow, "kalibr"))
-    shared = bound(slow, "N+K", 60.0, shared=True)
-    nees = [one.nees[60.0] for one in shared.of("gyro").values()]
-    (line,) = [line for line in lines if "NEES" in line]
-    assert line.startswith(f"# NEES at 60 s: gyro {min(nees):.3g} to {max(nees):.3g}, accel ")
-    gyro = max(slow.numbers, key=lambda name: bound(slow, "N+K")[name].N if name[0] == "g" else 0.0)
-    tau = slow[gyro].params["tau"]
-    (line,) = [line for line in lines if "also cover" in line]
-    assert re.search(rf"{gyro} (Gauss-Markov|GM) [\d.]+ deg/h, {brief(tau)} s", line)
-    sd = max(one.initial_sd for one in shared.of("gyro").values())
-    assert f"# start bias gyro {sd:.2e} rad/s, accel " in "\n".join(lines)
-
-
-def test_the_explanation_has_the_numbers_of_the_file_and_of_each_axis(slow):
-    text = explained(slow, "openvins")
-    assert bound(slow, shared=True).text("si") in text
-    assert bound(slow).text("si") in text
-    assert "Propagator.cpp: predict_and_compute" in " ".join(text.split())
-    of_axes = explained(slow, "basalt", 10.0)
-    assert bound(slow, horizon=10.0).text("si") in of_axes
-    assert "all axes of a sensor" not in of_axes
-
-
 YAML = ("kalibr", "vins", "orbslam3", "fastlio", "liosam", "kimera", "okvis2", "maplab")
 
 
@@ -256,24 +213,6 @@ def test_files_have_six_lines_and_yaml_twelve(slow, stepped, name, is_valid, sou
             line.partition(":")[0] for line in lines if line.endswith("do not use: not valid")
         ]
         assert marked == [key for key in NUMBERS if key.startswith(invalid)]
-
-
-def test_a_fast_term_of_the_sensors_n_is_not_named_as_covered():
-    model = WhiteNoise(1e-4) + GaussMarkov(6e-3, 0.005) + GaussMarkov(2e-4, 40.0)
-    wv = gmwm.wavelet_variance(model.simulate(200_000, DT, 8), DT)
-    fit = gmwm.fit("N + 2 GM", replace(wv, name="gyro_x", quantity="gyro", unit="rad/s"))
-    axis = axis_of("gyro_x", gmwm.bound(fit), float("nan"), fit)
-    tau = float(re.search(r", ([\d.]+) s$", axis.covers)[1])
-    assert tau == pytest.approx(fit.params["tau_2"], rel=0.05)
-
-
-def test_what_to_do_is_said_once_where_it_is_the_same():
-    cut, shield = (
-        Notice("step", "bad", "", "a step", {}, each) for each in ("cut it", "shield it")
-    )
-    said = "not valid: gyro_x (the bias stepped), gyro_y (the bias stepped); "
-    assert refusal({"gyro_x": cut, "gyro_y": cut}) == f"{said}cut it"
-    assert refusal({"gyro_x": cut, "gyro_y": shield}) == f"{said}gyro_x: cut it; gyro_y: shield it"
 
 
 def test_per_axis_files_have_the_bound_of_each_axis(slow):
@@ -350,21 +289,6 @@ def test_the_file_has_the_one_correlation_time_that_costs_least(slow):
     assert found.text("si") in explained(slow, "kfgins")
 
 
-def test_two_calibrations_have_one_correlation_time_too(slow):
-    parts = [replace(slow, fits={n: f for n, f in slow.items() if n[0] == q}) for q in "ga"]
-    whole, two = (yaml.safe_load(gmwm.export(each, "kfgins")) for each in (slow, parts))
-    assert two == whole
-
-
-@pytest.mark.parametrize(("form", "target"), [("N+K", "kalibr"), ("N+GM", "kfgins")])
-def test_consistency_that_saved_numbers_do_not_know(slow, form, target):
-    assert "NEES unknown" in gmwm.export(bound(slow, form, 60.0), target)
-    # The calibration, and numbers that the axes share, know it.
-    assert "NEES unknown" not in gmwm.export(slow, target)
-    if form == "N+K":
-        assert "NEES unknown" not in gmwm.export(bound(slow, form, 60.0, shared=True), target)
-
-
 @pytest.mark.parametrize(
     ("given", "target", "options", "message"),
     [
@@ -387,21 +311,6 @@ def test_consistency_that_saved_numbers_do_not_know(slow, form, target):
 def test_bad_input(given, target, options, message):
     with pytest.raises(InputError, match=message):
         gmwm.export(numbers("N+K") if given is None else given, target, **options)
-
-
-def test_the_full_model_has_no_horizon(slow):
-    with pytest.raises(InputError, match="the full model has no horizon"):
-        gmwm.export(slow, "state-space", horizon=3.0)
-    small = json.loads(gmwm.export(slow, "state-space", horizon=3.0, form="N+K+GM"))
-    states = small["channels"]["gyro_x"]["states"]
-    assert states in (["random walk", "Gauss-Markov"], ["Gauss-Markov", "random walk"])
-
-
-def test_the_room_is_its_function():
-    # Whichever was imported first.
-    import gmwm.export as room
-
-    assert room(numbers("N+K"), "glim") == gmwm.export(numbers("N+K"), "glim")
 
 
 def test_a_walk_that_is_not_there_has_its_limit_at_every_horizon(calibration):

@@ -351,13 +351,6 @@ def test_a_random_walk_says_what_else_it_stands_for(solve):
     assert not why(WhiteNoise(2e-4) + RandomWalk(1e-5))[1]
 
 
-def test_white_noise_behind_a_low_pass_is_nothing_to_be_explained():
-    """It was said that the model had no white noise."""
-    truth = gmwm.LowPassNoise(2e-4, 20.0, 2.0, 0.7) + SLOW
-    assert pytest.approx(2e-4, rel=0.05) == (found := gmwm.bound(truth, "N+K", 60.0)).N
-    assert "more-than-white-noise" not in {notice.code for notice in found.notices}
-
-
 def test_an_axis_does_not_explain_what_another_needs():
     models = {"accel_x": WhiteNoise(1e-3) + SLOW, "accel_y": WhiteNoise(5e-3) + SLOW}
     numbers = gmwm.bound(models, shared=True)
@@ -386,17 +379,6 @@ def test_a_start_of_half_a_degree_hides_no_quantization_of_a_heading(name, horiz
     steps = np.random.default_rng(5).uniform(-0.5, 0.5, (2, 4000)) * np.sqrt(12.0) * Q
     gained = np.mean((steps[1] - steps[0]) ** 2) + N**2 * horizon
     assert found.nees[horizon] == pytest.approx(gained / (N**2 * horizon), rel=0.08)
-
-
-def test_a_loose_form_names_the_one_that_is_worth_its_state():
-    truth = {"accel_x": WhiteNoise(1e-3) + GaussMarkov(2e-3, 30.0)}
-    plain, tight = (gmwm.bound(truth, form)["accel_x"] for form in ("N+K", "N+K+GM"))
-    (notice,) = (n for n in plain.notices if n.code == "loose-form")
-    assert notice.hint
-    assert notice.values["tightness"] == plain.tightness[60.0] > 1.2
-    assert notice.values["with_state"] == pytest.approx(tight.tightness[60.0], abs=1e-6)
-    short = gmwm.bound(truth, horizon=1.0)["accel_x"]
-    assert not any(n.code == "loose-form" for each in (tight, short) for n in each.notices)
 
 
 @pytest.fixture(scope="module")
@@ -512,19 +494,6 @@ def test_quantization_lines_and_fast_peaks_are_left_out_with_a_notice():
         assert pytest.approx(plain.N, rel=0.01) == found.N
         assert pytest.approx(plain.K, rel=0.01) == found.K
         assert notices[code].severity == "note"
-
-
-def test_a_little_more_horizon_changes_numbers_little():
-    """Where ten over the horizon passes a resonance, N fell to an eighth at once."""
-    resonance, f = Resonance(0.02, 9.5, 0.05), np.array([1e-3, 9.5])
-    foot, peak = resonance.psd(f, DT)
-    horizons = np.geomspace(0.7, 16.0, 34)
-    assert horizons[1] < 1.1 * horizons[0]
-    N = [gmwm.bound(WhiteNoise(1e-3) + resonance, "N+K", float(T)).N for T in horizons]
-    assert N[0] ** 2 == pytest.approx(1e-6 + peak, rel=0.02)
-    assert N[-1] ** 2 == pytest.approx(1e-6 + foot, rel=0.02)
-    ratio = np.divide(N[1:], N[:-1])
-    assert np.all((ratio > 1.0 / 1.16) & (ratio < 1.0 + 1e-6))
 
 
 def test_a_resonance_counts_by_its_low_frequency_density():

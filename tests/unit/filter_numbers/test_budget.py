@@ -2,7 +2,6 @@
 
 import json
 import re
-from functools import partial
 
 import matplotlib
 
@@ -14,7 +13,7 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 import gmwm
-from gmwm import GaussMarkov, QuantizationNoise, RandomWalk, RateRamp, WhiteNoise, error_budget
+from gmwm import GaussMarkov, RandomWalk, RateRamp, WhiteNoise, error_budget
 from gmwm.process import CATALOGUE
 
 G = 9.80665
@@ -157,15 +156,6 @@ def test_the_largest_contribution(budget):
 # -- notes ----------------------------------------------------------------------------------------
 
 
-def test_what_to_know(calibration):
-    notes = " ".join(error_budget(calibration, (1.0, 3600.0)).notes)
-    assert "neither gyro nor accelerometer, left out: voltage" in notes
-    assert "a record of 40 s shows little of what happens over more than 4 s" in notes
-    assert "the horizontal total lacks gyro_y, accel_x" in notes
-    assert "beyond 600 s the Schuler oscillation" in notes
-    assert error_budget(IMU, dt=DT).notes == ()
-
-
 def test_a_tilt_that_is_no_small_angle():
     large = {"gyro_x": GaussMarkov(0.1 * DEG, 1e6)}
     (_, note) = error_budget(large, dt=DT, calibrated=False).notes
@@ -175,40 +165,7 @@ def test_a_tilt_that_is_no_small_angle():
     assert error_budget(heading, dt=DT, calibrated=False).notes == ()
 
 
-def test_models_that_are_not_valid_are_named():
-    series = gmwm.Channel("gyro_x", WhiteNoise(1e-3).simulate(4000, DT, 1), DT, "gyro", "rad/s")
-    fit = gmwm.fit(WhiteNoise() + RandomWalk(), series)
-    assert not fit.valid
-    notes = error_budget(fit, (1.0,)).notes
-    assert "the model of gyro_x is not valid: read the notices first" in notes
-
-
 # -- looks ----------------------------------------------------------------------------------------
-
-
-def test_the_table_is_as_wide_as_a_terminal(budget):
-    for found in (budget, error_budget({"gyro_z": QuantizationNoise(1e-5) + RateRamp(1e-9)}, dt=1)):
-        lines = str(found).splitlines()
-        assert max(map(len, lines)) <= 80
-        assert not any(line != line.rstrip() for line in lines)
-
-
-def test_the_table_says_what_the_numbers_say(budget):
-    text = str(budget)
-    for quantity, scale in (("attitude", 1.0 / DEG), ("velocity", 1.0), ("position", 1.0)):
-        block = next(part for part in text.split("\n\n") if part.startswith(quantity))
-        head, *lines = block.splitlines()
-        assert head.split("]")[1].split() == ["1", "s", "10", "s", "60", "s", "600", "s"]
-        last = [float(word.replace(",", "")) for word in lines[-1].split()[-4:]]
-        assert last == pytest.approx(scale * budget.total()[quantity], rel=6e-3)
-        rows = [row for row in budget.rows if row.quantity == quantity]
-        totals = len({row.channel for row in rows})
-        assert len(lines) == len(rows) + totals + 1
-        label = "tilt" if quantity == "attitude" else "horizontal, radial"
-        assert lines[-1].strip().startswith(label)
-    assert "attitude [deg]" in text
-    assert "values of the slow errors known" in text
-    assert "from\nexact attitude, velocity and position" in text
 
 
 def test_to_dict_is_json_and_complete(budget):
@@ -223,31 +180,6 @@ def test_to_dict_is_json_and_complete(budget):
         )
         assert len(row["values"]) == 4
         assert len(row["curve"]) == len(content["grid_s"])
-
-
-def test_the_curves_of_a_channel(budget):
-    axes = budget.plot(of="gyro_x", quantity="attitude")
-    assert (axes.get_xscale(), axes.get_yscale()) == ("log", "log")
-    assert axes.get_ylabel() == "attitude error, 1 sigma [deg]"
-    lines = {line.get_label(): line for line in axes.get_lines()}
-    assert list(lines) == [*GYRO.term_labels(), "total"]
-    x, y = lines["total"].get_data()
-    assert (x[0], x[-1]) == pytest.approx((1.0, 600.0))
-    assert [y[0], y[-1]] == pytest.approx(np.degrees(budget.total("gyro_x")["attitude"][[0, -1]]))
-    assert np.sqrt(sum(lines[k].get_ydata() ** 2 for k in GYRO.term_labels())) == pytest.approx(y)
-    axes.figure.canvas.draw()
-    _, given_axes = plt.subplots()
-    assert budget.plot(given_axes) is given_axes  # of the horizontal pair
-    labels = [line.get_label() for line in given_axes.get_lines()]
-    assert labels == ["gyro_x", "gyro_y", "accel_x", "accel_y", "total"]
-    assert given_axes.get_ylabel() == "position error, 1 sigma [m]"
-
-
-def test_a_term_of_zero_is_in_the_table_but_not_drawn():
-    found = error_budget({"gyro_z": WhiteNoise(1e-5) + RandomWalk(0.0)}, [10.0], dt=DT)
-    assert re.search(r"random walk +0$", str(found), re.MULTILINE)
-    assert [line.get_label() for line in found.plot().get_lines()] == ["white noise", "total"]
-    assert len(error_budget({"gyro_z": WhiteNoise(0.0)}, dt=DT).plot().get_lines()) == 1
 
 
 # -- bad input ------------------------------------------------------------------------------------
@@ -284,27 +216,18 @@ def test_bad_input(what):
 # -- the command ----------------------------------------------------------------------------------
 
 
-@pytest.fixture
-def run(run):
-    return partial(run, "budget")
+def test_what_to_know(calibration):
+    notes = " ".join(error_budget(calibration, (1.0, 3600.0)).notes)
+    assert "neither gyro nor accelerometer, left out: voltage" in notes
+    assert "a record of 40 s shows little of what happens over more than 4 s" in notes
+    assert "the horizontal total lacks gyro_y, accel_x" in notes
+    assert "beyond 600 s the Schuler oscillation" in notes
+    assert error_budget(IMU, dt=DT).notes == ()
 
 
-def test_the_command_prints_the_table(run, calibration, tmp_path):
-    path = calibration.save(tmp_path / "calibration.json")
-    assert run(path) == (0, f"{error_budget(calibration)}\n", "")
-    code, printed, _ = run(path, "--times", "1, 2.5", "--unknown-start")
-    assert code == 0
-    assert printed == f"{error_budget(calibration, (1.0, 2.5), calibrated=False)}\n"
-
-
-def test_the_command_refuses(run, calibration, tmp_path):
-    path = calibration.save(tmp_path / "calibration.json")
-    for arguments, words in (
-        ((path, "--times", "1,x"), "--times 1,x: write seconds, e.g. 1,10,60"),
-        ((path, "--times", "0.001"), "shorter than the sampling interval"),
-        ((tmp_path / "none.json",), "cannot be read"),
-    ):
-        code, printed, told = run(*arguments)
-        assert (code, printed) == (2, "")
-        assert words in told
-        assert told.count("\n") == 1
+def test_models_that_are_not_valid_are_named():
+    series = gmwm.Channel("gyro_x", WhiteNoise(1e-3).simulate(4000, DT, 1), DT, "gyro", "rad/s")
+    fit = gmwm.fit(WhiteNoise() + RandomWalk(), series)
+    assert not fit.valid
+    notes = error_budget(fit, (1.0,)).notes
+    assert "the model of gyro_x is not valid: read the notices first" in notes

@@ -178,44 +178,6 @@ def test_what_the_navigation_filter_cannot_hold_is_left_out_with_a_notice():
     assert [notice.code for notice in found.notices] == ["no-navigation-filter"]
 
 
-def test_text_and_files(sheet, tmp_path):
-    text, verbose = str(sheet), sheet.text(verbose=True)
-    assert text.startswith("The numbers in use are too small on ")
-    assert len(text.splitlines()) <= 30
-    for part in (
-        "position by tilt [m]",
-        "angle [deg]",
-        "whole filter",
-        "- take the row 'error model'",
-    ):
-        assert part in text
-    for part in (
-        "Without aiding", "INS/GNSS filter", "Relative pose between keyframes",
-        "after 120 s of fixes every 1 s", "Recommended: N+K for 60 s",
-    ):  # fmt: skip
-        assert part in verbose
-    in_use, model = (
-        next(line for line in text.splitlines() if line.startswith(name)).split()[-2:]
-        for name in ("in use", "error model")
-    )
-    for each, cause in zip((in_use, model), sheet.causes, strict=False):
-        assert float(each[0]) == pytest.approx(3437.75 * cause.N, rel=1e-3)
-    assert "rad/s/sqrt(Hz)" in sheet.text("si")
-    assert max(map(len, f"{verbose}\n{sheet.text('si')}".splitlines())) <= 80
-    again = gmwm.load(sheet.save(tmp_path / "certificate.json"))
-    assert isinstance(again, gmwm.Certificate)
-    assert again.to_dict() == sheet.to_dict()
-    assert again.checks == sheet.checks
-    assert "NEES up to" in repr(sheet)
-    for change in ({"time": 7.0}, {"consumer": "keyframes"}):  # a row of the table would be missing
-        content = sheet.to_dict()
-        content["checks"][0] |= change
-        with pytest.raises(InputError, match="times"):
-            gmwm.Certificate.from_dict(content)
-    pandas = pytest.importorskip("pandas")
-    assert isinstance(sheet.to_frame(), pandas.DataFrame)
-
-
 def test_the_verdict_follows_the_numbers():
     models = {name: model for name, model in SENSOR.items()}
     safe = gmwm.bound(models, "N+K", horizon=60.0, shared=True, dt=0.1)

@@ -1,7 +1,7 @@
 """Filter numbers as a result: values, tables, files."""
 
 import math
-from dataclasses import FrozenInstanceError, replace
+from dataclasses import FrozenInstanceError
 
 import numpy as np
 import pytest
@@ -65,51 +65,6 @@ def test_a_damaged_file_is_refused():
     for change in ({"form": "N"}, {"horizon_s": "long"}, {"model": [{"process": "X"}]}):
         with pytest.raises(InputError, match="make it again"):
             AxisFilterNumbers.from_dict(content | change)
-
-
-def test_text_names_units_and_every_number():
-    lines = str(WALK).splitlines()
-    assert lines[0] == "N+K for 60 s, bound"
-    assert [line.split() for line in lines[1:4]] == [
-        ["N", "0.3438", "deg/sqrt(h)"],
-        ["K", "61.88", "deg/h/sqrt(h)"],
-        ["initial_sd", "6.188", "deg/h"],
-    ]
-    lines = WALK.text("si").splitlines()
-    assert [line.split() for line in lines[1:4]] == [
-        ["N", "0.0001", "rad/s/sqrt(Hz)"],
-        ["K", "5e-06", "rad/s^2/sqrt(Hz)"],
-        ["initial_sd", "3e-05", "rad/s"],
-    ]
-    assert "after 600 s without aiding: NEES 0.75" in str(WALK)
-    assert str(NOTICE) in str(WALK)
-    text = str(SENSOR)
-    assert "static.csv: N+K for 60 s, bound" in text
-    for part in ("deg/sqrt(h)", "ug/sqrt(Hz)", "sigma_2", "NEES 600 s", "0.91", "gyro_x: "):
-        assert part in text
-    assert "rad/s^2/sqrt(Hz)" in SENSOR.text("si")
-    for numbers in (WALK, SENSOR):
-        with pytest.raises(InputError, match="units = 'SI': choose from field, si"):
-            numbers.text("SI")
-    assert "<pre>" in SENSOR._repr_html_()
-    assert repr(SENSOR) == "<FilterNumbers of static.csv: N+K for 60 s, gyro_x, accel_x>"
-
-
-def test_errors_that_only_some_axes_have():
-    axes = {"none": WALK, "known": replace(WALK, stderr={"N": 1e-6, "K": 2e-7})}
-    rows = [line.split() for line in str(FilterNumbers(axes)).splitlines()]
-    values = {row[0]: row[1:] for row in rows[2:7] if row and row[0] in axes}
-    assert values["none"] == ["0.3438", "-", "61.88", "-", "6.188"]
-    assert values["known"] == ["0.3438", "0.0034", "61.88", "2.5", "6.188"]
-
-
-@pytest.mark.parametrize("name", ["gyro_x", "x" * 58, "x" * 90])
-def test_tables_fit_a_terminal(name):
-    known = replace(WALK, stderr={"N": 1.234e-6, "K": 2.345e-7})
-    numbers = FilterNumbers({name: known, "accel_x": TWO}, "static.csv")
-    for text in (str(numbers), numbers.text("si")):
-        tables = text.partition("NEES: predicted")[0]
-        assert max(map(len, tables.splitlines())) <= 80
 
 
 def test_table():

@@ -198,24 +198,3 @@ def test_page_shows_curves_factors_and_numbers(tmp_path):
     assert f"{N:.2e} SI" in page
     assert "at rest" in page
     assert "default-src" in page
-
-
-def test_page_without_rest_or_long_flights(tmp_path):
-    found = in_motion([allan(WhiteNoise(1e-3))])
-    page = found.report(tmp_path / "motion.html").read_text()
-    assert page.count("<svg") == 6
-    assert "Factor over rest" not in page
-
-
-def test_summary_has_the_numbers_and_few_lines():
-    rest = allan(WhiteNoise(1e-4))
-    found = in_motion([allan(QuantizationNoise(1e-3) + WhiteNoise(1e-3))] * 4, rest)
-    lines = str(found).splitlines()
-    rows = [line.split() for line in lines if line.startswith("updates")]
-    numbers = found.numbers(0.1, 1.0)["gyro_x"].params
-    assert rows[0] == ["updates", "0.1", "s,", "outages", "1", "s",
-                       *2 * [f"{numbers[key]:.2g}" for key in "NK"]]  # fmt: skip
-    assert rows[1][:6] == ["updates", "1", "s,", "outages", "2", "s"]
-    assert rows[2][6:8] == ["at", "rest"]
-    assert len(lines) <= 25
-    assert found.at("rest").curve("imu 1", "gyro_x").variance == pytest.approx(rest)

@@ -2,10 +2,9 @@
 
 import csv
 import json
-import pickle
 import re
 import shutil
-from dataclasses import FrozenInstanceError, replace
+from dataclasses import FrozenInstanceError
 from functools import wraps
 
 import numpy as np
@@ -14,9 +13,9 @@ import pytest
 
 import gmwm
 from fleets import QUICK
-from gmwm import Calibration, Fleet, InputError, Model, RandomWalk, WhiteNoise
+from gmwm import Calibration, Fleet, InputError, RandomWalk, WhiteNoise
 from gmwm.issues import Notice
-from gmwm.population import LETTERS, SCHEMA, Item, Task, Unit, task as tasks, unit as lots
+from gmwm.population import LETTERS, SCHEMA, task as tasks, unit as lots
 
 READING = ("rate", "units")
 
@@ -85,11 +84,11 @@ def worked(monkeypatch):
     return seen
 
 
+# -- the result -----------------------------------------------------------------------------------
+
+
 def codes(found):
     return {notice.code for notice in found.notices}
-
-
-# -- the result -----------------------------------------------------------------------------------
 
 
 def test_a_fleet_is_a_mapping_of_paths_to_calibrations_or_why_not(lot, outputs):
@@ -106,15 +105,6 @@ def test_a_fleet_is_a_mapping_of_paths_to_calibrations_or_why_not(lot, outputs):
     with pytest.raises(FrozenInstanceError):
         found.limits = {}
     assert repr(found) == "<Fleet of 4 units: 3 calibrated, 1 not>"
-
-
-def test_a_fleet_prints_what_units_have_in_common(outputs):
-    text = str(outputs[1])
-    assert "4 units: 3 calibrated, 3 of them with a valid model" in text
-    assert "_b_damaged: <b>damaged.npz is not an NPZ file" in text
-    assert "gyro_y: 1 unit has no such channel: third" in text
-    assert all(len(line) <= 80 for line in text.splitlines())
-    assert "&lt;b&gt;damaged" in outputs[1]._repr_html_()
 
 
 def test_the_table_has_a_row_per_unit_channel_and_number(lot, outputs):
@@ -319,15 +309,6 @@ def test_a_folder_has_one_fleet_at_a_time(lot, tmp_path):
     gmwm.fleet(lot[:1], folder=tmp_path, resume=True, **QUICK)
 
 
-def test_a_fleet_can_be_saved_later(lot, outputs, tmp_path):
-    folder, found = outputs
-    assert gmwm.fleet(lot, **QUICK).save(tmp_path / "new") == tmp_path / "new"
-    for name in ("calibrations/unit 0.json", "fleet.html"):
-        assert (tmp_path / "new" / name).read_text() == (folder / name).read_text()
-    with pytest.raises(InputError, match="earlier fleet"):
-        found.save(tmp_path / "new")
-
-
 # -- units that are not like the others -----------------------------------------------------------
 
 
@@ -383,60 +364,6 @@ def test_a_unit_that_fails_beside_the_others_costs_one_unit(lot, tmp_path, monke
     }  # fmt: skip
     assert all("unit 0" not in each.numbers for each in found.structures)
     assert {row["device"] for row in found.rows if row["valid"]} == {"unit 1", "third"}
-
-
-def test_a_page_of_thousands_of_units_stays_small_and_names_the_ones_to_look_at(outputs, tmp_path):
-    _, small = outputs
-    first = next(iter(small.done.values()))
-    names = [f"unit {i:04d}" for i in range(3000)]
-    units = {name: Unit(name, name, first) for name in names}
-    structures = [
-        replace(
-            each,
-            invalid=(),
-            numbers={
-                name: {
-                    letter: replace(number, upper=(1.0 if i % 100 else 9.0) * number.upper)
-                    for letter, number in each.numbers["unit 0"].items()
-                }
-                for i, name in enumerate(names)
-            },
-        )
-        for each in small.structures
-    ]
-    limits = {"gyro": {"N": 2.0 * structures[0].numbers[names[1]]["N"].upper}}
-    lot = Fleet(units, tuple(structures), {}, limits)
-    page = lot.report(tmp_path / "page.html").read_text()
-    assert len(page) < 2e6
-    assert len(page.split("<tr>")) < 500
-    # The 30 whose interval contains the limit come before the ones that pass.
-    assert all(f">{name}</th>" in page for name in names[::100])
-    assert "2700 more units" in page
-    assert len(lot.rows) == 3000 * 3 * len(first)
-
-
-def test_units_of_another_kind_are_reported(record, tmp_path):
-    options = {key: each for key, each in QUICK.items() if key != "rate"}
-    paths = [record(tmp_path / f"{i}.csv", seed=i, channels=("gyro_x",)) for i in (1, 2)]
-    shutil.copy(paths[0], tmp_path / "copy.csv")
-    alike = [*paths, tmp_path / "copy.csv"]
-    assert codes(gmwm.fleet(alike, **options)) == {"same-recording", "few-units"}
-    short = record(tmp_path / "short.csv", channels=("gyro_y",), n=100, dt=0.5)
-    assert codes(gmwm.fleet([*alike, short], **options)) == {
-        "same-recording", "few-units", "rates-differ", "channels-differ",
-    }  # fmt: skip
-
-
-def test_another_process_gives_the_same(lot, outputs):
-    """What is sent to workers, and what they send back."""
-    options = {k: QUICK[k] for k in READING}
-    task = Task(options, 0.0, None, {"": Model((QUICK["model"],))}, (), True, gmwm.__version__)
-    item = Item(lot[0], "unit 0")
-    unit = pickle.loads(pickle.dumps(pickle.loads(pickle.dumps(task))(item)))
-    assert unit.result.to_dict() == outputs[1][lot[0]].to_dict()
-    assert task.lost(item).result.code == "worker-lost"
-    old = pickle.loads(pickle.dumps(replace(task, version="0.0.0")))
-    assert "the worker has gmwm" in old(item).result.text
 
 
 def test_models_are_given_by_channel_or_sensor(lot):
@@ -519,3 +446,15 @@ def test_a_recording_that_changes_meanwhile_is_not_taken_for_the_other(
     monkeypatch.setattr(tasks, "read", changed)
     with pytest.raises(InputError, match="changed while it was calibrated"):
         gmwm.fleet(given, **QUICK)
+
+
+def test_units_of_another_kind_are_reported(record, tmp_path):
+    options = {key: each for key, each in QUICK.items() if key != "rate"}
+    paths = [record(tmp_path / f"{i}.csv", seed=i, channels=("gyro_x",)) for i in (1, 2)]
+    shutil.copy(paths[0], tmp_path / "copy.csv")
+    alike = [*paths, tmp_path / "copy.csv"]
+    assert codes(gmwm.fleet(alike, **options)) == {"same-recording", "few-units"}
+    short = record(tmp_path / "short.csv", channels=("gyro_y",), n=100, dt=0.5)
+    assert codes(gmwm.fleet([*alike, short], **options)) == {
+        "same-recording", "few-units", "rates-differ", "channels-differ",
+    }  # fmt: skip

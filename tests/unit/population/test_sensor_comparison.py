@@ -1,7 +1,5 @@
 """`compare`: what is compared, what is reported, and input that cannot be used."""
 
-import json
-import re
 from dataclasses import replace
 
 import numpy as np
@@ -11,7 +9,6 @@ import gmwm
 from gmwm import Calibration, InputError, RandomWalk, WhiteNoise
 from gmwm.estimate import estimate
 from gmwm.issues import Notice
-from gmwm.population import labelled
 
 ACCEL = WhiteNoise(1e-2) + RandomWalk(5e-3)
 N = 5000
@@ -67,24 +64,6 @@ def test_a_changed_axis_differs_and_the_other_agrees(compared):
     assert "curves-differ" in codes(compared)
 
 
-@pytest.mark.parametrize(
-    ("paths", "labels"),
-    [
-        (["monday/calibration.json", "friday/calibration.json"], ("monday", "friday")),
-        (["/x/u1/day/cal.json", "/x/u2/day/cal.json"], ("u1", "u2")),
-        (["a/1/cal.json", "a/2/cal.json", "b/1/cal.json"], ("a/1", "a/2", "b/1")),
-        (["out/monday.json", "out/friday.json"], ("monday", "friday")),
-        (["calibration.json", "friday/calibration.json"], ("static", "friday")),
-        (["same/calibration.json", "same/calibration.json"], ("static", "static (2)")),
-        (["", ""], ("static", "static (2)")),
-    ],
-)
-def test_recordings_of_one_name_are_distinguished_by_their_paths(three, paths, labels):
-    alike = [replace(each, source="static.csv") for each in [*three, three[0]][: len(paths)]]
-    assert tuple(labelled(alike, paths)) == labels
-    assert tuple(labelled([*alike, three[2]], [*paths, ""])) == (*labels, "day3")
-
-
 def test_numbers_of_all_recordings_come_from_one_structure(compared):
     structure = compared["gyro_x"].structure
     assert structure.model == "white noise + random walk"
@@ -115,29 +94,6 @@ def test_the_reversed_order_gives_the_same_verdicts(three, compared):
         assert back[name].for_filter("N") == (pytest.approx(value, rel=1e-3), is_limit)
 
 
-def test_a_comparison_shows_itself(compared, tmp_path):
-    assert repr(compared).startswith("<SensorComparison of 3 recordings, 3 axes: 1 agree")
-    assert max(map(len, str(compared).splitlines())) <= 80
-    assert list(compared.to_frame()["state"]) == ["differ", "agree", "untested"]
-    content = json.loads(json.dumps(compared.to_dict(), allow_nan=False))
-    assert content["channels"]["gyro_x"]["state"] == "differ"
-    sheet = tmp_path / "sheet.yaml"
-    sheet.write_text("gyro: {N: 3 deg/sqrt(h)}\n")
-    text = compared.report(tmp_path / "c.html", datasheet=sheet).read_text()
-    assert text.count('<svg viewBox="0 0 380') == 3
-    assert 'class="sheet"' in text
-    assert not re.search("<script|https?:|url\\(", text)
-
-
-def test_a_number_that_is_not_known_is_null_in_json(compared):
-    axis = compared["gyro_x"]
-    unknown = {label: replace(each, predicted=()) for label, each in axis.covering.items()}
-    with_nan = replace(axis, covering=unknown)
-    content = json.loads(json.dumps(with_nan.to_dict(), allow_nan=False))
-    assert content["filter_numbers"]["day1"]["nees"] is None
-    assert content["filter_numbers"]["day1"]["N"] == axis.for_filter("N")[0]
-
-
 def test_the_same_file_twice_is_one_recording(three, compared):
     with pytest.raises(InputError, match="is the same recording as"):
         gmwm.compare([three[0], three[0]])
@@ -158,11 +114,6 @@ def test_the_same_file_twice_is_one_recording(three, compared):
 def test_what_cannot_be_compared_is_one_sentence(sources, message):
     with pytest.raises(InputError, match=message):
         gmwm.compare(sources)
-
-
-def test_one_file_alone_is_refused(three):
-    with pytest.raises(InputError, match="two recordings or more"):
-        gmwm.compare(three[:1])
 
 
 def test_other_rates_are_not_compared_level_by_level(three):
@@ -187,15 +138,3 @@ def test_what_is_no_noise_or_missing_is_left_out_and_named(three, compared):
     assert found["accel_x"].left_out["b"].code == "channel-skipped"
     gyro = found["gyro_x"]
     assert list(gyro.fits) == ["a", "c"] and gyro.left_out["b"].values["reason"] == "step"
-
-
-def test_a_calibration_without_its_curve_is_refused_in_one_sentence(three, tmp_path):
-    kept, cut = (
-        each.save(tmp_path / f"{name}.json") for name, each in zip("ab", three[:2], strict=True)
-    )
-    content = json.loads(cut.read_text())
-    del content["channels"]["gyro_x"]["wavelet_variance"]
-    cut.write_text(json.dumps(content))
-    with pytest.raises(InputError, match=r"b\.json") as refused:
-        gmwm.compare([kept, cut])
-    assert "\n" not in str(refused.value)

@@ -41,13 +41,6 @@ def test_units_with_another_selection_get_the_model_of_the_lot(lot):
     assert all(each.outliers == () for each in spreads_of([found]))
 
 
-def test_the_order_of_units_changes_nothing(lot):
-    back = chosen(dict(reversed(lot.items())))
-    assert back.model == chosen(lot).model
-    for name, own in chosen(lot).numbers.items():
-        assert back.numbers[name] == own
-
-
 def test_the_unit_that_prevents_a_structure_is_named(lot, monkeypatch):
     usual = unit.estimate
     monkeypatch.setattr(unit, "estimate", lambda m, wv: 1 / 0 if wv is odd else usual(m, wv))

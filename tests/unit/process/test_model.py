@@ -135,20 +135,7 @@ def test_a_value_more_than_a_process_has_parameters_is_refused(kind):
         kind(*full, 1.0)
 
 
-@pytest.mark.parametrize(
-    "make", [lambda: gmwm.GaussMarkov(1.0, 2.0, 3.0), lambda: gmwm.GaussMarkov(sigma=1.0, size=2.0)]
-)
-def test_a_parameter_too_many_is_refused_with_those_that_there_are(make):
-    with pytest.raises(gmwm.InputError, match=r"its parameters are sigma, tau$"):
-        make()
-
-
 # -- models as text -------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("kind", CATALOGUE, ids=lambda kind: kind.__name__)
-def test_a_text_has_short_names_and_class_names(kind):
-    assert as_model(kind.short_name) == as_model(kind.__name__) == as_model(kind())
 
 
 @pytest.mark.parametrize(
@@ -178,14 +165,6 @@ def test_the_latest_process_of_a_name_of_ones_own_is_meant():
     assert type(model.terms[1]) is second is not first
     with pytest.raises(gmwm.InputError, match=r"write .*, Tinted, "):
         as_model("N + Colored")
-
-
-@pytest.mark.parametrize("text", ["", "N +", "N - K", "0 N", "N + X", "N(1)", "2 * N * K"])
-def test_a_text_that_is_none_names_the_terms(text):
-    with pytest.raises(
-        gmwm.InputError, match=r"is not a term: write B, K, N, Q, R, AR, GM, .* GM'$"
-    ):
-        as_model(text)
 
 
 def test_open_parameters_are_shown_as_they_are_given():

@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import gzip
-import math
-import subprocess
-import sys
 
 import numpy as np
 import pytest
@@ -14,7 +11,6 @@ from gmwm._core.units import factor
 from gmwm.readers import read
 from gmwm.readers.names import CANONICAL
 from gmwm.readers.text import csv_table
-from places import SHARED
 from reading import SI, assert_holds, texts
 
 HEADER = ",".join(CANONICAL)
@@ -156,11 +152,6 @@ def test_rostopic_header_begins_with_percent(tmp_path):
     assert "'field.header.seq'" in " ".join(texts(recording))
 
 
-def test_comment_above_a_header_is_not_taken_for_it(write, samples):
-    before = "# t,gx,gy,gz,ax,ay\n"
-    assert_holds(read(write(samples, HEADER, before=before), rate=50, units=SI), samples)
-
-
 def test_commented_header_that_means_nothing_is_no_header(write, samples):
     path = write(samples, before="# a,b,c,d,e,f\n")
     assert_holds(read(path, rate=50, units=SI), samples)
@@ -281,23 +272,6 @@ def test_gzip_by_content_and_of_two_members(write, samples):
     assert_holds(read(str(path), rate=1, units=SI), samples)
 
 
-@pytest.mark.skipif(not SHARED.is_dir(), reason="the shared data are not beside the repository")
-def test_real_recording():
-    path = SHARED / "data" / "adis16405" / "adis16405_1.csv.gz"
-    recording = read(path, rate=100, units={"gyro": "deg/s", "accel": "g"})
-    assert recording.names == CANONICAL
-    assert recording.n == 1_000_000
-    assert recording.rate == 100.0
-    assert recording["accel_z"].values.mean() == pytest.approx(-9.96, abs=0.01)
-    with gzip.open(path, "rt") as lines:
-        next(lines)
-        first = [float(cell) for cell in next(lines).split(",")]
-    assert recording["gyro_z"].values[0] == pytest.approx(math.radians(first[2]), rel=1e-15)
-    # Steps of 0.05 deg/s, to the last sample: nothing was lost on the way.
-    steps = np.rad2deg(recording["gyro_x"].values) / 0.05
-    np.testing.assert_allclose(steps, np.round(steps), atol=1e-9)
-
-
 def test_a_row_that_the_fast_parser_loses_is_read(write, samples, monkeypatch):
     import pyarrow
     from pyarrow import csv
@@ -310,15 +284,3 @@ def test_a_row_that_the_fast_parser_loses_is_read(write, samples, monkeypatch):
 
     monkeypatch.setattr(csv, "read_csv", one_less)
     assert_holds(read(write(samples, HEADER), rate=50, units=SI), samples)
-
-
-def test_reading_text_loads_nothing_that_only_others_need(write, samples):
-    times = np.arange(len(samples)) / 100.0
-    path = write(np.column_stack([times, samples]), f"time_s,{HEADER}")
-    heavy = ["numba", "scipy", "pint", "pandas", "matplotlib", "plotly"]
-    script = (
-        f"import sys, gmwm; gmwm.read({str(path)!r}, units={{'gyro': 'deg/s', 'accel': 'g'}}); "
-        f"print([m for m in {heavy} if m in sys.modules])"
-    )
-    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
-    assert done.stdout.strip() == "[]", done.stdout + done.stderr

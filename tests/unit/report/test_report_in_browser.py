@@ -219,6 +219,7 @@ CONTRAST = """
 """
 
 
+@pytest.mark.slow
 def test_six_axes_with_much_to_say_take_eight_pages(tab, tmp_path):
     model = (
         WhiteNoise(5e-4) + RandomWalk(1e-4) + GaussMarkov(3e-4, 0.1) + GaussMarkov(2e-4, 8.0)

@@ -270,10 +270,3 @@ def test_the_chosen_model_comes_first(walking):
     table = moved.to_frame()
     assert list(table["chosen"]) == [True] + [False] * (len(found) - 1)
     assert "chosen" in moved._repr_html_().split("</tr>")[1]
-
-
-def test_a_plot_has_the_chosen_model_and_its_rivals(walking):
-    found = gmwm.select(walking)
-    labels = found.plot().get_legend_handles_labels()[1]
-    rivals = [f"fits equally well: {rival.model.title()}" for rival in found.rivals]
-    assert rivals and "model" in labels and {*rivals} <= {*labels}

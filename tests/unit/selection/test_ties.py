@@ -195,12 +195,6 @@ class TestFlicker:
         assert chosen.surpassed_by is None
         assert not any(item.compared_only for item in chosen.ranking)
 
-    def test_it_is_told_what_is_best_of_all(self, plateau):
-        x = FLICKER.simulate(360_000, 0.01, seed=26_002)
-        rec = gmwm.Recording.from_arrays({"gyro_x": x}, 100.0, {"gyro": "rad/s"})
-        (told,) = [n for n in gmwm.calibrate(rec).notices if n.code == "ambiguity"]
-        assert "the one with bias instability fits best, 2 parameters" in told.text
-
     def test_it_is_no_rival_of_a_walk_that_is_resolved(self):
         truth = WhiteNoise(1e-4) + RandomWalk(1e-5)
         chosen = gmwm.select(truth.simulate(360_000, 0.01, seed=26_001), 0.01)

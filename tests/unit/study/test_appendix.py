@@ -30,6 +30,7 @@ def test_expectation_by_hand():
     assert expectation()[1] == pytest.approx(line @ seen / (line @ line), rel=1e-12)
 
 
+@pytest.mark.slow
 def test_means_fall_on_the_expectation_and_not_on_the_truth(monkeypatch):
     monkeypatch.setattr(appendix, "LENGTHS", (2_000, 30_000))
     rows = converge(runs=40, seed=3)

@@ -231,23 +231,6 @@ def gyro():
     return Channel("gyro_x", 1e-3 * noise(5000), 0.01, "gyro", "rad/s")
 
 
-def test_printed(gyro):
-    lines = str(gmwm.deviations(gyro)).splitlines()
-    assert lines[0] == "gyro_x: 5,000 samples at 100 Hz, deviations in rad/s"
-    assert lines[1].split() == ["tau", "[s]", *KINDS]
-    assert max(map(len, lines)) <= 80
-    assert len({len(line) for line in lines[1:]}) == 1
-    found = gmwm.deviations(gyro)
-    for line in lines[2:]:
-        time, *cells = line.split()
-        for kind, cell in zip(KINDS, cells, strict=True):
-            place = np.flatnonzero(np.isclose(found.tau[kind], float(time)))
-            if cell == "-":
-                assert not place.size
-            else:
-                assert float(cell) == pytest.approx(found.deviation[kind][place[0]], rel=1e-4)
-
-
 def test_to_dict_is_json(gyro):
     found = gmwm.deviations(gyro)
     content = json.loads(json.dumps(found.to_dict(), allow_nan=False))
@@ -256,37 +239,6 @@ def test_to_dict_is_json(gyro):
     for kind in KINDS:
         for part in ("tau", "deviation", "lower", "upper"):
             assert content["kinds"][kind][part] == getattr(found, part)[kind].tolist()
-
-
-def test_plot_has_every_kind_under_its_name(gyro):
-    found = gmwm.deviations(gyro)
-    axes = found.plot()
-    assert (axes.get_xscale(), axes.get_yscale()) == ("log", "log")
-    assert axes.get_ylabel() == "deviation [deg/h]"
-    per_si = 180.0 / np.pi * 3600.0
-    assert axes.get_title() == "gyro_x"
-    assert axes.get_legend().get_title().get_text() == "bars: 95 % intervals"
-    drawn = {line.get_label(): line for line in axes.get_lines()}
-    assert list(drawn) == ["overlapping Allan", "modified Allan", "overlapping Hadamard", "total"]
-    low, high = axes.get_ylim()
-    for kind, line in zip(KINDS, drawn.values(), strict=True):
-        np.testing.assert_array_equal(line.get_xdata(), found.tau[kind])
-        shown = per_si * found.deviation[kind]
-        np.testing.assert_allclose(line.get_ydata(), shown)
-        assert np.all((low < shown) & (shown < high))
-    axes.figure.canvas.draw()
-
-
-def test_plot_joins_that_of_the_wavelet_variance_and_keeps_its_colours(gyro):
-    axes = gmwm.wavelet_variance(gyro).plot()
-    assert gmwm.deviations(gyro, kinds=["hadamard"]).plot(axes) is axes
-    labels = [text.get_text() for text in axes.get_legend().get_texts()]
-    assert sorted(labels) == ["data, 95 % interval", "overlapping Hadamard"]
-    alone = axes.get_lines()[-1]
-    together = gmwm.deviations(gyro).plot().get_lines()
-    (same,) = [line for line in together if line.get_label() == alone.get_label()]
-    assert (same.get_color(), same.get_marker()) == (alone.get_color(), alone.get_marker())
-    axes.figure.canvas.draw()
 
 
 # -- bad input ------------------------------------------------------------------------------------

@@ -42,7 +42,7 @@ def test_elements_are_means_of_products_of_coefficients():
     )
 
 
-@pytest.mark.parametrize("gaps", [False, True])
+@pytest.mark.parametrize("gaps", [False, pytest.param(True, marks=pytest.mark.slow)])
 def test_estimates_have_the_mean_and_covariance_that_they_are_said_to_have(gaps):
     rng, runs = np.random.default_rng(3), 150
     hidden = rng.random(1024) < 0.1

@@ -16,7 +16,6 @@ from gmwm.errors import InputError
 from gmwm.estimate import METHODS, Fit
 from gmwm.estimate.likelihood.likelihood import Columns, KalmanLikelihood, defined
 from gmwm.process import as_model
-from gmwm.readers import Channel
 from marks import slow
 
 OF_SAMPLES = ("mle", "whittle", "em")
@@ -201,15 +200,6 @@ def test_missing_samples_cost_only_what_they_knew():
         assert abs(part.params[key] - whole.params[key]) < norm.isf(1e-4) * spread
 
 
-def test_one_long_gap_is_bridged():
-    truth = WhiteNoise(0.3) + RandomWalk(0.02)
-    x = truth.simulate(4000, 1.0, seed=10)
-    x[1500:2500] = np.nan
-    fit = mle(truth.opened(), x)
-    for key, error in fit.stderr.items():
-        assert abs(fit.params[key] - truth.params[key]) < norm.isf(1e-4) * error
-
-
 def test_estimates_are_where_the_likelihood_is_flat():
     truth = QuantizationNoise(0.4) + WhiteNoise(0.2) + GaussMarkov(0.5, 20.0) + RandomWalk(0.02)
     x = truth.simulate(8_000, 1.0, seed=11)
@@ -366,15 +356,6 @@ def test_a_fit_says_how_it_was_made(method, how):
     assert ("valid" if fit.valid else "NOT VALID") in rest[6:8]
 
 
-def test_a_channel_gives_its_name_and_sampling_interval():
-    truth = WhiteNoise(0.3) + RandomWalk(0.05)
-    x = truth.simulate(1000, 0.01, seed=5)
-    x[10] = np.nan
-    fit = gmwm.fit(truth.opened(), Channel("gyro_x", x, 0.01, "gyro", "rad/s"), method="mle")
-    assert str(fit).startswith("gyro_x: ")
-    assert fit.params == mle(truth.opened(), x, dt=0.01).params
-
-
 # -- awkward starts and gaps ----------------------------------------------------------------------
 
 
@@ -442,16 +423,6 @@ def test_gaps_may_be_anywhere(method, kept):
     assert np.isnan(fit.p_value)
     assert "no-test" in [notice.code for notice in fit.notices]
     assert Fit.from_dict(fit.to_dict()).params == fit.params
-
-
-def test_every_second_sample_is_a_series_of_twice_the_interval():
-    """A walk and white noise seen half as often are a walk and white noise."""
-    x = (WhiteNoise(0.5) + RandomWalk(0.05)).simulate(2000, 1.0, seed=8)
-    model = WhiteNoise() + RandomWalk()
-    gappy = mle(model, np.where(np.arange(x.size) % 2 == 0, x, np.nan))
-    thin = mle(model, x[::2], dt=2.0)
-    assert gappy.params["K"] == pytest.approx(thin.params["K"], rel=1e-3)
-    assert gappy.params["N"] == pytest.approx(thin.params["N"] / np.sqrt(2.0), rel=1e-3)
 
 
 def test_hardly_any_sample_is_refused():

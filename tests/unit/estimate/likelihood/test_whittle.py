@@ -110,37 +110,12 @@ def test_flicker_agrees_with_the_exact_too():
 # -- a spectrum is enough -------------------------------------------------------------------------
 
 
-class OnlySpectrum(gmwm.Process):
-    """A Gauss-Markov process of which nothing but the spectrum is known."""
-
-    sigma: float = gmwm.parameter("u", role="scale")
-    tau: float = gmwm.parameter("s")
-
-    def psd(self, f, dt):
-        return GaussMarkov(self.sigma, self.tau).psd(f, dt)
-
-
 class Coloured(gmwm.Process):
     level: float = gmwm.parameter("u", role="scale")
     slope: float = gmwm.parameter("-", lower=0.0, upper=2.0)
 
     def psd(self, f, dt):
         return self.level**2 * dt * (2.0 * f * dt) ** -self.slope
-
-
-@pytest.mark.parametrize("rest", ["N", slow("N + R"), "N + K"])
-def test_a_spectrum_alone_gives_the_same_estimates(rest):
-    truth = WhiteNoise(1.0) + GaussMarkov(0.5, 50.0)
-    x = gmwm.simulate(truth, n=6_000, rate=1.0, seed=9)
-    known, spectral = (
-        gmwm.fit(f"{rest} + {kind}", x, rate=1.0, method="whittle")
-        for kind in ("GM", "OnlySpectrum")
-    )
-    assert spectral.valid == known.valid
-    for key, error in known.stderr.items():
-        assert spectral.params[key] == pytest.approx(known.params[key], abs=0.2 * error), key
-        assert spectral.stderr[key] == pytest.approx(error, rel=0.1), key
-    assert spectral.log_likelihood == pytest.approx(known.log_likelihood, abs=0.1)
 
 
 def test_coloured_noise_is_found_within_its_errors():

@@ -72,12 +72,3 @@ def test_a_further_term_needs_no_larger_discrepancy(seed):
     )
     smallest = gmwm.fit(WhiteNoise() + RandomWalk(), bent(seed))
     assert larger.discrepancy <= 1.3 * nested.discrepancy <= 1.7 * smallest.discrepancy
-
-
-@pytest.mark.parametrize("source", ["Gyro. Y", 5])
-@pytest.mark.filterwarnings("ignore::gmwm.errors.FitWarning")
-def test_a_further_walk_needs_no_larger_discrepancy(source):
-    curve = stored(source) if isinstance(source, str) else bent(source)
-    nested = WhiteNoise() + 2 * GaussMarkov()
-    without, larger = (gmwm.fit(model, curve) for model in (nested, nested + RandomWalk()))
-    assert larger.discrepancy <= without.discrepancy

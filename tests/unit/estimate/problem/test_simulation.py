@@ -73,15 +73,6 @@ def test_the_covariance_grows_by_the_share_of_the_simulation():
         assert ratio == pytest.approx(1.0 + 1.0 / replications, rel=0.1)
 
 
-def test_the_same_seed_gives_the_same_estimates(series):
-    fits = [
-        gmwm.fit(TRUTH.opened(), series, dt=1.0, method=SimulatedMoments(replications=2, seed=seed))
-        for seed in (5, 5, 6)
-    ]
-    assert fits[0].params == fits[1].params
-    assert fits[0].params != fits[2].params
-
-
 def test_noise_rounded_as_coarsely_as_it_is_large():
     """White noise alone is off by the variance of rounding; the simulation is not."""
     x = RoundedNoise(sigma=0.7, lsb=1.0).simulate(8192, 1.0, 0)
@@ -128,11 +119,6 @@ def test_between_levels_curves_are_interpolated():
     np.testing.assert_allclose(curve, RandomWalk(1.0).haar_variance(tau, 1.0), rtol=0.1)
 
 
-def test_rounding_to_nothing_has_no_variance():
-    curve = Simulation(2, 0).curve(RoundedNoise(0.01, 1.0), np.ones(1), 256, 1.0, "haar")
-    np.testing.assert_array_equal(curve, 0.0)
-
-
 @pytest.mark.parametrize(
     ("options", "words"),
     [
@@ -145,16 +131,6 @@ def test_rounding_to_nothing_has_no_variance():
 def test_bad_options_are_refused(options, words):
     with pytest.raises(gmwm.InputError, match=words):
         SimulatedMoments(**options)
-
-
-def test_likelihoods_refuse_what_has_no_spectrum(series):
-    for method in ("mle", "whittle", "em"):
-        with pytest.raises(
-            gmwm.InputError, match=r"state-space|only be simulated|does not support"
-        ):
-            gmwm.fit(BlockBias(hold=8.0), series, dt=1.0, method=method)
-    with pytest.raises(gmwm.InputError, match="only be simulated"):
-        BlockBias(1.0, 8.0).psd(np.ones(1), 1.0)
 
 
 @pytest.mark.slow

@@ -1,15 +1,12 @@
 """Agreement of model and data, octave by octave, and how long a record would have to be."""
 
-import json
 from dataclasses import replace
 
-import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
 import gmwm
 from gmwm import GaussMarkov, Process, RandomWalk, RateRamp, Resonance, WhiteNoise, parameter
-from places import GOLDEN
 
 TRUTH = WhiteNoise(0.2) + GaussMarkov(0.5, 20.0)
 
@@ -123,14 +120,6 @@ class TestEveryMethod:
         assert np.all(np.abs(fit.goodness.residual[:4]) < 4.0)
         assert fit.goodness.worst is not None
 
-    def test_straight_lines_of_the_allan_plot(self):
-        fit = fitted(WhiteNoise(0.3) + RandomWalk(0.01), n=40_000, method="allan")
-        assert np.all(np.isfinite(fit.goodness.residual))
-        drift = 1e-3 * np.arange(4000.0) + 1e-6 * TRUTH.simulate(4000, 1.0, 1)
-        lonely = gmwm.fit(RateRamp(), drift, dt=1.0, method="allan")
-        assert lonely.goodness.worst is None
-        assert str(lonely.goodness)
-
     def test_a_process_that_can_only_be_simulated(self):
         x = np.random.default_rng(1).standard_normal(3000)
         at = gmwm.fit(Noise(), x, dt=1.0, method="simulated").goodness
@@ -147,14 +136,6 @@ class TestEveryMethod:
         given = gmwm.fit(TRUTH.opened() + RateRamp(0.01), (TRUTH + RateRamp(0.01)).simulate(
             6000, 1.0, 1), dt=1.0)  # fmt: skip
         np.testing.assert_allclose(given.goodness.data, plain.goodness.data, rtol=1e-6)
-
-    def test_several_recordings(self):
-        series = [TRUTH.simulate(n, 1.0, n) for n in (3000, 5000)]
-        fit = gmwm.fit(TRUTH.opened(), series, dt=1.0)
-        single = gmwm.fit(TRUTH.opened(), series[1], dt=1.0)
-        assert fit.goodness.dof[0] == pytest.approx(8.0 / 5.0 * single.goodness.dof[0], rel=0.03)
-        again = gmwm.Fit.from_dict(json.loads(json.dumps(fit.to_dict())))
-        assert str(again.goodness) == str(fit.goodness)
 
     def test_robust_and_gaps_and_other_wavelets(self):
         x = TRUTH.simulate(5000, 1.0, 4)
@@ -223,40 +204,12 @@ def test_short_records(n):
     assert str(at).count("\n") >= at.tau.size + 1
 
 
-def test_printed_table():
-    truth = WhiteNoise(0.2) + GaussMarkov(0.5, 20.0) + RateRamp(1e-3)
-    fit = gmwm.fit(truth.opened(), gmwm.simulate(truth, 20_000, 1.0, 1), dt=1.0)
-    text = str(fit.goodness)
-    assert text == (GOLDEN / "goodness.txt").read_text().rstrip("\n")
-    assert max(map(len, text.splitlines())) <= 80
-
-
-def test_extremes_fit_the_table():
-    at = fitted().goodness
-    odd = replace(at, misfit=at.misfit * 1e7, residual=at.residual * 1e3, name="x" * 20)
-    assert max(map(len, str(odd).splitlines())) <= 80
-    none = replace(odd, misfit=np.full(at.tau.size, np.nan), dof=np.full(at.tau.size, np.nan))
-    assert none.worst is None
-    assert "largest misfit" not in str(none)
-
-
 def test_the_fit_tells_the_largest_misfit():
     fit = fitted(n=20_000)
     misfit, tau = fit.goodness.worst
     assert f"largest misfit {100 * abs(misfit):.2g} % of the deviation at tau = {tau:.3g} s" in (
         " ".join(str(fit).split())
     )
-
-
-def test_it_draws_itself():
-    at = fitted(WhiteNoise(1.0), n=500).goodness
-    axes = at.plot()
-    assert axes.get_xscale() == "log"
-    assert [text.get_text() for text in axes.texts] == [f"{100 * m:+.2g}" for m in at.misfit]
-    stems = axes.collections[-1].get_segments()
-    np.testing.assert_allclose([s[1][1] for s in stems], at.residual)
-    assert at.plot(axes) is axes
-    plt.close(axes.figure)
 
 
 class TestNeededLength:

@@ -1,6 +1,5 @@
 """One model for several recordings."""
 
-import json
 import warnings
 from dataclasses import replace
 
@@ -96,24 +95,6 @@ def test_the_pooled_covariance_is_that_of_the_pooled_mean():
     expected = np.diag(pooled.covariance_under(TRUTH.psd))
     # A sample variance of 150 has a relative deviation of 0.12; coarse levels are far from normal.
     np.testing.assert_allclose(np.var(draws, axis=0)[:-3], expected[:-3], rtol=0.35)
-
-
-def test_arrays_and_channels_are_recordings_too():
-    rng = np.random.default_rng(8)
-    arrays = [TRUTH.simulate(4000, 0.5, rng) for _ in range(2)]
-    channels = [gmwm.Channel("gyro_x", x, 0.5, "gyro", "rad/s") for x in arrays]
-    by_array = gmwm.fit(TRUTH.opened(), arrays, dt=0.5)
-    assert by_array.params == gmwm.fit(TRUTH.opened(), channels).params
-    # A list of numbers is one series.
-    single = gmwm.fit(WhiteNoise(), [float(v) for v in arrays[0]], dt=0.5)
-    assert not hasattr(single, "parts")
-
-
-def test_a_joint_fit_turns_into_json():
-    joint = gmwm.fit(TRUTH.opened(), recordings([3000, 3000], 9))
-    content = json.loads(json.dumps(joint.to_dict()))
-    assert len(content["parts"]) == 2
-    assert content["spread"].keys() == set(joint.keys)
 
 
 def test_what_does_not_belong_together_is_refused():

@@ -295,30 +295,6 @@ def test_wrong_models_agree_with_monte_carlo(believed):
         assert abs(ratio.mean() - found.nees(part)[end]) < 5.0 * error
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("factor", [1.0, 0.1])
-def test_a_long_flight_agrees_with_monte_carlo(factor):
-    """Small errors agree at all epochs; large ones up to the first fix after the outage.
-
-    That fix takes off errors of hundreds of metres with gains that are far too small or large, and
-    products of errors, which a linear analysis leaves out, reach the vertical for half a minute.
-    """
-    truth = helicopter_mapping(duration=900.0)
-    sd = InitialSd()
-    scenario = Scenario(
-        truth,
-        gnss(truth, position_sd=(factor, factor, 1.5 * factor)),
-        (Outage(700.0, 60.0),),
-        InitialSd(
-            factor * sd.position, factor * sd.velocity, factor * sd.tilt, factor * sd.heading
-        ),
-    )
-    full, believed = scaled(FULL, factor), scaled(SLOW_ONLY, factor)
-    squares, _, found = agreement(scenario, full, believed, 500, 2)
-    kept = found.index(760.0) + 1 if factor == 1.0 else squares.shape[1]
-    assert_agree(squares[:, :kept])
-
-
 # ---- What cannot be used ----
 
 
@@ -329,13 +305,6 @@ def test_an_epoch_that_was_not_kept():
     assert not found.before[found.index(160.0, before=False)]
     with pytest.raises(InputError, match=r"no errors were kept at 161\.3 s"):
         found.index(161.3)
-
-
-def test_a_model_of_too_many_states():
-    long = SensorModels.of({"gyro": AR([0.1, 0.2, 0.3], 1e-8), "accel": WhiteNoise(1e-3)})
-    for pair in ((long, FULL), (FULL, long)):
-        with pytest.raises(InputError, match="more than two"):
-            covariance_analysis(PLAIN, *pair)
 
 
 # ---- Where it does not hold ----

@@ -10,7 +10,6 @@ import gmwm
 from gmwm import GaussMarkov, RandomWalk, RateRamp, Resonance, Sinusoid, WhiteNoise
 from gmwm.errors import InputError
 from gmwm.ins import Aiding, Fixes, SensorModels, emulate, gnss, helicopter_mapping, navigate
-from gmwm.ins.filter import Filter
 from gmwm.ins.geometry import matrix_from_rotation_vector, matrix_from_rpy, rpy_from_matrix
 from marks import every, slow
 
@@ -144,13 +143,6 @@ def flown(truth, aiding, *, sensors=SENSORS, seed=3, step=0.1, interval=1.0, bef
         step=step, interval=interval, before=before,
     )  # fmt: skip
     return solution, solution.errors(truth) / solution.sd
-
-
-def is_sound(P):
-    """Symmetric and positive definite, judged in units of its standard deviations."""
-    unit = np.sqrt(np.diag(P))
-    scaled = P / np.outer(unit, unit)
-    return np.array_equal(P, P.T) and np.linalg.eigvalsh(scaled).min() > 0.0
 
 
 PLACES = {
@@ -317,33 +309,3 @@ def test_what_cannot_be_used_is_said_in_one_sentence(hop, options, words):
             given["initial_sd"] = gmwm.ins.InitialSd(**given["initial_sd"])
         navigate(imu, initial, SENSORS, aiding, **given)
     assert "\n" not in str(caught.value)
-
-
-@pytest.mark.parametrize("dt", [0.1, slow(0.01)])
-def test_ten_hours(dt):
-    truth, hours = helicopter_mapping(duration=600.0, dt=dt).segment(0.0, 20.0), 10.0
-    loops = round(hours * 3600.0 / truth.duration)
-    imu = emulate(truth)
-    rng = np.random.default_rng(9)
-    n = loops * imu.n
-    drawn = SENSORS.simulate(n, dt, rng).total
-    still = gmwm.ins.Imu(dt, np.tile(imu.rotation, (loops, 1)), np.tile(imu.velocity, (loops, 1)))
-    noisy = still.with_errors(drawn[:, :3], drawn[:, 3:])
-    time = np.arange(1.0, n * dt)
-    place = np.tile(truth.lla[0], (time.size, 1))
-    fixes = Fixes("position", time, place, np.full((time.size, 3), 1.0))
-    aiding = Aiding((fixes,)).noisy(rng)
-    ready = Filter.of(SENSORS, aiding, dt, 10 * dt)
-    solution = navigate(noisy, truth.state(0), SENSORS, aiding, step=10 * dt, interval=600.0)
-    assert solution.diverged_at is None and ready.states.m == 12
-    assert is_sound(solution.state_covariance)
-    P = solution.covariance[-1]
-    assert is_sound(0.5 * (P + P.T))
-    np.testing.assert_allclose(P, P.T, atol=1e-12 * np.sqrt(np.outer(np.diag(P), np.diag(P))).max())
-    C = solution.matrix
-    np.testing.assert_allclose(C @ np.swapaxes(C, 1, 2), np.tile(np.eye(3), (len(C), 1, 1)),
-                               atol=1e-12)  # fmt: skip
-    standard = solution.innovations.standard.ravel()
-    assert np.mean(standard**2) == pytest.approx(1.0, abs=5.0 * np.sqrt(2.0 / standard.size))
-    # The heading of a vehicle that stands is lost by and by; its position is better than a fix.
-    assert np.all(solution.sd[-1, :3] < 1.0)

@@ -98,14 +98,6 @@ def test_circles_at_constant_speed_do_not_tell_stamps_from_a_lever_arm():
     assert fault.code in {"time-offset", "lever-arm"}
 
 
-def test_stamps_that_are_late_in_a_start_in_motion():
-    """The fix that the filter starts from is late too."""
-    navigated = found(1000, "stamps", vehicle="loiter", duration=300.0)
-    (fault,) = navigated.fault_notices
-    assert fault.code == "time-offset"
-    assert within(fault, "time offset", 0.2) < 0.02
-
-
 @pytest.mark.parametrize("vehicle", ["loiter", slow("car")])
 @pytest.mark.slow
 def test_stamps_that_are_farther_off_than_one_search_reaches(vehicle):
@@ -254,16 +246,6 @@ def test_right_models_of_noisy_sensors_are_not_blamed(seed, vehicle, options):
         assert navigated.alignment.stood >= 20.0
 
 
-@pytest.mark.slow
-def test_right_models_are_not_blamed_in_a_hundred_logs():
-    """By design one log in a thousand is blamed, so that two in a hundred have p = 0.005."""
-    blamed = [
-        seed for seed in range(400, 500)
-        if found(seed, velocity=seed % 2 == 0, duration=160.0).verdict.code != "consistent"
-    ]  # fmt: skip
-    assert len(blamed) <= 1, blamed
-
-
 @pytest.mark.parametrize(
     ("kind", "factor", "vehicle", "seed"),
     [("gyro", 10.0, "car", 209), slow("gyro", 0.1, "car", 209), ("accel", 10.0, "car", 209),
@@ -280,7 +262,10 @@ def test_a_wrong_sensor_model_is_no_fault_of_the_log(kind, factor, vehicle, seed
     assert not navigated.fits
 
 
-@pytest.mark.parametrize("fault", ["coloured", "clock step", "gyro scale"])
+SLOW_FAULT = pytest.param("clock step", marks=pytest.mark.slow)
+
+
+@pytest.mark.parametrize("fault", ["coloured", SLOW_FAULT, "gyro scale"])
 def test_other_faults_do_not_pass_as_one_that_explains_all(fault):
     navigated = found(203, fault, duration=200.0)
     assert not navigated.fits

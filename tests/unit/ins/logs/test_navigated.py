@@ -1,7 +1,6 @@
 """Real data: an IMU's log and GNSS fixes, made here from a known drive, so that truth is known."""
 
 import os
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
@@ -10,15 +9,12 @@ import numpy as np
 import pytest
 import yaml
 
-from gmwm import Calibration, Channel, WhiteNoise, fit
 from gmwm.errors import InputError
 from gmwm.ins import Measured, Navigated, Outage, car_drive, emulate, fixed_wing_loiter, gnss
 from gmwm.ins.filter import KINDS
 from gmwm.ins.geometry import ned_difference
-from gmwm.ins.imu import AXES
 from gmwm.ins.logs.replay import innovation_sizes
 from gmwm.ins.spec import sensor_models
-from gmwm.issues import Notice
 from marks import slow
 
 RATE, START = 10.0, 1000.0
@@ -269,48 +265,6 @@ def test_the_command_writes_the_solution_and_a_report(run, monkeypatch):
     assert page.index("Predicted accuracy") < page.index(
         "<li>initial roll and pitch from 20 s at rest, from 0 s"
     )
-
-
-def test_the_command_without_a_file(run, no_pages):
-    drive(Path())
-    calibrated = yaml.safe_dump(content(imu="imu.csv"))
-    Path("run.yaml").write_text(calibrated)
-    by_options = run("run.yaml", "--gyro-unit", "rad/s", "--accel-unit", "m/s^2", "--heading",
-                     57.3, "--lever-arm", "1,0.3,-1", "--gyro-bias", "0.1 deg/s",
-                     "--velocity-sd", "0.1,0.1,0.15", "--position-sd", "2")  # fmt: skip
-    assert by_options[0] == 0
-    assert "heading as given: 57.30 deg" in by_options[1]
-    assert "have no standard deviations" not in by_options[1]
-    assert "position: the fixes have their own standard deviations" in by_options[1]
-    assert run("run.yaml", "--velocity-sd", "0.1,1")[2].startswith(
-        "gmwm: --velocity-sd 0.1,1: write one number, or NORTH,EAST,DOWN"
-    )
-
-
-def test_models_that_are_not_valid_are_named_wherever_they_are_used(run):
-    """What `gmwm bound` reports; a filter used them without a word."""
-    drive(Path(), trajectory=car_drive(duration=310.0, dt=1.0 / RATE))
-    fits, bad = {}, Notice("misfit", "bad", "", "the model does not fit")
-    for i, axis in enumerate(AXES):
-        values = 1e-3 * np.random.default_rng(i).standard_normal(2000)
-        fits[axis] = fit(WhiteNoise(), Channel(axis, values, 0.01, axis.partition("_")[0]))
-        fits[axis] = replace(fits[axis], notices=(bad,) if axis in ("gyro_x", "accel_z") else ())
-    Calibration(fits, {}, "test", 100.0, 2000).save("cal.json")
-    Path("run.yaml").write_text(yaml.safe_dump(content(sensors="cal.json")))
-    told = "gyro_x, accel_z: the fits are not valid: do not use these numbers in a filter"
-    printed = " ".join(run("run.yaml", "-o", "out")[1].split())
-    assert told in printed
-    assert "(north, east, down) is assumed (give --velocity-sd)" in printed
-    assert told in Path("out/report.html").read_text()
-    compared = content(compare={"bad": "cal.json", "good": SENSORS})
-    del compared["sensors"]
-    Path("run.yaml").write_text(yaml.safe_dump(compared))
-    printed = " ".join(run("run.yaml", "-o", "both")[1].split())
-    assert f"bad: {told}" in printed
-    assert "(give --velocity-sd)" in printed
-    page = Path("both/comparison.html").read_text()
-    assert f"bad: {told}" in page
-    assert f"good: {told}" not in page
 
 
 BAD = {

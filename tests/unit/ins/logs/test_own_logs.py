@@ -7,11 +7,8 @@ from functools import partial
 
 import numpy as np
 import pytest
-import yaml
-from click.testing import CliRunner
 
 import gmwm
-from gmwm.cli.navigate import navigate
 from gmwm.errors import InputError
 from gmwm.ins import Measured, Navigated, Outage, Straight, Turn, car_drive, emulate, gnss, perform
 from gmwm.ins.geometry import ned_difference
@@ -168,15 +165,6 @@ def dated(log, folder):
     (folder / "imu.csv").write_text("\n".join([head.replace("time_s", "UTC"), *rows]) + "\n")
 
 
-def test_a_date_that_is_none_is_named_with_its_line(log, tmp_path):
-    log.imu(tmp_path)
-    log.fixes(tmp_path, iso, "time")
-    path = tmp_path / "fixes.csv"
-    path.write_text(path.read_text().replace("2024-02-29T23:59:05", "2024-02-31T23:59:05"))
-    with pytest.raises(InputError, match=r"fixes.csv, line 6.*2024-02-31T"):
-        navigated(tmp_path)
-
-
 @pytest.mark.parametrize("weeks", [False, True])
 def test_a_solution_of_rtklib(log, as_it_is, tmp_path, weeks):
     (log.imu if weeks else partial(dated, log))(tmp_path)
@@ -315,27 +303,6 @@ def test_coloured_noise_of_the_fixes_is_a_state(log, tmp_path):
     log.fixes(tmp_path)
     found = navigated(tmp_path, coloured_sd=[0.5, 0.5, 1.0], coloured_tau="60 s")
     assert found.solution.state_names[-3:] == ("GNSS north", "GNSS east", "GNSS down")
-
-
-def test_the_options_of_the_command(underway, tmp_path):
-    log = Log(underway, 2)
-    log.imu(tmp_path, stamped=False, names=("a", "b", "c", "d", "e", "f"))
-    log.fixes(tmp_path, iso, "time")
-    file = tmp_path / "run.yaml"
-    file.write_text(yaml.safe_dump({"sensors": SENSORS, "bias": BIAS}))
-    roll, pitch, yaw = np.degrees(underway.rpy[int(RATE)])
-    arguments = [
-        file, "--imu", tmp_path / "imu.csv", "--gnss", tmp_path / "fixes.csv", "--rate", RATE,
-        "--gyro-unit", "rad/s", "--accel-unit", "m/s^2", "--imu-start", f"{log.stamps[0]:.6f}",
-        "--attitude", f"{roll},{pitch},{yaw}", "--gate", "1e-5", "-o", tmp_path / "out",
-        *(f"--channel={name}={column}" for name, column in zip(NAMES, "abcdef", strict=True)),
-    ]  # fmt: skip
-    done = CliRunner().invoke(navigate, list(map(str, arguments)), catch_exceptions=False)
-    assert done.exit_code == 0
-    assert "roll, pitch and yaw as given" in done.output
-    assert (tmp_path / "out" / "report.html").exists()
-    with pytest.raises(InputError, match="write ROLL,PITCH,YAW in degrees"):
-        CliRunner().invoke(navigate, ["--attitude", "1,2"], catch_exceptions=False)
 
 
 def test_curves_of_the_sensors_are_subtracted_from_a_log(log, tmp_path):

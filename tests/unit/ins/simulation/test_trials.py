@@ -52,6 +52,7 @@ def test_a_seed_gives_one_result(reference):
     assert not np.any(study(2, seed=2)["good"].error == reference.error[:2])
 
 
+@pytest.mark.slow
 def test_the_result_does_not_depend_on_workers(reference):
     """But for the last digit: vector instructions follow the alignment of arrays."""
     found = study(12, jobs=2)["good"]

@@ -1,4 +1,3 @@
-import re
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -7,20 +6,6 @@ import numpy as np
 import pytest
 
 from gmwm.errors import InputError
-from places import GOLDEN
-
-
-def test_the_table_reads_as_it_did(made_up):
-    assert str(made_up()) + "\n" == (GOLDEN / "validation.txt").read_text()
-
-
-@pytest.mark.parametrize("outages", [(), ((20, 10),), ((10, 5), (20, 10), (40, 15))])
-@pytest.mark.parametrize("names", [("A",), ("ten_letter", "ten_lette2"), tuple("ABCDEF")])
-@pytest.mark.parametrize(("runs", "scale"), [(1, 1.0), (2, 1e-4), (30, 1e5)])
-def test_the_table_fits_a_terminal(outages, names, runs, scale, made_up):
-    text = str(made_up(dict.fromkeys(names, scale), outages, runs))
-    assert max(map(len, text.splitlines())) <= 80
-    assert "nan" not in re.sub(r"band nan .. nan|p = nan", "", text)
 
 
 def test_a_filter_whose_models_are_not_valid_is_named(made_up):

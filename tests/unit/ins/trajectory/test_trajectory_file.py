@@ -121,19 +121,6 @@ def test_bad_headers(tmp_path: Path, header: str, message: str) -> None:
         Trajectory.read(write(tmp_path, rows(), header))
 
 
-def test_no_file(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="does not exist"):
-        Trajectory.read(tmp_path / "no.csv")
-    with pytest.raises(InputError, match="is a directory"):
-        Trajectory.read(tmp_path)
-
-
-@pytest.mark.parametrize("smooth", [0.0, -1.0, float("nan"), "much"])
-def test_bad_cutoffs(tmp_path: Path, smooth: float) -> None:
-    with pytest.raises(InputError, match="smooth = "):
-        Trajectory.read(write(tmp_path, rows()), smooth=smooth)
-
-
 def test_a_wrapped_heading_and_longitude_are_smoothed_across(tmp_path: Path) -> None:
     table = rows(400, 0.02)
     wrapped = table.copy()

@@ -50,12 +50,6 @@ def test_frames(frame):
         assert found["temperature"].mean == 30.0
 
 
-def test_calibrate_takes_a_frame(frame):
-    found = gmwm.calibrate(frame, gmwm.WhiteNoise(), screening=())
-    assert list(found) == list(CANONICAL)
-    assert found.source == "the pandas DataFrame"
-
-
 def test_columns_without_names():
     assert exact(gmwm.read(pd.DataFrame(X), rate=100, units=SI))
     assert exact(gmwm.read(pl.DataFrame(X), rate=100, units=SI, channels=dict(
@@ -88,12 +82,6 @@ def test_frames_that_cannot_be_used(frame):
     assert "single column" in refusal(frame["time"])
     unsorted = frame.iloc[np.random.default_rng(1).permutation(200)]
     assert "row" in refusal(unsorted)
-
-
-def test_unit_gate(frame):
-    scaled = frame.assign(**{name: frame[name] / 9.80665 for name in NAMES[3:]})
-    assert 'units={"accel": "g"}' in refusal(scaled)
-    assert gmwm.read(scaled, units={"accel": "g"})["accel_z"].mean == pytest.approx(9.8, abs=0.01)
 
 
 # -- Parquet and Feather --------------------------------------------------------------------------

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 
 import numpy as np
@@ -67,14 +66,6 @@ def test_a_log_that_is_cut_off(log, share):
     assert float(seconds) == pytest.approx((found.n - 1) * found.dt)
     (notice,) = [each for each in found.notices if each.code == "damaged"]
     assert notice.severity == "warning" and "cut off" in notice.text
-
-
-def test_in_the_words_of_the_command_line(log, run):
-    log.write_bytes(log.read_bytes()[:-1])
-    status, _, said = run("health", str(log))
-    assert status == 2 and said.strip().endswith("or read the rest with --damaged")
-    status, found, _ = run("health", str(log), "--damaged", "--json")
-    assert status == 0 and json.loads(found)
 
 
 @pytest.mark.parametrize("padding", [b"\0", b"\xff"])

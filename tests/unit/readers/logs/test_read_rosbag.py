@@ -100,12 +100,6 @@ def test_frames_that_change_within_a_topic(tmp_path):
     assert exact(gmwm.read(write1(tmp_path / "a.bag", {"/imu": (kind, messages)})))
 
 
-def test_more_than_a_block(tmp_path):
-    samples = np.tile(X, (25, 1))
-    path = write2(tmp_path / "bag", {"/imu": imu_topic(ROS2, samples)}, "MCAP", "STORAGE")
-    assert exact(gmwm.read(path), samples)
-
-
 # -- topics ---------------------------------------------------------------------------------------
 
 
@@ -207,27 +201,6 @@ def test_a_bag_of_one_sensor_is_read_by_the_name_of_it_only(tmp_path, storage, a
 def test_sensors_of_two_topics_are_there(d435, options):
     found = gmwm.read(d435[0], **options)
     assert not [each for each in found.notices if each.severity != "note"]
-
-
-def test_one_calibration_of_two_rates(d435):
-    path, gyro, accel = d435
-    found = gmwm.calibrate(gmwm.read(path), gmwm.WhiteNoise(), screening=())
-    for name, samples, rate in (("gyro_x", gyro[:, 0], 400.0), ("accel_x", accel[:, 3], 250.0)):
-        expected = np.std(samples) / np.sqrt(rate)
-        assert found[name].params["N"] == pytest.approx(expected, rel=0.1)
-        assert 1.0 / found[name].wv.dt == pytest.approx(rate)
-    text = gmwm.export(found, "ros-covariance")
-    assert "sample at 400 Hz" in text and "sample at 250 Hz" in text
-
-
-def test_health_of_two_rates(d435):
-    recording = gmwm.read(d435[0])
-    found = gmwm.health(recording)
-    assert list(found.channels) == [*CANONICAL]
-    lengths = {notice.values["rate"] for notice in found.of(code="length")}
-    assert sorted(lengths) == pytest.approx([250.0, 400.0])
-    assert len(found.of(code="topics-joined")) == 1
-    assert found.masked(recording).names == recording.names
 
 
 def test_topics_without_common_time(tmp_path):
