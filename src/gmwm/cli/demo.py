@@ -19,7 +19,6 @@ if TYPE_CHECKING:
 
     from gmwm.calibration import Calibration
     from gmwm.process import Model
-    from gmwm.readers import Recording
 
 
 @click.command()
@@ -190,6 +189,8 @@ def reproduce(
       gmwm reproduce fig9 --recording a.csv --recording b.csv --rate 100 \\
         --gyro-unit deg/s --accel-unit g --rotate
     """
+    from gmwm.study import reproduce_sensor
+
     alone = {name: options.pop(name) for name in ("method", "cluster", "resume")}
     known = set(alone) if experiment in _SIMULATED else set()
     if experiment in _SENSORS:
@@ -206,7 +207,9 @@ def reproduce(
             if experiment in _SIMULATED:
                 text, paths = _simulated(experiment, folder, **work, **alone)
             elif experiment in _SENSORS:
-                text, paths = _of_sensor(experiment, folder, work["seed"], recordings)
+                own = {"seed": work["seed"], "recordings": recordings}
+                with progress_bar(experiment, "recordings") as bar:
+                    text, paths = reproduce_sensor(experiment, folder, progress=bar, **own)
             elif experiment in _NAVIGATED:
                 work |= {"recordings": recordings, "resume": alone["resume"]}
                 text, paths = _navigated(experiment, folder, rotate, **work)
@@ -244,13 +247,6 @@ def _raw(table: pyarrow.Table, path: Path) -> Path:
     with moved_into_place(path) as temporary:
         pq.write_table(table, temporary)
     return path
-
-
-def _of_sensor(experiment: str, folder: Path, seed: int, recordings: Sequence[Recording]) -> Found:
-    from gmwm.study import reproduce_sensor
-
-    with progress_bar(experiment, "recordings") as bar:
-        return reproduce_sensor(experiment, folder, seed=seed, recordings=recordings, progress=bar)
 
 
 def _navigated(experiment: str, folder: Path, rotate: bool, **work: Any) -> Found:

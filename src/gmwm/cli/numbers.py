@@ -372,9 +372,6 @@ def export(
 
 _CAUTIOUS = 0.5  # NEES below which predicted errors are 1.4 times the true ones
 
-if TYPE_CHECKING:
-    from gmwm.filter_numbers import FilterNumbers
-
 
 @click.command()
 @click.argument("source", metavar="SHEET", required=False)
@@ -511,14 +508,11 @@ def _in_use(imu: Path, rate: float) -> Any:
 
 
 def _judged(nees: dict[str, tuple[float, float]], imu: Path) -> str:
-    """The range of NEES of a filter with numbers in use, by sensor."""
+    """NEES of a filter with numbers in use in typical and in noisy units, by sensor."""
     lines = wrapped(f"{imu}: NEES of a filter with these numbers, over the models (1: consistent)")
-    rows = (f"{k}: {a:.2g} to {b:.2g}, {_verdict(a, b)}" for k, (a, b) in nees.items())
-    return "\n".join([*lines, *bullets(rows)])
-
-
-def _verdict(least: float, largest: float) -> str:
-    """Verdict on the NEES in typical and in noisy units."""
-    if largest > 1.0:
-        return "overconfident" if least > 1.0 else "overconfident where the sensor is noisier"
-    return "cautious" if largest < _CAUTIOUS else "consistent"
+    for sensor, (least, largest) in nees.items():
+        verdict = "cautious" if largest < _CAUTIOUS else "consistent"
+        if largest > 1.0:
+            verdict = "overconfident" + " where the sensor is noisier" * (least <= 1.0)
+        lines += bullets([f"{sensor}: {least:.2g} to {largest:.2g}, {verdict}"])
+    return "\n".join(lines)
