@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -12,24 +12,18 @@ import numpy as np
 from gmwm._core.files import writable_file
 from gmwm._core.pages import page_of
 from gmwm._core.text import brief, with_error
-from gmwm._core.units import customary_unit, shown_unit
+from gmwm._core.units import customary_unit
 from gmwm.datasheet import Datasheet, read_datasheet
-from gmwm.estimate import Fit
 from gmwm.issues import worst_first
-from gmwm.plotting import COMPONENT_COLOURS, DATA_COLOUR
 from gmwm.population import LETTERS, STATES, AxisComparison, Number, SensorComparison
-from gmwm.report.navigation import svg
 from gmwm.report.page import origin, write_page
+from gmwm.report.pictures import multiple
 
 _SIDE_BY_SIDE = 6  # recordings with columns of their own; of more the range is shown
 _ASIDE = ("not-noise", "channel-missing", "channel-skipped")  # the verdicts have them in a word
 _REPEATED = ("curves-differ", "curves-close")  # the verdicts repeat them
 _MARKS = {"agree": "good", "close": "good", "differ": "care", "untested": "bad"}
 _LETTERS = ("N", "K")
-_SIZE = (4.2, 3.9)  # in, of a picture
-_SHEET = "#9a5b00"
-_DODGE = 1.12  # ratio of the places of the first and the last recording at a level
-_SURE = 0.1  # relative error of a ratio that counts for the limits of its axis
 
 
 @page_of(SensorComparison)
@@ -65,8 +59,6 @@ def write_sensor_comparison_report(
         axes=[_axis(axis, comparison, sheet) for axis in comparison.values()],
         notices=[n for n in worst_first(list(comparison.notices)) if n.code not in _REPEATED],
         aside=_ASIDE,
-        colours=COMPONENT_COLOURS,
-        sheet_colour=_SHEET,
         columns=comparison.labels if len(comparison.labels) <= _SIDE_BY_SIDE else ("range",),
         sheet=sheet,
         stated={
@@ -91,57 +83,11 @@ def _axis(
         "of": axis,
         "state": _MARKS[axis.state],
         "word": STATES[axis.state],
-        "figure": _picture(axis, labels, others, sheet) if axis.fits or others else "",
+        "figure": multiple(axis, labels, others, sheet) if axis.fits or others else None,
         "rows": [_row(axis, letter, labels) for letter in LETTERS if axis.fits],
         "numbers": [_numbers(axis, letter, sheet) for letter in _LETTERS],
         "nees": _nees(axis, comparison.horizon),
     }
-
-
-def _picture(
-    axis: AxisComparison, labels: Sequence[str], out: Sequence[Fit], sheet: Datasheet | None
-) -> str:
-    """The curves of an axis, dotted those ``out`` of it, and below their ratios to the common one.
-
-    labels: Of all recordings, whose places are their colours.
-    """
-    import matplotlib.pyplot as plt
-
-    parts: Any = {"height_ratios": (2.5, 1.0), "sharex": True, "layout": "constrained"}
-    figure, (above, below) = plt.subplots(2, 1, figsize=_SIZE, **parts)
-    fits = [*axis.fits.values(), *out]
-    first, equality = fits[0].wv, axis.equality
-    unit, factor = shown_unit(first.quantity, first.unit, "field")
-    stated = sheet.deviation(axis.name, first.quantity, first.tau, first.dt) if sheet else None
-    if stated is not None:
-        above.plot(first.tau, factor * stated, "-.", color=_SHEET, linewidth=1.3)
-    for fit in out:
-        above.plot(fit.wv.tau, factor * fit.wv.allan_deviation, ":", color=DATA_COLOUR)
-    places = _DODGE ** np.linspace(-0.5, 0.5, max(len(axis.fits), 2))
-    style: dict[str, Any] = {"fmt": ".", "markersize": 4.0, "linewidth": 0.8, "elinewidth": 1.2}
-    for i, ((label, fit), place) in enumerate(zip(axis.fits.items(), places, strict=False)):
-        style["color"] = COMPONENT_COLOURS[labels.index(label) % len(COMPONENT_COLOURS)]
-        value = factor * fit.wv.allan_deviation
-        ends = factor * np.sqrt(2.0 * np.stack([fit.wv.lower, fit.wv.upper]))
-        above.errorbar(fit.wv.tau * place, value, np.abs(ends - value), **style | {"fmt": ".-"})
-        if equality is not None and equality.tau.size:
-            away, error = 100.0 * (equality.ratios[i] - 1.0), 196.0 * equality.errors[i]
-            below.errorbar(equality.tau * place, away, error, **style)
-    values = factor * np.concatenate([fit.wv.allan_deviation for fit in fits])
-    above.set(xscale="log", yscale="log", title=f"Allan deviation [{unit}]")
-    above.set_ylim(np.min(values[values > 0.0]) / 1.8, 1.4 * np.max(values))
-    if equality is not None and equality.tau.size:
-        away = 100.0 * np.abs(equality.ratios - 1.0)[equality.errors < _SURE]
-        limit = max(1.3 * np.max(away, initial=0.0), 2.0) if away.size else 100.0
-        below.set_ylim(-limit, limit)
-    else:
-        below.text(0.5, 0.5, "nothing to compare", ha="center", transform=below.transAxes)
-    below.axhline(0.0, color=DATA_COLOUR, linewidth=0.8)
-    below.set(xlabel="averaging time [s]", title="ratio to common - 1 [%]")
-    for ax in (above, below):
-        ax.title.set(fontsize="medium", ha="left", x=0.0)
-        ax.grid(True, which="major", color="#dddddd", linewidth=0.6)
-    return svg(figure)
 
 
 def _row(axis: AxisComparison, letter: str, labels: tuple[str, ...]) -> dict[str, Any]:

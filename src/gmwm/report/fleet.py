@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +12,6 @@ import numpy as np
 from gmwm._core.files import writable_file
 from gmwm._core.pages import page_of
 from gmwm._core.text import brief, per_cent
-from gmwm.plotting import COMPONENT_COLOURS, SUM_COLOUR, literal
 from gmwm.population import (
     CONFIDENCE,
     CONTENT,
@@ -24,16 +23,13 @@ from gmwm.population import (
     needed_units,
     outlier_distance,
 )
-from gmwm.report.navigation import svg
 from gmwm.report.page import duration_text, origin, write_page
+from gmwm.report.pictures import strip
 
 _TITLES = {"N": "N, random walk", "B": "B, bias instability", "K": "K, rate random walk"}
 _MARKS = {"pass": "good", "FAIL": "bad", "?": "care", "none": "bad"}
 _MOSTLY = 0.5  # of the variance between units, which longer recordings would make less
 _WIDE = 0.05  # spread from which that is worth it
-_FARTHEST = 3.0  # a limit beyond so many times the largest value is not drawn
-_NAMED = 3  # units of a row that stand apart and have their names beside them
-_APART, _LIMIT = "#a32014", "#8a4b00"
 _MOST_ROWS = 300  # of a table on the page: 3,000 units would take a browser 20 s
 
 
@@ -105,50 +101,11 @@ def _groups(fleet: Fleet) -> list[dict[str, Any]]:
             if own:
                 head = {"title": _TITLES[letter], "unit": own[0].field_unit[0]}
                 rows = [_row(each) for each in own]
-                numbers.append({**head, "picture": _strip(own), "rows": rows})
+                numbers.append({**head, "picture": strip(own), "rows": rows})
         is_free = any(row["free"] for number in numbers for row in number["rows"])
         title = quantity or "other channels"
         groups.append({"quantity": title, "numbers": numbers, "is_free": is_free})
     return groups
-
-
-def _strip(spreads: Sequence[Spread]) -> str:
-    """A row an axis, a point a unit, on a logarithmic scale."""
-    import matplotlib.pyplot as plt
-    from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter
-
-    figure, ax = plt.subplots(figsize=(4.4, 0.5 + 0.4 * len(spreads)), layout="constrained")
-    scale, points = spreads[0].field_unit[1], dict[str, Any](markersize=7.0, markeredgewidth=0.0)
-    largest = max(float(np.max(each.values)) for each in spreads)
-    for place, each in enumerate(spreads):
-        # Points that touch are spread a little, the same way each time.
-        y = place + 0.5 * ((np.arange(each.n) * 0.618034) % 1.0 - 0.5)
-        x, apart = scale * each.values, [outlier.device for outlier in each.outliers]
-        ax.plot(x, y, ".", color=COMPONENT_COLOURS[0], alpha=0.6, rasterized=each.n > _MOST_ROWS,
-                **points)  # fmt: skip
-        for name in apart:  # farthest first
-            at = each.devices.index(name)
-            ax.plot(x[at], y[at], ".", color=_APART, **points)
-            if name in apart[:_NAMED]:
-                side = -1 if each.values[at] > each.median else 1
-                text = ax.annotate(
-                    literal(name), (x[at], y[at]), (6 * side, 0), textcoords="offset points"
-                )
-                text.set(color=_APART, fontsize="small", va="center")
-                text.set(ha="right" if side < 0 else "left")
-        ends = [place - 0.35, place + 0.35]
-        ax.plot(2 * [scale * each.median], ends, color=SUM_COLOUR)
-        if each.normal_limit < _FARTHEST * largest:
-            ax.plot(2 * [scale * each.normal_limit], ends, "--", color=_LIMIT)
-    ax.set(xscale="log", ylim=(len(spreads) - 0.5, -0.5))
-    ax.set_yticks(range(len(spreads)), [literal(each.channel) for each in spreads])
-    low, high = ax.get_xlim()
-    ticks = MaxNLocator(5, steps=[1, 2, 5, 10]), LogLocator(subs=(1, 2, 5))
-    ax.xaxis.set_major_locator(ticks[int(high > 10.0 * low)])
-    ax.xaxis.set_major_formatter("{x:g}")
-    ax.xaxis.set_minor_formatter(NullFormatter())
-    ax.grid(True, axis="x", which="major", color="#dddddd", linewidth=0.6)
-    return svg(figure)
 
 
 def _row(spread: Spread) -> dict[str, Any]:
