@@ -41,7 +41,7 @@ def test_most_rows_lost_at_random_invent_no_rate(seed, kept):
 def test_bursts_with_stamps_close_together_are_no_losses(rows):
     k = np.arange(N)
     time = 0.01 * rows * (k // rows) + 0.005 * (k % rows)
-    with pytest.raises(InputError, match=f"every {rows} rows the clock .* rows come in bursts"):
+    with pytest.raises(InputError, match=f"every {rows} rows the clock .* written in bursts"):
         gmwm.read(frame(time))
 
 

@@ -89,7 +89,7 @@ def test_runs_in_which_either_filter_diverged_are_left_out():
     kept = difference({"vertical": a[2:]}, {"vertical": b[2:]}, "vertical")
     a[0], b[1] = np.nan, np.nan
     assert difference({"vertical": a}, {"vertical": b}, "vertical") == kept
-    with pytest.raises(InputError, match="diverged in every run"):
+    with pytest.raises(InputError, match="in every run one of the two filters diverged"):
         difference({"vertical": a[:1]}, {"vertical": b[:1]}, "vertical")
     with pytest.raises(InputError, match="8 and 3 runs cannot be paired"):
         difference({"vertical": a}, {"vertical": b[:3]}, "vertical")
