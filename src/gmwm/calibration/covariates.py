@@ -10,7 +10,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import product
+from itertools import combinations, product
 from typing import Any, Literal
 
 import numpy as np
@@ -160,8 +160,15 @@ def _channel_of(recording: Recording, name: str) -> Channel | None:
     if name in recording:
         return recording[name]
     of_kind = [each for each in recording.channels if each.quantity == name]
-    if len(of_kind) == 1 or (of_kind and name == "temperature"):
+    if len(of_kind) == 1:
         return of_kind[0]
+    if of_kind:
+        which = ", ".join(each.name for each in of_kind)
+        raise InputError(
+            f"{recording.source or 'the recording'} has several channels of {name}, {which}: name "
+            f"one as the covariate, such as {of_kind[0].name}",
+            "no-covariate",
+        )
     if name == "time":
         return None
     known = ", ".join(each.name for each in recording.channels if each.is_auxiliary) or "none"
@@ -284,11 +291,18 @@ def compensated(
 def designs_of(recordings: Sequence[Recording], given: Sequence[Wanted]) -> dict[str, Design]:
     """The design of each channel, chosen over all recordings that have it.
 
-    Raises InputError if a covariate is missing or does not change.
+    Raises InputError if a covariate is missing, does not change, or changes with another.
     """
     names = [each.name for each in given if each.name != "settling"]
     nodes = tuple(Nodes.of(each, names) for each in recordings)
     scales = tuple(_scale(recordings[0], nodes, name) for name in names)
+    rows = [np.concatenate([each.rows[name] for each in nodes]) for name in names]
+    for (one, x), (other, y) in combinations(zip(names, rows, strict=True), 2):
+        if (together := abs(float(np.corrcoef(x, y)[0, 1]))) > tuning.INSEPARABLE:
+            raise InputError(
+                f"{one} and {other} change together (correlation {together:.3f}), so that their "
+                "curves cannot be separated: leave one of them out"
+            )
     found = {}
     for name in dict.fromkeys(c.name for each in recordings for c in each.inertial):
         if not next(each[name] for each in recordings if name in each).is_constant:

@@ -74,6 +74,7 @@ MOST_DEGREE = 3  # chosen automatically: autopilots hold no more
 LAGS, LAG_STEPS, LONGEST_LAG = (20.0, 3000.0), 10, 0.33  # s; a slower one looks like a drift
 NODE_STEP = 10.0  # s between them in longer recordings: faster than a thermometer follows
 LONGEST_BRIDGE = 0.01  # of a record, without a covariate: a line is 2e-4 of a warm-up off
+INSEPARABLE = 0.99  # correlation of two covariates: beyond, errors are seven times those alone
 MARGIN = 0.02  # of its range, by which a curve is known beyond: means of a warm-up miss 1 %
 MOST_HELD = 0.1  # of a record beyond that: more is taken for the reason why a filter fails
 SCALED_PARTS, STEPS_OF_PART = 64, 16  # of a recording, and differences of short means in one

@@ -256,3 +256,27 @@ def test_a_log_that_picks_samples_has_the_curve_and_not_the_noise():
     assert said.severity == "warning"
     fast = gmwm.Recording.from_arrays({name: x[:SIZE] for name, x in arrays.items()}, 20.0, units)
     assert all(each.code != "slow-log" for each in calibrated(fast, "linear", model="N").notices)
+
+
+@pytest.mark.parametrize(
+    ("names", "message"),
+    [
+        (("temperature", "time"), "change together"),
+        (("temperature",), "name one as the covariate, such as temperature_a"),
+    ],
+)
+def test_covariates_that_cannot_be_separated_or_chosen_are_rejected(names, message):
+    rising = np.linspace(20.0, 50.0, SIZE)
+    x = WhiteNoise(N).simulate(SIZE, DT, 1)
+    columns = {"temperature": rising} if len(names) > 1 else {
+        "temperature_a": rising, "temperature_b": rising[::-1]
+    }  # fmt: skip
+    units = {
+        "gyro": "rad/s",
+        "temperature": "degC",
+        "temperature_a": "degC",
+        "temperature_b": "degC",
+    }
+    rec = gmwm.Recording.from_arrays({"gyro_x": x, **columns}, 1.0 / DT, units)
+    with pytest.raises(gmwm.InputError, match=message):
+        gmwm.calibrate(rec, covariates=dict.fromkeys(names, "linear"), model=MODEL, jobs=1)
