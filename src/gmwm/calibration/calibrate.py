@@ -147,9 +147,9 @@ def _without_curves(
     recordings: Sequence[Recording], covariates: tuple[Wanted, ...]
 ) -> tuple[list[Recording], dict[str, Design]]:
     """Recordings less the first curves of their channels, and the regressors of these."""
-    if not covariates:
+    designs = designs_of(recordings, covariates) if covariates else {}
+    if not designs:  # of constant channels there is none
         return list(recordings), {}
-    designs = designs_of(recordings, covariates)
     lost = [nodes.notices for nodes in next(iter(designs.values())).nodes]
     left = [
         replace(

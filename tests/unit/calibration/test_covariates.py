@@ -280,3 +280,10 @@ def test_covariates_that_cannot_be_separated_or_chosen_are_rejected(names, messa
     rec = gmwm.Recording.from_arrays({"gyro_x": x, **columns}, 1.0 / DT, units)
     with pytest.raises(gmwm.InputError, match=message):
         gmwm.calibrate(rec, covariates=dict.fromkeys(names, "linear"), model=MODEL, jobs=1)
+
+
+def test_constant_channels_are_rejected_beside_a_covariate_too():
+    arrays = {"gyro_x": np.ones(SIZE), "temperature": warm_up()}
+    rec = gmwm.Recording.from_arrays(arrays, 1.0 / DT, {"gyro": "rad/s", "temperature": "degC"})
+    with pytest.raises(gmwm.InputError, match="constant"):
+        calibrated(rec)
