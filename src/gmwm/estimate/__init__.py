@@ -31,8 +31,4 @@ from gmwm.estimate.result import (
     JointFit as JointFit,
     left_open as left_open,
 )
-from gmwm.estimate.shared import (
-    SharedFit as SharedFit,
-    common_parts as common_parts,
-    fit_shared as fit_shared,
-)
+from gmwm.estimate.shared import fit_shared as fit_shared

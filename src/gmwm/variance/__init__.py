@@ -9,7 +9,6 @@ from gmwm.variance.cross import (
 from gmwm.variance.curve import Curve as Curve, curve as curve, read_curves as read_curves
 from gmwm.variance.gaps import Runs as Runs
 from gmwm.variance.levels import pilot_psd as pilot_psd
-from gmwm.variance.modwt import Modwt as Modwt, imodwt as imodwt, modwt as modwt
 from gmwm.variance.regressors import RegressorPart as RegressorPart, Regressors as Regressors
 from gmwm.variance.series import (
     MIN_SAMPLES as MIN_SAMPLES,

@@ -27,7 +27,6 @@ from gmwm.variance.gaps import (
     window_centres,
     window_count,
 )
-from gmwm.variance.modwt import coefficients
 from gmwm.variance.periodogram import Periodogram
 
 
@@ -132,6 +131,34 @@ def haar_moments(
         with ThreadPoolExecutor(parts) as pool:
             found = np.sum(list(pool.map(of_part, range(parts), [parts] * parts)), axis=0)
     return found[:, 1:] / found[:, :1]
+
+
+def wavelet_coefficients(
+    values: FloatArray, wavelet: str, levels: int = 64
+) -> Iterator[FloatArray]:
+    """MODWT coefficients free of end effects, level by level, by the pyramid algorithm.
+
+    Percival & Walden, *Wavelet Methods for Time Series Analysis*, 2000, ch. 5: level j filters the
+    smooth of level j - 1 with the filters of level 1, their taps 2^(j-1) samples apart.
+
+    values: (n,), finite numbers.
+    levels: At most so many. A short series has fewer that have such a coefficient.
+    Yields: (n - width(j) + 1,), of level j = 1, 2, ..., in the order of time; element i stems from
+        samples i to i + width(j) - 1.
+    """
+    filters = known_wavelet(wavelet)
+    for row in range(min(filters.levels(values.size), levels)):
+        yield _filtered(values, filters.detail, 1 << row)
+        values = _filtered(values, filters.scaling, 1 << row)
+
+
+def _filtered(values: FloatArray, taps: FloatArray, step: int) -> FloatArray:
+    """sum_l taps[l] values[t - step l] where all of these exist."""
+    reach = step * (taps.size - 1)
+    out = np.zeros(values.size - reach)
+    for i, tap in enumerate(taps.tolist()):
+        out += tap * values[reach - step * i : values.size - step * i]
+    return out
 
 
 def level_changes(values: FloatArray, runs: Runs) -> BoolArray:
@@ -299,7 +326,7 @@ class Levels:
         if self.wavelet != "haar":
             number = self.averaging.size
             parts = [
-                coefficients((self.values - line)[a:b], self.wavelet, number)
+                wavelet_coefficients((self.values - line)[a:b], self.wavelet, number)
                 for a, b in self.runs.edges
             ]
             for _ in range(number):

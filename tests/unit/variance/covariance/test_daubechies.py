@@ -12,7 +12,7 @@ from gmwm.variance import tuning
 from gmwm.variance.covariance import daubechies as module
 from gmwm.variance.covariance.daubechies import wavelet_covariance
 from gmwm.variance.covariance.haar import haar_covariance, line_covariance
-from gmwm.variance.modwt import coefficients
+from gmwm.variance.levels import wavelet_coefficients
 from marks import slow
 
 WALKING = gmwm.WhiteNoise(1.0) + gmwm.RandomWalk(0.1)
@@ -41,7 +41,7 @@ def series_covariance(process, n):
 @lru_cache
 def filters(name, n):
     """A matrix a level, by which n samples become its coefficients."""
-    columns = [list(coefficients(unit, name)) for unit in np.eye(n)]
+    columns = [list(wavelet_coefficients(unit, name)) for unit in np.eye(n)]
     return [np.stack(level, axis=1) for level in zip(*columns, strict=True)]
 
 
@@ -127,7 +127,10 @@ def test_covariance_is_that_of_simulated_series(process, name):
     rng = np.random.default_rng(11)
     waves = np.array(
         [
-            [np.mean(level**2) for level in coefficients(process.simulate(n, 1.0, rng), name)]
+            [
+                np.mean(level**2)
+                for level in wavelet_coefficients(process.simulate(n, 1.0, rng), name)
+            ]
             for _ in range(runs)
         ]
     )
@@ -182,7 +185,7 @@ def test_lines_against_simulation():
     n, runs = 1024, 400
     rng = np.random.default_rng(8)
     waves = [
-        [np.mean(level**2) for level in coefficients(model.simulate(n, 1.0, rng), "db3")]
+        [np.mean(level**2) for level in wavelet_coefficients(model.simulate(n, 1.0, rng), "db3")]
         for _ in range(runs)
     ]
     predicted = np.diag(of(model, n, "db3", lines=model.lines()))
