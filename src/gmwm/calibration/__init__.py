@@ -2,11 +2,7 @@
 
 from gmwm.calibration.calibrate import AMBIGUITY as AMBIGUITY, calibrate as calibrate
 from gmwm.calibration.calibration import Calibration as Calibration, load as load
-from gmwm.calibration.channel import (
-    LONGEST_PART as LONGEST_PART,
-    Stopwatch as Stopwatch,
-    stage as stage,
-)
+from gmwm.calibration.channel import LONGEST_PART as LONGEST_PART
 from gmwm.calibration.covariates import compensated as compensated
 from gmwm.calibration.curve import (
     BiasCurve as BiasCurve,

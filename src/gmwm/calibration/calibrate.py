@@ -21,9 +21,7 @@ from gmwm.calibration.channel import (
     ChannelTask,
     GivenModels,
     advise_cut,
-    current,
     model_of,
-    stage,
     unresolved_notice,
     with_validity,
 )
@@ -176,11 +174,10 @@ def _picked(recording: Recording) -> list[Notice]:
 def _calibrated(
     given: list[Recording], model: GivenModels, work: _Work, progress: Progress | None
 ) -> Calibration:
-    with stage("health"):
-        given = work.split(given)
-        parts = [part for each in given for part in each.by_rate()]
-        parts, designs = _without_curves(parts, work.covariates)
-        treated = [screened(part, work.screening) for part in parts]
+    given = work.split(given)
+    parts = [part for each in given for part in each.by_rate()]
+    parts, designs = _without_curves(parts, work.covariates)
+    treated = [screened(part, work.screening) for part in parts]
     tasks, skipped = _tasks(treated, model, work.removals, designs)
     found = _models_found(tasks, progress)
     done = {name: each for name, each in found.items() if isinstance(each, ChannelModel)}
@@ -302,11 +299,8 @@ def _models_found(
             report(channel.name)
             yield channel
 
-    for channel, (one, watch) in workers.shared(ChannelTask.timed_model, begun()):
+    for channel, one in workers.shared(ChannelTask.model_or_why, begun()):
         found[channel.name] = one
-        if (running := current()) is not None:
-            for name, elapsed in watch.elapsed.items():
-                running.add(name, elapsed, watch.worked[name])
     report("")
     return {channel.name: found[channel.name] for channel in channels}
 

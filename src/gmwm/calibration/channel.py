@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
-from contextvars import ContextVar
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -25,58 +22,6 @@ from gmwm.process import Model, Process, RandomWalk, as_model
 from gmwm.readers import Channel
 from gmwm.selection import Selection, select
 from gmwm.variance import WaveletVariance
-
-
-@dataclass(frozen=True, eq=False)
-class Stopwatch:
-    """Time by stage, of all processes together; a stage costs nothing where no watch runs::
-
-        with Stopwatch().running() as watch:
-            gmwm.calibrate(recording)
-        print(watch.worked)
-
-    elapsed: Stage -> s by the clock on the wall; stages of several processes run at one time.
-    worked: Stage -> s of the processor.
-    """
-
-    elapsed: dict[str, float] = field(default_factory=dict)
-    worked: dict[str, float] = field(default_factory=dict)
-
-    @contextmanager
-    def running(self) -> Iterator[Stopwatch]:
-        """Let `stage` of this thread count here."""
-        before = _watch.set(self)
-        try:
-            yield self
-        finally:
-            _watch.reset(before)
-
-    def add(self, name: str, elapsed: float, worked: float) -> None:
-        self.elapsed[name] = self.elapsed.get(name, 0.0) + elapsed
-        self.worked[name] = self.worked.get(name, 0.0) + worked
-
-
-_watch: ContextVar[Stopwatch | None] = ContextVar("watch", default=None)
-
-
-def current() -> Stopwatch | None:
-    """The watch that runs in this thread, for threads that it starts."""
-    return _watch.get()
-
-
-@contextmanager
-def stage(name: str) -> Iterator[None]:
-    """Count the time of a block for the watch that runs, if one does."""
-    watch = _watch.get()
-    if watch is None:
-        yield
-        return
-    start, worked = time.perf_counter(), time.thread_time()
-    try:
-        yield
-    finally:
-        watch.add(name, time.perf_counter() - start, time.thread_time() - worked)
-
 
 LONGEST_PART = "longest-part"
 """Code of the advice for a recording with several departures from noise."""
@@ -140,38 +85,33 @@ class ChannelTask:
     design: Design | None = None
     places: Sequence[int] = ()
 
-    def timed_model(self) -> tuple[ChannelModel | Notice, Stopwatch]:
-        """The model of the channel, or why it has none, and the time that it took."""
-        with Stopwatch().running() as watch:
-            try:
-                found: ChannelModel | Notice = self._model()
-            except InputError as error:
-                found = failure(error.code or "not-estimable", self.name, str(error))
-        return found, watch
+    def model_or_why(self) -> ChannelModel | Notice:
+        """The model of the channel, or why it has none."""
+        try:
+            return self._model()
+        except InputError as error:
+            return failure(error.code or "not-estimable", self.name, str(error))
 
     def _model(self) -> ChannelModel:
         removed: list[tuple[Departure, ...]] = [()] * len(self.parts)
         before: list[WaveletVariance] = []
         for left in range(self.removals, -1, -1):
-            with stage("variance"):
-                both = zip(self.parts, removed, strict=True)
-                after = [variance_without(part, gone, robust=self.robust) for part, gone in both]
-                if self.design is not None:
-                    together = zip(after, self.places, strict=True)
-                    after = [self.design.beside(wv, place) for wv, place in together]
-                before = before or after
-            with stage("model"):
-                found = self._fitted(after[0] if len(after) == 1 else after)
-            with stage("departures"):
-                there = [departures(found.fit, each) for each in after]
+            both = zip(self.parts, removed, strict=True)
+            after = [variance_without(part, gone, robust=self.robust) for part, gone in both]
+            if self.design is not None:
+                together = zip(after, self.places, strict=True)
+                after = [self.design.beside(wv, place) for wv, place in together]
+            before = before or after
+            found = self._fitted(after[0] if len(after) == 1 else after)
+            there = [departures(found.fit, each) for each in after]
             if not left or not any(there):
                 break
             removed = [gone + more for gone, more in zip(removed, there, strict=True)]
-        fit, removing = found.fit, self.removals > 0
+        beside = () if self.design is None else self.design.notices
+        fit, removing = found.fit, self.removals > 0 or bool(beside)
         records = list(zip(there, removed, before, after, strict=True))
         notices = [departure_notices(fit, *each, removing=removing) for each in records]
-        with stage("departures"):
-            changes = [steadiness_notice(fit, wv, known) for known, _, _, wv in records]
+        changes = [steadiness_notice(fit, wv, known) for known, _, _, wv in records]
         notices += [[each] if each else [] for each in changes]
         sources = self.sources if len(records) > 1 else [""]
         named = [
@@ -181,6 +121,7 @@ class ChannelTask:
         ]
         curve = None
         if self.design is not None:
+            named += beside
             one = next(iter(self.design.covariates), None)
             growth = self.design.scaling(self.parts, self.places)
             found_curve = self.design.curve(fit, may_lack=self.model is None)

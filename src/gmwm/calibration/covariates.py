@@ -117,8 +117,8 @@ class Nodes:
     @classmethod
     def of(cls, recording: Recording, names: Sequence[str], most: int = 0) -> Nodes:
         """Means of parts of a recording, interpolated where samples are missing."""
-        parts = min(max(tuning.NODES, most), recording.n // tuning.SHORTEST_NODE)
-        step = recording.duration / max(parts, 1)
+        length = max(recording.n // max(tuning.NODES, most), tuning.SHORTEST_NODE)
+        parts, step = recording.n // length, length * recording.dt
         time = np.asarray(step * (np.arange(parts) + 0.5), dtype=float)
         rows: dict[str, FloatArray] = {}
         lost, notices = np.zeros(parts), list[Notice]()
@@ -144,8 +144,8 @@ class Nodes:
             away |= beyond > max(step, size * dt)
             if np.any(away):
                 lost[away] = np.nan
-                length = step * np.count_nonzero(away)
-                notices.append(notice("covariate-missing", "", {"length": length}, name=name))
+                values = {"length": step * np.count_nonzero(away)}
+                notices.append(notice("covariate-missing", "", values, name=name))
         begun = [each.values["start"] for each in recording.notices if each.code == "part"]
         return cls(time, float(sum(begun)), rows, lost, tuple(notices))
 
@@ -158,6 +158,12 @@ class Nodes:
 def _channel_of(recording: Recording, name: str) -> Channel | None:
     """The channel of a covariate: by its name, or the only one of that quantity; None for time."""
     if name in recording:
+        if not recording[name].is_auxiliary:
+            raise InputError(
+                f"{name} is a channel of the sensor itself, not a covariate: name a temperature or "
+                "another auxiliary channel",
+                "no-covariate",
+            )
         return recording[name]
     of_kind = [each for each in recording.channels if each.quantity == name]
     if len(of_kind) == 1:
@@ -184,6 +190,7 @@ class Design:
     """Regressors of a channel, and the first curve, which is removed from its samples.
 
     columns: Of each recording, (p, M), at its nodes.
+    notices: What the curve lacks.
     """
 
     name: str
@@ -193,6 +200,7 @@ class Design:
     columns: tuple[FloatArray, ...]
     removed: FloatArray
     offset: float
+    notices: tuple[Notice, ...]
 
     def without(self, channel: Channel, place: int) -> Channel:
         """A channel of a recording less the first curve, missing where that is not known."""
@@ -314,6 +322,12 @@ def _scale(recording: Recording, nodes: Sequence[Nodes], name: str) -> Covariate
     channel, rows = _channel_of(recording, name), [each.rows[name] for each in nodes]
     low, high = float(min(map(np.min, rows))), float(max(map(np.max, rows)))
     unit = "s" if channel is None else channel.unit or "unit"
+    if channel is not None and channel.quantity == "temperature" and not channel.unit:
+        raise InputError(
+            f"{recording.source or 'the recording'}: {name} has no unit: name its column with the "
+            "unit, such as temperature [degC]",
+            "no-covariate",
+        )
     if not high - low > tuning.LEAST_RANGE * max(abs(high), abs(low)):
         raise InputError(
             f"{name} does not change ({low:.4g} {unit}), so no curve can be estimated: leave it "
@@ -334,27 +348,63 @@ def _design(
     channels = {place: recordings[place][name] for place in places}
     means = {}
     for place, channel in channels.items():
-        size = max(channel.n // nodes[place].time.size, 1)
-        own_means = block_means([channel.values], size)[: nodes[place].time.size, 0]
-        means[place] = own_means + nodes[place].lost[: own_means.size]
+        size = round(2.0 * nodes[place].time[0] / channel.dt)
+        means[place] = block_means([channel.values], size)[:, 0] + nodes[place].lost
     count = sum(channel.n for channel in channels.values())
     length = max(each.duration for each in recordings)
-    tried: list[tuple[float, tuple[Regressor, ...], FloatArray]] = []
-    weight = np.ones(1)
-    for parts in product(*(each.choices(length) for each in given)):
-        chosen = tuple(one for part in parts for one in part)
-        rows = {
-            place: np.array([nodes[place].columns(one, known) for one in chosen])
-            for place in places
-        }
-        own = tuple(
-            RegressorPart(means[k], rows[k], channels[k].n // means[k].size, weight) for k in places
-        )
-        regressors = Regressors(own, np.zeros(len(chosen)), np.ones(1), channels[places[0]].dt)
-        found, likelihood = pilot(regressors)
+
+    def tested(chosen: tuple[Regressor, ...]) -> tuple[float, tuple[Regressor, ...], FloatArray]:
+        own = []
+        for k in places:
+            rows = np.array([nodes[k].columns(one, known) for one in chosen])
+            size = channels[k].n // means[k].size
+            own.append(RegressorPart(means[k], rows, size, np.ones(1)))
+        dt = channels[places[0]].dt
+        found, likelihood = pilot(Regressors(tuple(own), np.zeros(len(chosen)), np.ones(1), dt))
         cost = len(chosen) + sum(one.constant > 0.0 for one in chosen)
-        tried.append((penalty(count) * cost - 2.0 * likelihood, chosen, found.values))
-    _, chosen, removed = min(tried, key=lambda each: each[0])
+        return penalty(count) * cost - 2.0 * likelihood, chosen, found.values
+
+    tried = [
+        tested(tuple(one for part in parts for one in part))
+        for parts in product(*(each.choices(length) for each in given))
+    ]
+    least, chosen, removed = min(tried, key=lambda each: each[0])
+    for criterion, rivals, _ in tried:
+        if criterion < least + penalty(count):  # one of these may be true
+            terms = [[each.columns(one, known) for one in rivals] for each in nodes]
+            _check_separable(rivals, np.concatenate(terms, axis=1), is_chosen=len(tried) > 1)
+    late = [
+        tested((*chosen, lag))
+        for each in given
+        if each.constants == () and each.name != "time"
+        for _, lag in Wanted(each.name, (1,), None).choices(length)
+    ]
+    better, (*_, lag), _ = min(late, key=lambda each: each[0], default=(least, chosen, removed))
+    notices = list[Notice]()
+    if least - better > tuning.EVIDENT_LAG:
+        values = {"constant": lag.constant, "evidence": least - better}
+        notices.append(notice("curve-lags", "", values, name=lag.covariate))
     columns = tuple(np.array([each.columns(one, known) for one in chosen]) for each in nodes)
     left = [np.nanmean(means[k] - removed @ columns[k]) for k in places]
-    return Design(name, scales, chosen, nodes, columns, removed, float(np.mean(left)))
+    offset = float(np.mean(left))
+    return Design(name, scales, chosen, nodes, columns, removed, offset, tuple(notices))
+
+
+def _check_separable(chosen: Sequence[Regressor], rows: FloatArray, *, is_chosen: bool) -> None:
+    """Raise InputError if the others imitate a lag or settling, as in a warm-up.
+
+    A choice among them would then be by chance; intervals under given constants are only wide.
+    """
+    limit = tuning.INSEPARABLE if is_chosen else tuning.INSEPARABLE_IF_GIVEN
+    for k, one in enumerate(chosen):
+        if one.constant > 0.0:
+            others = np.vstack([np.delete(rows, k, axis=0), np.ones(rows.shape[1])]).T
+            left = rows[k] - others @ np.linalg.lstsq(others, rows[k])[0]
+            together = float(np.sqrt(max(1.0 - np.var(left) / np.var(rows[k]), 0.0)))
+            if together > limit:
+                way = ", or give the degree and all time constants" if is_chosen else ""
+                raise InputError(
+                    f"{one.title} changes as the other terms of the curve do (correlation "
+                    f"{together:.4f}), so that they cannot be separated: leave it out, record "
+                    f"cycles of temperature{way}"
+                )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
@@ -43,6 +44,13 @@ class Covariate:
     half: Positive
     low: float
     high: float
+
+    @property
+    def title(self) -> str:
+        """The range in words, rounded to a thousandth of it."""
+        digits = 2 - math.floor(math.log10(2.0 * self.half))
+        low, high = (f"{round(each, digits):.10g}" for each in (self.low, self.high))
+        return f"{self.name} {low} to {high} {self.unit}"
 
 
 @dataclass(frozen=True)
@@ -141,10 +149,15 @@ class BiasCurve(Document, Printed):
         return cls(wv.name, wv.quantity, wv.unit, covariates, regressors, *numbers, offset)
 
     @property
-    def main(self) -> Covariate | None:
-        """The covariate of powers; None for settling alone."""
+    def mains(self) -> tuple[Covariate, ...]:
+        """The covariates of powers."""
         powers = {each.covariate for each in self.regressors if each.kind == "power"}
-        return next((each for each in self.covariates if each.name in powers), None)
+        return tuple(each for each in self.covariates if each.name in powers)
+
+    @property
+    def main(self) -> Covariate | None:
+        """The first covariate of powers; None for settling alone."""
+        return next(iter(self.mains), None)
 
     def contrast(self, x: FloatArray, of: str = "") -> FloatArray:
         """Regressors at steady values of a covariate, the others at their centres, (k, p).
@@ -340,9 +353,8 @@ def curves_by_covariate(curves: Mapping[str, BiasCurve]) -> dict[str, list[BiasC
     """Curves by what they depend on and over which range, in words."""
     found: dict[str, list[BiasCurve]] = {}
     for each in curves.values():
-        one = each.main
-        name = (
-            "settling" if one is None else f"{one.name} {one.low:.3g} to {one.high:.3g} {one.unit}"
-        )
-        found.setdefault(name, []).append(each)
+        others = [term.title for term in each.regressors if term.constant]
+        degree = [f"degree {each.degree}"] if each.main is not None else []
+        what = "the record" if each.main is None else each.main.title
+        found.setdefault(f"{what} ({', '.join([*degree, *others])})", []).append(each)
     return found

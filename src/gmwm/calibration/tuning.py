@@ -72,9 +72,14 @@ SPANNED = 1e-6  # of the largest singular value: smaller ones are not independen
 NODES, SHORTEST_NODE = 2048, 8  # means of a recording that hold its covariates; samples of one
 MOST_DEGREE = 3  # chosen automatically: autopilots hold no more
 LAGS, LAG_STEPS, LONGEST_LAG = (20.0, 3000.0), 10, 0.33  # s; a slower one looks like a drift
+# Least gain in the criterion by a lag that was not asked for, "strong" (Kass and Raftery 1995,
+# J. Am. Stat. Assoc. 90). Curves without one had at most -1 in 180 records, a lag of 30 s had 27.
+EVIDENT_LAG = 6.0
 NODE_STEP = 10.0  # s between them in longer recordings: faster than a thermometer follows
 LONGEST_BRIDGE = 0.01  # of a record, without a covariate: a line is 2e-4 of a warm-up off
-INSEPARABLE = 0.99  # correlation of two covariates: beyond, errors are seven times those alone
+# Correlation of two covariates, or of a chosen lag or settling with the rest of a curve: beyond,
+# errors are seven times those alone. If time constants are given, errors of 1,000 times are left.
+INSEPARABLE, INSEPARABLE_IF_GIVEN = 0.99, 1.0 - 5e-7
 MARGIN = 0.02  # of its range, by which a curve is known beyond: means of a warm-up miss 1 %
 MOST_HELD = 0.1  # of a record beyond that: more is taken for the reason why a filter fails
 SCALED_PARTS, STEPS_OF_PART = 64, 16  # of a recording, and differences of short means in one

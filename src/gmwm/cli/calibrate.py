@@ -25,7 +25,7 @@ from gmwm.cli.options import FILE_TO_WRITE, PATH, folder_to_write, options, read
 from gmwm.errors import InputError
 
 if TYPE_CHECKING:
-    from gmwm.calibration import Calibration, Stopwatch
+    from gmwm.calibration import Calibration
     from gmwm.estimate import Fit
     from gmwm.readers import Recording
 
@@ -68,7 +68,6 @@ def folder_of_results(default: str) -> dict[str, Any]:
     --datasheet
     --jobs N  Largest number of processes; short recordings take one.
     -v --verbose  Print the error model of each axis and all notices too.
-    --timings  Print where the time went, stage by stage.
     --memory
     --json
     --quiet
@@ -89,7 +88,6 @@ def calibrate(
     target: str | None,
     datasheet: Path | None,
     verbose: bool,
-    timings: bool,
     memory: float | None,
     as_json: bool,
     quiet: bool,
@@ -118,7 +116,7 @@ def calibrate(
     """
     _start_workers(files, given["jobs"], memory)
     from gmwm._core.memory import limited
-    from gmwm.calibration import Stopwatch, calibrate as run, stage
+    from gmwm.calibration import calibrate as run
     from gmwm.datasheet import read_datasheet
 
     work = {name: given.pop(name) for name in ("screening", "still", "remove_departures", "jobs")}
@@ -131,8 +129,8 @@ def calibrate(
 
         checks.choice("--export", target, tuple(TARGETS))
         replaceable(output / TARGETS[target].file_name)
-    with folder_to_fill(output) as folder, Stopwatch().running() as watch:
-        with stage("read"), limited(memory):
+    with folder_to_fill(output) as folder:
+        with limited(memory):
             recordings = _recordings(files, temperature_file, given)
         quantities = {c.name: c.quantity or "" for each in recordings for c in each.inertial}
         for name in models:
@@ -153,8 +151,6 @@ def calibrate(
         click.echo(json.dumps(result.to_dict(), allow_nan=False))
     elif not quiet:
         show(result, written, verbose=verbose)
-    if timings:
-        _show_timings(watch, work["jobs"])
     exit_unless(any(fit.valid for fit in result.values()), "channel")
 
 
@@ -202,18 +198,6 @@ def _start_workers(files: Sequence[Path], jobs: int, memory: float | None) -> No
 
         others = worker_pool(extra_workers(jobs, _CHANNELS), "gmwm.estimate:compile_search")
         click.get_current_context().with_resource(others)
-
-
-def _show_timings(watch: Stopwatch, jobs: int) -> None:
-    """On the stream of errors: the output of --json stays JSON."""
-    from gmwm._core.tables import plain_table
-
-    took, worked = watch.elapsed, watch.worked
-    rows = [(name, f"{took[name]:.2f}", f"{worked[name]:.2f}") for name in took]
-    rows.append(("all stages", f"{sum(took.values()):.2f}", f"{sum(worked.values()):.2f}"))
-    click.echo(plain_table(("stage", "seconds", "of the processor"), rows), err=True)
-    if jobs > 1:
-        click.echo("stages of channels run side by side: their seconds are added up", err=True)
 
 
 def show(result: Calibration, files: Iterable[str] = (), *, verbose: bool = False) -> None:
@@ -295,23 +279,19 @@ def write_files(
 ) -> list[str]:
     """Write the files, all or none, then that of another program; returns the last lines."""
     from gmwm._core.text import wrapped
-    from gmwm.calibration import stage
     from gmwm.export import TARGETS, curve_files, export
 
     document, page, kalibr = (folder / name for name in _FILES)
     written, lines = [f"{page.name} (open this)", document.name], []
     shown = in_options(result)
     with moved_together(folder) as new:
-        with stage("exports"):
-            mark = run_of(result.save(new / document.name))
-        with stage("report"):
-            source = {**(origin or {}), "run": mark}
-            shown.report(new / page.name, recording, datasheet=datasheet, provenance=source)
+        mark = run_of(result.save(new / document.name))
+        source = {**(origin or {}), "run": mark}
+        shown.report(new / page.name, recording, datasheet=datasheet, provenance=source)
         if {"gyro", "accel"} <= {fit.wv.quantity for fit in result.values()}:
             try:
-                with stage("exports"):
-                    text = export(shown, "kalibr")
-                    write_text(new / kalibr.name, f"{text}# run: {mark}")
+                text = export(shown, "kalibr")
+                write_text(new / kalibr.name, f"{text}# run: {mark}")
                 written.insert(1, f"{kalibr.name} (Kalibr)")
             except InputError as error:  # the other files are no worse for it
                 lines = wrapped(f"no {kalibr.name}: {error}")
@@ -322,8 +302,7 @@ def write_files(
         lines.append(f"left {kalibr} of an earlier run: Kalibr needs gyro and accelerometer")
     if target is not None and not (target == "kalibr" and has_imu):
         path = folder / TARGETS[target].file_name
-        with stage("exports"):
-            export(result, target, path=path)
+        export(result, target, path=path)
         written.append(f"{path.name} ({target})")
     given = shlex.quote(str(document))
     after = f"gmwm export {given} --to openvins" if has_imu else f"gmwm bound {given}"

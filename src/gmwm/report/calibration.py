@@ -177,7 +177,7 @@ def _channel(
         "figure": deviation_figure(fit, sensor, filter_numbers=pair, rivals=rivals, sheet=sheet),
         "sliders": _sliders(fit, pair),
         "residuals": residual_figure(fit),
-        "curve": None if curve is None else curve_figure(fit, curve),
+        "curve": [curve_figure(fit, curve, one) for one in curve.mains] if curve else [],
         "leftovers": [] if curve is None else leftover_figures(fit, curve),
         "coefficients": [] if curve is None else curve.estimates,
         "left_out": sum(stop - start for start, stop in calibration.left_out.get(name, ())),

@@ -257,14 +257,11 @@ def series_figure(fitted: Fit, channel: Channel, spans: Spans) -> Figure:
     return _figure(traces, layout, units=units)
 
 
-def curve_figure(fitted: Fit, curve: BiasCurve) -> Figure | None:
-    """A curve with its 95 % band, less its value at the centre; None without a covariate."""
-    one = curve.main
-    if one is None:
-        return None
+def curve_figure(fitted: Fit, curve: BiasCurve, one: Covariate) -> Figure:
+    """A curve against a covariate, with its 95 % band, less its value at the centre."""
     factor = units_of("u", fitted.wv)[1]
-    x, value, error = curve.band()
-    value = factor * (value - curve(one.centre))
+    x, value, error = curve.band(of=one.name)
+    value = factor * (value - curve(one.centre, one.name))
     ends = (value - factor * error, value + factor * error)
     band = [_line(x, each, "95 % band", "#8a8a8a", "solid", 0.0) for each in ends]
     band[1] |= {"fill": "tonexty", "fillcolor": "rgba(130,130,130,0.28)"}

@@ -338,10 +338,12 @@ def actions(calibration: Calibration) -> list[str]:
     units = [each for each in found if each.issue.lacks == "units_agree"]
     found.sort(key=lambda n: (n not in units, not n.issue.spoils, n.code not in _DEPARTURES))
     departed = any(each.issue.topic == "departure" for each in found)
+    late = any(each.code == "curve-lags" for each in found)
+    consequences = ("unsteady",) * departed + tuple(_DEPARTURES) * late
     for notice in worst_first(found):
         key = "departure" if notice.code in _DEPARTURES else notice.code
         done = notice.code in _DONE and notice.severity != "bad"
-        if not done and not (departed and notice.code == "unsteady"):  # that is the cause
+        if not done and notice.code not in consequences:
             groups.setdefault(key, []).append(notice)
     texts = [_action(group, calibration) for group in groups.values()]
     length = length_sentence(calibration, SHOWN)

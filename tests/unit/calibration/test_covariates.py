@@ -110,6 +110,28 @@ def test_the_degree_is_chosen():
     assert calibrated(recording(2), "auto").curves["gyro_x"].degree == 3
 
 
+@pytest.mark.parametrize("size", [18_000, 20_000])
+def test_the_degree_is_chosen_at_any_length(size):
+    """Means of the samples and the temperature were up to a thirtieth of the record apart."""
+    knots = size * np.array([0.0, 0.2, 0.25, 0.45, 0.5, 0.7, 0.75, 1.0])
+    soaks = np.interp(np.arange(size), knots, [25.0, 25.0, 45.0, 45.0, 65.0, 65.0, 35.0, 35.0])
+    cal = calibrated(recording(4, soaks, size=size), "auto")
+    assert cal.curves["gyro_x"].degree == 3
+    assert cal["gyro_x"].valid
+    difference, error = off(cal.curves["gyro_x"], np.array([30.0, 50.0, 60.0]))
+    assert np.all(np.abs(difference) < 2.0 * error)
+
+
+@pytest.mark.parametrize("constant", ["auto", "256 s"])
+def test_settling_that_a_warm_up_imitates_is_rejected(constant):
+    """exp(-2 t / tau) is a square of the temperature; a choice was wrong by eight intervals."""
+    temperature = 25.0 + 40.0 * (1.0 - np.exp(-DT * np.arange(SIZE) / 512.0))
+    rec = recording(1, temperature, 0.02 * np.exp(-DT * np.arange(SIZE) / 256.0))
+    words = {"temperature": "auto" if constant == "auto" else "cubic", "settling": constant}
+    with pytest.raises(gmwm.InputError, match="cannot be separated: leave it out, record cycles"):
+        gmwm.calibrate(rec, MODEL, covariates=words, jobs=1)
+
+
 def test_hysteresis_and_settling_are_regressors():
     temperature = 45.0 - 20.0 * np.cos(4.0 * np.pi * np.arange(SIZE) / SIZE)
     late, keep = temperature.copy(), np.exp(-DT / 60.0)
@@ -287,3 +309,37 @@ def test_constant_channels_are_rejected_beside_a_covariate_too():
     rec = gmwm.Recording.from_arrays(arrays, 1.0 / DT, {"gyro": "rad/s", "temperature": "degC"})
     with pytest.raises(gmwm.InputError, match="constant"):
         calibrated(rec)
+
+
+@pytest.mark.parametrize("constant", [0.0, 60.0])
+def test_a_lag_that_the_curve_lacks_is_said(constant):
+    """Hysteresis was a random walk of ten times the size, without a word."""
+    temperature = 45.0 - 20.0 * np.cos(4.0 * np.pi * np.arange(SIZE) / SIZE)
+    keep = np.exp(-DT / constant) if constant else 0.0
+    late = temperature.copy()
+    for k in range(1, SIZE):
+        late[k] = keep * late[k - 1] + (1.0 - keep) * temperature[k]
+    cal = calibrated(recording(3, temperature, 0.02 * (late - temperature) / 20.0))
+    said = [each for each in cal["gyro_x"].notices if each.code == "curve-lags"]
+    assert bool(said) == bool(constant)
+    departures = [n for n in cal["gyro_x"].notices if n.issue.topic == "departure"]
+    assert not any(n.values.get("removable") for n in departures)
+    if said:
+        assert 20.0 < said[0].values["constant"] < 180.0
+        again = calibrated(
+            recording(3, temperature, 0.02 * (late - temperature) / 20.0), "cubic,lag"
+        )
+        assert not any(each.code == "curve-lags" for each in again["gyro_x"].notices)
+
+
+def test_a_channel_of_the_sensor_is_no_covariate():
+    with pytest.raises(gmwm.InputError, match="of the sensor itself, not a covariate"):
+        gmwm.calibrate(recording(), covariates={"gyro_x": "linear"}, model=MODEL, jobs=1)
+
+
+def test_a_temperature_needs_a_unit(tmp_path):
+    lines = "\n".join(f"{0.01 * k},{k % 7 * 1e-3},{20 + k * 1e-3}" for k in range(2000))
+    path = tmp_path / "static.csv"
+    path.write_text(f"time [s],gyro_x [rad/s],temperature\n{lines}\n")
+    with pytest.raises(gmwm.InputError, match=r"no unit: .* such as temperature \[degC\]"):
+        gmwm.calibrate(gmwm.read(path), covariates={"temperature": "linear"}, still=False)
