@@ -143,7 +143,9 @@ LINES_SIGMA = 3.0  # standard errors below which a misfit of the lines is chance
 
 # -- what channels share --------------------------------------------------------------------------
 
-SHARED_ROUNDS = 3  # of weights
+SHARED_ROUNDS, KEPT_ROUNDS = 6, 3  # of weights, with correlation times and without
+SHARED_STEP = 0.5  # longest step of the log of a correlation time
 SAME_SAMPLES = 1.0 - 1e-6  # correlation at all levels
+LEAST_SHARED_DOF = 0.5  # of a variance: those that are nearly zero seem better known
 CONE_STEPS = 200
 CONE_GAP = 1e-4  # of the weighted sum of squares to its minimum

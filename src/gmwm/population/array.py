@@ -306,7 +306,7 @@ def _axis(
     name: str, quantity: str, own: Sequence[Channel], parts: Sequence[Process], horizon: float
 ) -> ArrayAxis:
     """The weights of one axis."""
-    shared = fit_shared(parts, wavelet_covariance(own))
+    shared = fit_shared(parts, wavelet_covariance(own), refine=False)
     step = own[0].dt
     growth = [integral_rms(each, [horizon], step, known_start=True)[0, 0] ** 2 for each in parts]
     total, covariance = shared.matrix(np.array(growth))
