@@ -153,7 +153,7 @@ def cumulant_of_powers(square: float, fourth: float, count: float) -> float:
     square, fourth: Mean second and fourth power of the first differences, u^2 and u^4.
     count: Number of the first differences.
     """
-    excess = fourth / square**2 - 3.0 if square > 0.0 else 0.0
+    excess = fourth / square / square - 3.0 if square > 0.0 else 0.0  # the square may underflow
     chance = tuning.LARGEST_KURTOSIS * np.sqrt(tuning.KURTOSIS_VARIANCE / count)
     return 0.5 * square**2 * excess if excess > chance else 0.0
 

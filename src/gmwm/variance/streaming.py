@@ -364,7 +364,7 @@ class _Series:
         fits &= 0 <= run <= missing <= n == origin[0] + filled[0] <= checks.MOST_SAMPLES
         fits &= 0 <= blocks <= kernels.MOST_BLOCKS and 0 <= octave < len(filled)
         numbers = (self.rows.data[: np.sum(used)], self.sums.levels, self.sums.blocks)
-        fits &= not any(np.isnan(each).any() for each in numbers)
+        fits &= all(np.all(np.abs(each) < checks.LARGEST**4) for each in numbers)
         limits = self.sums.totals[[kernels.REFERENCE, kernels.LOWEST, kernels.HIGHEST]]
         fits &= missing == n or bool(np.all(np.isfinite(limits)))
         if not (fits and np.all((gaps >= 0) & (gaps <= n))):

@@ -8,6 +8,7 @@ import subprocess
 import sys
 import threading
 import time
+from contextlib import suppress
 
 import numpy as np
 import pytest
@@ -53,6 +54,18 @@ def test_a_checkpoint_counts_within_its_arrays(tmp_path):
         (tmp_path / "a.npz").write_bytes(whole)
         with pytest.raises(InputError, match="is not a saved streaming variance"):
             gmwm.StreamingVariance.load(edited(tmp_path / "a.npz", name, place, value))
+
+
+def test_sums_of_a_checkpoint_are_used_or_rejected(tmp_path):
+    stream = gmwm.StreamingVariance(0.01)
+    stream.update(np.random.default_rng(0).normal(size=9000))
+    whole = stream.save(tmp_path / "a.npz").read_bytes()
+    places = [("0.levels", (0, column)) for column in range(6)]
+    places += [("0.totals", (place,)) for place in range(7)]
+    for (name, place), value in itertools.product(places, (1e200, 1e60, 1e-170)):
+        (tmp_path / "a.npz").write_bytes(whole)
+        with suppress(InputError):
+            gmwm.StreamingVariance.load(edited(tmp_path / "a.npz", name, place, value)).results()
 
 
 # -- documents -------------------------------------------------------------------------------------
