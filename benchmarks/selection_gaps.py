@@ -1,7 +1,7 @@
 """How often the selected model is the true one, or predicts the same, with missing samples.
 
 Run with ``python benchmarks/selection_gaps.py`` (hours; ``--runs 2`` for a first look). True models
-of `gmwm.study.choice` without a rate ramp and a line, or (``--truths imu``) four that set no
+of `gmwm.study.studies` without a rate ramp and a line, or (``--truths imu``) four that set no
 constant of the selection, complete, with 0.1 % and 1 % of the samples missing at random, and with
 50 masked bursts of 0.2 s at 100 Hz (20 samples); ``--gaps`` takes some of these. Counted are
 
@@ -24,7 +24,7 @@ import numpy as np
 import gmwm
 from gmwm import BiasInstability, GaussMarkov, Model, QuantizationNoise, RandomWalk, WhiteNoise
 from gmwm.filter_numbers.propagation import integral_rms
-from gmwm.study.choice import TRUTHS
+from gmwm.study.studies import TRUTHS
 
 TIMES = (60.0, 600.0)
 CLOSE = 0.1

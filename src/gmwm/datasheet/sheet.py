@@ -16,7 +16,6 @@ from gmwm._core.tables import plain_table
 from gmwm._core.text import brief, wrapped
 from gmwm._core.typing import FloatArray
 from gmwm._core.units import customary_unit
-from gmwm.datasheet import tuning
 from gmwm.errors import InputError
 from gmwm.filter_numbers import (
     HORIZON,
@@ -35,6 +34,31 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 
+# Least and greatest averaging time, over that at which white noise alone has the lowest deviation,
+# and how many between them; 100 a decade show a flat place to 0.1 %:
+_AVERAGING_TIMES = (1e-2, 1e4, 601)
+_FLAT = 0.04  # Slope of log Allan variance from which on a curve counts as flat: flicker at 96 %
+_ALIKE = 0.01  # Relative difference of lowest deviations that counts as none
+# Correlation times of Gauss-Markov processes, over the same time; from 100 times on they are walks:
+_TAU = (2.0, 60.0, 9)
+# Of Gauss-Markov processes that make no flat place: their largest Allan deviation over that of
+# white noise there. In a trial of 61 sensors the largest NEES was 1.19 with 0.3 and 0.98 with this;
+# the median after 10 s was 0.67 and 0.50, and 0.35 with 1:
+_SHOULDER = 0.7
+_SHOULDER_TAU = (0.02, 2.0, 5)
+_FASTEST_SHOULDER = 1.0  # s, below which it counts as white noise, which is read at 1 s
+# Standard deviations of a unit over the typical ones of a sheet. The gyros of one ADIS16405 in four
+# recordings: N 1.08 to 1.24 times, lowest deviation 0.95 to 1.33 times its sheet's. Of 200
+# simulated sensors, K of recordings lies between the ends in 96 %: benchmarks/sheets.py
+_UNIT_SPREAD = 1.25
+
+# Densities of white noise that sensors have, SI: from hemispherical resonator gyros (1e-5
+# deg/sqrt(h)) to 0.5 deg/s/sqrt(Hz), as for recordings; from seismic accelerometers (2 ng/sqrt(Hz))
+# to 10 mg/sqrt(Hz):
+_DENSITIES = {"gyro": (3e-9, 8.7e-3), "accel": (2e-8, 0.1)}
+# s, averaging time at which white noise alone reaches the lowest deviation: 0.8 to 400 s for the
+# sheets installed. The ends are a factor of 1,000 in N apart:
+_CROSSINGS = (0.1, 1e5)
 _FLICKER = float(np.sqrt(2.0 * np.log(2.0) / np.pi))
 """Plateau of the Allan deviation over B, 0.664 (IEEE Std 952-1997, C.1.3)."""
 _PEAK_TIME, _PEAK = 1.89, 0.617
@@ -65,7 +89,7 @@ def agreeing(where: str, values: Mapping[str, float], N: float) -> dict[str, Mod
             "K, or record an hour at rest"
         )
     crossing = (N / lowest) ** 2  # s, where white noise alone has this deviation
-    first, last, many = tuning.AVERAGING_TIMES
+    first, last, many = _AVERAGING_TIMES
     tau = crossing * np.geomspace(first, last, many)
     found = {}
     for label, base, slow in _candidates(known, lowest, values.get("correlation_time")):
@@ -73,7 +97,7 @@ def agreeing(where: str, values: Mapping[str, float], N: float) -> dict[str, Mod
         if size is not None:
             found[label] = Model((*base, slow(size)))
     least = np.sqrt(np.min(_allan(known, tau)))
-    if not found and "K" in values and abs(least / lowest - 1.0) < tuning.ALIKE:
+    if not found and "K" in values and abs(least / lowest - 1.0) < _ALIKE:
         return {"N+K": Model(tuple(known))}
     if not found:
         raise InputError(
@@ -99,17 +123,17 @@ def _candidates(
         if not has_walk:
             yield f"{label}+K", known, RandomWalk
         yield f"{label}+B", known, BiasInstability
-    first, last, many = tuning.TAU
+    first, last, many = _TAU
     taus = crossing * np.geomspace(first, last, many) if memory is None else [memory]
     for tau in map(float, taus):
         yield f"{label}+GM {brief(tau, 2)} s", known, partial(GaussMarkov, tau=tau)
     if memory is not None or has_walk:
         return
-    first, last, many = tuning.SHOULDER_TAU
+    first, last, many = _SHOULDER_TAU
     for tau in map(float, crossing * np.geomspace(first, last, many)):
-        if tau > tuning.FASTEST_SHOULDER:
+        if tau > _FASTEST_SHOULDER:
             white = lowest * np.sqrt(crossing / (_PEAK_TIME * tau))  # its deviation at the peak
-            weak = GaussMarkov(tuning.SHOULDER * white / _PEAK, tau)
+            weak = GaussMarkov(_SHOULDER * white / _PEAK, tau)
             yield f"{label}+GM {brief(tau, 2)} s+K", [*known, weak], RandomWalk
 
 
@@ -124,7 +148,7 @@ def _size(base: FloatArray, unit: FloatArray, tau: FloatArray, target: float) ->
 
     def reading(square: float) -> float:
         total = base + square * unit
-        flat = np.flatnonzero(np.diff(np.log(total)) >= -tuning.FLAT * steps)
+        flat = np.flatnonzero(np.diff(np.log(total)) >= -_FLAT * steps)
         return float(total[flat[0]]) if flat.size else 0.0
 
     low, high = target / float(np.max(unit)) * 1e-9, target / float(np.min(unit))
@@ -133,7 +157,7 @@ def _size(base: FloatArray, unit: FloatArray, tau: FloatArray, target: float) ->
     for _ in range(60):  # below the least size that makes it flat there is no reading
         middle = np.sqrt(low * high)
         low, high = (middle, high) if reading(middle) < target else (low, middle)
-    return float(np.sqrt(high)) if abs(reading(high) / target - 1.0) < 2.0 * tuning.ALIKE else None
+    return float(np.sqrt(high)) if abs(reading(high) / target - 1.0) < 2.0 * _ALIKE else None
 
 
 UNITS = {"N": "u/sqrt(Hz)", "B": "u", "K": "u/s/sqrt(Hz)"}
@@ -257,7 +281,7 @@ class Datasheet(InUnits):
         form: str = "N+K",
         horizon: float = HORIZON,
         *,
-        unit_spread: float = tuning.UNIT_SPREAD,
+        unit_spread: float = _UNIT_SPREAD,
         rate: float = float("nan"),
     ) -> FilterNumbers:
         """The smallest numbers that are not overconfident for any model that agrees with the sheet.
@@ -305,7 +329,7 @@ class Datasheet(InUnits):
         self,
         numbers: Mapping[str, Any],
         horizon: float = HORIZON,
-        unit_spread: float = tuning.UNIT_SPREAD,
+        unit_spread: float = _UNIT_SPREAD,
     ) -> dict[str, tuple[float, float]]:
         """Least and largest NEES of a filter with given numbers, by sensor.
 
@@ -415,13 +439,13 @@ class Datasheet(InUnits):
 
 def _unlikely(quantity: str, values: Mapping[str, float], N: float) -> list[Notice]:
     """Where N (u/sqrt(Hz)) is out of the range of sensors, or does not belong to what is stated."""
-    least, largest = tuning.DENSITIES.get(quantity, (0.0, np.inf))
+    least, largest = _DENSITIES.get(quantity, (0.0, np.inf))
     if not least <= N <= largest:
         end, limit = ("least", least) if least > N else ("largest", largest)
         return [notice("unlikely-sheet", quantity, ratio=N / limit, end=end)]
     lowest = lowest_deviation(values)
     time = (N / lowest) ** 2 if lowest else 1.0
-    first, last = tuning.CROSSINGS
+    first, last = _CROSSINGS
     is_usual = first <= time <= last
     return [] if is_usual else [notice("unlikely-sheet", quantity, variant="pair", time=time)]
 

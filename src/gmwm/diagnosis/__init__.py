@@ -7,6 +7,6 @@ from gmwm.diagnosis.health import (
     Repetition as Repetition,
     gathered as gathered,
 )
+from gmwm.diagnosis.lines import Spectrum as Spectrum, spectrum as spectrum
 from gmwm.diagnosis.repeats import first_in_common as first_in_common, thinned as thinned
-from gmwm.diagnosis.spectrum import Spectrum as Spectrum, spectrum as spectrum
 from gmwm.diagnosis.still import Still as Still, find_still as find_still, rest_of as rest_of

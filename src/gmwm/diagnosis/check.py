@@ -32,8 +32,7 @@ from gmwm.diagnosis.health import ChannelHealth, Health
 from gmwm.diagnosis.innovations import Examined, crosstalk_notices, innovations
 from gmwm.diagnosis.lines import line_notices
 from gmwm.diagnosis.motion import Motion, find_motion, runs_of
-from gmwm.diagnosis.repeats import Copy, copied_rows, find_copies
-from gmwm.diagnosis.resolution import rounding, step_size, widest_step
+from gmwm.diagnosis.repeats import Copy, copied_rows, find_copies, rounding, step_size, widest_step
 from gmwm.diagnosis.resonances import peaks, resonance_notice
 from gmwm.diagnosis.still import moves, vibration
 from gmwm.issues import Notice, Severity, notice, worst_first

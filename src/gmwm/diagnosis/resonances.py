@@ -11,8 +11,16 @@ from gmwm._core.distributions import norm
 from gmwm._core.text import brief, readable
 from gmwm._core.typing import BoolArray, FloatArray
 from gmwm.diagnosis import tuning
-from gmwm.diagnosis.lines import Line, find_lines
-from gmwm.diagnosis.spectrum import POWER_INFLATION, Bands, Spectrum, background, bands, spectrum
+from gmwm.diagnosis.lines import (
+    POWER_INFLATION,
+    Bands,
+    Line,
+    Spectrum,
+    background,
+    bands,
+    find_lines,
+    spectrum,
+)
 from gmwm.issues import Notice, notice
 from gmwm.process import Resonance
 

@@ -28,7 +28,7 @@ from gmwm.diagnosis.motion import (
     runs_of,
     times_of,
 )
-from gmwm.diagnosis.resolution import step_size
+from gmwm.diagnosis.repeats import step_size
 from gmwm.issues import Notice, notice
 from gmwm.readers import Channel, Recording, require_recording
 

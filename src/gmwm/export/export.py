@@ -15,9 +15,8 @@ from gmwm.calibration import Calibration
 from gmwm.errors import InputError
 from gmwm.export.curves import CURVES
 from gmwm.export.imu import in_motion
-from gmwm.export.keys import MemoryKeys, Pair, WalkKeys, entries
 from gmwm.export.state_space import StateSpaceFile
-from gmwm.export.target import ImuFile, JsonFile, Target
+from gmwm.export.target import ImuFile, JsonFile, MemoryKeys, Pair, Target, WalkKeys, entries
 from gmwm.filter_numbers import FilterNumbers
 from gmwm.motion import InMotion
 from gmwm.process import Model

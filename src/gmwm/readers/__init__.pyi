@@ -1,5 +1,3 @@
-from .joining import with_thermometer as with_thermometer
-from .missing import Missing as Missing
 from .names import (
     AXES as AXES,
     TIME as TIME,
@@ -7,10 +5,11 @@ from .names import (
     meaning as meaning,
     stated_seconds as stated_seconds,
 )
-from .reader import read as read, read_imus as read_imus
+from .reader import read as read, read_imus as read_imus, with_thermometer as with_thermometer
 from .recording import (
     READING as READING,
     Channel as Channel,
+    Missing as Missing,
     Recording as Recording,
     require_recording as require_recording,
 )
@@ -28,5 +27,5 @@ from .rest import (
     turning_gravity as turning_gravity,
 )
 from .table import label as label, load_columns as load_columns
-from .text.cells import DATE as DATE, seconds_of as seconds_of
 from .text.csv_table import CsvTable as CsvTable, content_size as content_size
+from .text.layout import DATE as DATE, seconds_of as seconds_of

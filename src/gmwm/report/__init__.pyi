@@ -3,8 +3,10 @@ from .calibration import (
     fragment as fragment,
     write_report as write_report,
 )
-from .compared import write_sensor_comparison_report as write_sensor_comparison_report
-from .fleet import write_fleet_report as write_fleet_report
+from .fleet import (
+    write_fleet_report as write_fleet_report,
+    write_sensor_comparison_report as write_sensor_comparison_report,
+)
 from .health import verdict as verdict
 from .motion import write_motion_report as write_motion_report
 from .navigation import (

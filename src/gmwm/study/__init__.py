@@ -6,7 +6,6 @@ from gmwm.study.appendix import (
     convergence_table as convergence_table,
     raw_estimates as raw_estimates,
 )
-from gmwm.study.choice import choice_study as choice_study, choice_table as choice_table
 from gmwm.study.demo import (
     compare as compare,
     sensors as sensors,
@@ -20,6 +19,8 @@ from gmwm.study.studies import (
     FIGURES as FIGURES,
     STUDIES as STUDIES,
     Study as Study,
+    choice_study as choice_study,
+    choice_table as choice_table,
     run_study as run_study,
 )
 from gmwm.study.summary import boxplots as boxplots, saved as saved, summarise as summarise

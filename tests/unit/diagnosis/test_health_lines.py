@@ -9,8 +9,7 @@ from scipy.stats import binom
 
 from gmwm import GaussMarkov, Resonance, Sinusoid, WhiteNoise
 from gmwm.diagnosis import gathered
-from gmwm.diagnosis.lines import find_lines, line_notices
-from gmwm.diagnosis.spectrum import background, bands, spectrum
+from gmwm.diagnosis.lines import background, bands, find_lines, line_notices, spectrum
 from gmwm.diagnosis.tuning import FALSE_ALARM
 from gmwm.issues import Notice
 from marks import every

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 import gmwm
-from gmwm.diagnosis.resolution import step_size, widest_step
+from gmwm.diagnosis.repeats import step_size, widest_step
 from marks import slow
 
 

@@ -5,9 +5,8 @@ import pytest
 
 from gmwm import GaussMarkov, Resonance
 from gmwm.diagnosis import tuning
-from gmwm.diagnosis.lines import Line, find_lines, line_notices
+from gmwm.diagnosis.lines import Line, background, bands, find_lines, line_notices, spectrum
 from gmwm.diagnosis.resonances import peaks, resonance_notice
-from gmwm.diagnosis.spectrum import background, bands, spectrum
 
 DT, N = 0.01, 20_000
 TIME = DT * np.arange(N)

@@ -7,8 +7,7 @@ from examining import examined, only
 from gmwm import Channel
 from gmwm._core.text import per_cent
 from gmwm.diagnosis import tuning
-from gmwm.diagnosis.repeats import held_samples, repetition, thinned
-from gmwm.diagnosis.resolution import is_coarse, rounding
+from gmwm.diagnosis.repeats import held_samples, is_coarse, repetition, rounding, thinned
 from gmwm.diagnosis.samples import cut_off_or_abrupt_end, gap_notices, is_dithered, repeated_value
 
 

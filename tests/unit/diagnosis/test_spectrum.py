@@ -5,7 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from gmwm.diagnosis.spectrum import background, bands, spectrum
+from gmwm.diagnosis.lines import background, bands, spectrum
 
 DT = 0.02
 

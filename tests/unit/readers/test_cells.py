@@ -6,7 +6,7 @@ from datetime import UTC, datetime, timedelta, timezone
 import pytest
 
 from gmwm.readers.table import LARGEST
-from gmwm.readers.text import cells
+from gmwm.readers.text import layout as cells
 
 
 def seconds(text):

@@ -3,7 +3,7 @@
 import numpy as np
 from hypothesis import given, strategies as st
 
-from gmwm.readers.missing import Missing, missing_notices
+from gmwm.readers.recording import Missing, missing_notices
 
 
 @given(st.lists(st.booleans(), min_size=1, max_size=60))

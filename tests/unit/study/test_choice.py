@@ -1,6 +1,6 @@
 """How often the true model is chosen."""
 
-from gmwm.study import choice
+from gmwm.study import studies as choice
 
 
 def test_the_study_counts_right_choices_and_surplus_terms(monkeypatch):

@@ -26,9 +26,16 @@ from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.readers.registry import Wanted
 from gmwm.readers.table import Columns, Table, damage_notice, label, more_such, usable
-from gmwm.readers.text import cells
-from gmwm.readers.text.cells import BLANKS
-from gmwm.readers.text.layout import Layout, fields_of, find_layout, with_dialect
+from gmwm.readers.text.layout import (
+    BLANKS,
+    FIELD_OF_DATE,
+    Layout,
+    fields_of,
+    find_layout,
+    number,
+    seconds_of,
+    with_dialect,
+)
 
 if TYPE_CHECKING:
     import pyarrow
@@ -234,7 +241,7 @@ class CsvTable(Table):
                 continue
             fields = self._fields(line, text)
             for values, column in zip(found, columns, strict=True):
-                value = cells.number(fields[column], layout.decimal)
+                value = number(fields[column], layout.decimal)
                 problem = "is not a number"
                 if value is None and column in layout.dates:
                     value, problem = _date(fields[column], layout.dates[column])
@@ -332,11 +339,11 @@ def _floats(column: pyarrow.ChunkedArray) -> FloatArray:
 
 def _date(cell: str, zoned: bool) -> tuple[float | None, str]:
     """Seconds since 1970, or ``None`` and what is wrong with the field."""
-    found = cells.FIELD_OF_DATE.fullmatch(cell)
+    found = FIELD_OF_DATE.fullmatch(cell)
     if found is not None and (found[9] is not None) is not zoned:
         return None, f"has {'no' if zoned else 'a'} zone, unlike the dates before it"
     try:
-        return (cells.seconds_of(found), "") if found else (None, "is not a date")
+        return (seconds_of(found), "") if found else (None, "is not a date")
     except ValueError:
         return None, "is not a date that exists"
 
