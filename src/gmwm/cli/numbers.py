@@ -61,17 +61,21 @@ _number_options = options(
 def bound(file: Path, temperature: float | None, **options: Any) -> None:
     """Find the smallest numbers that are never overconfident.
 
-    FILE is a calibration.json.
+    FILE is a calibration.json. If no random walk was found, K is its 95 % upper limit.
 
     \b
     Example:
       gmwm bound out/calibration.json --horizon 10 -o numbers.json
     """
     from gmwm.calibration import Calibration
-    from gmwm.filter_numbers import bound as run
+    from gmwm.filter_numbers import bound as run, usable
 
     calibration = _at(Calibration.load(file), temperature)
-    _show(lambda **given: run(calibration, **given), **options)
+    find: Callable[..., FilterNumbers] = run
+    if options["form"] == "N+K" and options["level"] is None:
+        del options["level"]
+        find = usable  # filters divide by K: its limit in place of zero
+    _show(lambda **given: find(calibration, **given), **options)
 
 
 @click.command()

@@ -407,9 +407,8 @@ def axis_of(name: str, numbers: AxisFilterNumbers, rate: float, fitted: Fit | No
     sigma, tau = (values[0] if values else float("nan") for values in (numbers.sigma, numbers.tau))
     if fitted is not None and not rate > 0.0:  # channels of several rates
         rate = 1.0 / fitted.wv.dt
-    limits = [key for n in numbers.notices if n.code == "upper-limit" for key in n.values]
     values = (numbers.N, numbers.K, sigma, tau, numbers.initial_sd, dict(numbers.nees), rate)
-    about = (frozenset(limits), numbers.notices, _covered(numbers, fitted), numbers.turn_on_sd)
+    about = (numbers.upper, numbers.notices, _covered(numbers, fitted), numbers.turn_on_sd)
     return Axis(name, *values, *about)
 
 

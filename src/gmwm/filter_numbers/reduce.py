@@ -290,16 +290,13 @@ def _filled(
     axis: AxisModel, group: Sequence[AxisModel], numbers: AxisFilterNumbers, tau: float
 ) -> AxisFilterNumbers:
     """The numbers of an axis without zeros; ``group``: axes with the same numbers."""
-    upper, fits = {}, [each.fit for each in group if each.fit is not None]
+    upper = dict[str, float]()
 
     def largest(letter: str) -> float:
-        return max(_limit(fit, letter) for fit in fits)
+        return max(_limit(each.fit, letter) for each in group if each.fit is not None)
 
     def positive(letter: str, value: float) -> float:
-        if value > 0.0:
-            return value
-        upper[letter] = largest(letter)
-        return upper[letter]
+        return value if value > 0.0 else upper.setdefault(letter, largest(letter))
 
     N = positive("N", numbers.N)
     if numbers.form == "N+K":
@@ -312,10 +309,11 @@ def _filled(
         model = WhiteNoise(N) + GaussMarkov(upper["sigma"], tau)
     if not upper:
         return numbers
-    times = [each.time for each in numbers.predicted]
-    again = predicted(axis, axis.chain, model, numbers.initial_sd, times)
+    again = predicted(axis, axis.chain, model, numbers.initial_sd, [*numbers.nees])
     limits = notice("upper-limit", "", upper, letters=", ".join(upper))
-    return replace(numbers, model=model, predicted=again, notices=(*numbers.notices, limits))
+    known = {key: error for key, error in numbers.stderr.items() if key not in upper}
+    notices = (*numbers.notices, limits)
+    return replace(numbers, model=model, predicted=again, notices=notices, stderr=known)
 
 
 @lru_cache(maxsize=64)

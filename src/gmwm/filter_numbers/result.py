@@ -5,6 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from operator import add
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from annotated_types import MaxLen, MinLen
@@ -144,6 +145,11 @@ class AxisFilterNumbers(Document, InUnits):
         return tuple(v or 0.0 for key, v in self.model.params.items() if key[:3] == "tau")
 
     @property
+    def upper(self) -> frozenset[str]:
+        """Which of the numbers are 95 % upper limits of a term that was not found."""
+        return frozenset(k for n in self.notices if n.code == "upper-limit" for k in n.values)
+
+    @property
     def nees(self) -> Mapping[float, float]:
         """Predicted normalised error squared per degree of freedom, by time without aiding."""
         return {each.time: each.nees for each in self.predicted}
@@ -175,7 +181,7 @@ class AxisFilterNumbers(Document, InUnits):
 
     def row(self, units: str) -> dict[str, Any]:
         """A row of `FilterNumbers.to_frame`; units: "field" or "si"."""
-        first = self.predicted[0] if self.predicted else Predicted(self.horizon, _NAN, _NAN)
+        first = next(iter(self.predicted), Predicted(self.horizon, _NAN, _NAN))
         values: dict[str, Any] = {}
         for key, value in self._shown().items():
             unit, scale = shown_unit(key, self.quantity, units)
@@ -299,7 +305,9 @@ def _tables(axes: Mapping[str, AxisFilterNumbers], quantity: str, units: str) ->
     for key in longest._shown():
         unit, scale = shown_unit(key, quantity, units)
         heads.append(f"{key}\n{unit}")
-        columns.append([cell(each._shown().get(key), scale=scale) for each in axes.values()])
+        shown = [cell(each._shown().get(key), scale=scale) for each in axes.values()]
+        limits = ["<= " * (key in each.upper) for each in axes.values()]
+        columns.append(list(map(add, limits, shown)))
         if key in longest.stderr:
             heads.append("+-")
             columns.append([cell(each.stderr.get(key), 2, scale) for each in axes.values()])

@@ -36,6 +36,20 @@ def test_bound_prints_and_saves_what_python_gives(run, calibration, tmp_path):
     assert gmwm.load(tmp_path / "numbers.json").to_dict() == expected.to_dict()
 
 
+def test_bound_prints_the_limit_of_a_walk_that_was_not_found(run, tmp_path):
+    """It printed K = 0, by which filters divide; exports and pages had the limit."""
+    x = WhiteNoise(1e-4).simulate(3000, 0.1, 1)
+    rec = gmwm.Recording.from_arrays({"gyro_x": x}, 10.0, {"gyro": "rad/s"})
+    cal = gmwm.calibrate(rec, "N", screening=())
+    code, printed, _ = run("bound", cal.save(tmp_path / "white.json"), "-o", "white_numbers.json")
+    assert code == 0
+    found = gmwm.load(tmp_path / "white_numbers.json")["gyro_x"]
+    assert pytest.approx(gmwm.calibration.upper_limit(cal["gyro_x"], "K")) == found.K
+    assert found.upper == {"K"}
+    assert "K" not in found.stderr
+    assert "<= " in printed
+
+
 def test_options_reach_the_bound(run, calibration):
     code, printed, _ = run(
         "bound", calibration, "--form", "N+K+GM", "--level", 0.9, "--shared", "--gyro-bias", 0.01,
