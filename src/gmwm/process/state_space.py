@@ -161,7 +161,8 @@ def _propagate(
             for j in range(p):
                 value += transition[i, j] * state[j] + noise_root[i, j] * noise[k, j]
             following[i] = value
-        state[:] = following
+        for i in range(p):
+            state[i] = following[i]
 
 
 def _root(covariance: FloatArray) -> FloatArray:

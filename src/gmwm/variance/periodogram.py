@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property, lru_cache, partial
@@ -192,12 +193,16 @@ def _fitted(
     steps, largest: Of each kind, and that factor.
     """
     number = laws.shape[0]
-    powers = np.empty(number)
+    powers, pull, share = np.empty(number), np.empty(number), np.empty(number)
     for k in range(number):
-        powers[k] = np.mean(seen) / np.mean(laws[k]) / number
-    pull, share = np.empty(number), np.empty(number)
+        total = whole = 0.0
+        for b in range(seen.size):
+            total += seen[b]
+            whole += laws[k, b]
+        powers[k] = total / whole / number
     for step in range(2 * steps):
-        pull[:], share[:] = 0.0, 0.0
+        for k in range(number):
+            pull[k] = share[k] = 0.0
         for b in range(seen.size):
             implied = 0.0
             for k in range(number):
@@ -209,7 +214,8 @@ def _fitted(
                 part = laws[k, b] * count[b] / implied
                 share[k] += part
                 pull[k] += part * ratio
-        powers *= np.sqrt(pull / share)
+        for k in range(number):
+            powers[k] *= math.sqrt(pull[k] / share[k])
     return powers
 
 

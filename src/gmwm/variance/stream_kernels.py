@@ -316,7 +316,8 @@ def _take_in(samples: FloatArray, rows: Rows, sums: Sums) -> None:
                 totals[REFERENCE] = samples[i]
                 break
     own = data[0, filled:end]
-    own[:] = samples - totals[REFERENCE]
+    for i in range(samples.size):
+        own[i] = samples[i] - totals[REFERENCE]
     missing, _, low, high = survey(own)
     if not missing:
         _close_gap(sums)

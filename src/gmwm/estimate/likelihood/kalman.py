@@ -4,11 +4,13 @@ The state-space form is ``y[k] = h' x[k] + v[k]``, ``x[k+1] = F x[k] + w[k]`` wi
 covariance P0 (`gmwm.StateSpace`). Several columns Y (n, m) are filtered at once with the same
 gains: the series, and regressors (a constant, a ramp) whose coefficients are profiled out
 afterwards (Rosenberg 1973, *Annals of Economic and Social Measurement* 2, 399-428; de Jong 1991,
-*Annals of Statistics* 19, 1073-1083). A NaN in the first column is a missing sample.
+*Annals of Statistics* 19, 1073-1083). A NaN in the first column is a missing sample. Arrays are
+copied by loops: numba takes seconds to compile assignments of arrays.
 """
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -105,13 +107,13 @@ def whiten(space: Space, Y: FloatArray) -> tuple[FloatArray, float, int]:
     ahead, before, Ph, gain = np.zeros(p), np.zeros(p), np.zeros(p), np.zeros(p)
     total, count, steady, root, log_s = 0.0, 0, False, 1.0, 0.0
     for k in range(n):
-        missing = np.isnan(Y[k, 0])
+        missing = math.isnan(Y[k, 0])
         if not (missing or steady):
             s = _innovation(P, h, r, Ph)
             for i in range(p):
                 gain[i] = Ph[i] / s
-            root = np.sqrt(s)
-            log_s = np.log(s)
+            root = math.sqrt(s)
+            log_s = math.log(s)
         if not missing:
             total += log_s
             count += 1
@@ -127,16 +129,14 @@ def whiten(space: Space, Y: FloatArray) -> tuple[FloatArray, float, int]:
                 ahead[i] = 0.0
                 for j in range(p):
                     ahead[i] += F[i, j] * x[c, j]
-            x[c] = ahead
+            for i in range(p):
+                x[c, i] = ahead[i]
         if missing or not steady:
-            updated[:] = P
-            if not missing:
-                for i in range(p):
-                    for j in range(p):
-                        updated[i, j] -= gain[i] * Ph[j]
-            steady = not missing
             for i in range(p):
                 before[i] = P[i, i]
+                for j in range(p):
+                    updated[i, j] = P[i, j] if missing else P[i, j] - gain[i] * Ph[j]
+            steady = not missing
             _propagate(F, Q, updated, half, P)
             for i in range(p):
                 if abs(P[i, i] - before[i]) > _STEADY * P[i, i]:
@@ -151,20 +151,21 @@ def filtered(space: Space, Y: FloatArray, A0: FloatArray, U: FloatArray) -> Filt
     n, m = Y.shape
     p = h.size
     X, PP, G = np.zeros((n, m, p)), np.zeros((n, p, p)), np.zeros((n, p))
-    V, S = np.zeros((n, m)), np.full(n, np.inf)
+    V, S = np.zeros((n, m)), np.zeros(n)
     P, x = P0.copy(), A0.copy()
     updated, half, Ph = np.zeros((p, p)), np.zeros((p, p)), np.zeros(p)
     for k in range(n):
-        missing = np.isnan(Y[k, 0])
-        s = _innovation(P, h, r, Ph)
-        X[k], PP[k], updated[:] = x, P, P
-        if not missing:
-            S[k] = s
-            for i in range(p):
-                for j in range(p):
-                    updated[i, j] -= Ph[i] * Ph[j] / s
-                    G[k, i] += F[i, j] * Ph[j] / s
+        missing = math.isnan(Y[k, 0])
+        s = math.inf if missing else _innovation(P, h, r, Ph)
+        S[k] = s
+        for i in range(p):
+            for j in range(p):
+                PP[k, i, j] = P[i, j]
+                updated[i, j] = P[i, j] if missing else P[i, j] - Ph[i] * Ph[j] / s
+                G[k, i] += 0.0 if missing else F[i, j] * Ph[j] / s
         for c in range(m):
+            for i in range(p):
+                X[k, c, i] = x[c, i]
             if not missing:
                 V[k, c] = Y[k, c]
                 for i in range(p):
@@ -199,9 +200,9 @@ def smooth(
     N, L, later = np.zeros((p, p)), np.zeros((p, p)), np.zeros((p, p))
     left, right, predicted = np.zeros((p, p)), np.zeros((p, p)), np.zeros((p, p))
     for k in range(n - 1, -1, -1):
-        predicted[:] = C[k]
         for i in range(p):
             for j in range(p):
+                predicted[i, j] = C[k, i, j]
                 L[i, j] = F[i, j] - G[k, i] * h[j]
         if k < n - 1:  # (1 - P[k + 1] N) L P[k]
             _times(L, predicted, right)
@@ -215,10 +216,10 @@ def smooth(
                 back[i] = h[i] * V[k, c] / S[k]
                 for j in range(p):
                     back[i] += L[j, i] * R[c, j]
-            R[c] = back
             for i in range(p):
+                R[c, i] = back[i]
                 for j in range(p):
-                    X[k, c, i] += predicted[i, j] * R[c, j]
+                    X[k, c, i] += predicted[i, j] * back[j]
         _times(N, L, right)
         for i in range(p):
             for j in range(p):
@@ -227,8 +228,10 @@ def smooth(
                     N[i, j] += L[q, i] * right[q, j]
         _times(predicted, N, left)
         _times(left, predicted, right)
-        C[k] -= right
-        later[:] = predicted
+        for i in range(p):
+            for j in range(p):
+                C[k, i, j] -= right[i, j]
+                later[i, j] = predicted[i, j]
     return X, C, D, V, S
 
 
@@ -259,10 +262,11 @@ def accumulated(at: Recursion, by: Recursion) -> FloatArray:
     A, P, noise = np.zeros((size, size)), np.zeros((size, size)), np.zeros((size, size))
     half, b = np.zeros((size, size)), np.zeros(size)
     rows, known = np.zeros((d, size)), np.zeros((d, size))  # d v of each over the joint state
-    A[:p, :p] = F
-    for m in range(d):
-        rows[m, :p] = -dh[m]
-        rows[m, p * (1 + m) : p * (2 + m)] = -h
+    for i in range(p):
+        for j in range(p):
+            A[i, j] = F[i, j]
+        for m in range(d):
+            rows[m, i], rows[m, p * (1 + m) + i] = -dh[m, i], -h[i]
     for k in range(n):
         _times(rows, P, known)
         for i in range(d):
@@ -271,7 +275,8 @@ def accumulated(at: Recursion, by: Recursion) -> FloatArray:
                 for q in range(size):
                     moved += known[i, q] * rows[j, q]
                 information[i, j] += moved / s[k]
-        b[:p] = G[k]
+        for i in range(p):
+            b[i] = G[k, i]
         for m in range(d):
             own = p * (1 + m)
             for i in range(p):

@@ -185,7 +185,9 @@ def linearized(
     fixed: (J, terms), curves of the other terms.
     Returns: first of all whether the curves are known in compiled form.
     """
-    z = np.minimum(np.maximum(z, bounds[0]), bounds[1])
+    z = z.copy()
+    for k in range(z.size):
+        z[k] = min(max(z[k], bounds[0][k]), bounds[1][k])
     is_known, curves = _curves(z, terms, shapes, fixed)
     if is_known:
         is_known, slopes = _slopes(z, terms, shapes, fixed.shape[0])

@@ -119,16 +119,15 @@ def _solve(unit: FloatArray, y: FloatArray) -> FloatArray:
                 break
             for p in range(size):
                 x[order[p]] += step * (solution[p] - x[order[p]])
-            kept = 0
+            dropped = 0
             for p in range(size):
                 j = order[p]
+                order[p - dropped] = j
                 if p == at or x[j] <= 0.0:
                     x[j] = 0.0
                     is_passive[j] = False
-                else:
-                    order[kept] = j
-                    kept += 1
-            size = kept
+                    dropped += 1
+            size -= dropped
             solution = _least_squares(unit, y, order, size)
         for p in range(size):
             x[order[p]] = solution[p]

@@ -353,8 +353,9 @@ def _look(
         if table.axis[k] >= 0:
             sensed[table.axis[k]] -= table.output[k] * x[k]
     there = Kinematics(at.C.copy(), at.v.copy(), at.lla.copy())
-    s = sensed * offset
-    now = Increments(s[0], s[1], s[2], s[3], s[4], s[5])
+    a, b = sensed[0] * offset, sensed[1] * offset
+    c, d = sensed[2] * offset, sensed[3] * offset
+    now = Increments(a, b, c, d, sensed[4] * offset, sensed[5] * offset)
     step(there, now, now, offset)
     transition(at, offset, change)
     return there, sensed[:3]
