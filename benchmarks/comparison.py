@@ -11,8 +11,10 @@ import numpy as np
 
 from gmwm import GaussMarkov, RandomWalk, Sinusoid, WhiteNoise
 from gmwm.estimate import estimate
-from gmwm.population import AxisComparison, Equality, Structure
+from gmwm.population import AxisComparison
 from gmwm.population.compare import _holm
+from gmwm.population.curves import Equality
+from gmwm.population.unit import Structure
 
 DT, N = 0.01, 30_000
 TRUTHS = {

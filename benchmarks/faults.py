@@ -17,7 +17,7 @@ from pathlib import Path
 
 from gmwm.errors import InputError
 from gmwm.ins import Navigated, SensorModels
-from gmwm.study import sensors
+from gmwm.study.demo import sensors
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 from emulated_logs import FAULTS, emulated_log

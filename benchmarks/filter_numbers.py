@@ -29,7 +29,9 @@ from gmwm import (
 from gmwm.calibration import axis_numbers
 from gmwm.filter_numbers import Chain, tuning
 from gmwm.filter_numbers.axes import SensorAxes
-from gmwm.filter_numbers.spectra import Estimated, Problem, RequiredSpectrum, standard_errors
+from gmwm.filter_numbers.spectra.dominance import Problem, standard_errors
+from gmwm.filter_numbers.spectra.region import Estimated
+from gmwm.filter_numbers.spectra.required import RequiredSpectrum
 from gmwm.ins import (
     Recorded,
     SensorModels,

@@ -15,7 +15,7 @@ import numpy as np
 
 import gmwm
 from gmwm import Calibration, Fit, Fleet, GaussMarkov, Model, RandomWalk, WhiteNoise
-from gmwm.population import Choice, Unit
+from gmwm.population.unit import Choice, Unit
 
 RATE, SECONDS = 100.0, 3600
 DEG_PER_ROOT_HOUR = np.pi / 180.0 / 60.0

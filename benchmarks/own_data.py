@@ -27,7 +27,7 @@ from gmwm.ins import SensorModels, car_drive, compare, gnss, tuning
 from gmwm.ins.covariance.analysis import Course
 from gmwm.ins.filter import Outage
 from gmwm.ins.simulation import Scenario
-from gmwm.study import sensors
+from gmwm.study.demo import sensors
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 from emulated_logs import emulated_log

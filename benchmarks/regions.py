@@ -16,7 +16,7 @@ import numpy as np
 import gmwm
 from gmwm import GaussMarkov, Model, RandomWalk, WhiteNoise
 from gmwm.filter_numbers import Chain
-from gmwm.filter_numbers.spectra import ParameterRegion
+from gmwm.filter_numbers.spectra.region import ParameterRegion
 from gmwm.ins import SensorModels, covariance_analysis, loiter_with_outages, monte_carlo
 from gmwm.ins.simulation import Simulated
 from gmwm.study.navigation import TABLE_6

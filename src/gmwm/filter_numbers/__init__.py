@@ -20,19 +20,9 @@ from gmwm.filter_numbers.budget import (
     per_si as per_si,
     root_sum as root_sum,
 )
-from gmwm.filter_numbers.certify import (
-    CONSUMERS as CONSUMERS,
-    Cause as Cause,
-    Certificate as Certificate,
-    Check as Check,
-    certify as certify,
-)
+from gmwm.filter_numbers.certify import Certificate as Certificate, certify as certify
 from gmwm.filter_numbers.imperfections import Imperfections as Imperfections, Motion as Motion
-from gmwm.filter_numbers.propagation import (
-    Chain as Chain,
-    ChainErrors as ChainErrors,
-    integral_rms as integral_rms,
-)
+from gmwm.filter_numbers.propagation import Chain as Chain, integral_rms as integral_rms
 from gmwm.filter_numbers.reduce import reduce as reduce, usable as usable
 from gmwm.filter_numbers.result import (
     FORMS as FORMS,

@@ -9,12 +9,7 @@ from gmwm.process.kinds.low_pass import (
     shaped_curve as shaped_curve,
     shaped_slope as shaped_slope,
 )
-from gmwm.process.model import (
-    Model as Model,
-    as_model as as_model,
-    model_from_list as model_from_list,
-    simulate as simulate,
-)
+from gmwm.process.model import Model as Model, as_model as as_model, simulate as simulate
 from gmwm.process.parameter import Parameter as Parameter, parameter as parameter
 from gmwm.process.spectral import (
     PANEL as PANEL,
@@ -31,7 +26,6 @@ from gmwm.process.spectral import (
 from gmwm.process.state_space import StateSpace as StateSpace, block_diagonal as block_diagonal
 from gmwm.process.wavelets import (
     ComplexArray as ComplexArray,
-    Wavelet as Wavelet,
     pair_weights as pair_weights,
     unit_legendre as unit_legendre,
     wavelet as wavelet,

@@ -8,7 +8,6 @@ from gmwm.study.appendix import (
 )
 from gmwm.study.demo import (
     compare as compare,
-    sensors as sensors,
     simulated_imu as simulated_imu,
     write_demo_files as write_demo_files,
 )
@@ -18,7 +17,6 @@ from gmwm.study.sensor import reproduce_sensor as reproduce_sensor
 from gmwm.study.studies import (
     FIGURES as FIGURES,
     STUDIES as STUDIES,
-    Study as Study,
     choice_study as choice_study,
     choice_table as choice_table,
     run_study as run_study,

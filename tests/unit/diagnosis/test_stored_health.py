@@ -5,7 +5,8 @@ from copy import deepcopy
 import pytest
 
 from gmwm import InputError
-from gmwm.diagnosis import ChannelHealth, Health, Repetition
+from gmwm.diagnosis import Health, Repetition
+from gmwm.diagnosis.health import ChannelHealth
 
 GOOD = Health(
     (),

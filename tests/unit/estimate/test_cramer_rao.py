@@ -5,7 +5,8 @@ import pytest
 
 import gmwm
 from gmwm import BiasInstability, GaussMarkov, RandomWalk, RateRamp, WhiteNoise, cramer_rao
-from gmwm.estimate.problem import Coordinates, spectral_information
+from gmwm.estimate.problem.information import spectral_information
+from gmwm.estimate.problem.parameters import Coordinates
 
 MODELS = {
     "white": WhiteNoise(0.3),

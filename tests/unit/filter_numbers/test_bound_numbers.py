@@ -9,13 +9,9 @@ import gmwm
 from error_models import DT, TRUTHS
 from gmwm import GaussMarkov, Model, QuantizationNoise, RandomWalk, Resonance, Sinusoid, WhiteNoise
 from gmwm.filter_numbers import Chain
-from gmwm.filter_numbers.spectra import (
-    Estimated,
-    ParameterRegion,
-    Problem,
-    RequiredSpectrum,
-    standard_errors,
-)
+from gmwm.filter_numbers.spectra.dominance import Problem, standard_errors
+from gmwm.filter_numbers.spectra.region import Estimated, ParameterRegion
+from gmwm.filter_numbers.spectra.required import RequiredSpectrum
 from gmwm.ins import Outage, Scenario, SensorModels, covariance_analysis, fixed_wing_loiter, gnss
 from gmwm.study.navigation import TABLE_6
 

@@ -5,7 +5,7 @@ import pytest
 
 from gmwm import GaussMarkov, RandomWalk, RateRamp, WhiteNoise
 from gmwm.estimate import estimate
-from gmwm.population import Equality
+from gmwm.population.curves import Equality
 
 TRUTH = WhiteNoise(1.0) + RandomWalk(0.3)
 N, DT = 6000, 0.01

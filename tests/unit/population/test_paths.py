@@ -3,7 +3,7 @@
 import pytest
 
 from gmwm import InputError
-from gmwm.population import recordings
+from gmwm.population.task import recordings
 
 
 @pytest.fixture

@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 
-from gmwm.population import Number, Spread, Structure, outlier_distance, spreads_of
+from gmwm.population import Number, Spread, outlier_distance
+from gmwm.population.spread import spreads_of
+from gmwm.population.unit import Structure
 
 LEVEL = 0.01
 

@@ -9,7 +9,9 @@ from gmwm import GaussMarkov, RandomWalk, Sinusoid, WhiteNoise
 from gmwm.calibration import axis_numbers
 from gmwm.estimate import estimate
 from gmwm.issues import Notice
-from gmwm.population import Choice, spreads_of, unit
+from gmwm.population import unit
+from gmwm.population.spread import spreads_of
+from gmwm.population.unit import Choice
 
 TRUTH = WhiteNoise(1.0) + GaussMarkov(2.0, 0.5)
 N, DT = 12_000, 0.01

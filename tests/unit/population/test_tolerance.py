@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from scipy.stats import beta, norm
 
-from gmwm.population import needed_units, one_sided_factor, rank_of_limit
+from gmwm.population import needed_units
+from gmwm.population.spread import one_sided_factor, rank_of_limit
 
 RUNS = 40_000
 

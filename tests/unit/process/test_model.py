@@ -10,7 +10,8 @@ from hypothesis.extra import numpy as hnp
 
 import gmwm
 from gmwm import AR, ARIMA, ARMA, GaussMarkov, RandomWalk, Resonance, Sinusoid, WhiteNoise
-from gmwm.process import CATALOGUE, as_model, model_from_list
+from gmwm.process import CATALOGUE, as_model
+from gmwm.process.model import model_from_list
 
 
 def test_repr_is_readable_and_evaluates_back():

@@ -7,7 +7,7 @@ import pytest
 
 import gmwm
 from gmwm import GaussMarkov, RandomWalk, RateRamp, WhiteNoise
-from gmwm.estimate.problem import Slope
+from gmwm.estimate.problem.ramp import Slope
 from gmwm.selection.ranking import candidate_of
 from gmwm.selection.select import _choose
 from gmwm.selection.ties import ramp_or_walk

@@ -1,9 +1,4 @@
 """Maximum likelihood, exact, by the spectrum or by expectation-maximization."""
 
 from gmwm.estimate.likelihood.em import EM as EM
-from gmwm.estimate.likelihood.likelihood import (
-    Columns as Columns,
-    KalmanLikelihood as KalmanLikelihood,
-    stacked as stacked,
-)
 from gmwm.estimate.likelihood.mle import MLE as MLE, Whittle as Whittle

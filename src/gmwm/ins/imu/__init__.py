@@ -1,4 +1,3 @@
 """Inertial signals and the errors of sensors."""
 
-from gmwm.ins.imu.increments import Imu as Imu, emulate as emulate
 from gmwm.ins.imu.sensors import AXES as AXES, Recorded as Recorded, SensorModels as SensorModels

@@ -5,9 +5,6 @@ from gmwm.ins.simulation.consistency import (
     QUANTITIES as QUANTITIES,
     FilterErrors as FilterErrors,
     Ratio as Ratio,
-    chi_square_ratio as chi_square_ratio,
-    mean_ratio as mean_ratio,
-    serial_ratio as serial_ratio,
 )
 from gmwm.ins.simulation.trials import (
     Experiment as Experiment,

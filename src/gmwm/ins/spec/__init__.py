@@ -1,8 +1,4 @@
 """Studies of navigation as people write them, in YAML."""
 
 from gmwm.ins.spec.experiment import experiment_from as experiment_from
-from gmwm.ins.spec.fields import (
-    read_document as read_document,
-    read_models as read_models,
-    sensor_models as sensor_models,
-)
+from gmwm.ins.spec.fields import read_document as read_document, sensor_models as sensor_models

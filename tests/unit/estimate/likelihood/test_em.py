@@ -8,8 +8,8 @@ from scipy.optimize import minimize
 import gmwm
 from gmwm import AR, ARIMA, GaussMarkov, RandomWalk, RateRamp, Resonance, Sinusoid, WhiteNoise
 from gmwm.errors import InputError
-from gmwm.estimate.likelihood import Columns, KalmanLikelihood, stacked
 from gmwm.estimate.likelihood.em import _gauss_markov, expect
+from gmwm.estimate.likelihood.likelihood import Columns, KalmanLikelihood, stacked
 from gmwm.process import as_model
 
 

@@ -7,8 +7,7 @@ from statsmodels.tsa.statespace.structural import UnobservedComponents
 
 import gmwm
 from gmwm import AR, ARMA, GaussMarkov, QuantizationNoise, RandomWalk, Sinusoid, WhiteNoise
-from gmwm.estimate.likelihood import Columns, KalmanLikelihood
-from gmwm.estimate.likelihood.likelihood import Regression, whitened
+from gmwm.estimate.likelihood.likelihood import Columns, KalmanLikelihood, Regression, whitened
 
 MODELS = [
     (WhiteNoise(0.3),),

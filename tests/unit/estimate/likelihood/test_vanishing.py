@@ -7,7 +7,7 @@ from scipy.optimize import minimize_scalar
 
 import gmwm
 from gmwm import RandomWalk, WhiteNoise
-from gmwm.estimate.likelihood import Columns, KalmanLikelihood
+from gmwm.estimate.likelihood.likelihood import Columns, KalmanLikelihood
 from marks import slow
 
 

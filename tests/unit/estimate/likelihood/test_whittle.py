@@ -5,8 +5,7 @@ import pytest
 
 import gmwm
 from gmwm import AR, GaussMarkov, QuantizationNoise, RandomWalk, RateRamp, Resonance, WhiteNoise
-from gmwm.estimate.likelihood import Columns, KalmanLikelihood
-from gmwm.estimate.likelihood.likelihood import WhittleLikelihood
+from gmwm.estimate.likelihood.likelihood import Columns, KalmanLikelihood, WhittleLikelihood
 from gmwm.process import as_model
 from marks import slow
 

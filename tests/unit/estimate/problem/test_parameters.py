@@ -7,7 +7,7 @@ from hypothesis import given, settings, strategies as st
 import gmwm
 from gmwm import AR, ARMA, GaussMarkov, RandomWalk, RateRamp, Sinusoid, WhiteNoise
 from gmwm.errors import InputError
-from gmwm.estimate.problem import Coordinates, keys_by_term
+from gmwm.estimate.problem.parameters import Coordinates, keys_by_term
 from gmwm.process import CATALOGUE, Model, as_model
 
 EXAMPLES = [p for kind in CATALOGUE if kind is not RateRamp for p in kind.examples()]

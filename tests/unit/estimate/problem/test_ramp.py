@@ -7,14 +7,9 @@ from scipy.stats import norm
 
 import gmwm
 from gmwm import GaussMarkov, RandomWalk, RateRamp, WhiteNoise
-from gmwm.estimate.problem import (
-    Slope,
-    Walks,
-    detrended_covariance,
-    gls_slope,
-    slope_dof,
-    slope_p_value,
-)
+from gmwm.estimate.problem import detrended_covariance, gls_slope, slope_p_value
+from gmwm.estimate.problem.moments import slope_dof
+from gmwm.estimate.problem.ramp import Slope, Walks
 from gmwm.process import as_model
 from marks import slow
 

@@ -5,7 +5,7 @@ import pytest
 
 import gmwm
 from gmwm import GaussMarkov, Process, RandomWalk, RateRamp, SimulatedMoments, WhiteNoise, parameter
-from gmwm.estimate.problem import Simulation
+from gmwm.estimate.problem.moments import Simulation
 
 
 class RoundedNoise(Process):

@@ -11,17 +11,15 @@ import gmwm
 from gmwm import GaussMarkov, RandomWalk, RateRamp, WhiteNoise
 from gmwm.estimate import tuning
 from gmwm.estimate.problem import (
-    Slope,
     chi_square,
-    density,
     difference_covariance,
-    frequency_nodes,
     gls_slope,
-    ols_slope,
     slope_p_value,
     weight_root,
 )
-from gmwm.estimate.result import quantile_above_zero
+from gmwm.estimate.problem.information import density, frequency_nodes
+from gmwm.estimate.problem.ramp import Slope, ols_slope
+from gmwm.estimate.result.estimate import quantile_above_zero
 
 DT = 0.5
 WV = gmwm.wavelet_variance((WhiteNoise(1.0) + RandomWalk(0.01)).simulate(600, DT, 1), dt=DT)

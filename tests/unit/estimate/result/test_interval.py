@@ -6,8 +6,9 @@ from hypothesis import given, strategies as st
 from scipy.stats import chi2, norm
 
 from gmwm import GaussMarkov, Model, RandomWalk, Sinusoid, WhiteNoise
-from gmwm.estimate.problem import error_growth
-from gmwm.estimate.result import confidence_interval, estimates_of
+from gmwm.estimate.problem.information import error_growth
+from gmwm.estimate.result import confidence_interval
+from gmwm.estimate.result.estimate import estimates_of
 from gmwm.process import Parameter
 
 TAU = Parameter("tau", "s")

@@ -9,7 +9,8 @@ from scipy.stats import chi2, kstest
 
 import gmwm
 from gmwm import GaussMarkov, RandomWalk, RateRamp, WhiteNoise
-from gmwm.estimate.result import between, fit_joint
+from gmwm.estimate.result import fit_joint
+from gmwm.estimate.result.joint import between
 from gmwm.variance import PooledVariance
 
 TRUTH = WhiteNoise(1.0) + GaussMarkov(0.7, 30.0)

@@ -7,7 +7,8 @@ from scipy import stats
 import gmwm
 from gmwm import GaussMarkov, LowPassNoise, RandomWalk, Resonance, WhiteNoise, wavelet_variance
 from gmwm.estimate import tuning
-from gmwm.estimate.result import Goodness, estimate_notices, misfit_notices, missed_level_notices
+from gmwm.estimate.result.conclusion import estimate_notices, misfit_notices, missed_level_notices
+from gmwm.estimate.result.goodness import Goodness
 from gmwm.process import as_model
 
 DT = 0.01

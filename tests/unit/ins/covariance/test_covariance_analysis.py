@@ -11,7 +11,7 @@ from gmwm.errors import InputError
 from gmwm.ins.covariance.analysis import covariance_analysis
 from gmwm.ins.filter.aiding import Aiding, Outage, barometer, gnss, standstills
 from gmwm.ins.filter.filter import Filter, InitialSd
-from gmwm.ins.imu import emulate
+from gmwm.ins.imu.increments import emulate
 from gmwm.ins.imu.sensors import SensorModels
 from gmwm.ins.simulation.consistency import GROUPS
 from gmwm.ins.simulation.trials import Scenario, Simulated, monte_carlo

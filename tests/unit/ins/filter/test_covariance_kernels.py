@@ -7,16 +7,15 @@ from scipy.linalg import block_diag, expm
 import gmwm
 from gmwm import GaussMarkov, RandomWalk, RateRamp, Resonance, Sinusoid, WhiteNoise
 from gmwm.ins import Imu, NavState, SensorModels, integrate
-from gmwm.ins.filter import (
-    Kinematics,
-    SensorStates,
+from gmwm.ins.filter.covariance_kernels import (
+    error_rates,
     measurement_update,
-    new_transition,
     propagate,
     tilt_squared,
     transition,
 )
-from gmwm.ins.filter.covariance_kernels import error_rates
+from gmwm.ins.filter.records import Kinematics, new_transition
+from gmwm.ins.filter.states import SensorStates
 from gmwm.ins.geometry import (
     matrix_from_rotation_vector,
     matrix_from_rpy,

@@ -5,10 +5,11 @@ import pytest
 
 from gmwm import AR, GaussMarkov, RandomWalk, RateRamp, Resonance, WhiteNoise
 from gmwm.ins import SensorModels
-from gmwm.ins.filter import KINDS, Keyframe, Kinematics, SensorStates, observe, observe_since
+from gmwm.ins.filter import KINDS
 from gmwm.ins.filter.filter_kernels import _advance, correct
-from gmwm.ins.filter.measurements import MEASUREMENTS
-from gmwm.ins.filter.records import Samples
+from gmwm.ins.filter.measurements import MEASUREMENTS, observe, observe_since
+from gmwm.ins.filter.records import Keyframe, Kinematics, Samples
+from gmwm.ins.filter.states import SensorStates
 from gmwm.ins.geometry import (
     matrix_from_rotation_vector,
     matrix_from_rpy,

@@ -6,9 +6,8 @@ import pytest
 
 import gmwm
 from gmwm.ins import Trajectory, emulate, fixed_wing_loiter, helicopter_mapping, integrate
-from gmwm.ins.filter import Kinematics
 from gmwm.ins.filter.filter_kernels import step
-from gmwm.ins.filter.records import Increments
+from gmwm.ins.filter.records import Increments, Kinematics
 from gmwm.ins.geometry import RATE, matrix_from_rotation_vector, matrix_from_rpy, ned_difference
 from marks import slow
 

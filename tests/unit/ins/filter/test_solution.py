@@ -5,7 +5,7 @@ import pytest
 
 from gmwm.errors import InputError
 from gmwm.ins import FilterInnovations, Solution, Trajectory
-from gmwm.ins.filter import unmodified
+from gmwm.ins.filter.filter import unmodified
 from gmwm.ins.geometry import matrix_from_rotation_vector, matrix_from_rpy
 
 

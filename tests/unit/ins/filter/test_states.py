@@ -7,7 +7,7 @@ import gmwm
 from gmwm import AR, ARIMA, GaussMarkov, RandomWalk, RateRamp, Resonance, Sinusoid, WhiteNoise
 from gmwm.errors import InputError
 from gmwm.ins import SensorModels
-from gmwm.ins.filter import SensorStates
+from gmwm.ins.filter.states import SensorStates
 from marks import every
 
 DT = 0.02

@@ -7,7 +7,7 @@ import pytest
 
 from emulated_logs import emulated_log
 from gmwm.ins import Measured, Navigated, Straight, emulate, gnss, perform
-from gmwm.ins.filter import InitialSd
+from gmwm.ins.filter.filter import InitialSd
 from gmwm.ins.logs import Fault, Faults, Replay, fault_notice
 from gmwm.study.demo import LEVER_ARM, sensors
 from marks import slow

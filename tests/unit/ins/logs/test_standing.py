@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from gmwm.ins import tuning
-from gmwm.ins.filter import Aiding, Fixes
+from gmwm.ins.filter.aiding import Aiding, Fixes
 from gmwm.ins.geometry import RATE, matrix_from_rpy, ned_difference, offset, rpy_from_matrix
-from gmwm.ins.imu import Imu
+from gmwm.ins.imu.increments import Imu
 from gmwm.ins.logs import standstills, steady
 from gmwm.ins.logs.attitude import gyrocompass, heading_from_course, turned, velocity_at_rest
 

@@ -14,8 +14,14 @@ from scipy.stats import binom, chi2, multivariate_normal, norm
 from statsmodels.stats.proportion import proportion_confint
 
 from gmwm.ins import Consistency, FilterErrors, at_epoch, innovation_test, over_time
-from gmwm.ins.simulation import GROUPS, chi_square_ratio, mean_ratio, serial_ratio
-from gmwm.ins.simulation.consistency import LEVELS, coverage_of
+from gmwm.ins.simulation import GROUPS
+from gmwm.ins.simulation.consistency import (
+    LEVELS,
+    chi_square_ratio,
+    coverage_of,
+    mean_ratio,
+    serial_ratio,
+)
 from marks import slow
 
 SIZES = {name: part.stop - part.start for name, part in GROUPS.items()} | {"sensors": 6}

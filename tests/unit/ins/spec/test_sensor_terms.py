@@ -8,8 +8,8 @@ import gmwm
 from gmwm import BiasInstability, GaussMarkov, QuantizationNoise, RandomWalk, RateRamp, WhiteNoise
 from gmwm.errors import InputError
 from gmwm.ins.imu import SensorModels
-from gmwm.ins.spec import read_models, sensor_models
-from gmwm.ins.spec.fields import value
+from gmwm.ins.spec import sensor_models
+from gmwm.ins.spec.fields import read_models, value
 
 ACCEL = {"N": 1e-2}
 

@@ -2,8 +2,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
-from gmwm.ins.trajectory import unwrapped_angles
-from gmwm.ins.trajectory.trajectory import smoothed
+from gmwm.ins.trajectory.trajectory import smoothed, unwrapped_angles
 
 
 def test_smoothing_keeps_cubics_and_slow_waves() -> None:
