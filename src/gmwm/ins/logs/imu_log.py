@@ -247,10 +247,11 @@ def _first_stamp(
     if start is not None:
         raise InputError(f"{recording.source} has time stamps: leave out its start")
     stamps, dt = load_columns(table, found[:1])[found[0]], recording.dt
-    elapsed = stamps - stamps[0]
-    ratios = np.array(_UNITS_OF_CLOCKS) * elapsed[-1] / ((recording.n - 1) * dt)
+    # Half of the record: single stamps may be wrong.
+    half = max(float(np.subtract(*np.quantile(stamps, [0.75, 0.25]))), np.finfo(float).tiny)
+    ratios = np.array(_UNITS_OF_CLOCKS) * half / (0.5 * (recording.n - 1) * dt)
     unit = _UNITS_OF_CLOCKS[int(np.argmin(np.abs(np.log(ratios))))]
-    elapsed *= unit
+    elapsed = unit * (stamps - stamps[0])
     # One stamp may come late: the grid is where most of them are.
     late = float(np.median(elapsed - dt * np.rint(elapsed / dt)))
     return float(stamps[0]) * unit + late, []

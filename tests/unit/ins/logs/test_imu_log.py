@@ -45,6 +45,15 @@ def test_samples_become_increments_over_the_interval_that_ends_at_their_stamp(
     np.testing.assert_allclose(log.imu.velocity, rows[:, 4:] * DT, rtol=1e-9)
 
 
+def test_the_unit_of_a_clock_does_not_depend_on_its_last_stamp(tmp_path):
+    """With the first row again at the end it was a division by zero."""
+    rows = imu_rows()
+    rows[:, 0] *= 1e3
+    rows = np.vstack([rows, rows[:1]])
+    log = read_imu_log(write_imu(tmp_path, rows, HEAD.replace("time", "time_ms")))
+    assert log.start == pytest.approx(5.0 - DT)
+
+
 def test_a_minus_before_a_column_reverses_it(tmp_path):
     path = write_imu(tmp_path, imu_rows(), "time,a,b,c,d,e,f")
     names = ("gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z")
