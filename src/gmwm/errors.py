@@ -1,7 +1,5 @@
 """The exceptions and warnings of the package."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from types import MappingProxyType
 

@@ -1,7 +1,5 @@
 """Values that the user gave: what they must be, or one sentence about it."""
 
-from __future__ import annotations
-
 import textwrap
 from collections.abc import Sequence
 from numbers import Real

@@ -1,7 +1,5 @@
 """Compilation of hot loops, with a cache on disk where there is a place for one."""
 
-from __future__ import annotations
-
 import hashlib
 import logging
 import signal

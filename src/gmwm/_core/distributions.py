@@ -3,8 +3,6 @@
 `scipy.stats` has them too; importing it takes most of a second and 40 MB.
 """
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 from typing import Any
 

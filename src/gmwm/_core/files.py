@@ -1,7 +1,5 @@
 """Files: opened if they are regular ones, written so that they appear whole or not at all."""
 
-from __future__ import annotations
-
 import hashlib
 import os
 import platform

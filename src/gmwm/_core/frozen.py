@@ -1,7 +1,5 @@
 """What results hold does not change: arrays and dictionaries that can be read only, by name."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from typing import Any, ClassVar, NoReturn, TypeVar
 

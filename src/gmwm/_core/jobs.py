@@ -3,8 +3,6 @@
 A worker that ends before its work does loses nothing: its items are done again.
 """
 
-from __future__ import annotations
-
 import os
 import warnings
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence

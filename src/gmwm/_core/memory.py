@@ -1,7 +1,5 @@
 """How much memory may be used; what needs more is rejected before it is begun."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress

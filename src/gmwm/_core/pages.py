@@ -5,8 +5,6 @@ their class; the room registers its functions with `page_of`, and the package's 
 which stands above all rooms, says with `provide` where they are.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any, TypeVar
 

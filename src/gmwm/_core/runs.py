@@ -3,8 +3,6 @@
 A run is a function of its number: whoever does it, and in whatever order, it gives the same.
 """
 
-from __future__ import annotations
-
 import json
 import logging
 from collections.abc import Callable, Iterator, Mapping, Sequence

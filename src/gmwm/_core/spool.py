@@ -1,7 +1,5 @@
 """Arrays of a long record on disk, so that memory does not grow with its length."""
 
-from __future__ import annotations
-
 import mmap
 import os
 import shutil

@@ -1,7 +1,5 @@
 """What people read of results: lines of 80 columns, sizes in usual units, pages."""
 
-from __future__ import annotations
-
 import textwrap
 from collections.abc import Iterable
 from html import escape

@@ -1,7 +1,5 @@
 """Array types, and products and medians of long arrays."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

@@ -1,7 +1,5 @@
 """``gmwm navigate``: options are keys of a study file; parse, run, print, write."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path

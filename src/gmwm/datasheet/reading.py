@@ -1,7 +1,5 @@
 """Reading what a data sheet states, from YAML or from the sheets that are installed."""
 
-from __future__ import annotations
-
 import os
 import re
 from collections.abc import Mapping

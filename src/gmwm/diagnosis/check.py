@@ -5,8 +5,6 @@ add one, write it in the file of what it looks for, name it in one of these, and
 notices in `gmwm.issues`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial

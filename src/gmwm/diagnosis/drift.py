@@ -1,7 +1,5 @@
 """Slow changes of the level, by themselves or with the temperature, and of the noise."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from itertools import pairwise
 

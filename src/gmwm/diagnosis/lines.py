@@ -1,7 +1,5 @@
 """The periodogram, and its lines: peaks too high for noise and too narrow for a resonance."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Motion: stretches in which a recording is not static, and those in which it is."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import wraps

@@ -1,7 +1,5 @@
 """Samples that were not measured: rounded, held, interpolated, or copies of earlier stretches."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 

@@ -1,7 +1,5 @@
 """Resonances: bumps of the spectrum above its smooth background."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 

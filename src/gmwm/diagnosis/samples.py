@@ -1,7 +1,5 @@
 """Samples that are missing, stuck, cut off or made otherwise than by the sensor."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 

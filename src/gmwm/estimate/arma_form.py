@@ -7,8 +7,6 @@ partial fractions of the autocovariance, ``gamma(k) = sum c_i r_i^k``, the varia
 process is such a sum only if its roots are real and between 0 and 1, and all c_i positive.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -5,8 +5,6 @@ nearly normal (Wilson & Hilferty 1931, *PNAS* 17, 684-688), with the covariance 
 implies. A draw takes milliseconds, whatever the length of the record.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import ClassVar
 

@@ -1,7 +1,5 @@
 """Lower bounds on the covariance of estimates: of any estimates, and from wavelet variances."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar

@@ -1,7 +1,5 @@
 """`fit`: one entrance to all methods of estimation."""
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Sequence
 from dataclasses import replace

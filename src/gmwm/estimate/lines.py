@@ -6,8 +6,6 @@ slope. Where none prevails nothing can be read: that is the limit of this method
 generalized method of wavelet moments does not share.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations, pairwise, product

@@ -7,8 +7,6 @@ cones, weighted by the covariance that the fit itself implies (Isserlis), iterat
 times are found with it, by Gauss-Newton steps in their logarithms.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

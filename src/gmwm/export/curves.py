@@ -1,7 +1,5 @@
 """Curves of the bias against the temperature as files of autopilots, tables and functions."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping, Sequence
 from contextlib import suppress

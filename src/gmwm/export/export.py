@@ -1,7 +1,5 @@
 """Numbers for a filter as the file of the program that runs it, and back."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType

@@ -4,8 +4,6 @@ Discrete: x[k+1] = F x[k] + G w[k], y[k] = H x[k] + v[k] with covariances Q of w
 Continuous: dx/dt = F x + G w, y = H x + v with spectral densities Q and R.
 """
 
-from __future__ import annotations
-
 import os
 from collections.abc import Sequence
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Numbers with which a small filter is never overconfident."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from typing import Any

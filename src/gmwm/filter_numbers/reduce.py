@@ -1,7 +1,5 @@
 """Numbers with which a small filter is consistent, and those that a file can hold."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache

@@ -1,7 +1,5 @@
 """The Earth (WGS-84 ellipsoid, rotation, normal gravity) and rotations."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """`compare`: several recordings or units of a sensor side by side."""
 
-from __future__ import annotations
-
 import os
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence

@@ -1,7 +1,5 @@
 """How a sensor number of an axis differs from unit to unit, and limits for most units."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache

@@ -1,7 +1,5 @@
 """Parameters of an error process: name, unit, role, range, and the map to the real line."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Any, Literal

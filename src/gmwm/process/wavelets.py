@@ -43,8 +43,6 @@ the factor sin^2r(pi u) goes to the measure, and T has 2^-2r Q in the place of |
 positive.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache

@@ -1,7 +1,5 @@
 """Time stamps: the sampling rate, and the place of every row on an even grid."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """Which column is which channel, and in what unit."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal

@@ -1,7 +1,5 @@
 """The even grid that time stamps lie on: the sampling interval, and which rows are missing."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from itertools import pairwise

@@ -5,8 +5,6 @@ and the path before a name do not matter. A unit is what stands in brackets at t
 (``ax [m/s^2]``) or the last words (``gyro_x_dps``, ``time_us``).
 """
 
-from __future__ import annotations
-
 import re
 import unicodedata
 from collections.abc import Sequence

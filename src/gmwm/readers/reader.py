@@ -1,7 +1,5 @@
 """From a file, or the parts of a log, to a `Recording`."""
 
-from __future__ import annotations
-
 import math
 import os
 from collections.abc import Collection, Iterable, Mapping, Sequence

@@ -1,7 +1,5 @@
 """A file as columns that are not read yet: what every format gives to the reader."""
 
-from __future__ import annotations
-
 import warnings
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Sequence

@@ -1,7 +1,5 @@
 """The page of a calibration: its content, in order, from the first screen on."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Mapping
 from dataclasses import replace

@@ -5,8 +5,6 @@ field's unit and in SI with the factor from the first; ``toggles``: the traces t
 hide; and ``whatif``: N and K of the curve that sliders move, with the sampling interval.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Pages of several units: a fleet with its data sheet and limits, and a comparison of few."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Mapping
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Whether recording and fits are healthy: verdict, findings worst first, length for a filter."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Any

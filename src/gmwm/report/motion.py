@@ -1,7 +1,5 @@
 """The page of noise in motion: curves, factors over rest, coherence, vibration, and numbers."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterator
 from itertools import cycle

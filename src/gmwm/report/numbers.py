@@ -1,7 +1,5 @@
 """Filter numbers for outages, the texts to copy, the error budget, and the page of a data sheet."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Mapping, Set
 from dataclasses import dataclass, replace

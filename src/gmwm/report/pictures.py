@@ -1,7 +1,5 @@
 """Places of what the pictures of pages without scripts show; templates draw them as SVG."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """The answer in a page of text: sensor numbers, filter numbers, and what to do."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from pathlib import PurePath
 

@@ -4,8 +4,6 @@ The interval of a parameter holds if its model is the right one. Where other mod
 well, their intervals count too, and the range joins them.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Simulated recordings and a log with a known truth."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 

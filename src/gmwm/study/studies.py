@@ -3,8 +3,6 @@
 Titles, sizes, notes and published numbers stand in studies.toml.
 """
 
-from __future__ import annotations
-
 import json
 from collections import Counter
 from collections.abc import Mapping, Sequence

@@ -13,8 +13,6 @@ see `gmwm.variance.covariance.haar`. Where the spectral matrix is a sum of parts
 are sums over pairs of parts of one form, which is found by polarization too.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations

@@ -1,7 +1,5 @@
 """Allan curves that others made, without samples: arrays, tables, JSON, text of imu_utils."""
 
-from __future__ import annotations
-
 import os
 import re
 from collections.abc import Mapping, Sequence

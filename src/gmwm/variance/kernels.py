@@ -1,7 +1,5 @@
 """Hot loops of the wavelet variance."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from gmwm._core.compiled import compiled

@@ -44,8 +44,6 @@ may grow without bound towards zero. Farther levels get a value of the right siz
 only where one narrow resonance makes them all.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import lru_cache
 

@@ -1,7 +1,5 @@
 """From a series to its wavelet variance."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 

@@ -5,8 +5,6 @@ Row k of `Rows` holds the means of aligned blocks of 2^k samples. A row is worke
 as means, and `HALO` values stay for the windows of the next chunk.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """From the maximum of a likelihood to a result, and terms that it can do without."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 

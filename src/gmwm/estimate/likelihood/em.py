@@ -12,8 +12,6 @@ first state of a Gauss-Markov process takes part in it, so that the iteration cl
 likelihood; its maximum is the root of a cubic (Beach & MacKinnon 1978, *Econometrica* 46, 51-58).
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar

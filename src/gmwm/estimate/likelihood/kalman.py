@@ -8,8 +8,6 @@ afterwards (Rosenberg 1973, *Annals of Economic and Social Measurement* 2, 399-4
 copied by loops: numba takes seconds to compile assignments of arrays.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """Maximum likelihood: exact by the Kalman filter, or Whittle's for long series."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial

@@ -1,7 +1,5 @@
 """From the minimum of the method of moments to a fit, without terms that the data do not need."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache

@@ -4,8 +4,6 @@ Loops stand in place of expressions of whole arrays and of slices, which take nu
 compile.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any, NamedTuple
 

@@ -5,8 +5,6 @@ One or two dimensions per term are left to search; the Jacobian is that of varia
 Kaufman's form (Golub & Pereyra 2003, *Inverse Problems* 19, R1-R26).
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, cast

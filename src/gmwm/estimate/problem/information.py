@@ -7,8 +7,6 @@ information on a random walk, beside white noise or not, is the exact one to 1 %
 samples on; with 1/(2 n dt) a walk that is just seen loses a third.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from functools import lru_cache
 

@@ -1,7 +1,5 @@
 """Non-negative least squares of a few columns, many times over (Lawson & Hanson 1974, ch. 23)."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

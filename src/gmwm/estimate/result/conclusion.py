@@ -1,7 +1,5 @@
 """The one place where the estimates of a method become a `Fit`."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations, pairwise

@@ -1,7 +1,5 @@
 """One model for several recordings, and whether they are the same noise."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from typing import Annotated, Any, ClassVar, Self

@@ -12,8 +12,6 @@ their variances v_j is d(ln S). As many places as there are numbers touch, or th
 noise does; where more do, they agree. A maximum that moves changes nothing to first order.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property

@@ -9,8 +9,6 @@ Maybeck (1979), *Stochastic Models, Estimation, and Control* 1, sec. 6.8.
 trajectory. P is the filter's covariance, (n + q, n + q); J has the joint second moments.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

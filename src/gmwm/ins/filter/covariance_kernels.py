@@ -9,8 +9,6 @@ so that they do not depend on how the vehicle manoeuvres between two steps (Sche
 follow, truth less estimate.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

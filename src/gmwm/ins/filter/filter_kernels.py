@@ -1,7 +1,5 @@
 """The loop of the navigation filter: mechanization, covariance, measurements, closed loop."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Records of arrays that the kernels of the filter take."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -4,8 +4,6 @@ NEES, coverage, innovations and a proper score, after Bar-Shalom, Li & Kirubaraj
 *Estimation with Applications to Tracking and Navigation*, sec. 5.4.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 

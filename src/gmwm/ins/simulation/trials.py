@@ -1,7 +1,5 @@
 """Monte Carlo: the same errors for every filter, run after run, in parallel."""
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field

@@ -3,8 +3,6 @@
 A value such as ``"140 deg/h"`` becomes a number in SI units; pydantic says where a fault stood.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping
 from pathlib import Path

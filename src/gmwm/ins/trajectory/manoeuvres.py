@@ -4,8 +4,6 @@ Speed is horizontal, over ground; heading is counted from north to the east. Rat
 and fall smoothly, so that angular rates and specific forces are continuous.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass

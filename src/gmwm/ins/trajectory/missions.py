@@ -1,7 +1,5 @@
 """Ready-made trajectories: a helicopter that maps, a car, a small fixed-wing aircraft."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from itertools import cycle

@@ -1,7 +1,5 @@
 """AR, MA, ARMA and ARIMA processes, in samples."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import lru_cache
 from itertools import product

@@ -5,8 +5,6 @@ or estimator that integrates the sensor can do better than to take it for that, 
 state-space form is that white noise, without a state.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Collection
 from functools import lru_cache

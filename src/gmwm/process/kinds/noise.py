@@ -5,8 +5,6 @@ processes, so that closed forms and simulations agree at every averaging time, n
 limit of many samples.
 """
 
-from __future__ import annotations
-
 from typing import ClassVar
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Tables of Arrow, in memory or in files: pandas, polars, Parquet, Feather."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path

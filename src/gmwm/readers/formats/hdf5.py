@@ -8,8 +8,6 @@ The libraries are compiled code that trusts the sizes and addresses in a file. D
 process, read on without end, or take all memory: a file is read in another process first.
 """
 
-from __future__ import annotations
-
 import json
 import math
 import os

@@ -6,8 +6,6 @@ sensors, `GYR` and `ACC` (raw logging) and the batches `ISBH` and `ISBD` those a
 rate (libraries/AP_InertialSensor/LogStructure.h). All but batches are read in blocks.
 """
 
-from __future__ import annotations
-
 from collections import Counter, defaultdict
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass

@@ -8,8 +8,6 @@ ROS 2 in either byte order, aligned to eight bytes counted from the end of the e
 (OMG CDR, formal/2021-11-01, 9.3; DDSI-RTPS 2.5, 10.2).
 """
 
-from __future__ import annotations
-
 import weakref
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence

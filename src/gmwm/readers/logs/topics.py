@@ -1,7 +1,5 @@
 """Topics of a log: which to read, and tables of their messages."""
 
-from __future__ import annotations
-
 from abc import abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass

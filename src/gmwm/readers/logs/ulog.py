@@ -6,8 +6,6 @@ thinned to about 1 Hz unless one asks for more (docs.px4.io, Logging; msg/Sensor
 SensorGyroFifo.msg, SensorAccelFifo.msg, VehicleImu.msg).
 """
 
-from __future__ import annotations
-
 import io
 import re
 from collections.abc import Mapping, Sequence

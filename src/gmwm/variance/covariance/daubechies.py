@@ -12,8 +12,6 @@ over the lags that are multiples of a block of samples: g_jk^2 is smooth on that
 not be symmetric: their transfer functions enter with their phases.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import lru_cache
 

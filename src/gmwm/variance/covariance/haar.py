@@ -16,8 +16,6 @@ ratio of the two sums, with g_jk by FFT from the spectrum; in records of more th
 ratio is taken on means of blocks of samples, see `gmwm.variance.covariance.lags`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
