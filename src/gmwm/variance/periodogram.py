@@ -193,7 +193,7 @@ def _fitted(
     steps, largest: Of each kind, and that factor.
     """
     number = laws.shape[0]
-    powers, pull, share = np.empty(number), np.empty(number), np.empty(number)
+    powers = np.zeros(number)
     for k in range(number):
         total = whole = 0.0
         for b in range(seen.size):
@@ -201,8 +201,7 @@ def _fitted(
             whole += laws[k, b]
         powers[k] = total / whole / number
     for step in range(2 * steps):
-        for k in range(number):
-            pull[k] = share[k] = 0.0
+        pull, share = np.zeros(number), np.zeros(number)
         for b in range(seen.size):
             implied = 0.0
             for k in range(number):

@@ -353,5 +353,5 @@ def absorb(samples: FloatArray, rows: Rows, sums: Sums, scratch: FloatArray) -> 
         size = min(CHUNK - (begin - rows.state[0, OLD]), samples.size - place)
         _take_in(samples[place : place + size], rows, sums)
         _keep_blocks(0, begin, begin + size, rows, sums)
-        work_off(CHUNK, rows, sums, scratch)
+        work_off(max(size, CHUNK), rows, sums, scratch)  # a number would be compiled for anew
         place += size

@@ -196,11 +196,11 @@ def smooth(
     D = np.zeros((max(n - 1, 0), p, p))
     R, back = np.zeros((m, p)), np.zeros(p)
     N, L, later = np.zeros((p, p)), np.zeros((p, p)), np.zeros((p, p))
-    left, right, predicted = np.zeros((p, p)), np.zeros((p, p)), np.zeros((p, p))
+    left, right = np.zeros((p, p)), np.zeros((p, p))
     for k in range(n - 1, -1, -1):
+        predicted = C[k]
         for i in range(p):
             for j in range(p):
-                predicted[i, j] = C[k, i, j]
                 L[i, j] = F[i, j] - G[k, i] * h[j]
         if k < n - 1:  # (1 - P[k + 1] N) L P[k]
             _times(L, predicted, right)
@@ -228,8 +228,8 @@ def smooth(
         _times(left, predicted, right)
         for i in range(p):
             for j in range(p):
-                C[k, i, j] -= right[i, j]
                 later[i, j] = predicted[i, j]
+                predicted[i, j] -= right[i, j]
     return X, C, D, V, S
 
 
@@ -275,9 +275,8 @@ def accumulated(at: Recursion, by: Recursion) -> FloatArray:
                 information[i, j] += moved / s[k]
         for i in range(p):
             b[i] = G[k, i]
-        for m in range(d):
-            own = p * (1 + m)
-            for i in range(p):
+            for m in range(d):
+                own = p * (1 + m)
                 b[own + i] = dG[m, k, i]
                 for j in range(p):
                     A[own + i, j] = dF[m, i, j] - G[k, i] * dh[m, j]
