@@ -15,9 +15,9 @@ from time import process_time
 import numpy as np
 
 from gmwm import GaussMarkov, WhiteNoise
-from gmwm.ins.covariance.analysis import covariance_analysis
+from gmwm.ins.covariance import covariance_analysis
 from gmwm.ins.filter.aiding import Outage, gnss
-from gmwm.ins.imu.sensors import SensorModels
+from gmwm.ins.sensors import SensorModels
 from gmwm.ins.simulation.trials import Scenario, Simulated, monte_carlo
 from gmwm.ins.trajectory.missions import helicopter_mapping
 

@@ -20,8 +20,8 @@ import numpy as np
 from gmwm import GaussMarkov, WhiteNoise
 from gmwm.ins.filter.aiding import Aiding, gnss
 from gmwm.ins.filter.filter import Filter, InitialSd, Outputs
-from gmwm.ins.imu.increments import Imu, emulate
-from gmwm.ins.imu.sensors import AXES, SensorModels
+from gmwm.ins.increments import Imu, emulate
+from gmwm.ins.sensors import AXES, SensorModels
 from gmwm.ins.simulation.trials import Scenario, Simulated, monte_carlo
 from gmwm.ins.trajectory.missions import helicopter_mapping
 from gmwm.ins.trajectory.trajectory import Trajectory

@@ -24,7 +24,7 @@ import numpy as np
 from scipy.stats import binomtest
 
 from gmwm.ins import SensorModels, car_drive, compare, gnss, tuning
-from gmwm.ins.covariance.analysis import Course
+from gmwm.ins.covariance import Course
 from gmwm.ins.filter import Outage
 from gmwm.ins.simulation import Scenario
 from gmwm.study.demo import sensors

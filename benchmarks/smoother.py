@@ -25,7 +25,7 @@ from gmwm.filter_numbers import Chain
 from gmwm.filter_numbers.axes import SensorAxes
 from gmwm.filter_numbers.tuning import KEYFRAME_SD, KEYFRAMES
 from gmwm.ins import SensorModels
-from gmwm.ins.imu.sensors import AXES
+from gmwm.ins.sensors import AXES
 
 DT, SECONDS = 0.01, 60
 PER = round(1.0 / DT)

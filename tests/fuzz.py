@@ -43,8 +43,9 @@ from gmwm.datasheet import read_datasheet
 from gmwm.diagnosis import health
 from gmwm.estimate import bootstrap, cramer_rao
 from gmwm.export import TARGETS, export, read_numbers
+from gmwm.ins.fields import read_document
 from gmwm.ins.logs import Measured, read_fix_log, read_imu_log
-from gmwm.ins.spec import experiment_from, read_document
+from gmwm.ins.spec import experiment_from
 from gmwm.ins.trajectory.trajectory_file import read_log
 from gmwm.report import write_report
 

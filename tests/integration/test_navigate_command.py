@@ -12,7 +12,7 @@ from click.testing import CliRunner
 
 from gmwm import Calibration, Channel, WhiteNoise, fit, wavelet_variance
 from gmwm.cli.main import cli
-from gmwm.ins.imu import AXES
+from gmwm.ins.sensors import AXES
 
 MODELS = {"gyro": {"N": "140 deg/h/sqrt(Hz)"}, "accel": {"N": "140 ug/sqrt(Hz)"}}
 STUDY = {

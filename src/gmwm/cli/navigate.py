@@ -157,7 +157,7 @@ def navigate(
       gmwm navigate --imu imu.csv --gnss fixes.csv --sensors A=a.json \\
         --sensors B=b.json --outages auto
     """
-    from gmwm.ins.spec import read_document
+    from gmwm.ins.fields import read_document
 
     reading = {name: keys.pop(name) for name in READING}
     work = {name: keys.pop(name) for name in ("jobs", "resume", "cluster")}

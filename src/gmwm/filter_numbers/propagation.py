@@ -21,7 +21,8 @@ from scipy.special import gamma
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.filter_numbers import tuning
-from gmwm.ins.covariance import CovarianceErrors, LinearStep, aid_jointly
+from gmwm.ins.covariance import CovarianceErrors
+from gmwm.ins.joint_kernels import LinearStep, aid_jointly
 from gmwm.process import (
     BiasInstability,
     ComplexArray,

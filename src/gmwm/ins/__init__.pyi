@@ -1,4 +1,4 @@
-from .covariance.analysis import (
+from .covariance import (
     AIDINGS as AIDINGS,
     Analysis as Analysis,
     covariance_analysis as covariance_analysis,
@@ -22,16 +22,11 @@ from .filter.filter import (
     navigate as navigate,
 )
 from .filter.filter_kernels import integrate as integrate
-from .imu.increments import (
+from .increments import (
     Imu as Imu,
     Preintegration as Preintegration,
     emulate as emulate,
     preintegrate as preintegrate,
-)
-from .imu.sensors import (
-    Recorded as Recorded,
-    SensorErrors as SensorErrors,
-    SensorModels as SensorModels,
 )
 from .logs.comparison import (
     Comparison as Comparison,
@@ -43,6 +38,11 @@ from .logs.fix_log import read_fixes as read_fixes
 from .logs.imu_log import read_imu as read_imu
 from .logs.measured import Measured as Measured
 from .logs.navigated import Navigated as Navigated
+from .sensors import (
+    Recorded as Recorded,
+    SensorErrors as SensorErrors,
+    SensorModels as SensorModels,
+)
 from .simulation.consistency import (
     Consistency as Consistency,
     FilterErrors as FilterErrors,
@@ -60,7 +60,7 @@ from .simulation.trials import (
     monte_carlo as monte_carlo,
 )
 from .simulation.validation import Validation as Validation
-from .spec.experiment import experiment_from as experiment_from
+from .spec import experiment_from as experiment_from
 from .trajectory.manoeuvres import (
     Accelerate as Accelerate,
     Climb as Climb,

@@ -1,3 +1,5 @@
+from .csv_table import CsvTable as CsvTable, content_size as content_size
+from .layout import DATE as DATE, seconds_of as seconds_of
 from .names import (
     AXES as AXES,
     TIME as TIME,
@@ -27,5 +29,3 @@ from .rest import (
     turning_gravity as turning_gravity,
 )
 from .table import label as label, load_columns as load_columns
-from .text.csv_table import CsvTable as CsvTable, content_size as content_size
-from .text.layout import DATE as DATE, seconds_of as seconds_of

@@ -11,8 +11,8 @@ from gmwm._core.typing import FloatArray
 from gmwm._core.units import SI_UNIT, customary_unit
 from gmwm.estimate.result import Fit
 from gmwm.ins import SensorModels, car_drive, emulate, gnss
-from gmwm.ins.imu import AXES
-from gmwm.ins.spec import sensor_models
+from gmwm.ins.fields import sensor_models
+from gmwm.ins.sensors import AXES
 from gmwm.process import GaussMarkov, Model, WhiteNoise
 from gmwm.readers import Recording
 

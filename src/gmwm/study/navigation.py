@@ -22,10 +22,10 @@ from gmwm.errors import InputError
 from gmwm.estimate import AllanLines, estimate
 from gmwm.estimate.result import Fit
 from gmwm.ins import tuning
+from gmwm.ins.fields import sensor_models
 from gmwm.ins.filter import Outage, gnss
-from gmwm.ins.imu import AXES, Recorded, SensorModels
+from gmwm.ins.sensors import AXES, Recorded, SensorModels
 from gmwm.ins.simulation import Experiment, Scenario, Simulated, Validation
-from gmwm.ins.spec import sensor_models
 from gmwm.ins.trajectory import car_drive, helicopter_mapping
 from gmwm.process import BiasInstability, GaussMarkov, Model, Process, RandomWalk, WhiteNoise
 from gmwm.readers import Recording

@@ -28,7 +28,7 @@ from gmwm.calibration import Calibration, calibrate
 from gmwm.errors import InputError
 from gmwm.filter_numbers import FilterNumbers
 from gmwm.ins import tuning
-from gmwm.ins.imu import AXES, Recorded, SensorModels
+from gmwm.ins.sensors import AXES, Recorded, SensorModels
 from gmwm.ins.simulation import GROUPS, Experiment, FilterErrors, Validation
 from gmwm.issues import Notice, notice
 from gmwm.readers import Recording

@@ -5,8 +5,8 @@ from datetime import UTC, datetime, timedelta, timezone
 
 import pytest
 
+from gmwm.readers import layout as cells
 from gmwm.readers.table import LARGEST
-from gmwm.readers.text import layout as cells
 
 
 def seconds(text):

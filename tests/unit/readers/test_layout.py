@@ -4,7 +4,7 @@ import pytest
 
 from gmwm.errors import InputError
 from gmwm.readers import tuning
-from gmwm.readers.text.layout import find_layout
+from gmwm.readers.layout import find_layout
 
 
 def layout(*lines, end="\n"):

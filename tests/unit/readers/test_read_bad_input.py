@@ -144,7 +144,7 @@ def test_not_finite(damaged, cell):
 
 
 def test_what_is_infinite_is_counted_over_all_blocks(damaged, monkeypatch):
-    from gmwm.readers.text import csv_table
+    from gmwm.readers import csv_table
 
     monkeypatch.setattr(csv_table.blocks, "__defaults__", (0, 1, 500, str))
     path = damaged(12, "1,inf,3,4,-inf,6")
@@ -322,7 +322,7 @@ def test_latin_1_header(write, samples):
 
 
 def test_endless_line(tmp_path, monkeypatch):
-    from gmwm.readers.text import csv_table as text_file
+    from gmwm.readers import csv_table as text_file
 
     monkeypatch.setattr(text_file, "_LONGEST_LINE", 1 << 18)
     path = tmp_path / "a.csv"

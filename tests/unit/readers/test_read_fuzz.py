@@ -10,9 +10,8 @@ import pytest
 
 import fuzz
 from gmwm.errors import InputError
-from gmwm.readers import read
+from gmwm.readers import csv_table, read
 from gmwm.readers.names import CANONICAL
-from gmwm.readers.text import csv_table
 from reading import SI
 
 CASES = 48

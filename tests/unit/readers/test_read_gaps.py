@@ -9,10 +9,9 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from gmwm.errors import InputError
-from gmwm.readers import read
+from gmwm.readers import csv_table, read
 from gmwm.readers.grid import find_jumps
 from gmwm.readers.names import CANONICAL
-from gmwm.readers.text import csv_table
 from reading import SI, texts
 
 GYRO = {"gyro": "rad/s"}

@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 from gmwm._core.units import factor
-from gmwm.readers import read
+from gmwm.readers import csv_table, read
 from gmwm.readers.names import CANONICAL
-from gmwm.readers.text import csv_table
 from reading import SI, assert_holds, texts
 
 HEADER = ",".join(CANONICAL)

@@ -5,7 +5,7 @@ import gzip
 import pytest
 
 from gmwm.errors import InputError
-from gmwm.readers.text.csv_table import blocks, content_size, count_lines
+from gmwm.readers.csv_table import blocks, content_size, count_lines
 
 
 @pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])

@@ -5,7 +5,7 @@ import pytest
 
 from gmwm import Calibration, GaussMarkov, RandomWalk, Recording, WhiteNoise, fit, wavelet_variance
 from gmwm.errors import InputError
-from gmwm.ins.imu import AXES, SensorModels
+from gmwm.ins.sensors import AXES, SensorModels
 from gmwm.process import BiasInstability, Model
 from gmwm.study import navigation
 from gmwm.study.navigation import TABLE_6, Calibrated, aligned, experiment, reproduce_figure

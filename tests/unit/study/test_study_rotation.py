@@ -10,7 +10,7 @@ from gmwm import Calibration, GaussMarkov, RandomWalk, Recording, WhiteNoise, fi
 from gmwm.errors import InputError
 from gmwm.ins import car_drive, gnss
 from gmwm.ins.filter.aiding import Outage
-from gmwm.ins.imu import AXES
+from gmwm.ins.sensors import AXES
 from gmwm.ins.simulation import Scenario
 from gmwm.study import rotation
 from gmwm.study.rotation import Rotation, crossed_weights, reproduce_rotation, rotate

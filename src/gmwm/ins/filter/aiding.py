@@ -14,7 +14,7 @@ from gmwm.errors import InputError
 from gmwm.ins import tuning
 from gmwm.ins.filter.measurements import IS_INFERRED, KINDS, MEASUREMENTS, Instrument, Measurement
 from gmwm.ins.filter.records import Events
-from gmwm.ins.imu.increments import Imu
+from gmwm.ins.increments import Imu
 from gmwm.ins.trajectory.trajectory import Trajectory, three_numbers
 
 _STANDSTILL = 1e-3  # m/s, below which the vehicle of a simulated trajectory stands

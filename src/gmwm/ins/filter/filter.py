@@ -32,8 +32,8 @@ from gmwm.ins.filter.records import (
 )
 from gmwm.ins.filter.states import SensorStates
 from gmwm.ins.geometry import matrix_from_rpy, ned_difference, rpy_from_matrix, skew
-from gmwm.ins.imu.increments import Imu
-from gmwm.ins.imu.sensors import SensorModels
+from gmwm.ins.increments import Imu
+from gmwm.ins.sensors import SensorModels
 from gmwm.ins.trajectory.trajectory import NavState, Trajectory, check_latitudes
 
 _POSE = ("north", "east", "down", "roll", "pitch", "yaw")  # states of a keyframe

@@ -52,7 +52,7 @@ from gmwm.ins.geometry import (
     rpy_from_matrix,
     turn_navigation,
 )
-from gmwm.ins.imu.increments import Imu
+from gmwm.ins.increments import Imu
 from gmwm.ins.trajectory.trajectory import NavState, Trajectory, check_latitudes
 
 

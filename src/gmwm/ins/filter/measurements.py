@@ -23,7 +23,7 @@ from gmwm.ins.geometry import (
     radii_at,
     rpy_from_matrix,
 )
-from gmwm.ins.imu.increments import Imu
+from gmwm.ins.increments import Imu
 from gmwm.ins.trajectory.trajectory import Trajectory
 
 if TYPE_CHECKING:

@@ -14,7 +14,7 @@ import numpy as np
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.ins.filter.records import SensorTable
-from gmwm.ins.imu.sensors import AXES, SensorModels
+from gmwm.ins.sensors import AXES, SensorModels
 from gmwm.process import GaussMarkov, Model, StateSpace
 
 _LARGEST_BLOCK = 2

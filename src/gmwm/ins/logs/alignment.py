@@ -16,8 +16,7 @@ from gmwm.ins import tuning
 from gmwm.ins.filter.aiding import Aiding
 from gmwm.ins.filter.filter import InitialSd
 from gmwm.ins.geometry import RATE, STANDARD_GRAVITY, matrix_from_rpy, offset, rpy_from_matrix
-from gmwm.ins.imu.increments import Imu
-from gmwm.ins.imu.sensors import AXES, SensorModels
+from gmwm.ins.increments import Imu
 from gmwm.ins.logs.attitude import (
     Heading,
     acceleration,
@@ -30,6 +29,7 @@ from gmwm.ins.logs.attitude import (
     velocity_at_rest,
 )
 from gmwm.ins.logs.measured import Measured
+from gmwm.ins.sensors import AXES, SensorModels
 from gmwm.ins.trajectory.trajectory import NavState
 from gmwm.issues import Notice, notice
 

@@ -16,7 +16,7 @@ from gmwm.ins import tuning
 from gmwm.ins.filter.aiding import Aiding, Fixes
 from gmwm.ins.filter.records import set_matrix
 from gmwm.ins.geometry import RATE, matrix_from_rpy, ned_difference, rpy_from_matrix, turn_body
-from gmwm.ins.imu.increments import Imu
+from gmwm.ins.increments import Imu
 
 _WINDOWS = 1024  # looked at together: a few MB
 

@@ -19,13 +19,13 @@ from gmwm._core.text import bullets, wrapped
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.ins import tuning
+from gmwm.ins.fields import read_models
 from gmwm.ins.filter.aiding import Outage
 from gmwm.ins.geometry import ned_difference
-from gmwm.ins.imu.sensors import SensorModels
 from gmwm.ins.logs.measured import LogSpec, Measured
 from gmwm.ins.logs.replay import Replay, Smoothed, smooth
+from gmwm.ins.sensors import SensorModels
 from gmwm.ins.simulation.consistency import InnovationTest, Ratio, mean_ratio
-from gmwm.ins.spec.fields import read_models
 from gmwm.issues import Notice, notice
 
 if TYPE_CHECKING:

@@ -16,16 +16,7 @@ from gmwm._core.typing import FloatArray
 from gmwm._core.units import SI_UNIT
 from gmwm.errors import InputError
 from gmwm.ins import tuning
-from gmwm.ins.filter.aiding import Aiding, Fixes
-from gmwm.ins.filter.filter import Solution
-from gmwm.ins.imu.increments import Imu
-from gmwm.ins.imu.sensors import AXES, SensorModels
-from gmwm.ins.logs.attitude import standstills
-from gmwm.ins.logs.fix_log import height_steps, read_fix_log, read_heights
-from gmwm.ins.logs.imu_log import ImuLog, read_imu_log
-from gmwm.ins.simulation.consistency import GROUPS, Ratio, serial_ratio
-from gmwm.ins.spec.experiment import ReadingSpec
-from gmwm.ins.spec.fields import (
+from gmwm.ins.fields import (
     FileName,
     Meters,
     Models,
@@ -41,6 +32,15 @@ from gmwm.ins.spec.fields import (
     read_models,
     written,
 )
+from gmwm.ins.filter.aiding import Aiding, Fixes
+from gmwm.ins.filter.filter import Solution
+from gmwm.ins.increments import Imu
+from gmwm.ins.logs.attitude import standstills
+from gmwm.ins.logs.fix_log import height_steps, read_fix_log, read_heights
+from gmwm.ins.logs.imu_log import ImuLog, read_imu_log
+from gmwm.ins.sensors import AXES, SensorModels
+from gmwm.ins.simulation.consistency import GROUPS, Ratio, serial_ratio
+from gmwm.ins.spec import ReadingSpec
 from gmwm.ins.trajectory.trajectory import Trajectory, unwrapped_angles, unwrapped_longitudes
 from gmwm.ins.trajectory.trajectory_file import read_log
 from gmwm.issues import Notice, notice

@@ -17,10 +17,10 @@ from gmwm.ins.filter.filter import Filter, FilterInnovations, InitialSd, Outputs
 from gmwm.ins.filter.measurements import KINDS, observe
 from gmwm.ins.filter.records import Events, Kinematics, Transition, new_transition
 from gmwm.ins.geometry import gravity_at, matrix_from_rpy, offset
-from gmwm.ins.imu.increments import Imu
-from gmwm.ins.imu.sensors import AXES, SensorModels
+from gmwm.ins.increments import Imu
 from gmwm.ins.logs.alignment import Alignment, align, started
 from gmwm.ins.logs.measured import Measured
+from gmwm.ins.sensors import AXES, SensorModels
 from gmwm.ins.simulation.consistency import InnovationTest, chi_square_ratio, lag_one
 from gmwm.ins.trajectory.trajectory import NavState
 

@@ -16,7 +16,7 @@ from gmwm._core.typing import BoolArray, FloatArray, IntArray
 from gmwm.errors import InputError
 from gmwm.ins import tuning
 from gmwm.ins.filter.filter import Outputs, Solution
-from gmwm.ins.imu.sensors import SensorErrors
+from gmwm.ins.sensors import SensorErrors
 from gmwm.ins.trajectory.trajectory import Trajectory
 
 GROUPS = {

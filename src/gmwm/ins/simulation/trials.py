@@ -16,8 +16,8 @@ from gmwm.ins import tuning
 from gmwm.ins.filter.aiding import Aiding, Outage
 from gmwm.ins.filter.filter import Filter, InitialSd, Outputs, Solution
 from gmwm.ins.geometry import matrix_from_rotation_vector, matrix_from_rpy, offset, rpy_from_matrix
-from gmwm.ins.imu.increments import Imu, emulate
-from gmwm.ins.imu.sensors import Recorded, SensorErrors, SensorModels
+from gmwm.ins.increments import Imu, emulate
+from gmwm.ins.sensors import Recorded, SensorErrors, SensorModels
 from gmwm.ins.simulation.consistency import (
     PER_RUN,
     QUANTITIES,

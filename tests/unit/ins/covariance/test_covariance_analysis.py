@@ -8,11 +8,11 @@ from scipy.stats import chi2, t
 
 from gmwm import AR, GaussMarkov, QuantizationNoise, RandomWalk, RateRamp, Resonance, WhiteNoise
 from gmwm.errors import InputError
-from gmwm.ins.covariance.analysis import covariance_analysis
+from gmwm.ins.covariance import covariance_analysis
 from gmwm.ins.filter.aiding import Aiding, Outage, barometer, gnss, standstills
 from gmwm.ins.filter.filter import Filter, InitialSd
-from gmwm.ins.imu.increments import emulate
-from gmwm.ins.imu.sensors import SensorModels
+from gmwm.ins.increments import emulate
+from gmwm.ins.sensors import SensorModels
 from gmwm.ins.simulation.consistency import GROUPS
 from gmwm.ins.simulation.trials import Scenario, Simulated, monte_carlo
 from gmwm.ins.trajectory.missions import car_drive, fixed_wing_loiter, helicopter_mapping

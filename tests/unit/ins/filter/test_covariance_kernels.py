@@ -23,7 +23,7 @@ from gmwm.ins.geometry import (
     offset,
     rpy_from_matrix,
 )
-from gmwm.ins.imu import AXES
+from gmwm.ins.sensors import AXES
 
 DT = 0.01
 # Latitude, longitude (deg), height, velocity, roll, pitch, yaw (deg).

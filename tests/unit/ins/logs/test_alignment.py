@@ -7,9 +7,9 @@ from gmwm import GaussMarkov, RandomWalk, WhiteNoise
 from gmwm.ins import tuning
 from gmwm.ins.filter.aiding import Aiding, Fixes
 from gmwm.ins.geometry import RATE, gravity, matrix_from_rpy, ned_difference, offset
-from gmwm.ins.imu import SensorModels
-from gmwm.ins.imu.increments import Imu
+from gmwm.ins.increments import Imu
 from gmwm.ins.logs import Measured, align
+from gmwm.ins.sensors import SensorModels
 
 DT, N, LLA = 0.1, 300, np.array([0.8, 0.2, 300.0])
 RPY = np.array([0.02, -0.03, 1.1])

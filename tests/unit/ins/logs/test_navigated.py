@@ -11,10 +11,10 @@ import yaml
 
 from gmwm.errors import InputError
 from gmwm.ins import Measured, Navigated, Outage, car_drive, emulate, fixed_wing_loiter, gnss
+from gmwm.ins.fields import sensor_models
 from gmwm.ins.filter import KINDS
 from gmwm.ins.geometry import ned_difference
 from gmwm.ins.logs.replay import innovation_sizes
-from gmwm.ins.spec import sensor_models
 from marks import slow
 
 RATE, START = 10.0, 1000.0

@@ -11,8 +11,8 @@ import pytest
 import gmwm
 from gmwm.errors import InputError
 from gmwm.ins import Measured, Navigated, Outage, Straight, Turn, car_drive, emulate, gnss, perform
+from gmwm.ins.fields import sensor_models
 from gmwm.ins.geometry import ned_difference
-from gmwm.ins.spec import sensor_models
 
 RATE = 25.0
 DATE = datetime(2024, 2, 29, 23, 59, 0, tzinfo=UTC)

@@ -6,7 +6,7 @@ import pytest
 from gmwm.ins import tuning
 from gmwm.ins.filter.aiding import Aiding, Fixes
 from gmwm.ins.geometry import RATE, matrix_from_rpy, ned_difference, offset, rpy_from_matrix
-from gmwm.ins.imu.increments import Imu
+from gmwm.ins.increments import Imu
 from gmwm.ins.logs import standstills, steady
 from gmwm.ins.logs.attitude import gyrocompass, heading_from_course, turned, velocity_at_rest
 

@@ -11,7 +11,7 @@ from gmwm import GaussMarkov, RandomWalk, WhiteNoise
 from gmwm.errors import InputError
 from gmwm.ins import FilterErrors, InitialSd, Outage, Scenario, SensorModels, Simulated, gnss
 from gmwm.ins.geometry import matrix_from_rpy
-from gmwm.ins.imu import AXES
+from gmwm.ins.sensors import AXES
 from gmwm.ins.simulation import GROUPS
 from gmwm.ins.simulation.trials import disturbed
 from gmwm.readers.recording import Recording

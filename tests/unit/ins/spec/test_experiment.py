@@ -6,10 +6,10 @@ import pytest
 
 from gmwm.errors import InputError
 from gmwm.ins import experiment_from
-from gmwm.ins.imu import AXES
+from gmwm.ins.fields import read_document
 from gmwm.ins.logs import LogSpec
-from gmwm.ins.spec import read_document
-from gmwm.ins.spec.experiment import ExperimentSpec
+from gmwm.ins.sensors import AXES
+from gmwm.ins.spec import ExperimentSpec
 from gmwm.process import RandomWalk
 from places import REPOSITORY
 

@@ -7,9 +7,8 @@ from hypothesis import given, settings, strategies as st
 import gmwm
 from gmwm import BiasInstability, GaussMarkov, QuantizationNoise, RandomWalk, RateRamp, WhiteNoise
 from gmwm.errors import InputError
-from gmwm.ins.imu import SensorModels
-from gmwm.ins.spec import sensor_models
-from gmwm.ins.spec.fields import read_models, value
+from gmwm.ins.fields import read_models, sensor_models, value
+from gmwm.ins.sensors import SensorModels
 
 ACCEL = {"N": 1e-2}
 

@@ -6,7 +6,7 @@ import pytest
 
 from gmwm.errors import InputError
 from gmwm.ins.geometry import gravity, ned_difference
-from gmwm.ins.imu.increments import emulate
+from gmwm.ins.increments import emulate
 from gmwm.ins.trajectory.trajectory import Trajectory
 from places import SHARED
 

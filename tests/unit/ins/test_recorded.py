@@ -6,7 +6,7 @@ from hypothesis import given, settings, strategies as st
 
 from gmwm.errors import InputError
 from gmwm.ins import Recorded
-from gmwm.ins.imu import AXES
+from gmwm.ins.sensors import AXES
 from gmwm.readers.recording import Recording
 
 UNITS = {"gyro": "rad/s", "accel": "m/s^2"}

@@ -6,7 +6,7 @@ import pytest
 from gmwm import GaussMarkov, QuantizationNoise, RandomWalk, RateRamp, WhiteNoise
 from gmwm.errors import InputError
 from gmwm.ins import SensorModels
-from gmwm.ins.imu import AXES
+from gmwm.ins.sensors import AXES
 
 PLAIN = {"gyro": WhiteNoise(1e-4), "accel": WhiteNoise(1e-3)}
 

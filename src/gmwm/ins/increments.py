@@ -22,7 +22,7 @@ from gmwm.ins.geometry import (
     radii_along,
     skew,
 )
-from gmwm.ins.imu.sensors import AXES, SensorModels
+from gmwm.ins.sensors import AXES, SensorModels
 from gmwm.ins.trajectory.trajectory import (
     Trajectory,
     check_latitudes,

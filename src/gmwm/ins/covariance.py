@@ -15,7 +15,6 @@ from gmwm._core import checks
 from gmwm._core.typing import BoolArray, FloatArray, IntArray
 from gmwm.errors import InputError
 from gmwm.ins import tuning
-from gmwm.ins.covariance.joint_kernels import JointFilter, KeptCovariances, Track, run_jointly
 from gmwm.ins.filter.aiding import Aiding, Outage, gnss, odometry, poses, wheels
 from gmwm.ins.filter.covariance_kernels import NAVIGATION
 from gmwm.ins.filter.filter import Filter, Outputs, unmodified
@@ -23,8 +22,9 @@ from gmwm.ins.filter.measurements import IS_RELATIVE, KINDS, new_keyframe, obser
 from gmwm.ins.filter.records import Events, Keyframe, Kinematics
 from gmwm.ins.filter.states import SensorStates
 from gmwm.ins.geometry import matrix_from_rpy
-from gmwm.ins.imu.increments import Imu, emulate
-from gmwm.ins.imu.sensors import SensorModels
+from gmwm.ins.increments import Imu, emulate
+from gmwm.ins.joint_kernels import JointFilter, KeptCovariances, Track, run_jointly
+from gmwm.ins.sensors import SensorModels
 from gmwm.ins.simulation.consistency import place_of
 from gmwm.ins.simulation.trials import Scenario
 from gmwm.ins.trajectory.missions import car_drive, fixed_wing_loiter

@@ -24,9 +24,7 @@ import numpy as np
 from gmwm._core.files import opened
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
-from gmwm.readers.registry import Wanted
-from gmwm.readers.table import Columns, Table, damage_notice, label, more_such, usable
-from gmwm.readers.text.layout import (
+from gmwm.readers.layout import (
     BLANKS,
     FIELD_OF_DATE,
     Layout,
@@ -36,6 +34,8 @@ from gmwm.readers.text.layout import (
     seconds_of,
     with_dialect,
 )
+from gmwm.readers.registry import Wanted
+from gmwm.readers.table import Columns, Table, damage_notice, label, more_such, usable
 
 if TYPE_CHECKING:
     import pyarrow

@@ -14,13 +14,7 @@ from pydantic import BeforeValidator, Discriminator, Field, StrictInt, Tag
 from gmwm._core import checks
 from gmwm.errors import InputError
 from gmwm.ins import tuning
-from gmwm.ins.filter.aiding import Outage, gnss
-from gmwm.ins.filter.filter import InitialSd
-from gmwm.ins.filter.states import SensorStates
-from gmwm.ins.imu.increments import emulate
-from gmwm.ins.imu.sensors import Recorded, SensorModels
-from gmwm.ins.simulation.trials import ErrorSource, Experiment, Scenario, Simulated
-from gmwm.ins.spec.fields import (
+from gmwm.ins.fields import (
     RECORDINGS,
     FileName,
     Meters,
@@ -38,6 +32,12 @@ from gmwm.ins.spec.fields import (
     read_models,
     written,
 )
+from gmwm.ins.filter.aiding import Outage, gnss
+from gmwm.ins.filter.filter import InitialSd
+from gmwm.ins.filter.states import SensorStates
+from gmwm.ins.increments import emulate
+from gmwm.ins.sensors import Recorded, SensorModels
+from gmwm.ins.simulation.trials import ErrorSource, Experiment, Scenario, Simulated
 from gmwm.ins.trajectory.missions import car_drive, fixed_wing_loiter, helicopter_mapping
 from gmwm.ins.trajectory.trajectory import Trajectory
 from gmwm.readers import read

@@ -30,7 +30,7 @@ from gmwm._core.documents import read_yaml
 from gmwm._core.units import SI_UNIT, factor, si_parameter_unit
 from gmwm.calibration import load
 from gmwm.errors import InputError
-from gmwm.ins.imu.sensors import SensorModels
+from gmwm.ins.sensors import SensorModels
 from gmwm.process import (
     BiasInstability,
     GaussMarkov,

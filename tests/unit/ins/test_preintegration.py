@@ -6,7 +6,7 @@ from scipy.spatial.transform import Rotation
 
 from gmwm import GaussMarkov, InputError, QuantizationNoise, RandomWalk, WhiteNoise
 from gmwm.ins import Imu, SensorModels, preintegrate
-from gmwm.ins.imu import AXES
+from gmwm.ins.sensors import AXES
 
 DT = 0.005
 GYRO = WhiteNoise(2e-4) + GaussMarkov(3e-4, 0.5) + GaussMarkov(2e-4, 8.0)
