@@ -46,7 +46,7 @@ from gmwm.export import TARGETS, export, read_numbers
 from gmwm.ins.fields import read_document
 from gmwm.ins.logs import Measured, read_fix_log, read_imu_log
 from gmwm.ins.spec import experiment_from
-from gmwm.ins.trajectory.trajectory_file import read_log
+from gmwm.ins.trajectory.trajectory import read_log
 from gmwm.report import write_report
 
 SECONDS, BYTES = 10, 1 << 30

@@ -44,7 +44,7 @@ __getattr__, __dir__, __all__ = lazy_loader.attach(__name__, ["ins"], _public())
 
 def _load_rooms() -> None:
     """Import what writes pages of results, and each room, which may have documents of its own."""
-    from gmwm.report import calibration, fleet, motion, navigation, numbers  # noqa: F401
+    from gmwm.report import calibration, fleet, navigation, numbers  # noqa: F401
 
     for room in _public():
         import_module(f"gmwm.{room}")

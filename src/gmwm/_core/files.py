@@ -120,7 +120,7 @@ def of_other_runs(path: Path, names: Iterable[str]) -> list[str]:
     return found
 
 
-def toml_beside(module: str) -> dict[str, Any]:
+def toml_beside(module: str | Path) -> dict[str, Any]:
     """Content of the TOML file beside a module, of its name: what the package itself knows.
 
     module: Its ``__file__``.

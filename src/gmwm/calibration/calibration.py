@@ -16,8 +16,7 @@ from gmwm._core.documents import Document, Rate, Samples, Text, load_document
 from gmwm._core.files import of_other_runs
 from gmwm._core.frozen import ByName, freeze
 from gmwm._core.pages import make
-from gmwm._core.tables import frame
-from gmwm._core.text import wrapped
+from gmwm._core.text import frame, wrapped
 from gmwm.calibration.covariates import compensated
 from gmwm.calibration.curve import BiasCurve
 from gmwm.calibration.numbers import SensorNumbers, axis_numbers

@@ -13,8 +13,7 @@ from annotated_types import Ge, Le
 
 from gmwm._core import checks
 from gmwm._core.documents import Array, Document, NotNegative, Positive, Text, check_covariance
-from gmwm._core.tables import plain_table
-from gmwm._core.text import Printed, brief, readable, with_error
+from gmwm._core.text import Printed, brief, plain_table, readable, with_error
 from gmwm._core.typing import FloatArray
 from gmwm._core.units import factor, shown_unit
 from gmwm.calibration import tuning

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from gmwm._core.frozen import ByName
-from gmwm._core.tables import frame, html_table, plain_table
-from gmwm._core.text import Printed, brief, with_error
+from gmwm._core.text import Printed, brief, frame, html_table, plain_table, with_error
 from gmwm._core.typing import FloatArray
 from gmwm._core.units import shown_unit
 from gmwm.calibration import tuning

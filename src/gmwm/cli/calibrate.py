@@ -20,8 +20,17 @@ from gmwm._core.files import (
     run_of,
     write_text,
 )
-from gmwm.cli.console import command_line, in_options, print_result, progress_bar
-from gmwm.cli.options import FILE_TO_WRITE, PATH, folder_to_write, options, read_recording
+from gmwm.cli.options import (
+    FILE_TO_WRITE,
+    PATH,
+    command_line,
+    folder_to_write,
+    in_options,
+    options,
+    print_result,
+    progress_bar,
+    read_recording,
+)
 from gmwm.errors import InputError
 
 if TYPE_CHECKING:
@@ -346,7 +355,7 @@ def health(
       gmwm health static.csv --rate 100 --gyro-unit deg/s --accel-unit g
     """
     from gmwm._core.memory import limited
-    from gmwm.cli.console import with_option
+    from gmwm.cli.options import with_option
     from gmwm.diagnosis import health as examine
 
     with limited(memory):

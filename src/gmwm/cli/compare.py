@@ -9,15 +9,18 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from gmwm.cli.calibrate import NONE_VALID, exit_unless
-from gmwm.cli.console import command_line, print_result, progress_bar, with_hint
 from gmwm.cli.options import (
     FILE_TO_WRITE,
     PATH,
     arguments_of_read,
+    command_line,
     folder_to_write,
     numbers,
     options,
+    print_result,
+    progress_bar,
     read_recording,
+    with_hint,
 )
 from gmwm.errors import InputError
 

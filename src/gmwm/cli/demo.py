@@ -10,8 +10,7 @@ import click
 
 from gmwm._core.files import folder_to_fill, moved_into_place, moved_together, write_text
 from gmwm.cli.calibrate import folder_of_results, show, write_files
-from gmwm.cli.console import print_result, progress_bar
-from gmwm.cli.options import folder_to_write, options, read_recording
+from gmwm.cli.options import folder_to_write, options, print_result, progress_bar, read_recording
 from gmwm.errors import InputError
 
 if TYPE_CHECKING:
@@ -101,8 +100,7 @@ def write_files_to_try(output: Path, hours: float, seed: int) -> None:
 
 def show_truth(fitted: Calibration, truth: dict[str, Model]) -> None:
     """One table of truth beside estimate."""
-    from gmwm._core.tables import plain_table
-    from gmwm._core.text import wrapped
+    from gmwm._core.text import plain_table, wrapped
     from gmwm.study import compare
 
     table, shown = [], [row for name, fit in fitted.items() for row in compare(fit, truth[name])]

@@ -18,10 +18,10 @@ from gmwm._core import __version__
 from gmwm._core.memory import OUT_OF_MEMORY
 from gmwm.cli.calibrate import calibrate, health
 from gmwm.cli.compare import array, compare, fleet, motion
-from gmwm.cli.console import with_hint
 from gmwm.cli.demo import demo, reproduce
 from gmwm.cli.navigate import navigate
 from gmwm.cli.numbers import bound, budget, certify, export, reduce, sheet
+from gmwm.cli.options import with_hint
 from gmwm.errors import InputError, printable
 
 if TYPE_CHECKING:

@@ -8,8 +8,17 @@ from typing import Any
 import click
 
 from gmwm._core.files import folder_to_fill, moved_together, write_text
-from gmwm.cli.console import print_result, progress_bar, with_option
-from gmwm.cli.options import PATH, READING, arguments_of_read, folder_to_write, numbers, options
+from gmwm.cli.options import (
+    PATH,
+    READING,
+    arguments_of_read,
+    folder_to_write,
+    numbers,
+    options,
+    print_result,
+    progress_bar,
+    with_option,
+)
 from gmwm.errors import InputError
 
 _NEEDED = (

@@ -10,10 +10,17 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from gmwm._core.files import content_of
-from gmwm._core.tables import plain_table
-from gmwm._core.text import brief, bullets, wrapped
-from gmwm.cli.console import print_result, progress_bar, with_option
-from gmwm.cli.options import FILE_TO_WRITE, PATH, numbers, options, seconds
+from gmwm._core.text import brief, bullets, plain_table, wrapped
+from gmwm.cli.options import (
+    FILE_TO_WRITE,
+    PATH,
+    numbers,
+    options,
+    print_result,
+    progress_bar,
+    seconds,
+    with_option,
+)
 from gmwm.errors import InputError
 
 if TYPE_CHECKING:

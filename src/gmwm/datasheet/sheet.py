@@ -12,8 +12,7 @@ import numpy as np
 
 from gmwm import plotting
 from gmwm._core import checks
-from gmwm._core.tables import plain_table
-from gmwm._core.text import brief, wrapped
+from gmwm._core.text import brief, plain_table, wrapped
 from gmwm._core.typing import FloatArray
 from gmwm._core.units import customary_unit
 from gmwm.errors import InputError

@@ -12,8 +12,7 @@ from annotated_types import Ge, Le
 from gmwm._core.documents import Document, NotNegative, Positive, Rate, Samples, Text
 from gmwm._core.frozen import freeze
 from gmwm._core.spool import scaled
-from gmwm._core.tables import frame, html_table
-from gmwm._core.text import Printed, wrapped
+from gmwm._core.text import Printed, frame, html_table, wrapped
 from gmwm.diagnosis import tuning
 from gmwm.errors import InputError, MissingNameError
 from gmwm.issues import SEVERITIES, Notice, Severity, notice

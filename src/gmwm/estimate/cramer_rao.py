@@ -9,8 +9,7 @@ import numpy as np
 from gmwm._core import checks
 from gmwm._core.documents import Array, Document, Interval, Samples, Text, check_covariance
 from gmwm._core.frozen import freeze
-from gmwm._core.tables import cell, plain_table
-from gmwm._core.text import per_cent, wrapped
+from gmwm._core.text import cell, per_cent, plain_table, wrapped
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.estimate.likelihood.conclusion import regular_inverse

@@ -9,8 +9,13 @@ from importlib import import_module
 from types import ModuleType
 from typing import Any
 
-from gmwm.export.curves import CURVES as CURVES, curve_files as curve_files
-from gmwm.export.export import TARGETS as TARGETS, export as export, read_numbers as read_numbers
+from gmwm.export.export import (
+    CURVES as CURVES,
+    TARGETS as TARGETS,
+    curve_files as curve_files,
+    export as export,
+    read_numbers as read_numbers,
+)
 from gmwm.export.imu import (
     SENSORS as SENSORS,
     Axis as Axis,

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from gmwm._core.tables import plain_table
-from gmwm._core.text import brief, bullets
+from gmwm._core.text import brief, bullets, plain_table
 from gmwm._core.typing import BoolArray, FloatArray
 from gmwm._core.units import SI_UNIT, factor
 from gmwm.errors import InputError

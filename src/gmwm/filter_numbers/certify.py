@@ -11,8 +11,7 @@ from annotated_types import MaxLen, MinLen
 
 from gmwm._core import checks
 from gmwm._core.documents import Document, NoneIs, NotNegative, Text
-from gmwm._core.tables import cell, frame, plain_table
-from gmwm._core.text import bullets, wrapped
+from gmwm._core.text import bullets, cell, frame, plain_table, wrapped
 from gmwm._core.units import SI_UNIT, factor
 from gmwm.errors import InputError
 from gmwm.filter_numbers import tuning

@@ -13,8 +13,7 @@ from annotated_types import MaxLen, MinLen
 from gmwm._core import checks
 from gmwm._core.documents import Document, NoneIs, NotNegative, Positive, Rate, Text
 from gmwm._core.frozen import ByName, freeze
-from gmwm._core.tables import cell, frame, plain_table
-from gmwm._core.text import WIDTH, Printed, bullets, wrapped
+from gmwm._core.text import WIDTH, Printed, bullets, cell, frame, plain_table, wrapped
 from gmwm._core.units import SI_UNIT, field_units, si_parameter_unit
 from gmwm.issues import Notice
 from gmwm.process import Model

@@ -14,8 +14,7 @@ from gmwm import plotting
 from gmwm._core import checks, pages
 from gmwm._core.documents import Array, Document, Positive, Text
 from gmwm._core.frozen import freeze
-from gmwm._core.tables import frame, plain_table
-from gmwm._core.text import Printed, brief, bullets, per_cent
+from gmwm._core.text import Printed, brief, bullets, frame, per_cent, plain_table
 from gmwm._core.typing import FloatArray
 from gmwm._core.units import SI_UNIT, factor
 from gmwm.errors import InputError, MissingNameError

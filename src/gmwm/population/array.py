@@ -12,8 +12,7 @@ from gmwm._core import checks
 from gmwm._core.distributions import chi2, norm
 from gmwm._core.documents import Array, Document, Positive, Probability, Text
 from gmwm._core.frozen import freeze
-from gmwm._core.tables import frame, plain_table
-from gmwm._core.text import Printed, brief, bullets
+from gmwm._core.text import Printed, brief, bullets, frame, plain_table
 from gmwm._core.typing import FloatArray, Progress
 from gmwm._core.units import factor
 from gmwm.calibration import departure_notices, departures, screened

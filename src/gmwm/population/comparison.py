@@ -16,8 +16,7 @@ from pydantic_core import to_json
 
 from gmwm._core.frozen import ByName, freeze
 from gmwm._core.pages import make
-from gmwm._core.tables import frame
-from gmwm._core.text import Printed, brief, bullets, per_cent, wrapped
+from gmwm._core.text import Printed, brief, bullets, frame, per_cent, wrapped
 from gmwm._core.units import customary_unit
 from gmwm.calibration import Calibration
 from gmwm.estimate import Fit

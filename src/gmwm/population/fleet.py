@@ -19,8 +19,7 @@ from gmwm._core.files import moved_together, replaceable
 from gmwm._core.frozen import ByName, freeze
 from gmwm._core.jobs import results
 from gmwm._core.pages import make
-from gmwm._core.tables import cell, frame, plain_table
-from gmwm._core.text import Printed, brief, bullets, per_cent, wrapped
+from gmwm._core.text import Printed, brief, bullets, cell, frame, per_cent, plain_table, wrapped
 from gmwm._core.typing import Progress
 from gmwm.calibration import Calibration
 from gmwm.errors import InputError, MissingNameError, printable

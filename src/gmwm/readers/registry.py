@@ -50,8 +50,8 @@ class Format:
     has_clocks: bool = False  # whether messages have stamps of their header and of their recording
 
 
-_TEXT = Format("text", "CSV and other delimited text (plain or .gz)", "text.csv_table:open_text")
-_FRAME = Format("a table in memory", "tables in memory", "formats.frame:open_frame")
+_TEXT = Format("text", "CSV and other delimited text (plain or .gz)", "csv_table:open_text")
+_FRAME = Format("a table in memory", "tables in memory", "formats.arrays:open_frame")
 
 FORMATS = (
     _TEXT,
@@ -60,8 +60,8 @@ FORMATS = (
     Format("hdf5", "HDF5", "formats.hdf5:open_hdf5", (".h5", ".hdf5", ".hdf"),
            (b"\x89HDF\r\n\x1a\n", b"MATLAB 7.3")),
     Format("mat", "MAT", "formats.hdf5:open_mat", (".mat",), (b"MATLAB 5.0",)),
-    Format("parquet", "Parquet", "formats.frame:open_parquet", (".parquet",), (b"PAR1",)),
-    Format("feather", "Feather", "formats.frame:open_feather", (".feather", ".arrow"),
+    Format("parquet", "Parquet", "formats.arrays:open_parquet", (".parquet",), (b"PAR1",)),
+    Format("feather", "Feather", "formats.arrays:open_feather", (".feather", ".arrow"),
            (b"ARROW1", b"FEA1")),
     Format("rosbag", "bags of ROS 1", "logs.rosbag:open_bag", (".bag",), (b"#ROSBAG",), True, True),
     Format("rosbag2", "bags of ROS 2", "logs.rosbag:open_bag", (".mcap", ".db3"),

@@ -8,9 +8,9 @@ from .fleet import (
     write_sensor_comparison_report as write_sensor_comparison_report,
 )
 from .health import verdict as verdict
-from .motion import write_motion_report as write_motion_report
 from .navigation import (
     write_comparison_report as write_comparison_report,
+    write_motion_report as write_motion_report,
     write_navigated_report as write_navigated_report,
     write_validation_report as write_validation_report,
 )

@@ -28,8 +28,7 @@ from gmwm.population import (
     needed_units,
     outlier_distance,
 )
-from gmwm.report.page import duration_text, origin, write_page
-from gmwm.report.pictures import multiple, strip
+from gmwm.report.page import duration_text, multiple, origin, strip, write_page
 
 _TITLES = {"N": "N, random walk", "B": "B, bias instability", "K": "K, rate random walk"}
 _MARKS = {"pass": "good", "FAIL": "bad", "?": "care", "none": "bad"}

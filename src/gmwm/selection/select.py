@@ -13,8 +13,7 @@ from gmwm._core import checks
 from gmwm._core.distributions import chi2
 from gmwm._core.documents import Document
 from gmwm._core.jobs import one_blas_thread
-from gmwm._core.tables import frame, html_table, plain_table
-from gmwm._core.text import Printed, bullets
+from gmwm._core.text import Printed, bullets, frame, html_table, plain_table
 from gmwm._core.units import shown_unit
 from gmwm.errors import InputError
 from gmwm.estimate import Data, Fit, are_several, estimate

@@ -1,11 +1,5 @@
 """The simulation study of Stebler et al. (2012), and a harder case, over the public API."""
 
-from gmwm.study.appendix import (
-    converge as converge,
-    convergence_boxes as convergence_boxes,
-    convergence_table as convergence_table,
-    raw_estimates as raw_estimates,
-)
 from gmwm.study.demo import (
     compare as compare,
     simulated_imu as simulated_imu,
@@ -21,4 +15,12 @@ from gmwm.study.studies import (
     choice_table as choice_table,
     run_study as run_study,
 )
-from gmwm.study.summary import boxplots as boxplots, saved as saved, summarise as summarise
+from gmwm.study.summary import (
+    boxplots as boxplots,
+    converge as converge,
+    convergence_boxes as convergence_boxes,
+    convergence_table as convergence_table,
+    raw_estimates as raw_estimates,
+    saved as saved,
+    summarise as summarise,
+)

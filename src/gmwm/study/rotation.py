@@ -21,8 +21,7 @@ from gmwm._core.distributions import norm
 from gmwm._core.documents import Document
 from gmwm._core.files import folder_to_fill, write_text
 from gmwm._core.runs import Earlier
-from gmwm._core.tables import plain_table
-from gmwm._core.text import bullets, wrapped
+from gmwm._core.text import bullets, plain_table, wrapped
 from gmwm._core.typing import FloatArray, Progress
 from gmwm.calibration import Calibration, calibrate
 from gmwm.errors import InputError

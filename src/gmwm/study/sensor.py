@@ -15,8 +15,7 @@ import numpy as np
 
 from gmwm import filter_numbers
 from gmwm._core.files import write_text
-from gmwm._core.tables import plain_table
-from gmwm._core.text import wrapped
+from gmwm._core.text import plain_table, wrapped
 from gmwm._core.typing import Progress
 from gmwm._core.units import field_units, shown_unit
 from gmwm.calibration import Calibration, calibrate

@@ -18,7 +18,7 @@ import pyarrow as pa
 
 from gmwm._core.files import toml_beside
 from gmwm._core.runs import do_runs
-from gmwm._core.tables import plain_table
+from gmwm._core.text import plain_table
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.estimate import (

@@ -22,7 +22,7 @@ import numpy as np
 
 from gmwm._core import checks
 from gmwm._core.distributions import chi2
-from gmwm._core.tables import cell, plain_table
+from gmwm._core.text import cell, plain_table
 from gmwm._core.typing import FloatArray
 from gmwm._core.units import shown_unit
 from gmwm.errors import InputError

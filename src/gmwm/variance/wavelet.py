@@ -21,8 +21,7 @@ from gmwm._core.documents import (
     Text,
     check_covariance,
 )
-from gmwm._core.tables import frame, html_table, plain_table
-from gmwm._core.text import Printed
+from gmwm._core.text import Printed, frame, html_table, plain_table
 from gmwm._core.typing import FloatArray
 from gmwm._core.units import shown_unit
 from gmwm.errors import InputError

@@ -11,7 +11,7 @@ from scipy.stats import binom
 import gmwm
 from gmwm import BiasInstability, GaussMarkov, RandomWalk, RateRamp, Recording, WhiteNoise
 from gmwm.calibration import departures
-from gmwm.cli.console import with_option
+from gmwm.cli.options import with_option
 from marks import every, slow
 
 DT = 1.0

@@ -5,8 +5,8 @@ import re
 
 import pytest
 
-from gmwm.cli.console import HINTS, with_hint
 from gmwm.cli.main import cli
+from gmwm.cli.options import HINTS, with_hint
 from gmwm.errors import InputError
 from places import REPOSITORY
 

@@ -8,7 +8,7 @@ from scipy.linalg import expm
 
 import gmwm
 from gmwm import GaussMarkov, RandomWalk, RateRamp, Resonance, Sinusoid, WhiteNoise
-from gmwm.export.state_space import channel
+from gmwm.export.export import channel
 from imu_numbers import RATE, numbers
 
 DT = 0.005

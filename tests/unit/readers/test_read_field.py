@@ -7,7 +7,7 @@ import pytest
 
 import gmwm
 from gmwm import InputError
-from gmwm.cli.console import with_hint
+from gmwm.cli.options import with_hint
 
 N, RATE = 300, 100.0
 SAMPLES = np.random.default_rng(1).normal(0.0, 1e-3, (N, 6))

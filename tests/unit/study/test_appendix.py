@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from gmwm.study import appendix
-from gmwm.study.appendix import (
+from gmwm.study import summary as appendix
+from gmwm.study.summary import (
     allan_least_squares,
     converge,
     convergence_table,

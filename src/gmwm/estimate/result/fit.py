@@ -14,8 +14,7 @@ from gmwm._core import checks
 from gmwm._core.distributions import chi2, norm
 from gmwm._core.documents import Array, Document, OrInfinity, OrNaN, Text, check_covariance
 from gmwm._core.frozen import freeze, frozen
-from gmwm._core.tables import frame, html_table, plain_table
-from gmwm._core.text import Printed, bullets, per_cent, wrapped
+from gmwm._core.text import Printed, bullets, frame, html_table, per_cent, plain_table, wrapped
 from gmwm._core.typing import FloatArray
 from gmwm._core.units import shown_unit
 from gmwm.errors import InputError, MissingNameError

@@ -13,8 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gmwm._core.distributions import norm
-from gmwm._core.tables import cell, plain_table
-from gmwm._core.text import per_cent, wrapped
+from gmwm._core.text import cell, per_cent, plain_table, wrapped
 from gmwm._core.typing import BoolArray, FloatArray
 from gmwm.estimate import tuning
 from gmwm.estimate.problem.moments import FittedMoments, chi_square, weight_root

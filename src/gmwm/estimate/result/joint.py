@@ -10,7 +10,7 @@ from annotated_types import MinLen
 from gmwm._core.distributions import chi2
 from gmwm._core.documents import NotNegative, Probability, Text
 from gmwm._core.frozen import freeze
-from gmwm._core.tables import cell, plain_table
+from gmwm._core.text import cell, plain_table
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.estimate import tuning

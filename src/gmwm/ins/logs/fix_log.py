@@ -19,7 +19,7 @@ from gmwm.errors import InputError
 from gmwm.ins import tuning
 from gmwm.ins.filter.aiding import Aiding, Fixes
 from gmwm.ins.geometry import ned_difference
-from gmwm.ins.trajectory.trajectory_file import POSITION_WORDS, LogColumns, is_time, words_of
+from gmwm.ins.trajectory.trajectory import POSITION_WORDS, LogColumns, is_time, words_of
 from gmwm.issues import Notice, notice
 from gmwm.readers import DATE, TIME
 

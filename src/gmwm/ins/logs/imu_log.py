@@ -21,7 +21,7 @@ from gmwm.ins import tuning
 from gmwm.ins.geometry import STANDARD_GRAVITY
 from gmwm.ins.increments import Imu
 from gmwm.ins.sensors import AXES, require_axes
-from gmwm.ins.trajectory.trajectory_file import is_time
+from gmwm.ins.trajectory.trajectory import is_time
 from gmwm.issues import Notice, Severity, notice
 from gmwm.readers import CsvTable, Recording, bare, is_text, load_columns, read
 

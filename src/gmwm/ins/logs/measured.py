@@ -41,8 +41,12 @@ from gmwm.ins.logs.imu_log import ImuLog, read_imu_log
 from gmwm.ins.sensors import AXES, SensorModels
 from gmwm.ins.simulation.consistency import GROUPS, Ratio, serial_ratio
 from gmwm.ins.spec import ReadingSpec
-from gmwm.ins.trajectory.trajectory import Trajectory, unwrapped_angles, unwrapped_longitudes
-from gmwm.ins.trajectory.trajectory_file import read_log
+from gmwm.ins.trajectory.trajectory import (
+    Trajectory,
+    read_log,
+    unwrapped_angles,
+    unwrapped_longitudes,
+)
 from gmwm.issues import Notice, notice
 
 _JUDGED = ("position", "velocity", "attitude")

@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Any, Unpack
 import numpy as np
 
 from gmwm._core.pages import make
-from gmwm._core.tables import plain_table
-from gmwm._core.text import bullets, wrapped
+from gmwm._core.text import bullets, plain_table, wrapped
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.ins import tuning
