@@ -5,14 +5,9 @@ The Haar MODWT filter of averaging time ``tau = m dt`` has the squared gain
     |H_m(f)|^2 = sin^4(pi m f dt) / (m^2 sin^2(pi f dt)),
 
 (Percival & Walden, *Wavelet Methods for Time Series Analysis*, 2000, ch. 5 and 8), so that the
-wavelet variance is ``2 int_0^{1/(2 dt)} |H_m(f)|^2 S(f) df``. At coarse levels the gain has up to
-millions of lobes. The quadrature here is one fixed set of Gauss-Legendre nodes, octave by octave
-towards zero frequency, shared by all levels: lobes are resolved over the octaves that hold the
-first ``_RESOLVED_LOBES`` of a level, and replaced by their mean 3/8 above, with a smooth transition
-over one octave (an infinitely smooth cut-off makes the error of the replacement fall faster
-than any power of the number of lobes). With that, a spectrum is evaluated once, and the variances
-of all levels are one matrix product. Other wavelets have weights of their own
-(`gmwm.process.wavelets`), for dyadic averaging times.
+wavelet variance is ``2 int_0^{1/(2 dt)} |H_m(f)|^2 S(f) df``. One fixed set of nodes serves all
+levels: a spectrum is evaluated once, and all variances are one matrix product. Other wavelets have
+weights of their own (`gmwm.process.wavelets`); docs/derivations.md has both.
 """
 
 from __future__ import annotations

@@ -2,45 +2,11 @@
 
 Filters are those of PyWavelets in the normalisation of the maximal overlap transform (MODWT): the
 scaling filter g sums to 1, the wavelet filter h to 0, and sum h^2 = sum g^2 = 1/2 (Percival &
-Walden, *Wavelet Methods for Time Series Analysis*, 2000, ch. 5). Their squared gains are
+Walden, *Wavelet Methods for Time Series Analysis*, 2000, ch. 5).
 
-    |G(f)|^2 = cos^2r(pi f) Q(f),    |H(f)|^2 = |G(1/2 - f)|^2,    |G|^2 + |H|^2 = 1,
-
-with r vanishing moments and a polynomial Q >= 1 in y = sin^2(pi f) that the last equation
-determines but for an odd polynomial R,
-
-    Q = sum_{k<r} C(r-1+k, k) y^k + y^r R(1 - 2y)
-
-(Daubechies, *Ten Lectures on Wavelets*, 1992, sec. 6.1). R = 0 for "db" and "sym"; for "coif" it
-is found from the filter. The form keeps all digits near f = 0, where |H|^2 falls as f^2r.
-
-Integrals of the gains against smooth spectra are exact at every level. A level's squared gain
-|H_j|^2 has up to 2^(j-1) lobes, which no fixed quadrature resolves at coarse levels. But a spectrum
-S is smooth on the panels of a grid graded by octaves, so that there
-
-    int |H_j|^2 S df = sum_i W_ji S(f_i),    W_ji = int |H_j|^2 l_i df,
-
-with the Lagrange polynomials l_i of a panel's Gauss-Legendre nodes f_i: the lobes go into weights
-that are found once. A panel is [a, a + 2^-s] with a a multiple of 2^-s; as f runs through it,
-u = 2^s f - 2^s a runs through one period, and
-
-    |H_j(f)|^2 = P_s(f) |H_{j-s}(u)|^2,    P_s(f) = prod_{l<s} |G(2^l f)|^2.
-
-P_s is smooth there, and integrals of smooth functions against |H_j(u)|^2 over a period obey
-
-    int |H_j|^2 phi du = int |H_{j-1}|^2 T phi du,
-    T phi(u) = [|G(u/2)|^2 phi(u/2) + |G((u+1)/2)|^2 phi((u+1)/2)] / 2,
-
-where T, the transfer operator of the scaling filter, leads from smooth functions to smooth
-functions (Daubechies, *Ten Lectures on Wavelets*, 1992, ch. 7; Villemoes 1992, *SIAM J. Math.
-Anal.* 23, 1519-1543). On ``_ORDER`` nodes it is a matrix, and each level costs one product with it.
-To keep all digits where the gain is minute, the zeros are taken out in closed form: with r
-vanishing moments and Q = |G|^2 / cos^2r,
-
-    P_s(f) = [sin(pi u) / (2^s sin(pi f))]^2r prod_{l<s} Q(2^l f),
-
-the factor sin^2r(pi u) goes to the measure, and T has 2^-2r Q in the place of |G|^2: all terms are
-positive.
+Integrals of the gains against smooth spectra are exact at every level: on panels graded by octaves
+a spectrum is a polynomial, the lobes of a gain go into the weights of its nodes, and these follow
+from level to level by the transfer operator of the scaling filter. docs/derivations.md has it.
 """
 
 from collections.abc import Iterator

@@ -3,19 +3,8 @@
 A coefficient of averaging time m is half the difference of two neighbouring means of m samples.
 Where some are missing, each is the mean of those that exist. Gaps of m/4 and more split the record,
 and so do gaps in which the level changes by more than the noise explains: coefficients that contain
-them are left out.
-
-The mean of C of m samples differs from the mean of all by a random part. As windows slide over a
-gap, samples are missing at any place equally often, so that its variance is (1/C - 1/m) S with
-
-    S = sum_k r(k) (V(1, m) - D(k)/2) / r(0)
-
-over lags k of either sign. r is the autocovariance of what is missing, D(k) the mean square of
-differences of samples k apart, and V(1, m) the variance of samples about the mean of m: the sum of
-the Haar wavelet variances of averaging times up to m/2, whatever the spectrum (analysis of
-variance; Percival & Walden 2000, sec. 8.1). All of them are known without a model, so the part is
-subtracted level by level. Where single samples are missing at random S is V(1, m), exactly; where
-gaps have L samples it is L times V(L, m), the variance of means of L samples.
+them are left out. What the others have too much variance by is known without a model, and is
+subtracted level by level; see docs/derivations.md.
 """
 
 from __future__ import annotations

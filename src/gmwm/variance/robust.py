@@ -1,47 +1,13 @@
 """The robust variance of wavelet coefficients: a bounded-influence M-estimator.
 
-A few outliers, jumps or glitches raise the wavelet variances of all levels they touch. The robust
-variance of the coefficients W_t of a level solves
+The robust variance nu^2 of the coefficients W_t of a level solves
 
     mean_t chi(W_t / nu) = a(c),    chi(r) = r^2 w(r)^2,    w(r) = (1 - (r/c)^2)^2 for |r| < c,
 
-with Tukey's biweight w, which takes all weight from coefficients beyond c nu, and
-a(c) = E chi(Z), Z ~ N(0, 1), which makes it consistent for Gaussian data (Mondal & Percival 2012,
-*Ann. Inst. Stat. Math.* 64, 27-53; Huber & Ronchetti 2009, *Robust Statistics*, ch. 5-6). From the
-derivative of the equation by nu^2, with E[Z chi'(Z)] = E[(Z^2 - 1) chi(Z)] (Stein's identity), the
-influence of a coefficient nu r on nu^2 is
-
-    2 nu^2 (chi(r) - a) / E[(Z^2 - 1) chi(Z)],
-
-and the efficiency at independent Gaussian coefficients, 2 nu^4 over its variance,
-
-    E[(Z^2 - 1) chi(Z)]^2 / (2 var chi(Z)).
-
-It has a limit. Outliers are rare in the coefficients of fine levels only: a coefficient of
-averaging time m is made of 2 m samples. Where most of these coefficients contain an outlier, they
-are nearly Gaussian with the raised variance, which no estimate from that level can tell from noise.
-
-The influence function of the robust variance is even, and in Hermite
-polynomials of r = W/nu, orthogonal under the normal law,
-
-    nu^2 (H_2(r) + b_4 H_4(r) + b_6 H_6(r) + ...),    b_q = (2 / q!) E[chi H_q] / E[chi H_2].
-
-The first term is that of the classical variance. With E[H_q H_q] = q! rho^q for coefficients of
-correlation rho (Mehler), for two levels
-
-    cov_robust = cov_classical
-                 + nu_j^2 nu_k^2 / (M_j M_k) sum_h c_jk(h) sum_{q=4,6,..} b_q^2 q! rho_jk(h)^q,
-
-with c_jk(h) the number of pairs at lag h. For independent coefficients the sum of all terms is
-the classical variance over the efficiency. Each power of a correlation function is one itself
-(Schur), so the excess is positive semi-definite.
-
-The powers from the fourth on are local: two levels whose averaging times differ by 2^d share about
-2^(-3d/2) of the added variance (random walk) or less. Levels up to four apart are summed, at lags
-of blocks of samples, whose means give these coefficients exactly; between these lags the sum of
-powers is taken as a straight line. Frequencies lie in the middle of their bins, so that a spectrum
-may grow without bound towards zero. Farther levels get a value of the right size, which matters
-only where one narrow resonance makes them all.
+with Tukey's biweight w and a(c) = E chi(Z), Z ~ N(0, 1) (Mondal & Percival 2012, *Ann. Inst. Stat.
+Math.* 64, 27-53). docs/derivations.md has its influence function, efficiency and limit, and the
+covariance of two levels: that of the classical variances and a sum over even powers of the
+correlations of their coefficients.
 """
 
 from dataclasses import dataclass

@@ -5,15 +5,8 @@ out (the diffuse, or restricted, likelihood: Harville 1974, *Biometrika* 61, 383
 Koopman 2012, *Time Series Analysis by State Space Methods*, ch. 5), so that correlation times of
 the order of the record are not taken for a drift that was removed.
 
-Whittle's likelihood (1953, *Arkiv for Matematik* 2, 423-434) compares the periodogram with the
-spectrum, frequency by frequency. The periodogram of a series with a steep spectrum is biased by
-leakage, and so are the estimates (Sykulski, Olhede, Guillaumin, Lilly & Early 2019, *Biometrika*
-106, 251-266). Here the series is first filtered to its innovations under starting values that are
-close (prewhitening: Percival & Walden 1993, *Spectral Analysis for Physical Applications*,
-sec. 6.5), which leaves no leakage; the periodogram is that of the zero-padded innovations, so that
-the end of the series does not meet its beginning; and its expectation at the starting values, one
-less the share that the regression on a constant and a ramp has taken, is exact. The filter is
-renewed until its values are the estimates.
+Whittle's likelihood (1953, *Arkiv for Matematik* 2, 423-434) is that of the innovations of the
+series under starting values that are close, which leaves no leakage; see docs/derivations.md.
 """
 
 from __future__ import annotations

@@ -5,15 +5,9 @@ For two levels j, k with M_j, M_k coefficients W free of end effects,
     cov(nu2_j, nu2_k) = 2 / (M_j M_k) sum_h c_jk(h) g_jk(h)^2,
 
 where g_jk is the cross-covariance of W_j and W_k at lag h and c_jk(h) the number of pairs at that
-lag (Percival 1995, *Biometrika* 82, 619-631; Serroukh, Walden & Percival 2000, *JASA* 95, 184-196).
-With c_jk(h) replaced by min(M_j, M_k), which is what it is at the lags that matter unless both
-levels are coarse, the sum is by Parseval's theorem
-
-    2 / max(M_j, M_k) int |H_j|^2 |H_k|^2 S^2 df.
-
-For the coarse levels, whose few coefficients make the counts matter, this is multiplied by the
-ratio of the two sums, with g_jk by FFT from the spectrum; in records of more than some samples the
-ratio is taken on means of blocks of samples, see `gmwm.variance.covariance.lags`.
+lag (Percival 1995, *Biometrika* 82, 619-631; Serroukh, Walden & Percival 2000, *JASA* 95, 184-196):
+a spectral integral, multiplied for coarse levels by a ratio of sums over lags by FFT; see
+docs/derivations.md.
 """
 
 from collections.abc import Sequence
