@@ -78,7 +78,6 @@ COMPASS_SD = math.radians(5.0)  # beyond which the Earth's rotation gives no hea
 # -- own logs: verdicts ---------------------------------------------------------------------------
 
 LOST = 5.0  # innovations over their expected size above which a filter is lost
-MOSTLY_FINE = 1.5  # NIS by the median, below which a few outliers make the mean large
 MILD = 1.5  # factor on assumed deviations of fixes up to which the solution may still be used
 
 # -- own logs: faults of a log --------------------------------------------------------------------
@@ -88,6 +87,8 @@ TRACK_STEP = 1.0  # s, of a track between whose points only noise of the IMU is 
 LARGEST_OFFSET = 1.5  # s, of a time offset found from the innovations: with more, no fix is near
 OFFSET_MARGIN = 0.1  # s beside it, for fixes left out at both ends
 USUAL_RATE = 0.01  # error of a clock that only counts samples, 1 sigma
+# Scale error of an IMU that was not calibrated, 1 sigma; and one that no sensor has.
+USUAL_SCALE, LARGEST_SCALE = 0.03, 0.15
 # Largest error of its rate that is looked for, over 3, and s at first: a step is then 0.6 s.
 RATE_STEP, RATE_SPAN = 0.012, 50.0
 LARGEST_ARM = 5.0  # m, usual length of a lever arm that was left out, 1 sigma
@@ -95,6 +96,8 @@ HEADINGS = 8  # directions that are tried where the filter is lost: 45 deg apart
 ROUGH_HEADING = math.radians(15.0)  # 1 sigma of each: the nearest is up to 22.5 deg off
 FINE_HEADING = math.radians(0.5)  # of the estimated one: the data and not the start decide
 DIAGNOSED = 3600.0  # s from the start in which faults are looked for, by tens of runs
+# NIS above which faults that were found leave too much to be the cause; nor may half of it be left.
+MOST_LEFT = 1.5
 MOST_FAULTS = 4  # at once: with more, nothing can be known
 ROUNDS, SETTLED_GAIN = 6, 0.05  # Gauss-Newton steps; the gain in log-likelihood that ends them
 # Shares of LARGEST_OFFSET and times LARGEST_ARM from which more of a time offset may be behind it.

@@ -15,7 +15,14 @@ from gmwm.errors import InputError
 from gmwm.ins import tuning
 from gmwm.ins.filter.aiding import Aiding, Fixes
 from gmwm.ins.filter.records import set_matrix
-from gmwm.ins.geometry import RATE, matrix_from_rpy, ned_difference, rpy_from_matrix, turn_body
+from gmwm.ins.geometry import (
+    RATE,
+    STANDARD_GRAVITY,
+    matrix_from_rpy,
+    ned_difference,
+    rpy_from_matrix,
+    turn_body,
+)
 from gmwm.ins.increments import Imu
 
 _WINDOWS = 1024  # looked at together: a few MB
@@ -75,7 +82,8 @@ def steady(imu: Imu) -> Iterator[tuple[int, int]]:
 def velocity_at_rest(aiding: Aiding, dt: float, first: int, last: int) -> float | None:
     """Standard deviation of the velocity of a vehicle at rest in a stretch; ``None`` if it moves.
 
-    Fixes show it: velocities near zero, or positions at one place.
+    Fixes show it: velocities near zero, or positions at one place. ``None`` too where they would
+    not show a vehicle that speeds up from rest, whose accelerometers are as steady.
     """
     velocity = aiding.of("velocity")
     part = None if velocity is None else _inside(velocity, dt, first, last)
@@ -88,7 +96,9 @@ def velocity_at_rest(aiding: Aiding, dt: float, first: int, last: int) -> float 
         between = part.time[-1] - part.time[0]
         mean = ned_difference(part.value[-1], part.value[0]) / between
         sd = np.hypot(part.sd[0], part.sd[-1]) / between
-    if np.any(np.abs(mean) > tuning.SIGMAS * sd):
+    unseen = tuning.SIGMAS * sd
+    fastest = tuning.TILT_MOST * STANDARD_GRAVITY * (np.mean(part.time[[0, -1]]) - first * dt)
+    if np.any(np.abs(mean) > unseen) or np.max(unseen[:2]) > fastest:
         return None
     return max(float(np.max(sd)), tuning.STILL_VELOCITY_SD)
 

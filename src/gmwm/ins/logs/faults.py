@@ -1,9 +1,9 @@
 """The faults that a log shows, looked for before the sensor models are blamed.
 
-Time offset, lever arm, heading, clock rate, axis signs, outliers: each is a filter that allows for
-it, with the parameters under which the fixes are most probable. Constant errors are estimated by
-least squares from the innovations and their derivatives (Friedland 1969, *IEEE Trans. Autom.
-Control* 14, 359-367).
+Time offset, lever arm, heading, clock rate, scales, axis signs, outliers: each is a filter that
+allows for it, with the parameters under which the fixes are most probable. Constant errors are
+estimated by least squares from the innovations and their derivatives (Friedland 1969, *IEEE Trans.
+Autom. Control* 14, 359-367).
 """
 
 from __future__ import annotations
@@ -22,14 +22,15 @@ from gmwm._core.typing import BoolArray, FloatArray
 from gmwm.errors import InputError
 from gmwm.ins import tuning
 from gmwm.ins.filter.measurements import KINDS
+from gmwm.ins.increments import Imu
 from gmwm.ins.logs.measured import Measured
 from gmwm.ins.logs.replay import Replay
 from gmwm.issues import Notice, notice
 
-TESTS = 15
+TESTS = 17
 """Tests of a log: size of the innovations of three kinds and of all, whiteness, time offset, lever
-arm, heading, clock rate, the first two together, directions, rates, signs of both sensors,
-outliers."""
+arm, heading, clock rate, the first two together, directions, rates, scales and signs of both
+sensors, outliers."""
 
 LEVEL = tuning.CONTRADICTED / TESTS
 """Level of each test: right models are blamed with ``tuning.CONTRADICTED`` at most (Bonferroni)."""
@@ -45,6 +46,7 @@ class Fault:
         left: where something else is wrong too, everything explains a part of it.
     cost: Gain that chance exceeds with the probability of a false alarm.
     values, errors: Estimates, in SI units, and standard errors.
+    rivals: Codes of other faults that explain the log equally well.
     """
 
     code: str
@@ -54,6 +56,7 @@ class Fault:
     cost: float
     values: dict[str, float] = field(default_factory=dict)
     errors: dict[str, float] = field(default_factory=dict)
+    rivals: tuple[str, ...] = ()
 
     @property
     def excess(self) -> float:
@@ -157,27 +160,35 @@ def wrong_signs(base: Replay) -> Iterator[Fault]:
 
 # -- constant errors ------------------------------------------------------------------------------
 
-# Name -> code, step of its derivatives, usual size.
-_CONSTANTS = {"time offset": ("time-offset", 0.05, tuning.LARGEST_OFFSET)}
-_CONSTANTS |= dict.fromkeys(("forward", "right", "down"), ("lever-arm", 0.5, tuning.LARGEST_ARM))
-_CONSTANTS |= {"heading": ("heading", 0.01, 0.5 * np.pi)}
-_CONSTANTS |= {"clock rate": ("clock-rate", 1e-4, tuning.USUAL_RATE)}
-_NAMES = np.array(list(_CONSTANTS))
-_CODES = np.array([code for code, _, _ in _CONSTANTS.values()])
-_STEPS, _USUAL = np.array([sizes for _, *sizes in _CONSTANTS.values()], dtype=float).T
-# Stamps that are farther off leave no fix near.
+# Name, code and kind of sensor, step of its derivatives, usual size.
+_CONSTANTS = (
+    ("time offset", "time-offset", 0.05, tuning.LARGEST_OFFSET),
+    *((name, "lever-arm", 0.5, tuning.LARGEST_ARM) for name in ("forward", "right", "down")),
+    ("heading", "heading", 0.01, 0.5 * np.pi),
+    ("clock rate", "clock-rate", 1e-4, tuning.USUAL_RATE),
+    *((axis, "scale-error gyro", 1e-3, tuning.USUAL_SCALE) for axis in "xyz"),
+    *((axis, "scale-error accel", 1e-3, tuning.USUAL_SCALE) for axis in "xyz"),
+)
+_NAMES, _CODES = (np.array([each[i] for each in _CONSTANTS]) for i in (0, 1))
+_STEPS, _USUAL = np.array([sizes for _, _, *sizes in _CONSTANTS], dtype=float).T
+# Stamps that are farther off leave no fix near; a scale that is farther off has another cause.
 _MOST = np.where(_CODES == "time-offset", _USUAL, np.inf)
+_MOST[_USUAL == tuning.USUAL_SCALE] = tuning.LARGEST_SCALE
 _TOGETHER = (*((code,) for code in dict.fromkeys(_CODES)), ("time-offset", "lever-arm"))
 """Errors that are tried. Along a straight track at constant speed a time offset is a lever arm, so
 that one of the two alone takes up the other; both together are right."""
 
 
 def changed(replay: Replay, errors: FloatArray, is_smooth: bool = False) -> Replay:
-    """A log without constant errors, (6,): of stamps (s), antenna (m), heading (rad) and rate.
+    """A log without the constant errors of `_CONSTANTS`, (12,), in SI units.
 
     is_smooth: Allow for late stamps less exactly, but with the same noise between two fixes.
     """
     offset, arm, heading, rate = errors[0], errors[1:4], errors[4], errors[5]
+    if np.any(errors[6:]):
+        gyro, accel = 1.0 / (1.0 + errors[6:].reshape(2, 3))
+        imu = Imu(replay.imu.dt, replay.imu.rotation * gyro, replay.imu.velocity * accel)
+        replay = replace(replay, imu=imu)
     if rate:
         replay = replay.slower(float(rate))
     if offset:
@@ -188,7 +199,7 @@ def changed(replay: Replay, errors: FloatArray, is_smooth: bool = False) -> Repl
 
 
 def constant_errors(base: Replay, known: Collection[str] = ()) -> list[tuple[Fault, ...]]:
-    """Stamps, antenna, heading, rate, and the first two together, but for the known ones."""
+    """Each alone, and stamps with antenna, but for the known ones."""
     none, found = np.zeros(_CODES.size), []
     columns = _columns(base, partial(changed, base), none, none == 0.0)
     for codes in _TOGETHER:
@@ -247,7 +258,8 @@ def fitted(
             dict(zip(_NAMES[part].tolist(), each[part].tolist(), strict=True))
             for each in (theta, errors)
         )
-        found.append(Fault(str(_CODES[part][0]), "", here, gain, price, values, spread))
+        code, _, where = str(_CODES[part][0]).partition(" ")
+        found.append(Fault(code, where, here, gain, price, values, spread))
     return tuple(found)
 
 
@@ -303,7 +315,7 @@ class Faults:
             return cls((), not contradicted(base), base)
         near = cls._near(base)
         if measured is None or not (near._is_far or (base.is_lost and not near.explained)):
-            return near
+            return near._without_doubtful(base)
         own = [each.values["time offset"] for each in near.found if each.code == "time-offset"]
         for offset in (*own, tuning.LEAP_SECONDS, -tuning.LEAP_SECONDS):
             try:
@@ -313,8 +325,16 @@ class Faults:
             far = cls._near(replay)
             if far.explained and not far._is_far:
                 return far._with_offset(offset)
-        # Errors beyond their limits that do not explain all are no findings.
-        return near if near.explained or not near._is_far else replace(near, found=(), replay=base)
+        return near._without_doubtful(base)
+
+    def _without_doubtful(self, base: Replay) -> Faults:
+        """No findings where many, or ones that leave a misfit, do not explain all."""
+        if self.explained or not self.found:
+            return self
+        left, before = (each.test().nis.value for each in (self.replay, base))
+        most = np.fmin(tuning.MOST_LEFT, 0.5 * (1.0 + before))  # NaN if the filter diverged
+        is_sure = left <= most and not self._is_far and len(self.found) < tuning.MOST_FAULTS
+        return self if is_sure else replace(self, found=(), replay=base)
 
     @property
     def _is_far(self) -> bool:
@@ -329,7 +349,7 @@ class Faults:
         """Faults one after the other, each the most probable, while they are beyond chance."""
         here, found = base, list[Fault]()
         while len(found) < tuning.MOST_FAULTS:
-            known = {each.code for each in found}
+            known = {f"{each.code} {each.where}".strip() for each in found}
             tried = [*constant_errors(here, known), *((each,) for each in outliers(here))]
             if contradicted(here, tuning.SUSPECTED) and here.is_lost:  # these are costly
                 tried += [(each,) for each in wrong_signs(here)]
@@ -337,10 +357,16 @@ class Faults:
                     tried.append(far_heading(here))
                 if "clock-rate" not in known:
                     tried.append(far_rate(here))
-            best = max(filter(None, tried), key=lambda faults: faults[0].excess, default=())
+            # One that explains all comes before two, of which one may only be of the noise.
+            alone = [e for e in tried if len(e) == 1 and not contradicted(e[0].replay)]
+            best = max(filter(None, alone or tried), key=lambda e: e[0].excess, default=())
             if not best or best[0].excess <= 0.0:
                 break
-            found += best
+            codes = {each.code for each in best}
+            close = (each[0] for each in tried if each and codes.isdisjoint(e.code for e in each))
+            least = best[0].excess - tuning.AMBIGUOUS
+            rivals = tuple(dict.fromkeys(each.code for each in close if each.excess > least))
+            found += [replace(each, rivals=rivals) for each in best]
             here = best[0].replay
         return cls(tuple(found), not contradicted(here), here)
 
@@ -379,7 +405,12 @@ def fault_notice(fault: Fault, start: float) -> Notice:
     if "time" in values:
         values["time"] += start
     variant = {"outliers": "fixes", "heading": "wrong"}.get(fault.code, "")
-    return notice(fault.code, fault.where, values, severity="bad", variant=variant, **_words(fault))
+    words, also = _words(fault), ", ".join(fault.rivals)
+    found = notice(fault.code, fault.where, values, severity="bad", variant=variant, **words)
+    if not also:
+        return found
+    text = f"{found.text}, or another fault that explains the log equally well ({also})"
+    return replace(found, text=text, values={**values, "rivals": also})
 
 
 def _words(fault: Fault) -> dict[str, Any]:
@@ -400,6 +431,11 @@ def _words(fault: Fault) -> dict[str, Any]:
         rate, error = values["clock rate"], errors["clock rate"]
         fast = "fast" if rate < 0.0 else "slow"
         return {"share": abs(rate), "fast": fast, "error_share": error, "factor": 1.0 + rate}
+    if fault.code == "scale-error":
+        parts = ", ".join(f"{x:.1%} {axis} ({errors[axis]:.1%})" for axis, x in values.items())
+        # A small error beside a large one may be of the other axes.
+        seen = [f"{fault.where}_{a}" for a, x in values.items() if abs(x) > tuning.SEEN * errors[a]]
+        return {"parts": parts, "axes": ", ".join(seen) or "all axes"}
     if fault.code == "heading":
         yaw = np.degrees(fault.replay.state.rpy[2]) % 360.0
         hint = f"give the heading {yaw:.1f} deg, or turn the axes to forward, right, down"

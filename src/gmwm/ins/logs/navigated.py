@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from gmwm._core.distributions import chi2
 from gmwm._core.files import written
 from gmwm._core.pages import make
 from gmwm._core.text import brief, bullets, wrapped
@@ -183,7 +182,7 @@ class Navigated:
             return replace(bad[0], text=text, hint="")
         sizes = self._misfits
         largest = max(sizes.values(), default=1.0)
-        if self.faults.found and (self.faults.explained or largest <= tuning.LOST):
+        if self.faults.found:
             return self._fault_verdict(self.fault_notices)
         if self.solution.diverged_at is not None:
             return notice("diverged", values={"time": self.solution.diverged_at})
@@ -212,13 +211,8 @@ class Navigated:
         words: dict[str, Any] = {"sizes": shown, "hint": hint}
         if sizes.keys() <= assumed and is_mild:
             return notice(code, values=sizes, severity="note", variant="assumed", **words)
-        # By the median, which a few far fixes do not move.
-        usual = np.nanmedian(self.solution.innovations.standard**2) / chi2.ppf(0.5, 1)
         if min(sizes.values()) < 1.0 < largest:
             code = "mixed-sizes"
-        elif largest >= 1.0 and usual < tuning.MOSTLY_FINE:
-            words |= {"variant": "innovations", "hint": "", "severity": "bad"}
-            code = "outliers"
         return notice(code, values=sizes, **words)
 
     @property
