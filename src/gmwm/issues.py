@@ -167,10 +167,7 @@ def notice(
     The templates are those of `str.format`; two formats are added: ``{share:.2g%}`` writes a
     share in per cent, and ``sample{count:s?}`` an s unless the count is one.
 
-    where: Channel, parameter or file.
     values: Numbers in SI units, and names; kept in the notice.
-    severity: Where it is not the usual one.
-    variant: Which of several sentences.
     hint: Where it is not that of the catalogue; empty for none.
     words: Phrases of the templates that are no values, e.g. a number in a reader's unit.
     Raises KeyError if the code, the variant or a word of the template is unknown.

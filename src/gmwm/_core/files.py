@@ -121,10 +121,7 @@ def of_other_runs(path: Path, names: Iterable[str]) -> list[str]:
 
 
 def toml_beside(module: str | Path) -> dict[str, Any]:
-    """Content of the TOML file beside a module, of its name: what the package itself knows.
-
-    module: Its ``__file__``.
-    """
+    """Content of the TOML file beside a module, of its name: what the package itself knows."""
     return tomllib.loads(Path(module).with_suffix(".toml").read_text(encoding="utf-8"))
 
 

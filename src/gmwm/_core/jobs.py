@@ -62,7 +62,6 @@ def results(
 
     items: Hashable and different.
     jobs: Processes on this machine; -1 for one a core. One does the work itself.
-    cluster: Address of a Dask scheduler that does the work instead.
     lost: Gives the result of an item at which `ENDED` processes ended; by default that is an error.
     Raises InputError if no scheduler answers, it has no workers, or an item is lost (code
         "worker-lost").

@@ -53,9 +53,6 @@ def do_runs(
     study: What runs depend on, in JSON types. Those of another study are never mixed in.
     folder: Where finished runs are kept every few seconds, also when the work is interrupted.
     earlier: {"resume", "replace", "refuse"}, what to do with runs that the folder holds already.
-    jobs: Processes on this machine; -1 for one a core.
-    cluster: Address of a Dask scheduler that does the work instead.
-    progress: Called as ``progress(done, runs, "")``.
     Returns: name -> values of all runs in order, the run on the first axis.
     Raises InputError if the folder cannot be used, is in use, or holds runs of another study (code
         "other-runs") or runs that are not to be resumed (code "earlier-runs"); or if no scheduler

@@ -33,9 +33,7 @@ class Printed:
 def readable(value: float, unit: str, *, sign: bool = False, digits: int = 3) -> str:
     """A number in deg/s, mg or g; in its own unit where that is another.
 
-    value: In ``unit``.
     unit: Of the channel, SI.
-    sign: Whether a plus is written.
     """
     for name in _UNITS.get(unit, (unit,)):
         shown = value if name == unit else value / factor(name, unit)

@@ -73,7 +73,6 @@ def agreeing(where: str, values: Mapping[str, float], N: float) -> dict[str, Mod
     rate random walk or a correlation time is stated, all models have it.
 
     values: By key of `KEYS`, SI.
-    N: u/sqrt(Hz).
     Raises InputError if there is no such model, or no slow noise is stated.
     """
     lowest = lowest_deviation(values)

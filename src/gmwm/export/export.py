@@ -121,9 +121,6 @@ class StateSpaceFile(Target):
 def channel(model: Model, dt: float, quantity: str, initial_sd: float = 0.0) -> dict[str, Any]:
     """Matrices of one channel in discrete and, if there is one, continuous form.
 
-    model: With given parameters.
-    dt: Sampling interval, s.
-    initial_sd: Standard deviation at the start of a random walk, u.
     Returns: ``continuous`` is ``None`` where a term is defined for samples only.
     Raises InputError if a term has no state space.
     """

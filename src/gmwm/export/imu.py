@@ -33,14 +33,11 @@ NO_RATE = "the numbers hold no sampling rate, which this file needs: export the 
 class Axis:
     """The numbers of one axis in a file.
 
-    name: Of its channel.
     N, K: u/sqrt(Hz) and u/s/sqrt(Hz).
     sigma, tau: Of the Gauss-Markov process, u and s; not a number in forms without one.
     initial_sd: Of the bias at the start, u.
     nees: Predicted normalised error squared by time without aiding.
-    rate: Of its samples, Hz; NaN if it is not known.
     upper: Which of the numbers are upper limits of a term that was not found.
-    notices: Those of its filter numbers.
     covers: The largest term that N or K covers beside the sensor's own; empty if there is none.
     turn_on_sd: Of the turn-on bias that ``initial_sd`` contains, u.
     """
@@ -77,8 +74,6 @@ class Axis:
 class Triad:
     """The axes of the gyros or of the accelerometers.
 
-    quantity: {"gyro", "accel"}.
-    axes: Each with its own numbers.
     common: The bound of all, where a file has one value for them and one calibration has them all.
     shared_nees: Where a file has one value for all: predicted normalised error squared of each axis
         with that value, by time without aiding; empty for an axis whose model is not known.
@@ -159,12 +154,7 @@ class Triad:
 class ImuNumbers:
     """Gyros and accelerometers, and the purpose of the numbers.
 
-    horizon: Time without aiding, s.
     method: {"bound", "reduce", "given", "motion"}.
-    sources: One line about each recording.
-    invalid: Axes that are not valid -> why.
-    reserved: Axes from which departures were subtracted.
-    topic: On which the samples were sent, where a bag was calibrated; else empty.
     """
 
     gyro: Triad
@@ -334,8 +324,6 @@ def imu_of(
 ) -> ImuNumbers:
     """The numbers of an IMU in a form, of calibrations or of numbers that were found before.
 
-    given: Together they have gyros and accelerometers.
-    horizon, one_tau: As of `numbers_for`.
     shared: Whether the axes of a sensor have one value in the file.
     Raises InputError if a sensor is missing or given twice, or numbers are of another form or
         horizon.

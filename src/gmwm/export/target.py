@@ -48,7 +48,6 @@ class Keys(ABC):
     def read(self, values: Mapping[str, FloatArray], rate: float) -> list[list[Pair | Model]]:
         """Numbers of gyro and accelerometer, of one axis for all or of three.
 
-        values: By name, of one axis or of three.
         rate: Of the IMU, Hz; zero if unknown.
         Raises InputError if they depend on a rate that is not known.
         """
@@ -201,11 +200,7 @@ def comment(lines: Sequence[str], mark: str) -> list[str]:
 
 
 def notes(imu: ImuNumbers, title: str, caution: str) -> list[str]:
-    """The lines of comment in a file: what the numbers are, for what, and what to mind.
-
-    title: Of the program.
-    caution: A line about it; may be empty.
-    """
+    """The lines of comment in a file: what the numbers are, for what, and what to mind."""
     how = f" ({imu.method})" if imu.method in ("reduce", "motion") else ""
     purpose = f"{imu.form} for outages up to {imu.horizon:g} s{how}"
     upper = [f"{t.quantity} {k}" for t in imu.triads for k in ("N", "K", "sigma") if t.is_upper(k)]
@@ -296,7 +291,6 @@ def purpose(imu: ImuNumbers) -> list[str]:
 class Target(ABC):
     """A file that some program reads; export.toml says what the attributes are.
 
-    name: As users write it.
     keys: By which the numbers are read back; None if they cannot be.
     """
 

@@ -52,9 +52,6 @@ class AxisModel:
     """The error model of one axis of a sensor.
 
     name: Of the channel; empty if there is none.
-    model: With given parameters.
-    dt: Sampling interval, s.
-    quantity: {"gyro", "accel", ""}.
     bias_sd: Of a constant bias, u.
     fit: Where the model is from, if from a fit.
     rivals: Models that describe its data equally well, of a calibration.
@@ -93,11 +90,7 @@ class AxisModel:
 
 @dataclass(frozen=True, eq=False)
 class SensorAxes:
-    """The axes of a source.
-
-    rate, duration: Hz and s; NaN if unknown.
-    single: Whether one axis was given, not a mapping.
-    """
+    """The axes of a source."""
 
     axes: tuple[AxisModel, ...]
     source: str

@@ -70,11 +70,6 @@ _OrNaN = Annotated[NotNegative, NoneIs(float("nan"))]
 class Check:
     """Predicted error beside the true one.
 
-    consumer: Key of `CONSUMERS`.
-    where: The channel, or "horizontal".
-    quantity: Of the error.
-    time: Without aiding, s.
-    true, believed: Standard deviations.
     nees: Normalised error squared per degree of freedom: of all integrals of a channel, or of the
         position.
     """
@@ -93,7 +88,6 @@ class Check:
 class Cause:
     """A cause of larger numbers of a kind of sensor.
 
-    quantity: {"gyro", "accel", ""}.
     N, K: That dominate with it, for all axes, u/sqrt(Hz) and u/s/sqrt(Hz).
     N_factor, K_factor: Of the error model and of all together, over the numbers in use; of the
         others, over those of the error model.

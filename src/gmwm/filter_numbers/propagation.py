@@ -48,11 +48,8 @@ class ChainErrors(CovarianceErrors):
 class Chain:
     """What is integrated, and how it is aided.
 
-    order: Number n of integrals.
     fix_sd: Standard deviation of a fix of the last integral, in its unit.
     settled: Time with fixes before they end, s; zero for none.
-    interval: Between fixes, s.
-    initial_sd: Standard deviations of the integrals at the start.
     is_relative: Whether the last integral starts anew at each fix, as a relative pose at a
         keyframe.
     is_gained: Whether it is counted from the last fix, without the error of that fix.
@@ -100,8 +97,6 @@ class Chain:
     ) -> ChainErrors:
         """Predicted and true errors of the integrals after some times without aiding.
 
-        truth, believed: Of the sensor, and in the filter.
-        dt: Sampling interval, s.
         times: Rising, s.
         true_sd, believed_sd: Standard deviation of a constant bias, or of the start of a walk.
         every_fix: Whether the errors after every fix come first, with negative times.

@@ -327,7 +327,6 @@ def _smallest_score(
 
     score: Of logarithms of factors on the numbers at the start of the search. To it comes a little
         of their squares, so that a factor which does not matter stays at one.
-    starts: Where the search begins.
     """
 
     def cost(logs: FloatArray) -> float:

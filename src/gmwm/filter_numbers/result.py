@@ -56,7 +56,6 @@ class Predicted:
     It is the expectation for the filter of `gmwm.filter_numbers.Chain`, by covariance analysis; of
     one integral, that of its gain since the last fix where this is the worse.
 
-    time: Without aiding, s.
     nees: Normalised error squared per degree of freedom; 1 if the filter is consistent, above if it
         is overconfident. NaN where a term of the truth has no state-space form.
     tightness: Predicted over true standard deviation, of the last integral of the sensor's error.

@@ -49,7 +49,6 @@ class Track(NamedTuple):
 
     epoch, samples: (S + 1,), epoch at the end of each step, and samples of the step that leads
         there (none to the first).
-    dt: Sampling interval, s.
     middle, end: Arrays of the true motion in the middle of each step, and at its end.
     rate: (S + 1, 3), angular rate at the end, body axes, rad/s.
     """
@@ -96,7 +95,6 @@ def update_jointly(J: FloatArray, h: FloatArray, n: int, variance: float, gain: 
 
     h: Row of the n integrals, and of states whose estimates are their errors with the sign turned;
         with -1 for the estimated and 1 for the true slow noise of the measurement.
-    variance: Of the measurement's white noise.
     gain: (n + q,), the filter's.
     """
     size = J.shape[0]
@@ -143,7 +141,6 @@ def aid_jointly(
 ) -> tuple[FloatArray, FloatArray]:  # fmt: skip
     """Propagate over equal steps, each of which ends with a fix of the last integral.
 
-    variance: Of a fix.
     is_relative: Whether the last integral starts anew at each fix.
     out_P, out_J: (K, n, n), covariances of the integrals after the first K fixes, overwritten.
     Returns: P and J after the last fix.

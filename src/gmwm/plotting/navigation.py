@@ -82,8 +82,6 @@ def errors(
     """True errors of one run beside what each filter predicted, a panel a component.
 
     panels: Name -> times (K,), s; errors and predicted standard deviations (K, d).
-    spans: Outages, s.
-    labels: Of the d components.
     """
     figure, axes = _panels(len(labels), 1, (7.6, 2.6 * len(labels) + 0.5), sharex=True)
     for row, (ax, label) in enumerate(zip(axes[:, 0], labels, strict=True)):
@@ -126,8 +124,6 @@ def growth(
 
     panels: Outage -> filter -> times since the outage began (K,), s; root mean squares of the true
         errors and of the predicted ones, (K, d).
-    runs: Over which the root mean square is.
-    labels: Of the d components.
     """
     rows, columns = len(labels), len(panels)
     size = max(4.6 * columns, 7.0), 2.9 * rows + 0.3
@@ -224,7 +220,6 @@ def measured_track(track: FloatArray, fixes: FloatArray, without: FloatArray) ->
     """An estimated track, the fixes that it rests on, and its part without fixes.
 
     track: (n, 2), east and north, m.
-    fixes: (k, 2).
     without: (j, 2), part of the track.
     """
     figure, axes = _panels(1, 1, (6.4, 5.2))

@@ -80,8 +80,6 @@ class Curve:
 class Difference:
     """How far recordings are apart in one part of the Allan plot.
 
-    part: One of `PARTS`.
-    shortest, longest: Averaging times of the part, s.
     ratios: (R,), Allan deviation of each recording over the common one; NaN without data there.
     errors: (R,), relative standard errors of these.
     """
@@ -128,7 +126,6 @@ class Equality:
     ratios, errors: (R, J), Allan deviation of each recording over the common one, and relative
         standard errors; NaN where a recording has no such level.
     chi_square: Weighted sum of squares about the common curve, on cube roots of the variances.
-    differences: Differences in the parts of the plot.
     """
 
     tau: FloatArray

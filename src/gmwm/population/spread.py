@@ -37,7 +37,6 @@ class Outlier:
 class Spread:
     """N, B or K of one axis over the units with a valid model of it.
 
-    values: (n,), SI.
     errors: (n,), standard errors of their logarithms; NaN of upper limits.
     found: (n,) of bool; where false, the value is an upper limit.
     level: Probability that one of as many equal units is an outlier.
@@ -164,7 +163,6 @@ def spreads_of(structures: Sequence[Structure]) -> tuple[Spread, ...]:
 def one_sided_factor(n: int, content: float = CONTENT, confidence: float = CONFIDENCE) -> float:
     """Factor k of the upper limit ``mean + k * sd`` of normal units.
 
-    n: Units measured, 2 or more.
     content, confidence: With this confidence, this fraction of all units is below the limit.
 
     Exact, by the noncentral t distribution (ISO 16269-6:2014; Krishnamoorthy and Mathew,

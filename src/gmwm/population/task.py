@@ -48,10 +48,7 @@ class Item(NamedTuple):
 class Task:
     """The calibration of a unit as a function of its recording, which can be sent to workers.
 
-    reading: Arguments of `gmwm.read`.
-    start, stop: Part of the recordings, s.
     models: Channel, sensor ("gyro", "accel") or "" for all -> fitted model; selected if empty.
-    still: See `gmwm.calibrate`.
     version: Version of gmwm that all numbers come from.
     """
 
@@ -161,7 +158,6 @@ def recordings(paths: Paths, folder: Path | None) -> list[Item]:
 
     paths: A path that exists is taken as it is, brackets and all; ``**`` in a pattern stands for
         any folders.
-    folder: Folder of the outputs, which are no recordings.
     Raises InputError if there are none, or a pattern matches nothing.
     """
     given: Iterable[Any] = [paths]

@@ -79,9 +79,6 @@ def numbers_of(fit: Fit) -> dict[str, Number]:
 class Unit:
     """A unit of a fleet.
 
-    path: Path of its recording.
-    name: Short name, unique in the fleet.
-    result: The calibration, or why there is none.
     digest: SHA-256 of the recording; empty where it cannot be read.
     """
 
@@ -222,7 +219,6 @@ class Structure:
 class Choice:
     """The choice of a structure as a function of the channel, which can be sent to workers.
 
-    fits: Channel -> unit -> its own fit.
     is_given: Whether the models were given, so that there is nothing to choose.
     """
 

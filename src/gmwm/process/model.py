@@ -27,8 +27,6 @@ class ModelParameter:
     """A parameter of one term of a model.
 
     key: Its name in ``model.params``, e.g. ``"sigma_2"``.
-    term: Index of the term in ``model.terms``.
-    value: ``None`` where open.
     """
 
     key: str

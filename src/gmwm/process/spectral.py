@@ -209,7 +209,6 @@ class Panels:
     """The nodes of a quadrature in panels, on which a smooth spectrum is a polynomial.
 
     points: (P, 12), Chebyshev points of each panel, in the coordinate of the nodes.
-    starts: (P,), first node of each panel.
     share: (K, 12), lagrange's polynomials of the points of its panel at each node.
     """
 
@@ -272,9 +271,6 @@ def panel_weights(averaging: tuple[float, ...], times: int = 1) -> tuple[FloatAr
 def haar_variance(psd: PSD, tau: FloatArray, dt: float) -> FloatArray:
     """Haar wavelet variance of a process from its spectrum alone.
 
-    psd: ``psd(f, dt)``, two-sided, u^2/Hz.
-    tau: Averaging times in seconds.
-    dt: Sampling interval in seconds.
     Returns: same shape as ``tau``, in u^2.
     """
     tau = np.asarray(tau, dtype=float)

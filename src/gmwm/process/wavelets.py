@@ -78,7 +78,6 @@ class Wavelet:
         """Squared gain of a level's equivalent filter, to full relative precision at small f.
 
         level: j = 1, 2, ...; the averaging time is 2^(j-1) samples.
-        f: Frequencies in cycles per sample.
         Returns: |H_j(f)|^2 = |H(2^(j-1) f)|^2 prod_{l<j-1} |G(2^l f)|^2, same shape as ``f``.
         """
         return np.asarray(self.gains(level, f)[-1])
@@ -299,10 +298,8 @@ def gain_weights(name: str, levels: int) -> GainWeights:
 class PairWeights:
     """Weights for products of the gains of two levels.
 
-    frequency: (K,), as in `GainWeights`.
     weight: (P, K), int_0^{1/2} |H_j|^2 |H_k|^2 F df = weight[p] @ F(frequency) for the pair p of
         levels j = first[p] + 1 <= k = second[p] + 1.
-    first, second: (P,).
     """
 
     frequency: FloatArray

@@ -78,10 +78,7 @@ READABLE = f"gmwm reads {', '.join(each.title for each in FORMATS)}"
 
 
 def open_tables(data: Any, wanted: Wanted, name: str | None = None) -> Sequence[Table]:
-    """Open a file or a table in memory, whatever it is; sensors with own rates are own tables.
-
-    name: One of `NAMES`, in place of what the first bytes and the name of the file show.
-    """
+    """Open a file or a table in memory, whatever it is; sensors with own rates are own tables."""
     if wanted.clock not in CLOCKS:
         raise InputError(f"clock = {wanted.clock!r}: give one of {', '.join(CLOCKS)}")
     if name is not None and name not in NAMES:

@@ -269,10 +269,7 @@ def _needed(seconds: float | None, duration: float) -> str:
 def first_screen(
     calibration: Calibration, numbers: Certified, sheet: Datasheet | None = None
 ) -> dict[str, Any]:
-    """Content of the first screen, and of the filter numbers axis by axis.
-
-    sheet: Its numbers stand below those of the axes.
-    """
+    """Content of the first screen, and of the filter numbers axis by axis."""
     return {
         "state": verdict(calibration)["state"],
         "verdict": verdict_line(calibration),
@@ -290,10 +287,7 @@ def first_screen(
 
 
 def sensor_tables(calibration: Calibration, sheet: Datasheet | None = None) -> list[dict[str, Any]]:
-    """N, B and K with their intervals, a table a sensor; where an axis is not valid, why.
-
-    sheet: Its numbers stand below those of the axes.
-    """
+    """N, B and K with their intervals, a table a sensor; where an axis is not valid, why."""
     groups: dict[tuple[str, ...], list[str]] = {}
     for name, axis in calibration.numbers.items():
         groups.setdefault((axis.quantity, *(n.usual.unit for n in axis)), []).append(name)

@@ -219,9 +219,6 @@ def write_sheet_report(
 ) -> Path:
     """Write what a data sheet says as one HTML file that needs no network.
 
-    numbers: Of `Datasheet.numbers`.
-    answer: Text about them.
-
     Raises InputError if the file cannot be written.
     """
     import matplotlib.pyplot as plt

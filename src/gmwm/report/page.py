@@ -87,7 +87,6 @@ def write_page(path: str | os.PathLike[str], template: str, **values: Any) -> Pa
 def rendered(template: str, scripts: Sequence[str] = (), **values: Any) -> str:
     """A page from its template.
 
-    template: Name of the file in this folder.
     scripts: The only ones that a browser will run, by a Content-Security-Policy; nothing is loaded
         from any network.
     **values: Of the template, where ``tojson`` writes figures and ``scripts`` are those above; it
@@ -175,7 +174,6 @@ def multiple(
 ) -> dict[str, Any]:
     """The curves of an axis with their intervals, and below them their ratios to the common one.
 
-    labels: Of all recordings, whose places are their colours.
     out: Of recordings that are not compared, drawn faintly.
     """
     fits = [*axis.fits.values(), *out]

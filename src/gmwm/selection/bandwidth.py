@@ -46,7 +46,6 @@ class Bandwidth:
     given: Of open amplitude, with the shape that was found.
     free: The same as the fit is to have it: with an open bandwidth, as a low-pass, but of the order
         and damping that were found, which two or three levels know only together.
-    n_shapes: Number of shape parameters that were searched.
     """
 
     given: Process
@@ -60,7 +59,6 @@ def sensor_bandwidth(
     """The low-pass or moving average that describes the finest levels, if one is needed there.
 
     extra: Lines and resonances that the series may have.
-    penalty: Of the criterion, for each parameter.
     """
     reference = dictionary_fit(wv, wv.variance, extra)
     if reference.discrepancy == 0.0:

@@ -54,7 +54,6 @@ _RAMP = next(kind() for kind in CATALOGUE if kind.is_drift)
 class Choices:
     """The terms that a model may have.
 
-    max_gauss_markov: Largest number of Gauss-Markov terms.
     extra: Further terms of open amplitude and given shape, each of which a candidate may have.
     bandwidth: The sensor's own low-pass, where the finest levels show one.
     models: The only candidates, where they are given; the other choices do not matter then.
@@ -145,13 +144,11 @@ class Choices:
 class Candidate:
     """A model of the ranking.
 
-    model: With open parameters.
     criterion: Chi-square plus ``3 p ln ln n``; less is better.
     objective: Weighted sum of squares under weights common to all candidates.
     chi_square: Sum of squares on cube roots of the wavelet variances, which are close to normal at
         coarse levels too: otherwise a level of few degrees of freedom that is high by chance would
         ask for a term.
-    dof: Moments less parameters.
     compared_only: Whether it is never chosen: flicker noise, unless it is asked for.
     """
 

@@ -23,8 +23,6 @@ Ranges = dict[str, tuple[float, float]]
 def ranges(fitted: Fit, others: Sequence[Fit], level: float = 0.95) -> Ranges:
     """Union of the intervals of each parameter over several models.
 
-    fitted: Of the chosen model.
-    others: Of the models that are as good.
     Returns: key -> (lower, upper) in SI units, for every estimated parameter of the chosen model.
         An amplitude or slope of a term that one of the others does without has zero in its range.
     """
@@ -99,11 +97,7 @@ def _correlation_times(model: Model) -> dict[int, float]:
 
 
 def wider_ranges(fitted: Fit, found: Ranges) -> list[str]:
-    """The parameters whose range is more than 20 % wider than their interval, in words.
-
-    fitted: Of the chosen model.
-    found: From `ranges`, at 95 %.
-    """
+    """The parameters whose range is more than 20 % wider than their interval, in words."""
     intervals = fitted.interval()
     texts = []
     for estimate in fitted.estimates:

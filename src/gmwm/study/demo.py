@@ -27,7 +27,6 @@ def sensors(
     """Sensors of a small tactical IMU, with factors on white noise and on slow errors.
 
     gyro, accel, slow: Factors on N of the gyros, N of the accelerometers, and sigma of all.
-    tau: Correlation time of the slow errors, s.
     """
     return SensorModels.of(
         {
@@ -59,7 +58,6 @@ def simulated_imu(
 ) -> tuple[Recording, dict[str, Model]]:
     """A six-axis static recording and the model of each of its channels.
 
-    seconds: Length.
     Returns: dict, channel name -> Model that made it.
     """
     rng, n, truth = np.random.default_rng(seed), int(seconds * RATE), sensors.models
@@ -116,7 +114,6 @@ _GRAVITY = 9.80665
 def write_demo_files(folder: Path, seconds: float, seed: int) -> tuple[float, float, float]:
     """Write ``static.csv``, ``imu.csv`` and ``fixes.csv``.
 
-    seconds: Length of the recording at rest.
     Returns: from the IMU to the antenna: forward, right, down; m.
     """
     rng = np.random.default_rng(seed)

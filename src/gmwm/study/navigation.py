@@ -71,10 +71,7 @@ _FROM, _TO = 115.0, 1335.0
 
 @dataclass(frozen=True, eq=False)
 class Calibrated:
-    """A static recording, calibrated by lines and by GMWM.
-
-    lines: Axis -> fit by ``method="allan"``.
-    """
+    """A static recording, calibrated by lines and by GMWM."""
 
     lines: dict[str, Fit]
     gmwm: Calibration
@@ -160,7 +157,6 @@ def experiment(
 ) -> Experiment:
     """Filters with different calibrations, on a helicopter or in a car.
 
-    vehicle: See `scenario_of`.
     recordings: The one that was calibrated, and those whose errors are navigated with; by default
         errors of Table VI are drawn.
     """
@@ -256,8 +252,6 @@ def reproduce_figure(
     figure: One of `FIGURES`. 7 and 8 are of the same runs.
     folder: Where figures and tables go, and finished runs, every few seconds.
     recordings: The first is calibrated, the others are navigated with.
-    resume: Go on with the runs that the folder holds.
-    progress: Called with the number of runs done.
     Returns: what to print, and the files that were written.
     """
     if len(recordings) == 1:

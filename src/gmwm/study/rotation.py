@@ -66,7 +66,6 @@ class Interval:
 class Rotation:
     """How filters navigated with each recording calibrated in turn.
 
-    sources: The n recordings.
     stretches: How many of each are navigated with.
     turns: With each recording calibrated; its runs are the stretches of the others, in their order.
     """
@@ -84,10 +83,7 @@ class Rotation:
     # -- numbers; with one recording calibrated (``turn``) or, by default, over all turns ----------
 
     def ratio(self, name: str, quantity: str, turn: int | None = None) -> Interval:
-        """Root mean square of an error at the ends of outages against the first filter's.
-
-        quantity: {"horizontal", "vertical"}.
-        """
+        """Root mean square of an error at the ends of outages against the first filter's."""
         part = slice(0, 2) if quantity == "horizontal" else slice(2, 3)
 
         def squares(runs: FilterErrors, end: int) -> FloatArray:
@@ -291,13 +287,11 @@ def rotate(
 ) -> Rotation:
     """Calibrate every recording in turn, and navigate with the others.
 
-    vehicle: {"helicopter", "car"}.
     recordings: Two at least.
     folder: Where calibrations and finished runs are kept, so that work that was interrupted goes
         on.
     runs: Most stretches of each recording; by default all that do not overlap.
     earlier: {"resume", "replace", "refuse"}, what to do with what the folder holds.
-    progress: Called as ``progress(done, total, what)``.
     Raises InputError if there are fewer than two recordings, an axis is missing, one is too short,
         or the folder holds runs that are not to be resumed.
     """
@@ -347,7 +341,6 @@ def reproduce_rotation(
 ) -> tuple[str, list[Path]]:
     """Figure 8 (helicopter) or 9 (car) with every recording calibrated in turn.
 
-    options: ``runs``, ``seed``, ``jobs`` and ``progress`` of `rotate`.
     Returns: what to print, and the files that were written.
     """
     check_channels(figure, recordings, AXES)

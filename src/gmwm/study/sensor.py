@@ -59,10 +59,8 @@ def reproduce_sensor(
 ) -> tuple[str, list[Path]]:
     """Make one of the paper's Figures 1, 5 and 6 and Tables V and VI.
 
-    experiment: One of `SENSORS`.
     recordings: Figures are of the first, by default of a simulated sensor; tables have all of them
         beside it.
-    progress: Called as ``progress(done, total, what)``.
     Returns: what to print, and the files that were written.
     Raises InputError if a recording has neither gyro_x nor accel_z.
     """

@@ -67,8 +67,6 @@ class Quantity:
 class Estimation:
     """A method with its options, and what it is given.
 
-    method: See `gmwm.fit`.
-    wavelet, robust: Of the wavelet variance; see `gmwm.wavelet_variance`.
     arma: Orders of an ARMA that is estimated in place of the model and turned into it.
     """
 
@@ -80,13 +78,7 @@ class Estimation:
 
 @dataclass(frozen=True)
 class Study:
-    """A true model, the quantities to estimate, and the ways to do so.
-
-    n: Samples of a run.
-    dt: Sampling interval, s.
-    runs: Customary number of runs.
-    notes: What a reader of the table has to know.
-    """
+    """A true model, the quantities to estimate, and the ways to do so."""
 
     name: str
     title: str
@@ -251,7 +243,6 @@ STUDIES = {s.name: s for s in (TABLE_2, TABLE_3, TABLE_4, *_FURTHER, *WEIGHTS)}
 def one_run(name: str, methods: Sequence[str], seed: int, run: int) -> dict[str, npt.NDArray[Any]]:
     """Simulate one series and estimate it by every method.
 
-    name: Of the study.
     seed, run: Together the seed of the series.
     Returns: column -> its values by method.
     """
@@ -317,9 +308,6 @@ def run_study(
     Finished runs are kept in ``folder/NAME-runs`` every few seconds, also when the work is
     interrupted.
 
-    methods: Some of ``study.methods``; all by default.
-    resume: Go on where an earlier call stopped.
-    work: ``jobs``, ``cluster`` and ``progress`` of `gmwm._core.runs.do_runs`.
     Returns: one row a run and method: estimates, intervals, validity, seconds.
     Raises InputError if a method is unknown, or the folder holds runs and ``resume`` is not set, or
         it is and they are not of the same study.
@@ -374,7 +362,6 @@ TRUTHS: tuple[Model, ...] = (
 class Choice:
     """What was chosen for one true model at one length.
 
-    right: Runs in which the very model was chosen.
     surplus: Terms more than the truth has -> runs.
     """
 

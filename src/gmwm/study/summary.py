@@ -42,7 +42,6 @@ class Score:
     ratio: ``relative`` over the Cramer-Rao bound.
     moment_ratio: ``relative`` over the bound of estimators by wavelet variances.
     coverage: Fraction of the runs whose 95 % interval holds the truth.
-    missing: Runs without an estimate.
     published: Relative error in the paper, NaN where there is none.
     """
 
@@ -60,7 +59,6 @@ class Score:
 class Summary:
     """All methods on all quantities of a study.
 
-    scores: (quantity, method) -> Score.
     bounds: Quantity -> relative Cramer-Rao bound.
     moment_bounds: Quantity -> that of estimates by the wavelet variances only.
     invalid: Method -> runs that the method itself calls not valid.
@@ -194,11 +192,7 @@ def markdown_table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 
 
 def boxplots(study: Study, table: pa.Table, stem: Path) -> list[Path]:
-    """Draw one panel a quantity, one box a method; returns the PNG and the SVG.
-
-    table: As `run_study` gives it.
-    stem: Where to, without suffix.
-    """
+    """Draw one panel a quantity, one box a method; returns the PNG and the SVG."""
     names = np.array(table["method"].to_pylist())
     methods = [m for m in study.methods if m in set(names)]
     panels = {}
@@ -265,7 +259,6 @@ def allan_least_squares(
     """Least-squares lines through the first k scales and the others to 128 s, (2,).
 
     tau: (J,), averaging times 1, 2, 4, ... s, at least to 128 s.
-    allan_variance: (J,).
     k: From 1 to 7.
     covariance: (J, J), of the levels, up to a factor, to weight them by; by default all are equal.
     """

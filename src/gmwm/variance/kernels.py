@@ -60,7 +60,6 @@ def fine_moments(
 
     values: (n,), about their mean.
     start, stop: First window, and the one after the last.
-    end: Of the run.
     levels: At most `FINE`.
     found: (levels, 3), to which number, sum and sum of squares of the coefficients are added.
     """
@@ -101,7 +100,6 @@ def coarse_moments(
     All levels use a tile of some columns that stays in the cache: one read of the data.
 
     integral: (n + 1,), cumulative sum of the series, starting with 0.
-    start, end: Of the run.
     columns: The first, and the one after the last, of `ROW`.
     averaging: (L,), multiples of `ROW`, in samples.
     found: (L, 3), to which number, sum and sum of squares of the coefficients are added.
@@ -141,7 +139,6 @@ def haar_coefficients(integral: FloatArray, start: int, stop: int, m: int) -> Fl
     """Haar MODWT coefficients of the samples from ``start`` to ``stop``, free of end effects.
 
     integral: (n + 1,), cumulative sum of the series, starting with 0.
-    m: Averaging time in samples.
     """
     count = max(stop - start - 2 * m + 1, 0)
     result = np.empty(count)
@@ -268,7 +265,6 @@ def lagged_squares(values: FloatArray, parts: IntArray, lags: IntArray, slope: f
 
     values: (n,), NaN where missing.
     parts: (P, 2), first sample of each part, and the one after its last.
-    lags: (K,), in samples.
     slope: Of the line, per sample.
     """
     found = np.zeros(lags.size)
@@ -305,7 +301,6 @@ def survey(values: FloatArray) -> tuple[int, float, float, float]:
 def biweight_means(coefficients: FloatArray, factor: float) -> tuple[float, float]:
     """Means of u t^4 and of its derivative by log u, with u = (factor W)^2 and t = max(1 - u, 0).
 
-    coefficients: (M,), W.
     factor: One over the distance beyond which a coefficient has no weight.
     """
     value = 0.0
@@ -325,7 +320,6 @@ def weighted_series(correlation: FloatArray, weight: FloatArray, series: FloatAr
     """Sum over lags of weight times sum_p series[p] correlation^(2 p + 4).
 
     correlation, weight: (L,).
-    series: (P,).
     """
     total = 0.0
     for i in range(correlation.size):

@@ -35,7 +35,6 @@ def pilot_psd(variance: FloatArray, averaging: FloatArray, dt: float) -> PSD:
 
     variance: (J,), Haar wavelet variances, u^2, positive.
     averaging: (J,), averaging times in samples, rising.
-    dt: Sampling interval, s.
     Returns: ``psd(f, dt)``.
     """
     x, weight = _points(tuple(averaging.tolist()))
@@ -211,8 +210,6 @@ class Levels:
     """The levels of a series with at least one coefficient, gaps included.
 
     values: (n,), about their mean; NaN where samples are missing.
-    runs: The samples that exist.
-    averaging: (J,), averaging times, in samples.
     apart: (runs - 1,), gaps in which the level changes, which no coefficient contains.
     """
 

@@ -164,7 +164,6 @@ def _places(
     """First ordinate of each bin, from 0 on, their centres and numbers of ordinates.
 
     least: Ordinate that the first bin begins with; no bin has one from ``end`` or ``high`` on.
-    spacing: Of the ordinates, cycles per sample.
     """
     ordinate = np.arange(float(least), end)
     ordinate = ordinate[ordinate * spacing < high]

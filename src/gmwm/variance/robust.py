@@ -91,7 +91,6 @@ def robust_variance(coefficients: FloatArray, efficiency: float = EFFICIENCY) ->
     variance, a level that holds nothing but a periodic line 40 % more.
 
     coefficients: (M,), finite, free of end effects, in u; at least one.
-    efficiency: See `tuning_constant`.
     """
     c = tuning_constant(efficiency)
     w = np.ascontiguousarray(coefficients, dtype=float)
@@ -178,9 +177,7 @@ def excess_series(efficiency: float) -> FloatArray:
 class _Grid:
     """Lags and frequencies for some levels and the coarser ones within reach.
 
-    block: Samples between lags.
     first, own: First level, and number of levels whose pairs are summed here.
-    frequency: (L,), cycles per block.
     amplitude: (K, L), gain of each level over its phase, on means of blocks.
     weight: (own, tuning.ROBUST_REACH + 1, L), share of the pairs of coefficients at each lag, both
         signs together, for each level and the ones from itself on.
@@ -264,7 +261,6 @@ def robust_covariance(
     independent coefficients: with fewer than about ten equivalent degrees of freedom robust
     estimates vary more than this.
 
-    psd: ``psd(f, dt)``, two-sided, in u^2/Hz.
     efficiency: Of the estimates at independent coefficients, between 0 and 1.
     classical: (J, J), covariance of the classical wavelet variances, u^4, of the first J levels of
         `dyadic_levels`. The result is at least that, and positive definite if that is.

@@ -149,7 +149,6 @@ def cumulant_of_powers(square: float, fourth: float, count: float) -> float:
     Cumulants of independent samples add up: first differences have twice that of the samples.
 
     square, fourth: Mean second and fourth power of the first differences, u^2 and u^4.
-    count: Number of the first differences.
     """
     excess = fourth / square / square - 3.0 if square > 0.0 else 0.0  # the square may underflow
     chance = tuning.LARGEST_KURTOSIS * np.sqrt(tuning.KURTOSIS_VARIANCE / count)

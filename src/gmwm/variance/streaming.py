@@ -99,7 +99,6 @@ def effects(
     A share p of the windows of a level is left. Windows left out singly cost little, since their
     neighbours say the same; as many in a row as are correlated cost 1/p.
 
-    n, missing: Samples.
     gaps: (G, 2), number of gaps of up to 2^i samples, and samples they have.
     windows, change: (J,), number of windows used, and the change that `unmasked` finds.
     """

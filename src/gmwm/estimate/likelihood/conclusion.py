@@ -153,8 +153,6 @@ _FINE = 2000
 class Top:
     """The maximum of a likelihood over the open parameters of some terms.
 
-    coordinates: Of these terms.
-    processes: The terms at the maximum.
     information: (d, d), observed information of the coordinates.
     likelihood: The log-likelihood of any processes.
     """
@@ -180,10 +178,7 @@ def conclude_likelihood(
 
     Where straight lines bridge the gaps, the wavelet variances do not test the model.
 
-    processes: All noise terms with their values.
     absent: Those among them that the likelihood can do without.
-    top: The maximum over the other terms.
-    notices, trace: What only the method itself knows.
     drift: Slope (u/s) that it has estimated in place of the regression.
     """
     slope = series.columns.slope(top.processes) if series.columns.drift_is_free else None

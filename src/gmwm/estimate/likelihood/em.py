@@ -132,9 +132,7 @@ class Expectation:
     later, cross, earlier: (p, p), sums over k of E x[k+1] x[k+1]', E x[k+1] x[k]' and E x[k] x[k]'.
     first: (p, p), E x[0] x[0]'.
     start, later_sum, earlier_sum: (p,), E x[0] and the sums of E x[k+1] and E x[k].
-    steps: Number of transitions, n - 1.
     residual: Sum of the expected squares of the measurement noise.
-    count: Number of samples that are not missing.
     log_likelihood: Of the parameters that the expectation was taken under.
     """
 

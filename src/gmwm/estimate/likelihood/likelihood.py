@@ -46,13 +46,7 @@ _BINS_PER_OCTAVE = 256  # above them
 
 @dataclass(frozen=True, eq=False)
 class Regression:
-    """Generalized least squares of whitened regressors.
-
-    beta: (k,), coefficients.
-    covariance: (k, k).
-    residual: Sum of squares that is left.
-    log_determinant: Of the regressors' information matrix.
-    """
+    """Generalized least squares of whitened regressors."""
 
     beta: FloatArray
     covariance: FloatArray
@@ -88,7 +82,6 @@ class Columns:
     """A series and its regressors: a constant and, where the model has one, a ramp.
 
     values: (n,), NaN where missing.
-    dt: Sampling interval, s.
     drift: Given slope, u/s, which is removed; ``None`` to estimate it.
     has_drift: Whether the model has a ramp at all.
     """
@@ -292,11 +285,9 @@ def objective_of(
 class Series:
     """A channel ready for a likelihood.
 
-    columns: The samples and regressors.
     wv: Of the samples; where gaps leave none, of the series bridged by straight lines.
     is_bridged: Whether ``wv`` is of the bridged series: fine levels are then too low, so that it is
         a starting point but no test of a fit.
-    coordinates: Of the model's noise.
     start: Starting values of its terms, all of them positive.
     start_is_valid: Whether they are valid estimates by the method of moments.
     """

@@ -30,8 +30,6 @@ class Converged:
 
     found: Coefficients of the ramp or the curve removed from the wavelet variances.
     covariance: (J, J), of the moments, with the discrepancy, u^4.
-    statistical: (J, J), the same without it.
-    point: The minimum under ``covariance``.
     basis: (J,), the wavelet variances to which the covariance belongs, u^2.
     discrepancy: Relative error allowed for at each level.
     """
@@ -106,8 +104,6 @@ def reweighted(fit: Fit, end: Converged, weights: Weights) -> Fit:
     Whether the model is right and which terms the data need does not depend on Omega, so that all
     tests are those of the fit by model weights. B and the covariance of the wavelet variances are
     taken there too: at a poor estimate, errors would be as poor as that.
-
-    fit, end: By model weights.
     """
     design, moments, coordinates = end.design, end.moments(fit.wv), end.design.coordinates
     best, target = end.point, moments.target
@@ -258,8 +254,6 @@ def _with_doubtful_terms(
     amplitude looks significant under the noise that it is part of. It is needed all the same where
     the model without it, by its own errors, misses an averaging time (`Goodness.loses_to`). Several
     similar terms can stand in for each other: one of them is too many, not all.
-
-    processes: The noise terms with their values.
     """
     present = [key for key in fit.upper_bounds if fit.params[key] > 0.0]
     if not redundant and not present:

@@ -30,10 +30,6 @@ _SIMULATED_STEP = 0.05  # where a simulation may move in jumps
 class Design:
     """The moment curves of a model over the free parameters.
 
-    model: With open parameters.
-    terms: The noise terms.
-    linear: Noise terms of free amplitude.
-    shaped: Noise terms with a free shape parameter.
     owners: For each element of z, the term it belongs to.
     Raises InputError if the model has no noise, or a process that cannot be fitted in part is fixed
         in part.

@@ -55,10 +55,7 @@ class Weighted(NamedTuple):
 
 @compiled()
 def profiled(problem: Weighted, curves: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Weighted columns of free amplitude, the best amplitudes, and the weighted residuals.
-
-    curves: (J, terms).
-    """
+    """Weighted columns of free amplitude, the best amplitudes, and the weighted residuals."""
     root, linear, given, target = problem
     rows = target.size
     rest = target.copy()
@@ -82,7 +79,6 @@ def projected(
 ) -> FloatArray:
     """Weighted slopes of the curves times factors, orthogonal to columns of positive amplitude.
 
-    root: (J, J).
     columns, x: (J, L), (L,), weighted columns and their amplitudes.
     slopes, factor: (J, z), (z,), derivatives of the curves by the shapes, and the amplitudes of the
         terms they belong to.

@@ -31,7 +31,6 @@ _XTOL, _FTOL, _GTOL = 1e-7, 1e-9, 1e-9  # tolerances at which MINPACK ends it
 class Point:
     """A point of the parameter space and its weighted sum of squares.
 
-    shapes: Of every term.
     x: (L,), free amplitudes, non-negative.
     """
 

@@ -35,7 +35,6 @@ WEIGHTS = ("model", "data", "diagonal", "identity")
 class Weights:
     """A choice of Omega.
 
-    name: One of `WEIGHTS`.
     variance: (J,), wavelet variances of the data, u^2.
     of_data: (J, J) or None, covariance estimated from the coefficients, for "data".
     is_literal: Whether that is taken as it is, eq. (5) of the paper to the letter.
@@ -142,7 +141,6 @@ def _objective(
 class Discrepancy:
     """The level of discrepancy while a fit is iterated.
 
-    given: Fixed value; ``None`` to estimate it.
     is_overdetermined: Whether there are more levels than parameters, without which it is zero.
     """
 

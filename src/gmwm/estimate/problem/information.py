@@ -112,10 +112,6 @@ def error_growth(model: Model, keys: Sequence[str], n: int, dt: float) -> dict[s
     A relative standard error is proportional to value^k between the points half a standard error
     below and above the estimate, along which the other parameters follow as they are correlated; by
     the expected information.
-
-    model: With the estimates.
-    keys: The estimated parameters of its noise.
-    dt: Sampling interval, s.
     """
     coordinates, processes, names = _opened(model, keys)
     if not names or not all(process.has_spectrum() for process in processes):

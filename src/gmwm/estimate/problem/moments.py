@@ -41,7 +41,6 @@ _FARTHEST, _HALVINGS = 40.0, 40  # deviations of a normal number that can be; of
 class Simulation:
     """How moments are simulated.
 
-    replications: Number of series as long as the data.
     single: Whether they are one series of their total length.
     """
 
@@ -87,11 +86,7 @@ def _simulated(
 class Scales:
     """The levels of a wavelet variance, without its values.
 
-    tau: (J,), averaging times, s.
-    dt: Sampling interval, s.
-    n: Length of the record, samples.
     simulation: How curves without a closed form are simulated.
-    simulate_all: Whether all curves are simulated.
     shared: Cache of starting shapes and their curves, for fits of several models to these levels.
     """
 
@@ -162,7 +157,6 @@ class Moments:
 
     found: Coefficients of the ramp, or of the curve beside the noise, removed from the wavelet
         variances; ``None`` where there is neither.
-    is_free: Whether they are estimated (rather than given).
     """
 
     wv: WaveletVariance
@@ -286,7 +280,6 @@ class FittedMoments:
     ) -> FittedMoments:
         """Moments of the data at a model with values.
 
-        keys: The parameters that were estimated.
         slope_error: Standard error of the slope of a rate ramp, u/s; 0 if it was not estimated.
         """
         drift = drift_key(model)
@@ -314,8 +307,6 @@ class FittedMoments:
 class CurveCoefficients:
     """Coefficients of the regressors that a wavelet variance holds.
 
-    values: (p,), u.
-    covariance: (p, p), u^2.
     spread: (k, p * p), errors of ``covariance`` by each of k independent errors of the noise; with
         weights what it is less under each of k random walks.
     weights: (k,), probabilities of walks; empty where the fitted noise is taken alone.

@@ -32,9 +32,6 @@ def difference(function: Callable[[FloatArray], Any], z: FloatArray, k: Any, ste
 class Term:
     """A noise term of a model, and which of its parameters are free.
 
-    process: As in the model, with open parameters.
-    place: Index of the term in the model.
-    free_scale: Whether the linear parameter is open.
     free_shape: (s,) of bool, which shape parameters are open.
     """
 
@@ -90,8 +87,6 @@ def shape_of(process: Process) -> Shape:
 class Coordinates:
     """Free parameters of the noise terms of a model, in the order of the terms.
 
-    model: With open parameters.
-    terms: The noise terms, without rate ramps.
     owners: For each coordinate, its noise term and whether it is the amplitude.
     names: For each coordinate, its noise term and the name of the parameter.
     Raises InputError if the model has no noise.
@@ -173,11 +168,7 @@ class Coordinates:
     def fitted(
         self, processes: Sequence[Process], slope: float | None = None
     ) -> tuple[Model, list[str]]:
-        """The whole model with values, its terms in order, and the key of each coordinate.
-
-        processes: The noise terms with values.
-        slope: Of the rate ramp, where it is estimated, u/s.
-        """
+        """The whole model with values, its terms in order, and the key of each coordinate."""
         values = {term.place: process for term, process in zip(self.terms, processes, strict=True)}
         terms = [values.get(place, term) for place, term in enumerate(self.model.terms)]
         if slope is not None:

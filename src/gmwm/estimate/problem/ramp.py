@@ -274,8 +274,6 @@ def walks_beside(
 ) -> Walks | None:
     """Sizes that the random walk of a model may have beside its ramp or a curve.
 
-    model: With values.
-    keys: Of the parameters that were open.
     may_lack: Whether there may be a walk where the model has none.
     Returns: ``None`` without a walk, or where it competes with other slow noise of the model.
     """

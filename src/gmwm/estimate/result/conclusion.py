@@ -27,13 +27,10 @@ from gmwm.variance import WaveletVariance
 class Estimates:
     """Estimates of the noise terms of a model by some method.
 
-    coordinates: Of the whole model.
     processes: Its noise terms with their values, those of zero amplitude included.
     covariance: (d, d), of the coordinates of the terms that have an amplitude.
     absent: Noise term of zero amplitude -> 95 % upper limit of its scale.
-    slope: Of the rate ramp, where it is estimated.
     method, weights, discrepancy, log_likelihood, trace: See `Fit`.
-    notices: Those that only the method finds.
     """
 
     coordinates: Coordinates
@@ -68,7 +65,6 @@ def agreement(
 
     covariance: Belongs to the wavelet variances ``basis``.
     statistical: The covariance less the discrepancy, where there is one.
-    taken: As of `chi_square`.
     """
     whitened = weight_root(covariance) @ (target - implied)
     dof = target.size - n_free
@@ -88,12 +84,7 @@ def agreement(
 def conclude(
     found: Estimates, agrees: Mapping[str, Any], wv: WaveletVariance, *, misfits: bool
 ) -> Fit:
-    """Make the `Fit` of some estimates and judge it.
-
-    agrees: From `agreement`.
-    wv: The data.
-    misfits: Whether the fit fails the chi-square test.
-    """
+    """Make the `Fit` of some estimates and judge it."""
     slope = found.slope
     model, all_keys = found.coordinates.fitted(
         found.processes, None if slope is None else slope.value
@@ -164,12 +155,7 @@ def estimate_notices(
     upper: Mapping[str, float],
     wv: WaveletVariance,
 ) -> tuple[list[Notice], list[Notice]]:
-    """Notices about the estimates themselves: those that make a fit not valid, and the others.
-
-    model: With the estimates.
-    keys, matrix: The estimated parameters and their covariance.
-    upper: Upper limits of amplitudes that are not significantly above zero.
-    """
+    """Notices about the estimates themselves: those that make a fit not valid, and the others."""
     bad = [notice("amplitude-bound", key, {"upper": limit}) for key, limit in upper.items()]
     errors = dict(zip(keys, map(float, np.sqrt(np.diag(matrix))), strict=True))
     for item in model.parameters:
@@ -256,7 +242,6 @@ def missed_level_notices(goodness: Goodness) -> list[Notice]:
 def misfit_notices(goodness: Goodness, discrepancy: float, *, failed: bool) -> list[Notice]:
     """Consequence for prediction where a model misses an averaging time.
 
-    discrepancy: Relative error of the variances that was allowed for.
     failed: Whether the chi-square test failed. If not, a misfit is bad only where fewer than one in
         twenty right models have one as clear at any level: of six axes with right models nearly one
         has a smaller one by chance.

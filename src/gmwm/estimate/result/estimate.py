@@ -28,10 +28,7 @@ Kind = Literal["estimated", "bound", "fixed", "undefined"]
 
 @dataclass(frozen=True)
 class InUnit:
-    """An estimate in a data-sheet unit.
-
-    value, lower, upper: In ``unit``.
-    """
+    """An estimate in a data-sheet unit."""
 
     value: float
     lower: float
@@ -146,9 +143,7 @@ def estimates_of(
 ) -> Iterator[Estimate]:
     """Every parameter of a fitted model, in order.
 
-    model: With values.
     quantity: "gyro", "accel" or empty, for the units.
-    stderr, intervals, upper_bounds: By key, SI.
     """
     for item in model.parameters:
         key, value, term = item.key, float(item.value or 0.0), model.terms[item.term]
@@ -181,7 +176,6 @@ def estimates_of(
 class Region:
     """A straight part of the log-log Allan plot from which a parameter was read.
 
-    key: The parameter.
     slope: Of the Allan deviation: -1, -1/2, 0, 1/2 or 1.
     tau_min, tau_max: First and last averaging time of the region, s.
     coefficient: Of the line ``coefficient * tau^slope``, u/s^slope.
@@ -223,10 +217,7 @@ def confidence_interval(
     variance known to a relative error of r has 2/r^2 of them, and no fewer than three are taken, as
     the tails of t are then heavier than those of a variance's logarithm.
 
-    value, error: Estimate and standard error.
-    level: Probability, between 0 and 1.
     growth: The exponent k, of positive parameters.
-    slope_dof: Degrees of freedom of the standard error of a ramp's slope.
     """
     if parameter.lower == 0.0 and value > 0.0:
         relative = error / value
@@ -281,11 +272,8 @@ def upper_amplitude(
     does not exceed the amplitude that explains all of the variance at any level.
 
     coordinates, processes: Of all noise terms, which have values.
-    term: Index of the term.
     estimate: The amplitude without the restriction to positive values, its standard error, and the
         amplitude at which that standard error holds.
-    wv: The data.
-    absent: Terms without an amplitude.
     """
     kept = [i for i in range(len(processes)) if i == term or i not in absent]
     coordinates = coordinates.without([i for i in absent if i != term])

@@ -496,7 +496,6 @@ def dense_curves(
 ) -> tuple[FloatArray, dict[str, FloatArray]]:
     """Allan deviation of each term of a model at closely spaced whole numbers of samples.
 
-    model: The fitted one by default.
     Returns: tau (k,), averaging times from the first to the last of the data, s, and only those of
         the data where a term is simulated or the wavelet is not Haar's; deviations by the term's
         label, u, the root of whose sum of squares is that of the model.

@@ -91,9 +91,6 @@ def fit_joint(
 ) -> JointFit:
     """Fit one model to several recordings together, and to each alone.
 
-    model: With open parameters.
-    estimate: ``estimate(model, wv) -> Fit`` of a method.
-    whole: The model fitted to all recordings, if known already.
     Raises InputError if the model has a rate ramp.
     """
     if any(term.is_drift for term in model.terms) and len(parts) > 1:

@@ -42,7 +42,6 @@ class Problem:
     """Spectra to dominate by one set of numbers, and the cost of these.
 
     targets: Of one axis, or of several that share the numbers: the cost is relative to them.
-    horizon: s.
     region: Spectra of a confidence region, to be dominated in place of the targets.
     lowest: Frequency from which on they are dominated, Hz; by default all frequencies are.
     """
@@ -98,7 +97,6 @@ class Problem:
 def dominating(problem: Problem, form: str, tau: float | None = None) -> Model:
     """The smallest model of a form whose spectrum lies above those of a problem.
 
-    form: {"N+K", "N+GM", "N+K+GM"}.
     tau: Correlation time of the Gauss-Markov process, s; by default the smallest model's.
     Raises InputError if the form cannot dominate: "N+GM" where a spectrum has no limit at zero
         frequency.
@@ -253,7 +251,6 @@ def least_sum(rows: FloatArray, least: FloatArray) -> FloatArray:
     """The x of least sum with ``rows @ x >= 1`` and ``x >= least``, (b, m); NaN if there is none.
 
     rows: (b, n, m), of b programs of two to four variables under hundreds of constraints.
-    least: (m,).
 
     With x = least + y and the rest r = 1 - rows @ least the dual is to maximise r @ u over u >= 0
     with rows^T u <= 1, for which u = 0 is a start. The prices of a basis are y; the constraint that
@@ -304,11 +301,7 @@ _STEP = 1e-3  # standard errors
 
 
 def standard_errors(problem: Problem, model: Model, estimate: Estimated) -> dict[str, float]:
-    """Standard errors of the amplitudes of a bound, by their keys.
-
-    problem: Of one target, which was estimated.
-    model: The bound.
-    """
+    """Standard errors of the amplitudes of a bound, by their keys."""
     terms = [term.with_amplitude(1.0) for term in model.terms]
     columns = columns_of(problem, terms)
     walks = [term.is_walk for term in terms]

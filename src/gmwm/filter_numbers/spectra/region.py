@@ -126,7 +126,6 @@ class _Spectrum:
 
     Only the term that a parameter changes is made anew, not the model.
 
-    terms: Those with a spectrum.
     free: For each term, numbers and names of its parameters in the region.
     """
 
@@ -181,8 +180,6 @@ def region_spectra(
     They are drawn, or found by search at frequencies on a grid. Models that fit equally well, and
     those with one more Gauss-Markov process that the data leave open, belong to them.
 
-    target: Of the estimate.
-    rivals: Models that fit equally well.
     Raises InputError if the data do not bound a parameter.
     """
     region = ParameterRegion.of(fit, level)

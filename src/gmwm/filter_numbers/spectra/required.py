@@ -23,7 +23,6 @@ class RequiredSpectrum:
     weights: Share of each spectrum that counts: one, or less where its peak is fast.
     feet: Low-frequency density of the rest of each term, u^2/Hz.
     constant_sd: Standard deviation of the constant that stands for ramps, u.
-    dt, horizon: Sampling interval and horizon, s.
     lowest: Frequency below which nothing changes, Hz.
     floor: Frequency above which a spectrum without a limit is bounded in time: that of the horizon.
     slope: Of the spectrum against 1/f at the lowest frequency, on logarithmic axes: 0 if it is

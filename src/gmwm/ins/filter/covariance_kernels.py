@@ -68,8 +68,6 @@ def error_rates(v: FloatArray, lla: FloatArray, F: FloatArray) -> None:
 def transition(at: Kinematics, step: float, into: Transition) -> None:
     """Fill the transition of the navigation errors over a step, and the effect of the sensors.
 
-    at: Solution in the middle of the step.
-    step: s.
     into: Overwritten; A is ``I + F step + F^2 step^2 / 2``, and sensor errors act as if made in the
         middle of the step.
     """
@@ -108,11 +106,7 @@ def transition(at: Kinematics, step: float, into: Transition) -> None:
 
 @compiled(fastmath=_FAST)
 def propagate(P: FloatArray, change: Transition, table: SensorTable, samples: int) -> None:
-    """Propagate a covariance (9 + m, 9 + m) over a step of some samples, in place.
-
-    change: From `transition`.
-    table: Of the m sensor states.
-    """
+    """Propagate a covariance (9 + m, 9 + m) over a step of some samples, in place."""
     A, B = change.A, change.B
     axis, partner, paired = table.axis, table.partner, table.paired
     phi, phi_off, gain = table.phi[samples], table.phi_off[samples], table.gain[samples]
@@ -208,8 +202,6 @@ def tilt_squared(P: FloatArray, g: float, step: float, gathered: float) -> float
     it; heights and standstills do not show it.
 
     P: (n, n), changed in place: variance of the vertical velocity error.
-    g: m/s^2.
-    step: s.
     gathered: Root mean square of the velocity error of this kind since the last GNSS fix, m/s.
     Returns: ``gathered`` after the step.
     """
@@ -245,9 +237,7 @@ def measurement_update(
 ) -> tuple[float, float]:
     """Update by one scalar measurement ``z = h x + noise``, in place.
 
-    P: (n, n).
     h: (n,), with -1 for a state of coloured measurement noise.
-    variance: Of the white noise of the measurement.
     z: Estimate less measurement.
     x: (n,), errors estimated so far at this epoch.
     K: (n,), work space; holds the gain after the call.

@@ -201,7 +201,6 @@ class Filter:
     sensor errors sample by sample. The covariance is propagated in steps of ``stride`` samples, and
     at every epoch that has a measurement or a result.
 
-    dt: Sampling interval of the IMU, s.
     keyframe: First place in the covariance of the states of the last keyframe; -1 for none.
     """
 

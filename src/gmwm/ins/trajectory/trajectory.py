@@ -58,11 +58,7 @@ def words_of(name: str) -> list[str]:
 
 @dataclass(frozen=True, eq=False)
 class LogColumns:
-    """Columns of a delimited text whose quantities are known by their names.
-
-    columns: Quantity -> column.
-    unused: Names of the other columns.
-    """
+    """Columns of a delimited text whose quantities are known by their names."""
 
     table: CsvTable
     columns: Mapping[str, int]
@@ -79,8 +75,6 @@ class LogColumns:
         """Look at the header of a file.
 
         quantities: Quantities that a column of a name holds; empty if it is something else.
-        needed: Quantities that must be there.
-        header: An example that has them.
         """
         table = CsvTable.open(existing_file(path))
         columns: dict[str, int] = {}

@@ -284,8 +284,6 @@ def shaped_curve(kind: int, shape: FloatArray, levels: Any) -> FloatArray:
     """`Process.unit_haar_variance` of a compiled kind, (J,), for inner loops; empty where unknown.
 
     kind: `Process.compiled_kind`.
-    shape: Values of the shape parameters.
-    levels: From `compiled_levels`.
     """
     m, dt, wide, narrow = levels
     if kind == _GAUSS_MARKOV:
