@@ -117,7 +117,7 @@ def test_command_gives_numbers_of_a_class(run, files):
     code, out, error = run("motion", *files, "--at", "low", "-o", "low.json", "--report", "a.html")
     assert (code, error) == (0, "")
     assert out.endswith("wrote low.json\nwrote a.html\n")
-    assert "for filters, SI" in out
+    assert "largest axis and IMU, SI" in out
     code, out, error = run("export", "low.json", "--to", "kalibr")
     assert (code, error) == (0, "")
     assert "N+K for outages up to 1 s (motion)" in out

@@ -233,18 +233,18 @@ def in_motion(given: Iterable[Any], horizon: float | None, interval: float | Non
 
 
 def _bounding(found: InMotion, interval: float, horizon: float) -> FilterNumbers:
-    axes = {}
+    axes, dt = {}, float(found.curves[0].tau[0])
     for name, model in found.numbers(interval, horizon).items():
         tau, variance = found.envelope(name)
         true = float(between(tau, variance, np.array([horizon]))[0])
-        nees = true / float(2.0 * model.haar_variance(np.array([horizon]), tau[0])[0])
+        nees = true / float(2.0 * model.haar_variance(np.array([horizon]), dt)[0])
         predicted = (Predicted(horizon, nees, float(1.0 / np.sqrt(nees))),)
         quantity = name.partition("_")[0]
         axes[name] = AxisFilterNumbers(
             "N+K", model, horizon, 0.0, "motion", predicted, quantity=quantity
         )
     source = f"{len(found.imus)} IMUs in motion, updates every {interval:g} s"
-    return FilterNumbers(axes, source, 1.0 / tau[0], sum(found.durations))
+    return FilterNumbers(axes, source, 1.0 / dt, sum(found.durations))
 
 
 def not_valid(given: Iterable[Any]) -> dict[str, Notice]:

@@ -9,7 +9,7 @@ import re
 import textwrap
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache, partial
 from math import sqrt
 from typing import TYPE_CHECKING, Any
@@ -268,6 +268,8 @@ def _consistency(imu: ImuNumbers) -> str:
         if np.all(np.isfinite(values)):
             ends = dict.fromkeys(f"{end(values):.3g}" for end in (min, max))
             parts.append(f"{triad.quantity} {' to '.join(ends)}")
+    if not parts and imu.method == "motion":
+        return "NEES at most 1 in these flights; judge others: gmwm certify --motion"
     if not parts:
         return "NEES unknown: the file holds other numbers; export the calibration"
     return f"NEES at {imu.horizon:g} s: {', '.join(parts)}; 1: consistent"
@@ -342,6 +344,7 @@ class ImuFile(Target):
     mark: str = "#"
     head: tuple[str, ...] = ()
     line: str = "{key}: {value:.6e}  # {unit}"
+    most: Mapping[str, float] = field(default_factory=dict)
     template: str = ""
 
     def body(self, imu: ImuNumbers) -> str:
@@ -366,6 +369,7 @@ class ImuFile(Target):
         keys, (gyro, accel) = self.keys, imu.triads
         assert isinstance(keys, WalkKeys)
         rate, lines = imu.rate if keys.needs_rate else float("nan"), list[str]()
+        beyond = list[str]()
         triads = (gyro, gyro, accel, accel)
         for key, letter, triad in zip(keys.names, "NKNK", triads, strict=True):
             value = keys.written(letter, getattr(triad, letter), rate)
@@ -375,7 +379,9 @@ class ImuFile(Target):
             if any(axis.name in imu.invalid for axis in triad.axes):
                 unit += ", do not use: not valid"
             lines.append(self.line.format(key=key, value=value, unit=unit))
-        return "\n".join([*lines[2:], *lines[:2]])
+            if value > self.most.get(key, value):
+                beyond.append(f"{self.mark} {self.title} takes at most {self.most[key]:g} as {key}")
+        return "\n".join([*lines[2:], *lines[:2], *beyond])
 
     def text(self, imu: ImuNumbers) -> str:
         """The whole file."""

@@ -378,7 +378,7 @@ def _in_motion(
         tau, variance = measured.envelope(name)
         times = np.array([INTERVAL, *tau[(tau > INTERVAL) & (tau < HORIZON)], HORIZON])
         true = between(tau, variance, times)
-        own = 2.0 * numbers[name].model.haar_variance(times, tau[0])
+        own = 2.0 * numbers[name].model.haar_variance(times, measured.curves[0].tau[0])
         found += [
             Check(
                 "motion", name, "rate", unit, float(t), float(np.sqrt(a)), float(np.sqrt(b)), a / b

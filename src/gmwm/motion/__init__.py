@@ -5,4 +5,4 @@ from gmwm.motion.envelope import between as between
 from gmwm.motion.mapping import Mounting as Mounting
 from gmwm.motion.motion import motion as motion
 from gmwm.motion.result import InMotion as InMotion, MotionCurve as MotionCurve
-from gmwm.motion.tuning import HORIZON as HORIZON, INTERVAL as INTERVAL
+from gmwm.motion.tuning import HORIZON as HORIZON, INTERVAL as INTERVAL, USES as USES

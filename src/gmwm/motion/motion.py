@@ -138,7 +138,7 @@ def motion(
     classes = _classes(differences, flights[0][0].dt, static, limits)
     if count := sum(events.values()):
         notices.append(notice("motion-events", values={"events": count}))
-    notices += _notices(curves, len(labels))
+    notices += [*_notices(curves, len(labels)), *_together(labels, flights, clocks)]
     durations = tuple(float(imus[0].time[-1]) for imus in flights)
     joints = tuple(clocks), tuple(mountings), tuple(notices)
     return InMotion(labels, durations, curves, *joints, classes, _history(flights))
@@ -193,7 +193,7 @@ def _against(sources: Any, references: Any, static: Mapping[str, Any] | None) ->
     notices = [notice("motion-reference", values={"angle": 1e3 * angle})]
     notices += [notice("motion-events", values={"events": events})] if events else []
     joints = tuple(clocks), tuple(mountings), tuple(notices)
-    by_axis = tuple(_by_axis("imu", "gyro", curves, static))
+    by_axis = tuple(_by_axis("imu", "gyro", curves, [static]))
     return InMotion(("imu",), tuple(durations), by_axis, *joints)
 
 
@@ -355,11 +355,13 @@ def _curves(
 ) -> tuple[MotionCurve, ...]:
     """Curve of each IMU and sensor, at all instants, or those with vibration within limits."""
     longest = min(max(len(each.vibration) for each in own) for own in differences.values())
-    found = []
+    found, labels = [], list(dict.fromkeys(label for label, _ in differences))
     for (label, sensor), own in differences.items():
         if within is not None:
             own = [each.within(*within) for each in own]
-        at_rest = static.get(label, static) if static is not None else None
+        # Of two, the variance is the sum of both.
+        summed = labels if len(labels) == 2 else [label]
+        at_rest = [static.get(each, static) if static is not None else None for each in summed]
         found += _by_axis(label, sensor, curves_of(own, dt, longest), at_rest)
     return tuple(found)
 
@@ -390,17 +392,36 @@ def _classes(
 
 
 def _by_axis(
-    label: str, sensor: str, curves: Curves, static: Mapping[str, Fit] | None
+    label: str, sensor: str, curves: Curves, static: Sequence[Mapping[str, Fit] | None]
 ) -> list[MotionCurve]:
     pairs, differences = (each.swapaxes(0, 1) for each in (curves.pairs, curves.differences))
     parts = curves.variance, curves.lower, curves.upper, pairs, differences, curves.agree
     found = []
     for name, *own in zip(_AXES, *parts, strict=True):
         channel = f"{sensor}_{name}"
-        at_rest = static_variance(static, channel, curves.tau)
+        at_rest = np.sum([static_variance(s, channel, curves.tau) for s in static], axis=0)
         own += [at_rest, curves.exponent, curves.exponent_error]
         found.append(MotionCurve(label, channel, sensor, curves.tau, *own))
     return found
+
+
+def _together(
+    labels: Sequence[str], flights: Sequence[Sequence[_Imu]], clocks: Sequence[Clock]
+) -> list[Notice]:
+    """Which IMUs sample at one instant most of the time, so that their aliases are the same."""
+    dt, apart = flights[0][0].dt, list[FloatArray]()
+    for number in dict.fromkeys(each.flight for each in clocks):
+        own = [each for each in clocks if each.flight == number]
+        time = np.linspace(0.0, flights[number - 1][0].time[-1], tuning.INSTANTS)
+        late = np.stack([0.0 * time, *(each.own(time) - time for each in own)])
+        away = (late[:, None] - late[None, :]) / dt
+        apart.append(np.abs(away - np.rint(away)))
+    if not apart:
+        return []
+    share = np.mean(np.concatenate(apart, axis=2) < tuning.TOGETHER, axis=2)
+    pairs = [(labels[i], labels[j]) for i, j in np.argwhere(np.triu(share > 0.5, 1))]
+    which = ", ".join(" and ".join(pair) for pair in pairs)
+    return [notice("motion-together", pairs=which)] if pairs else []
 
 
 def _notices(curves: Sequence[MotionCurve], imus: int) -> list[Notice]:

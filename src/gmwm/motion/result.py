@@ -56,8 +56,8 @@ class MotionCurve(Document):
     tau : (J,) ndarray
         Averaging times, s.
     variance, lower, upper : (J,) ndarray
-        u^2, with the ends of 95 % intervals. By chance a variance can be negative. Of two IMUs it
-        is the sum of both.
+        u^2, with the ends of 95 % intervals. By chance, or if errors are shared, a variance can be
+        negative. Of two IMUs this and ``static`` are the sums of both.
     pairs : (P, J) ndarray
         Of each pair of the other IMUs in their order, u^2: ``variance`` is their mean. Pairs
         differ where IMUs share errors, as aliased vibration of one instant.
@@ -175,10 +175,7 @@ class InMotion(Document, Printed):
         ----------
         name : {"low", "middle", "high", "rest"}
 
-        Raises
-        ------
-        MissingNameError
-            If there is no such class, or nothing is known at rest.
+        Raises MissingNameError if there is no such class, or nothing is known at rest.
         """
         by_name = {each.name: each.curves for each in self.classes}
         if self.is_known_at_rest:
@@ -211,7 +208,7 @@ class InMotion(Document, Printed):
     def envelope(
         self, channel: str, imu: str | None = None, *, upper: bool = False
     ) -> tuple[FloatArray, FloatArray]:
-        """Averaging times (s), and the largest Allan variance of a channel (u^2).
+        """Averaging times that were measured (s), and the largest Allan variance (u^2).
 
         It is nowhere below the one at rest.
 
@@ -223,15 +220,15 @@ class InMotion(Document, Printed):
         upper : bool, optional
             Whether the upper ends of the 95 % intervals count.
 
-        Raises
-        ------
-        MissingNameError
-            If there is no such curve.
+        Raises MissingNameError if there is no such curve, InputError if it has no time.
         """
         own = [self.curve(each, channel) for each in ([imu] if imu else self.imus)]
         seen = [c.upper if upper else np.where(c.variance > 0.0, c.variance, c.upper) for c in own]
         at_rest = [np.nan_to_num(c.static) for c in own]
-        return own[0].tau, np.max([*seen, *at_rest], axis=0)
+        known = np.all(np.isfinite([c.variance for c in own]), axis=0)
+        if not np.any(known):
+            raise InputError(f"{channel} is not measured at any time: use a better reference")
+        return own[0].tau[known], np.max([*seen, *at_rest], axis=0)[known]
 
     def models(self, imu: str | None = None) -> dict[str, Model]:
         """The smallest bounded angle, white noise and walk that are nowhere below the curves.
@@ -244,15 +241,12 @@ class InMotion(Document, Printed):
         imu : str, optional
             By default the largest of all IMUs.
 
-        Raises
-        ------
-        MissingNameError
-            If there is no such IMU.
+        Raises MissingNameError if there is no such IMU.
         """
         found = {}
         for channel in dict.fromkeys(each.channel for each in self.curves):
             tau, variance = self.envelope(channel, imu)
-            found[channel] = dominating(tau, variance, BOUNDED, tau[0])
+            found[channel] = dominating(tau, variance, BOUNDED, self.curves[0].tau[0])
         return found
 
     def numbers(
@@ -291,13 +285,21 @@ class InMotion(Document, Printed):
             tau, variance = self.envelope(channel, imu, upper=upper)
             if not tau[0] <= interval <= horizon <= tau[-1]:
                 raise InputError(
-                    f"from {interval:g} s to {horizon:g} s: these flights show {tau[0]:.2g} s to "
-                    f"{tau[-1]:.2g} s in motion; give times between, or longer flights"
+                    f"{channel}, from {interval:g} s to {horizon:g} s: these flights show "
+                    f"{tau[0]:.2g} s to {tau[-1]:.2g} s in motion; give times between, or longer "
+                    "flights"
                 )
             inside = tau[(tau > interval) & (tau < horizon)]
             times = np.array(sorted({interval, *inside, horizon}))
-            found[channel] = dominating(times, between(tau, variance, times), FILTER, tau[0])
+            found[channel] = dominating(
+                times, between(tau, variance, times), FILTER, self.curves[0].tau[0]
+            )
         return found
+
+    def shows(self, interval: float, horizon: float) -> bool:
+        """Whether `numbers` can be given for such times, s."""
+        seen = [c.tau[np.isfinite(c.variance)] for c in self.curves]
+        return all(t.size and t[0] <= interval <= horizon <= t[-1] for t in seen)
 
     @property
     def sensors(self) -> tuple[str, ...]:
@@ -361,10 +363,7 @@ class InMotion(Document, Printed):
         ----------
         path : path-like
 
-        Raises
-        ------
-        InputError
-            If the file cannot be written.
+        Raises InputError if the file cannot be written.
         """
         page: Path = pages.make("page", self, path)
         return page
@@ -420,8 +419,9 @@ class InMotion(Document, Printed):
         chosen = sorted({int(np.argmin(np.abs(np.log(tau / t)))) for t in tuning.SHOWN_AT})
         rows = []
         for imu in ("both",) if len(self.imus) == 2 else self.imus:
-            mean = np.mean([c.variance for c in own if imu in (c.imu, "both")], axis=0)
-            own_texts = (brief(scale * np.sqrt(mean[k])) if mean[k] > 0.0 else "-" for k in chosen)
+            axes = np.array([c.variance for c in own if imu in (c.imu, "both")])
+            seen, mean = np.all(axes > 0.0, axis=0), np.mean(axes, axis=0)
+            own_texts = (brief(scale * np.sqrt(mean[k])) if seen[k] else "-" for k in chosen)
             rows.append((imu, *own_texts))
         reach = _median([np.sqrt(np.maximum(c.upper, 0.0)) / c.deviation for c in own])
         rows.append(("95 %", *(f"x/{reach[k]:.2f}" if reach[k] > 0.0 else "-" for k in chosen)))
@@ -432,7 +432,8 @@ class InMotion(Document, Printed):
             rows.append((name, *(f"{shares[k]:.2f}".replace("nan", "-") for k in chosen)))
         if np.any(np.isfinite([c.static for c in own])):
             times = self.factor(sensor)
-            rows.append(("over rest", *(brief(times[k]) for k in chosen)))
+            over = (brief(times[k]) if times[k] > 0.0 else "-" for k in chosen)
+            rows.append(("over rest, median", *over))
         return plain_table((f"{sensor}, {unit}", *(f"{tau[k]:.2g} s" for k in chosen)), rows)
 
     def _vibration(self) -> list[str]:
@@ -446,13 +447,17 @@ class InMotion(Document, Printed):
             power, error = (float(np.median([getattr(each, name)[k] for each in own]))
                             for name in ("exponent", "exponent_error"))  # fmt: skip
             parts.append(f"{sensor} {power:.2f} +-{error:.2f}")
-        ends = f"{self.classes[0].low:.2g} to {self.classes[-1].high:.2g} m/s^2"
-        return [f"noise ~ vibration^p: {', '.join(parts)}; {ends}"]
+        ends = (f"{end:.2g}" for end in (self.classes[0].low, *(c.high for c in self.classes)))
+        named = ", ".join(each.name for each in self.classes)
+        return [
+            f"noise ~ vibration^p: {', '.join(parts)}",
+            f"vibration, {named}: {' - '.join(ends)} m/s^2",
+        ]
 
     def _for_filters(self) -> str:
         """N and K, SI, the largest of all axes and IMUs, for some intervals of updates."""
         rows = []
-        known = [(self, "", use) for use in tuning.USES if self.curves[0].tau[-1] >= use[1]]
+        known = [(self, "", use) for use in tuning.USES if self.shows(*use)]
         if known and self.is_known_at_rest:
             known.append((self.at("rest"), " at rest", tuning.USES[0]))
         for result, where, (interval, horizon) in known:
@@ -462,7 +467,9 @@ class InMotion(Document, Printed):
             largest = (f"{max(p[key] or 0.0 for p in each):.2g}" for each in own for key in "NK")
             rows.append((f"updates {interval:g} s, outages {horizon:g} s{where}", *largest))
         heads = [f"{sensor} {key}" for sensor in self.sensors for key in "NK"]
-        return plain_table(("for filters, SI", *heads), rows) if rows else ""
+        least = f"{per_cent(tuning.LEAST_WALK)} of the variance at the outage"
+        table = plain_table(("largest axis and IMU, SI", *heads), rows)
+        return f"{table}\nK, if no walk is seen: {least}" if rows else ""
 
     def factor(self, sensor: str) -> FloatArray:
         """(J,) Median over IMUs and axes of the deviation in motion over that at rest."""

@@ -35,6 +35,9 @@ BLOCK_LEVELS, BLOCK_LEAST = 4.0, 1.0
 FEWEST_BLOCKS = 20  # that show how a deviation depends on vibration
 FEWEST_FLIGHTS = 5  # from so many on, flights are the unit, of which blocks are not independent
 SHOWN_AT = (0.008, 0.03, 0.13, 0.5, 1.0, 2.0, 4.0)  # s, averaging times that are printed
+# Instants of a flight at which clocks are compared, and share of a sampling interval within which
+# IMUs sample together: second-order aliases then correlate by 0.8 and more.
+INSTANTS, TOGETHER = 50, 0.05
 CONTRADICT = 1e-4  # p-value of one curve and octave; a result has some 200 of them
 MOST_FILLED = 0.02  # share of missing samples that lines may replace
 BESIDE_LOST = 0.1  # s: samples beside a lost packet are up to 24 deg/s off in a flight

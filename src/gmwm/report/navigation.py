@@ -18,7 +18,7 @@ from gmwm._core.units import SI_UNIT, customary_unit
 from gmwm.ins.logs import Comparison, Navigated
 from gmwm.ins.simulation import QUANTITIES, Ratio, Validation
 from gmwm.issues import worst_first
-from gmwm.motion import HORIZON, INTERVAL, InMotion
+from gmwm.motion import USES, InMotion
 from gmwm.plotting import COMPONENT_COLOURS, DATA_COLOUR
 from gmwm.process import Model
 from gmwm.report.page import origin, write_page
@@ -197,7 +197,6 @@ def write_motion_report(found: InMotion, path: str | os.PathLike[str]) -> Path:
     """
     path = writable_file(path)
     channels = dict.fromkeys(each.channel for each in found.curves)
-    shown = found.curves[0].tau[-1] >= HORIZON
     return write_page(
         path,
         "motion.html",
@@ -207,8 +206,8 @@ def write_motion_report(found: InMotion, path: str | os.PathLike[str]) -> Path:
         factors=_ranges(found, "factor", "in motion over at rest", 10.0, "times ten"),
         coherence=_ranges(found, "coherence", "coherence", 0.5, "") if len(found.imus) > 2 else {},
         vibration=_vibration(found) if found.classes else "",
-        rows=list(_rows(found)) if shown else [],
-        purpose=f"updates every {INTERVAL:g} s, outages up to {HORIZON:g} s",
+        rows=list(_rows(found)),
+        purpose="updates every {:g} s and outages up to {:g} s".format(*USES[0]),
         notices=worst_first(list(found.notices)),
         provenance=origin({}, "page of", None),
     )
@@ -283,11 +282,12 @@ def _vibration(found: InMotion) -> str:
 
 def _rows(found: InMotion) -> Iterator[tuple[str, list[str]]]:
     """Largest N and K of axes and IMUs in motion, at each class of vibration, and at rest."""
-    names = ["", *(each.name for each in found.classes), "rest"]
-    for name in names:
-        if name == "rest" and not found.is_known_at_rest:
+    rest = ["rest"] * found.is_known_at_rest
+    names = [*([""] * len(USES)), *(each.name for each in found.classes), *rest]
+    for name, use in zip(names, [*USES, *(USES[:1] * len(names))], strict=False):
+        if not found.shows(*use):
             continue
-        numbers = (found.at(name) if name else found).numbers()
+        numbers = (found.at(name) if name else found).numbers(*use)
         cells = []
         for sensor in found.sensors:
             own = [model.params for key, model in numbers.items() if key.startswith(sensor)]
@@ -296,4 +296,6 @@ def _rows(found: InMotion) -> Iterator[tuple[str, list[str]]]:
                 field, scale = customary_unit(unit, sensor, "u")
                 cells.append(f"{value:.2e} SI, {brief(value * scale, 2)} {field}")
         where = f"{name} vibration" if name else "all of it"
-        yield "at rest" if name == "rest" else where, cells
+        where = "at rest" if name == "rest" else where
+        other = f"; updates every {use[0]:g} s, outages up to {use[1]:g} s" * (use != USES[0])
+        yield where + other, cells

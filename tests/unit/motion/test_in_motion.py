@@ -129,8 +129,11 @@ def test_lags_of_motion_do_not_amplify_vibration():
 
 def test_two_imus_give_the_sum_and_say_so():
     rng = np.random.default_rng(6)
-    found = gmwm.motion(imus(rng, 2))
+    at_rest = recording(white(rng, 1)[0])
+    static = {name: gmwm.fit("N", gmwm.wavelet_variance(at_rest[name])) for name in AXES}
+    found = gmwm.motion(imus(rng, 2), static=static)
     curve = found.curve("imu 1", "gyro_y")
+    assert curve.factor[4] == pytest.approx(1.0, rel=0.1)  # the sum of both at rest, too
     both = 2.0 * SIZE[1] ** 2  # half a variance of differences, of two IMUs
     # Interpolation between samples takes some of the mapped IMU's noise.
     assert 0.75 * both < curve.variance[0] < 1.03 * both
@@ -219,6 +222,10 @@ def test_aliased_vibration_is_seen_as_far_as_imus_sample_apart(late):
 
     errors = white(rng, 3)
     found = gmwm.motion([imu(shaken, e, offset=d * DT) for e, d in zip(errors, late, strict=True)])
+    together = [n.text for n in found.notices if n.code == "motion-together"]
+    pairs = {"imu 1 and imu 2": late[0] == late[1], "imu 2 and imu 3": late[1] == late[2]}
+    for pair, is_one in pairs.items():
+        assert (pair in "".join(together)) == is_one
     seen = np.sin(2.0 * np.pi * 12.0 * DT * np.arange(errors.shape[1]))
     for k, channel in product(range(3), AXES):
         p, q, r = 2.0 * np.pi * np.roll(late, -k)
@@ -227,6 +234,9 @@ def test_aliased_vibration_is_seen_as_far_as_imus_sample_apart(late):
         line = 25.0 * white_too * 0.5 * np.mean(np.diff(seen) ** 2)
         variance = found.curve(f"imu {k + 1}", channel).variance[0]
         assert variance == pytest.approx(share * line + white_too, rel=0.1, abs=0.03 * line)
+    rows = [row for row in str(found).splitlines() if row.startswith("imu ")]
+    negative = any(np.any(curve.variance[:3] <= 0.0) for curve in found.curves)
+    assert any(" - " in f"{row} " for row in rows) or not negative
 
 
 def test_glitches_and_lost_samples_cost_an_instant():

@@ -53,6 +53,9 @@ def test_noise_of_gyros_is_told_from_that_of_the_reference():
         assert np.mean(inside[seen]) >= 0.6
         assert np.all(curve.upper[:3] > truth[:3])
     assert np.mean(ratios) == pytest.approx(1.0, abs=0.1)
+    with pytest.raises(gmwm.InputError, match=r"these flights show .* in motion"):
+        found.numbers(0.05, 1.0)  # not measured that early
+    assert found.numbers(1.0, 2.0)["gyro_x"].params["N"] == pytest.approx(N, rel=0.3)
     (noise,) = (each for each in found.notices if each.code == "motion-reference")
     assert noise.values["angle"] == pytest.approx(4e-2, rel=0.15)
     # Rates of the reference stand in the middle of two attitudes.
