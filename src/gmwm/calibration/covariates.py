@@ -21,6 +21,7 @@ from gmwm._core.typing import FloatArray
 from gmwm.calibration import tuning
 from gmwm.calibration.curve import MOST_POWER, BiasCurve, Covariate, Regressor
 from gmwm.calibration.scaling import Scaling, scaling
+from gmwm.diagnosis import thermometer_fails
 from gmwm.errors import InputError
 from gmwm.estimate import Fit
 from gmwm.estimate.problem import pilot
@@ -129,6 +130,11 @@ class Nodes:
             dt = recording.dt if channel is None else channel.dt
             size = max(int(own.size // max(parts, 1)), 1)
             means = block_means([own], size, 0.0)[:, 0]
+            if channel is not None and channel.quantity == "temperature":
+                means[fails := thermometer_fails(means, own)] = np.nan
+                if np.any(fails):
+                    values = {"length": size * dt * np.count_nonzero(fails)}
+                    notices.append(notice("thermometer-fails", "", values, name=name))
             there = np.flatnonzero(~np.isnan(means))
             if there.size < 2:
                 raise InputError(

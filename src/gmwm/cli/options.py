@@ -129,7 +129,8 @@ def with_option(notice: Notice, span: Span = None, lost: float = 0.0, longest: s
         "read gravity instead of the reaction to it, reverse accel_x, accel_y and accel_z only",
         "noise-scales": "for numbers at your working temperature give --temperature to gmwm bound, "
         "budget and export",
-        "curve-lags": "add a lag, such as --covariate temperature=cubic,lag",
+        "curve-lags": "add a lag, such as --covariate temperature=cubic,lag, or check the "
+        "thermometer's clock",
         "vibration": "leave it out with --start and --stop, or record again",
     }
     if unit := values.get("alike"):

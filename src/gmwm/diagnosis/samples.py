@@ -4,11 +4,12 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
+from scipy import ndimage
 from scipy.special import erf
 
 from gmwm._core.distributions import binom
 from gmwm._core.text import brief, readable
-from gmwm._core.typing import FloatArray, IntArray
+from gmwm._core.typing import BoolArray, FloatArray, IntArray
 from gmwm.diagnosis import tuning
 from gmwm.diagnosis.innovations import Examined
 from gmwm.issues import Notice, Severity, notice
@@ -239,3 +240,23 @@ def _cut_towards_zero(channel: Examined) -> Iterator[Notice]:
         return
     hint = "round to the nearest step before the conversion to integers"
     yield _repeated(channel, 0.0, zeros, variant="cut", hint=hint)
+
+
+def thermometer_fails(means: FloatArray, samples: FloatArray) -> BoolArray:
+    """Where means of a thermometer jump and return, or stay equal and jump then.
+
+    A temperature does neither: soaks end without a jump or, of steps, with one to another soak.
+    """
+    there = np.flatnonzero(~np.isnan(means))
+    steps = np.abs(np.diff(samples[: tuning.SAMPLES_OF_STEP]))
+    x, found = means[there], np.zeros(means.size, dtype=bool)
+    usual = ndimage.median_filter(x, 2 * tuning.WIDEST_SPIKE + 1, mode="nearest")
+    least = tuning.USUAL_STEPS * np.median(np.append(steps[steps > 0.0], 0.0))
+    least = max(least, tuning.LEAST_JUMP * np.ptp(usual))
+    starts = np.flatnonzero(np.diff(x, prepend=np.nan))
+    lengths = np.diff(starts, append=x.size)
+    after = np.minimum(starts + lengths + 1, x.size - 1)  # the mean in between is of both
+    stuck = (np.abs(x[after] - x[starts]) > least) & (lengths > tuning.WIDEST_SPIKE)
+    stuck &= 3 * np.repeat(lengths, lengths)[after] < lengths
+    found[there] = ndimage.binary_dilation(np.repeat(stuck, lengths)) | (np.abs(x - usual) > least)
+    return found

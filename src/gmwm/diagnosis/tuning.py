@@ -57,6 +57,10 @@ CUT_TO_ZERO = 1.1
 LAST_OF_END, FEWEST_OF_END, FEWEST_OF_PART, PARTS_OF_END = 1.0 / 32.0, 1024, 8, 16
 HARMFUL_END = 0.08  # density times deviation of Gaussian noise cut at 2.1: 10 % too small
 
+# Means that a spike of a thermometer may take: what stays equal for longer and jumps then is stuck.
+# Least jump, of its range and of its samples' median step (of so many): cycles have less.
+WIDEST_SPIKE, LEAST_JUMP, USUAL_STEPS, SAMPLES_OF_STEP = 5, 0.04, 3.0, 1_000_000
+
 HELD_AT_MOST = 0.05  # share of repeated samples that may stay; the noise is larger by that
 CHANCE_OF_HELD = 0.05  # share equal by chance up to which they are masked (noise 1.6 % too small)
 BLOCK_OF_HELD, LIKE_SCATTER = 64, 1.5  # samples that give a mean to 9 %, ratio of means alike

@@ -343,3 +343,40 @@ def test_a_temperature_needs_a_unit(tmp_path):
     path.write_text(f"time [s],gyro_x [rad/s],temperature\n{lines}\n")
     with pytest.raises(gmwm.InputError, match=r"no unit: .* such as temperature \[degC\]"):
         gmwm.calibrate(gmwm.read(path), covariates={"temperature": "linear"}, still=False)
+
+
+@pytest.mark.parametrize("fault", ["spikes", "off", "frozen"])
+def test_where_the_thermometer_fails_it_is_not_used(fault):
+    """The range began at -127 degC, the degree was 1, and the fit was not valid, or off."""
+    temperature = 45.0 - 20.0 * np.cos(4.0 * np.pi * np.arange(16 * SIZE) / (16 * SIZE))
+    temperature += np.random.default_rng(1).normal(0.0, 0.01, temperature.size)
+    x = WhiteNoise(N).simulate(temperature.size, DT, 7) + cubic(temperature)
+    if fault == "frozen":
+        temperature[9000:12000] = temperature[9000]
+    else:
+        for start in (5000, 15000, 25000):
+            temperature[start : start + (1 if fault == "spikes" else 300)] = -127.0
+    arrays = {"gyro_x": x, "temperature": temperature}
+    units = {"gyro": "rad/s", "temperature": "degC"}
+    rec = gmwm.Recording.from_arrays(arrays, 1.0 / DT, units)
+    cal = calibrated(rec, "auto", model="N")
+    assert any(each.code == "thermometer-fails" for each in cal.notices)
+    curve = cal.curves["gyro_x"]
+    assert cal["gyro_x"].valid
+    assert curve.degree == 3
+    assert (curve.main.low, curve.main.high) == pytest.approx((25.0, 65.0), abs=0.2)
+    difference, error = off(curve, np.linspace(26.0, 64.0, 8))
+    assert np.all(np.abs(difference) < 2.0 * error)
+
+
+@pytest.mark.parametrize("step", [0.0, 0.5])
+@pytest.mark.parametrize("is_soaked", [False, True])
+def test_thermometers_that_round_and_soaks_do_not_fail(step, is_soaked):
+    s = np.arange(SIZE) / SIZE
+    temperature = 45.0 - 20.0 * np.cos(4.0 * np.pi * s)
+    if is_soaked:
+        temperature = np.select([s < 0.3, s < 0.6], [25.0, 45.0], 65.0)
+    if step:
+        temperature = step * np.round(temperature / step)
+    cal = calibrated(recording(8, temperature))
+    assert not any(each.code == "thermometer-fails" for each in cal.notices)
