@@ -36,6 +36,7 @@ from gmwm.issues import Notice, notice
 class CovarianceErrors:
     """What a filter predicts of its errors, and what is true of them, at T times.
 
+    time: (T,), s.
     predicted, actual: (T, n, n), covariance of n errors: the filter's own, and the true one.
     """
 

@@ -60,7 +60,9 @@ def deviation(
 ) -> Axes:
     """Allan deviation with error bars against averaging time, log-log.
 
+    tau: (J,), averaging times, s.
     value, lower, upper: (J,), deviations and the ends of their intervals, in ``unit``.
+    interval: Level of the intervals, for the legend.
     """
     ax = ax or _new_axes(4.6)
     bars = np.stack([np.maximum(value - lower, 0.0), np.maximum(upper - value, 0.0)])
@@ -151,6 +153,9 @@ def curves(
 ) -> None:
     """Fitted curve, its band and its components over the data of `deviation`.
 
+    tau: (J,), averaging times, s.
+    total: (J,), deviation of the sum.
+    components: Deviations of the terms by label.
     data: (J,), deviations of the data, to keep in view.
     band: Ends of the 95 % interval of the sum, (J,) each, if it is drawn.
     """
@@ -177,6 +182,7 @@ def model_set(
 ) -> Axes:
     """The Allan deviations of models that agree, as a band, and straight or curved lines over it.
 
+    tau: (J,), averaging times, s.
     models: (M, J), deviations of the models, in ``unit``.
     lines: Label -> deviations, (J,).
     lowest: Deviation at which all of them are flat.
@@ -245,6 +251,7 @@ def residuals(
 ) -> Axes:
     """Standardised residuals as stems with the band of two standard errors; returns the axes.
 
+    tau: (J,), averaging times, s.
     residual: (J,), in standard errors; NaN where there is none.
     misfit: (J,), relative difference of the deviations, written in per cent at each stem.
     """

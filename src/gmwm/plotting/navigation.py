@@ -220,6 +220,7 @@ def measured_track(track: FloatArray, fixes: FloatArray, without: FloatArray) ->
     """An estimated track, the fixes that it rests on, and its part without fixes.
 
     track: (n, 2), east and north, m.
+    fixes: (k, 2).
     without: (j, 2), part of the track.
     """
     figure, axes = _panels(1, 1, (6.4, 5.2))

@@ -37,6 +37,7 @@ class Outlier:
 class Spread:
     """N, B or K of one axis over the units with a valid model of it.
 
+    values: (n,), SI.
     errors: (n,), standard errors of their logarithms; NaN of upper limits.
     found: (n,) of bool; where false, the value is an upper limit.
     level: Probability that one of as many equal units is an outlier.

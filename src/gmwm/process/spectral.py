@@ -209,6 +209,7 @@ class Panels:
     """The nodes of a quadrature in panels, on which a smooth spectrum is a polynomial.
 
     points: (P, 12), Chebyshev points of each panel, in the coordinate of the nodes.
+    starts: (P,), first node of each panel.
     share: (K, 12), lagrange's polynomials of the points of its panel at each node.
     """
 

@@ -298,8 +298,10 @@ def gain_weights(name: str, levels: int) -> GainWeights:
 class PairWeights:
     """Weights for products of the gains of two levels.
 
+    frequency: (K,), as in `GainWeights`.
     weight: (P, K), int_0^{1/2} |H_j|^2 |H_k|^2 F df = weight[p] @ F(frequency) for the pair p of
         levels j = first[p] + 1 <= k = second[p] + 1.
+    first, second: (P,).
     """
 
     frequency: FloatArray

@@ -259,6 +259,7 @@ def allan_least_squares(
     """Least-squares lines through the first k scales and the others to 128 s, (2,).
 
     tau: (J,), averaging times 1, 2, 4, ... s, at least to 128 s.
+    allan_variance: (J,).
     k: From 1 to 7.
     covariance: (J, J), of the levels, up to a factor, to weight them by; by default all are equal.
     """

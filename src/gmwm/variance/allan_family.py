@@ -59,7 +59,10 @@ class AllanFilter:
         return 1 + self.differences + self.modified
 
     def gain(self, m: float, f: FloatArray, power: int = 1) -> FloatArray:
-        """Squared gain to a power; beyond `tuning.LOBES` lobes their mean."""
+        """Squared gain to a power; beyond `tuning.LOBES` lobes their mean.
+
+        f: (K,), cycles per sample.
+        """
         means = 2 * (1 + self.modified)  # powers of the sine of means
         sines = power * (self.differences + 1 + self.modified)
         resolved = np.sin(np.pi * m * f) ** (2 * sines)

@@ -64,6 +64,8 @@ class Runs:
 class GapEffects:
     """What gaps do to the wavelet variances of the levels.
 
+    missing: Number of missing samples.
+    counts: (J,), number of coefficients.
     change: (J,), what missing samples added to the expected variance, relative to it; it has been
         subtracted.
     inflation: (J, J), growth of the covariance over that of a complete record.
@@ -94,6 +96,7 @@ def unmasked(
 ) -> tuple[FloatArray, FloatArray]:
     """Variances without what missing samples add, and that relative to them, (J,) each.
 
+    square: (J,), mean squares of the coefficients.
     scarcity: (J,), mean over windows of a quarter of 1/C - 1/m, for both halves together.
     spread: S of a level from the variances of the finer ones.
     """
@@ -121,6 +124,7 @@ def spread_by_lags(
 ) -> float:
     """S of the level after the finer ones, of windows within some runs.
 
+    finer: (j,), variances of the finer levels.
     there: (Q, 2), intervals of samples that exist within the runs.
     runs: (P, 2), intervals with windows.
     lags: (K,), from 0 on; shorter than an averaging time.

@@ -265,6 +265,7 @@ def lagged_squares(values: FloatArray, parts: IntArray, lags: IntArray, slope: f
 
     values: (n,), NaN where missing.
     parts: (P, 2), first sample of each part, and the one after its last.
+    lags: (K,), in samples.
     slope: Of the line, per sample.
     """
     found = np.zeros(lags.size)
@@ -301,6 +302,7 @@ def survey(values: FloatArray) -> tuple[int, float, float, float]:
 def biweight_means(coefficients: FloatArray, factor: float) -> tuple[float, float]:
     """Means of u t^4 and of its derivative by log u, with u = (factor W)^2 and t = max(1 - u, 0).
 
+    coefficients: (M,), W.
     factor: One over the distance beyond which a coefficient has no weight.
     """
     value = 0.0
@@ -320,6 +322,7 @@ def weighted_series(correlation: FloatArray, weight: FloatArray, series: FloatAr
     """Sum over lags of weight times sum_p series[p] correlation^(2 p + 4).
 
     correlation, weight: (L,).
+    series: (P,).
     """
     total = 0.0
     for i in range(correlation.size):

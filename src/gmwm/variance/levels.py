@@ -210,6 +210,8 @@ class Levels:
     """The levels of a series with at least one coefficient, gaps included.
 
     values: (n,), about their mean; NaN where samples are missing.
+    runs: The samples that exist.
+    averaging: (J,), averaging times, in samples.
     apart: (runs - 1,), gaps in which the level changes, which no coefficient contains.
     """
 

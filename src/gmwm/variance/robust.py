@@ -177,7 +177,9 @@ def excess_series(efficiency: float) -> FloatArray:
 class _Grid:
     """Lags and frequencies for some levels and the coarser ones within reach.
 
+    block: Samples between lags.
     first, own: First level, and number of levels whose pairs are summed here.
+    frequency: (L,), cycles per block.
     amplitude: (K, L), gain of each level over its phase, on means of blocks.
     weight: (own, tuning.ROBUST_REACH + 1, L), share of the pairs of coefficients at each lag, both
         signs together, for each level and the ones from itself on.

@@ -40,6 +40,7 @@ class Filtered(NamedTuple):
     states: (n, m, p), predicted.
     covariances: (n, p, p), of the predicted states.
     gains: (n, p), F P h / s.
+    innovations: (n, m).
     variances: (n,), of the innovations, infinite where the sample is missing.
     """
 

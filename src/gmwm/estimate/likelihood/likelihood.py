@@ -46,7 +46,13 @@ _BINS_PER_OCTAVE = 256  # above them
 
 @dataclass(frozen=True, eq=False)
 class Regression:
-    """Generalized least squares of whitened regressors."""
+    """Generalized least squares of whitened regressors.
+
+    beta: (k,), coefficients.
+    covariance: (k, k).
+    residual: Sum of squares that is left.
+    log_determinant: Of the regressors' information matrix.
+    """
 
     beta: FloatArray
     covariance: FloatArray

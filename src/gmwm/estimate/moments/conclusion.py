@@ -30,6 +30,8 @@ class Converged:
 
     found: Coefficients of the ramp or the curve removed from the wavelet variances.
     covariance: (J, J), of the moments, with the discrepancy, u^4.
+    statistical: (J, J), the same without it.
+    point: The minimum under ``covariance``.
     basis: (J,), the wavelet variances to which the covariance belongs, u^2.
     discrepancy: Relative error allowed for at each level.
     """

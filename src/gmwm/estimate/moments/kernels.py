@@ -79,6 +79,7 @@ def projected(
 ) -> FloatArray:
     """Weighted slopes of the curves times factors, orthogonal to columns of positive amplitude.
 
+    root: (J, J).
     columns, x: (J, L), (L,), weighted columns and their amplitudes.
     slopes, factor: (J, z), (z,), derivatives of the curves by the shapes, and the amplitudes of the
         terms they belong to.

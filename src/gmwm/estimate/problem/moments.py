@@ -86,7 +86,11 @@ def _simulated(
 class Scales:
     """The levels of a wavelet variance, without its values.
 
+    tau: (J,), averaging times, s.
+    dt: Sampling interval, s.
+    n: Length of the record, samples.
     simulation: How curves without a closed form are simulated.
+    simulate_all: Whether all curves are simulated.
     shared: Cache of starting shapes and their curves, for fits of several models to these levels.
     """
 
@@ -307,6 +311,8 @@ class FittedMoments:
 class CurveCoefficients:
     """Coefficients of the regressors that a wavelet variance holds.
 
+    values: (p,), u.
+    covariance: (p, p), u^2.
     spread: (k, p * p), errors of ``covariance`` by each of k independent errors of the noise; with
         weights what it is less under each of k random walks.
     weights: (k,), probabilities of walks; empty where the fitted noise is taken alone.

@@ -32,7 +32,9 @@ _STEP = 1e-4  # relative, of central differences
 class Goodness:
     """Agreement of model and data at each level, from ``gmwm.Fit.goodness``.
 
+    tau: (J,), averaging times, s.
     data, model: (J,), Allan deviations, u; both without the drift where the model has a ramp.
+    misfit: (J,), ``data / model - 1``.
     residual: (J,), difference of the cube roots of the variances in statistical standard errors,
         close to standard normal at every level if the model is right (Wilson & Hilferty 1931,
         *PNAS* 17, 684-688). Neighbouring levels are correlated.

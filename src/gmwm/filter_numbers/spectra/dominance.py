@@ -251,6 +251,7 @@ def least_sum(rows: FloatArray, least: FloatArray) -> FloatArray:
     """The x of least sum with ``rows @ x >= 1`` and ``x >= least``, (b, m); NaN if there is none.
 
     rows: (b, n, m), of b programs of two to four variables under hundreds of constraints.
+    least: (m,).
 
     With x = least + y and the rest r = 1 - rows @ least the dual is to maximise r @ u over u >= 0
     with rows^T u <= 1, for which u = 0 is a start. The prices of a basis are y; the constraint that

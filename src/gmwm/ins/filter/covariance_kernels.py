@@ -237,7 +237,9 @@ def measurement_update(
 ) -> tuple[float, float]:
     """Update by one scalar measurement ``z = h x + noise``, in place.
 
+    P: (n, n).
     h: (n,), with -1 for a state of coloured measurement noise.
+    variance: Of the white noise of the measurement.
     z: Estimate less measurement.
     x: (n,), errors estimated so far at this epoch.
     K: (n,), work space; holds the gain after the call.

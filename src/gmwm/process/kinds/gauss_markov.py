@@ -217,6 +217,7 @@ def real_haar(rate: float, m: FloatArray) -> FloatArray:
     """Haar wavelet variance of the process of unit variance and a real rate, for inner loops.
 
     rate: a > 0.
+    m: (J,), averaging times in samples.
     """
     result = np.empty(m.size)
     if rate > _WHITE_ABOVE:

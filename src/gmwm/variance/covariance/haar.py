@@ -39,6 +39,7 @@ def lag_sums(
     averaging: (L,) of int, averaging times, rising, in lags.
     zero: (L, L), what the bin at zero frequency adds, which no difference shows.
     counts: (L, L, H), weights of the lags from zero on, of those that there are.
+    weights: (H,), of all of them.
     Returns: mean (L, L), sum of covariances times counts; above the diagonal, as are the others;
         square, whole (L, L), sums of their squares, times counts and times weights.
     """
@@ -194,6 +195,7 @@ def _excess(
 class _Pairs:
     """Weights of the integrals of products of two gains against the square of a spectrum.
 
+    starts: (P,), first node of each panel.
     frequency: (P * 12,), points of the panels, cycles per sample.
     weight: (pairs, P, 12).
     first, second: (pairs,), levels.
