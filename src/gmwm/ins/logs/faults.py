@@ -365,8 +365,10 @@ class Faults:
             codes = {each.code for each in best}
             close = (each[0] for each in tried if each and codes.isdisjoint(e.code for e in each))
             least = best[0].excess - tuning.AMBIGUOUS
-            rivals = tuple(dict.fromkeys(each.code for each in close if each.excess > least))
-            found += [replace(each, rivals=rivals) for each in best]
+            rivals = [each.code for each in close if each.excess > least]
+            if np.cos(best[0].replay.state.rpy[0]) < 0.0 and "axis-signs" not in codes:
+                rivals.append("axis-signs")  # no vehicle starts upside down
+            found += [replace(each, rivals=tuple(dict.fromkeys(rivals))) for each in best]
             here = best[0].replay
         return cls(tuple(found), not contradicted(here), here)
 

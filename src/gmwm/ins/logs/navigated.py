@@ -177,9 +177,10 @@ class Navigated:
 
         A fault of the log comes before a fault of the sensor models.
         """
-        if (bad := self._bad_inputs) and not self.fits:
-            text = "The filter cannot fit these data: " + "; ".join(map(str, bad))
-            return replace(bad[0], text=text, hint="")
+        if bad := self._bad_inputs:
+            text = "The innovations agree, but the data are wrong: "
+            text = text if self.fits else "The filter cannot fit these data: "
+            return replace(bad[0], text=text + "; ".join(map(str, bad)), hint="")
         sizes = self._misfits
         largest = max(sizes.values(), default=1.0)
         if self.faults.found:

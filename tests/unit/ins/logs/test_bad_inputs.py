@@ -73,6 +73,21 @@ def test_a_sensor_at_the_end_of_its_range_is_named_and_nothing_else(log, tmp_pat
     assert not found.fault_notices
 
 
+def test_a_cut_off_sensor_is_the_verdict_where_the_innovations_agree(log, tmp_path):
+    """A car on level roads hardly needs its roll rate: the verdict was "consistent"."""
+
+    def clipped(samples):
+        reach = np.quantile(np.abs(samples[:, 0]), 0.95)
+        samples[:, 0] = np.clip(samples[:, 0], -reach, reach)
+        return samples
+
+    write(tmp_path, log, change=clipped)
+    found = navigated(tmp_path)
+    assert found.fits
+    assert (found.verdict.code, found.verdict.severity) == ("saturation", "bad")
+    assert "The innovations agree, but the data are wrong" in found.verdict.text
+
+
 @pytest.mark.parametrize("velocity", [True, False])
 def test_a_step_of_the_height_is_dated_and_its_hint_mends_it(log, tmp_path, velocity):
     """The heights were outliers, a lever arm, or sensors worse than their models."""

@@ -290,6 +290,14 @@ def test_scale_errors(kind, vehicle, seed, axis):
     assert f"{kind}_{axis}" in fault.hint
 
 
+def test_a_start_upside_down_is_a_doubtful_heading():
+    """A helicopter that does not turn: a heading 172 deg off explained reversed accelerometers."""
+    log, _ = emulated_log(12, "helicopter", duration=200.0, rate=10.0)
+    navigated = Navigated.of(replace(log, imu=replace(log.imu, velocity=-log.imu.velocity)))
+    (fault,) = navigated.fault_notices
+    assert "axis-signs" in {fault.code, *fault.values["rivals"].split(", ")}
+
+
 def test_a_lever_arm_that_explains_all_has_no_time_offset_beside_it():
     """Of good fixes in circles, an offset of 0.07 s and an antenna 2.6 m forward, not 1 m."""
     log, truth = emulated_log(32, "loiter", duration=400.0, rate=10.0)
