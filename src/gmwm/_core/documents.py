@@ -264,10 +264,7 @@ class Document:
         return self
 
     def save(self, path: str | os.PathLike[str]) -> Path:
-        """Write everything as JSON; the file appears whole or not at all.
-
-        Raises InputError if it cannot be written.
-        """
+        """Write everything as JSON; the file appears whole or not at all."""
         return write_text(path, json.dumps(self.to_dict(), indent=1, allow_nan=False))
 
 

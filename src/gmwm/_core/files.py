@@ -42,10 +42,7 @@ def _remove_left_over(folder: Path, _: int) -> None:
 
 @contextmanager
 def moved_into_place(path: str | os.PathLike[str]) -> Iterator[Path]:
-    """A temporary file to be filled; it takes its own name when all went well.
-
-    Raises InputError if it cannot be written.
-    """
+    """A temporary file to be filled; it takes its own name when all went well."""
     target = Path(path)
     try:
         handle, name = tempfile.mkstemp(prefix=_own_prefix(target.parent), dir=target.parent)
@@ -66,19 +63,13 @@ def moved_into_place(path: str | os.PathLike[str]) -> Iterator[Path]:
 
 @contextmanager
 def written(path: str | os.PathLike[str]) -> Iterator[TextIO]:
-    """Open a text file for writing under a temporary name; it takes its own when all went well.
-
-    Raises InputError if it cannot be written.
-    """
+    """Open a text file for writing under a temporary name; it takes its own when all went well."""
     with moved_into_place(path) as name, open(name, "w", encoding="utf-8") as stream:
         yield stream
 
 
 def write_text(path: str | os.PathLike[str], text: str) -> Path:
-    """Write a text file, with a line end at its end, whole or not at all; returns its path.
-
-    Raises InputError if it cannot be written.
-    """
+    """Write a text file, with a line end at its end, whole or not at all; returns its path."""
     with written(path) as stream:
         stream.write(text if text.endswith("\n") else f"{text}\n")
     return Path(path)

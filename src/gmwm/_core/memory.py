@@ -24,10 +24,7 @@ _CGROUP = Path("/sys/fs/cgroup")
 
 
 def budget() -> int:
-    """Bytes that may be used: as `VARIABLE` says, or half of what the machine has to give.
-
-    Raises InputError if the variable holds something else than a positive number.
-    """
+    """Bytes that may be used: as `VARIABLE` says, or half of what the machine has to give."""
     limit = _LIMIT.get()
     if limit is not None:
         return limit
@@ -42,10 +39,7 @@ def budget() -> int:
 
 @contextmanager
 def limited(gigabytes: float | None) -> Iterator[None]:
-    """Allow this much within the block; None changes nothing.
-
-    Raises InputError if it is not positive.
-    """
+    """Allow this much within the block; None changes nothing."""
     if gigabytes is None:
         yield
         return

@@ -28,10 +28,7 @@ class Spool:
         self._width, self.n = width, 0
 
     def append(self, rows: FloatArray) -> None:
-        """Add rows, (n, width).
-
-        Raises InputError if the disk is full.
-        """
+        """Add rows, (n, width)."""
         _check_room(8 * rows.size)
         self._file.write(np.ascontiguousarray(rows, dtype=float).data)
         self.n += len(rows)
@@ -59,10 +56,7 @@ def _check_room(size: int) -> None:
 
 
 def alike(array: FloatArray, n: int, dtype: Any = float) -> npt.NDArray[Any]:
-    """An array for ``n`` numbers, on disk if another one is.
-
-    Raises InputError if the disk is full.
-    """
+    """An array for ``n`` numbers, on disk if another one is."""
     if not is_spooled(array):
         return np.empty(n, dtype)
     size = n * np.dtype(dtype).itemsize

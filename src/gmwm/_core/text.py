@@ -89,10 +89,7 @@ def wrapped(text: str, first: str = "", indent: int = 0) -> list[str]:
 
 
 def frame(rows: Iterable[Mapping[str, Any]], columns: Sequence[str]) -> pandas.DataFrame:
-    """A data frame of rows by column, in SI units; an empty one has the columns, too.
-
-    Raises InputError if pandas is not installed.
-    """
+    """A data frame of rows by column, in SI units; an empty one has the columns, too."""
     try:
         import pandas
     except ImportError:

@@ -62,10 +62,7 @@ def _quantity(text: str) -> pint.Quantity[Any]:
 
 @lru_cache(maxsize=512)
 def factor(unit: str, si_unit: str) -> float:
-    """How many ``si_unit`` one ``unit`` is, such as rad/s one deg/s.
-
-    Raises InputError if a unit is unknown or the two do not measure the same thing.
-    """
+    """How many ``si_unit`` one ``unit`` is, such as rad/s one deg/s."""
     known = _USUAL.get(si_unit, {}).get(unit)
     if known is not None:
         return known
@@ -92,10 +89,7 @@ def seconds_in(unit: str) -> float | None:
 
 @lru_cache(maxsize=512)
 def quantity_of(unit: str) -> str:
-    """``"gyro"`` for an angular rate, ``"accel"`` for a specific force.
-
-    Raises InputError if the unit is unknown or neither of the two.
-    """
+    """``"gyro"`` for an angular rate, ``"accel"`` for a specific force."""
     for quantity, si_unit in SI_UNIT.items():
         if unit in _USUAL[si_unit]:
             return quantity

@@ -264,7 +264,6 @@ def numbers(flag: str, text: str, form: str, *counts: int, separator: str = ",")
 
     form: How they are to be written, for messages.
     counts: How many there may be; by default any number.
-    Raises InputError for anything else.
     """
     try:
         found = [float(part) for part in text.split(separator)]
@@ -435,10 +434,7 @@ def _column(text: str) -> str | int:
 
 
 def written_models(texts: Sequence[str]) -> dict[str, Model]:
-    """Models of ``--model MODEL`` and ``--model NAME=MODEL``, by name; empty for all channels.
-
-    Raises InputError if a text is no model, or a name has two.
-    """
+    """Models of ``--model MODEL`` and ``--model NAME=MODEL``, by name; empty for all channels."""
     from gmwm.process import as_model
 
     given: dict[str, Model] = {}

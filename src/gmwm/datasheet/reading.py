@@ -95,12 +95,7 @@ def read_datasheet(
 ) -> Datasheet:
     """Read a YAML file of what a data sheet states; see `datasheet`.
 
-    Parameters
-    ----------
-    path : path-like
-    channels : dict of str to str, optional
-        Channel name -> quantity. Without them a name may be of any axis, such as gyro_x.
-
+    channels: Channel name -> quantity. Without them a name may be of any axis, such as gyro_x.
     Raises InputError if it cannot be read or has anything else.
     """
     return _read(str(path), read_yaml(path), channels)

@@ -25,18 +25,12 @@ from gmwm.variance import WaveletCovariance
 class SharedFit:
     """Parts of the noise of several channels, and what the channels share of each.
 
-    Attributes
-    ----------
-    names : tuple of str
-        Of the p channels.
-    parts : tuple of Process
-        At unit amplitude.
-    matrices : (K, p, p) ndarray
-        Q_k, positive semidefinite: variances and covariances of each part, in products of the
-        channels' units.
-    covariance : (K P, K P) ndarray
-        Of the P = p (p + 1) / 2 elements a <= b of each matrix, part by part; with the uncertainty
-        of the correlation times.
+    names: Of the p channels.
+    parts: At unit amplitude.
+    matrices: (K, p, p), Q_k, positive semidefinite: variances and covariances of each part, in
+        products of the channels' units.
+    covariance: (K P, K P), of the P = p (p + 1) / 2 elements a <= b of each matrix, part by part;
+        with the uncertainty of the correlation times.
     """
 
     names: tuple[str, ...]
@@ -85,18 +79,10 @@ def fit_shared(
 ) -> SharedFit:
     """Fit the matrices of parts, and their correlation times, to wavelet covariances.
 
-    Parameters
-    ----------
-    parts : sequence of Process
-        Of the shapes where the search starts; all but correlation times are kept.
-    data : WaveletCovariance
-    refine : bool, optional
-        Whether correlation times are fitted; else they are kept too.
-
-    Raises
-    ------
-    InputError
-        If there are no parts, two have one shape, or a channel has the samples of another.
+    parts: Of the shapes where the search starts; all but correlation times are kept.
+    refine: Whether correlation times are fitted; else they are kept too.
+    Raises InputError if there are no parts, two have one shape, or a channel has the samples of
+        another.
     """
     kinds = [type(part) for part in parts if not part.is_exponential]
     if not parts or len(set(kinds)) < len(kinds):

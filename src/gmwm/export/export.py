@@ -254,10 +254,7 @@ class CurveFile:
 
 
 def _triads(curves: Curves) -> dict[str, tuple[list[BiasCurve], float, float]]:
-    """By sensor the curves of x, y and z, and the range that they have in common, degC.
-
-    Raises InputError for other covariates, too high a degree, or an axis without a curve.
-    """
+    """By sensor the curves of x, y and z, and the range that they have in common, degC."""
     found = {}
     for quantity in ("gyro", "accel"):
         own = {name[-1]: each for name, each in curves.items() if each.quantity == quantity}
@@ -404,7 +401,6 @@ def read_numbers(
     rate: Of the IMU, Hz, for programs whose numbers depend on it; by default the file's own.
     Returns: "gyro" and "accel", or each of the axes ("gyro_x" to "accel_z") where they differ -> N
         (u/sqrt(Hz)) and K (u/s/sqrt(Hz)), or a model with a Gauss-Markov process.
-    Raises InputError if the file cannot be read, has no known keys, or its numbers need a rate.
     """
     values = entries(content_of(path).decode("utf-8-sig", errors="replace"))
     layouts = {each.keys: None for each in TARGETS.values() if each.keys}

@@ -196,7 +196,6 @@ def numbers_of(
     """Those found of a calibration, or given ones if they have the form and the horizon.
 
     tau: Of those found, as in `gmwm.bound`.
-    Raises InputError if there are none.
     """
     if isinstance(given, Calibration):
         return usable(given, form, HORIZON if horizon is None else horizon, tau=tau)
@@ -222,7 +221,6 @@ def in_motion(given: Iterable[Any], horizon: float | None, interval: float | Non
     """What is given, with the largest N and K of all IMUs in place of noise in motion.
 
     horizon, interval: s; by default 1 s, and updates every 0.1 s or the horizon if that is less.
-    Raises InputError if an interval is given to nothing in motion, or flights do not show it.
     """
     found = list(given)
     if interval is not None and not any(isinstance(each, InMotion) for each in found):

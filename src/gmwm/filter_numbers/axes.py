@@ -102,10 +102,7 @@ class SensorAxes:
     def of(
         cls, source: One | Several, dt: float | None, bias_sd: Sd, rate: float | None = None
     ) -> SensorAxes:
-        """Axes of a model, a fit, a calibration or a mapping.
-
-        Raises InputError if the source is something else, or a parameter is free.
-        """
+        """Axes of a model, a fit, a calibration or a mapping."""
         dt = checks.sampling_interval(DT if dt is rate is None else dt, rate)
         is_file = isinstance(source, str) and source.endswith(".json")
         if isinstance(source, One) and not is_file:
@@ -161,10 +158,7 @@ class SensorAxes:
 
 
 def given_tau(form: str, tau: float | str | None) -> float | str | None:
-    """A correlation time as users give it, checked; s or "shared".
-
-    Raises InputError if it is neither, or the form has no such process or several.
-    """
+    """A correlation time as users give it, checked; s or "shared"."""
     if tau is None:
         return None
     if form not in ("N+GM", "N+K+GM"):

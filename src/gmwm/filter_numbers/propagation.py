@@ -193,10 +193,7 @@ def _over(
 
 @lru_cache(maxsize=64)
 def with_constant(model: Model, sd: float, dt: float) -> StateSpace:
-    """State-space form of a model and of a constant, which is the start of a walk if it has one.
-
-    Raises InputError if a term has no state-space form.
-    """
+    """State-space form of a model and of a constant, which is the start of a walk if it has one."""
     forms = []
     variance = sd**2
     for term in model.terms:
@@ -275,8 +272,6 @@ def integral_rms(
         process that has a spectrum only is treated alike in both. Otherwise the process starts as
         `Process.simulate` starts it.
     Returns: u s, u s^2 and u s^3. A deterministic drift counts by its absolute value.
-    Raises InputError if the process is known by simulation only, or its spectrum rises too fast
-        towards zero frequency.
 
     With flicker noise S(f) = B^2/(2 pi f) of known past, the integral of order m is the
     Riemann-Liouville process of index m + 1/2 (Mandelbrot & Van Ness 1968, *SIAM Review* 10,

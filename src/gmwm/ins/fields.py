@@ -70,10 +70,7 @@ class Spec(BaseModel):
 
     @classmethod
     def parse(cls, given: Any, where: str = "") -> Self:
-        """Check what was written.
-
-        Raises InputError with the place of the first thing that cannot be used.
-        """
+        """Check what was written."""
         try:
             return cls.model_validate(given)
         except ValidationError as error:

@@ -50,26 +50,18 @@ _COLUMNS = (
 class ArrayAxis(Document):
     """Weights of one axis of an array, and the errors that they lead to.
 
-    Attributes
-    ----------
-    channel, quantity : str
-    weights : (N,) ndarray
-        Those of least error, with sum 1. IMUs that share errors with better ones may have
-        negative ones.
-    lower, upper : (N,) ndarray
-        Ends of 95 % intervals.
-    alone : (N,) ndarray
-        Standard deviation of the angle (rad) or velocity (m/s) of each IMU after the horizon.
-    best, mean, inverse : float
-        The same of the sum with ``weights``, of the mean of all, and with weights 1/N^2 from the
-        angle or velocity random walks. ``best`` includes what the weights' errors cost.
-    cost : float
-        By how much the variance exceeds that of the best weights, on average, as these are known
+    weights: (N,), those of least error, with sum 1. IMUs that share errors with better ones may
+        have negative ones.
+    lower, upper: (N,), ends of 95 % intervals.
+    alone: (N,), standard deviation of the angle (rad) or velocity (m/s) of each IMU after the
+        horizon.
+    best, mean, inverse: The same of the sum with ``weights``, of the mean of all, and with weights
+        1/N^2 from the angle or velocity random walks. ``best`` includes what the weights' errors
+        cost.
+    cost: By how much the variance exceeds that of the best weights, on average, as these are known
         from a recording only; relative.
-    p_value : float
-        Of the test that the mean is the best sum.
-    correlation : (N, N) ndarray
-        Of the errors of the IMUs after the horizon.
+    p_value: Of the test that the mean is the best sum.
+    correlation: (N, N), of the errors of the IMUs after the horizon.
     """
 
     channel: Text

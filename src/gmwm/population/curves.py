@@ -149,10 +149,7 @@ class Equality:
 
     @classmethod
     def of(cls, fits: Sequence[Fit]) -> Equality:
-        """The test for fits to several recordings of one channel at one rate.
-
-        Raises InputError if curves are known at different averaging times.
-        """
+        """The test for fits to several recordings of one channel at one rate."""
         drifting = any(term.is_drift for fit in fits for term in fit.model.terms)
         terms = [tuple(t for t in fit.model.terms if not t.is_drift) for fit in fits]
         noises = [Model(each) for each in terms if each]  # an Allan fit may have a ramp only

@@ -158,7 +158,6 @@ def recordings(paths: Paths, folder: Path | None) -> list[Item]:
 
     paths: A path that exists is taken as it is, brackets and all; ``**`` in a pattern stands for
         any folders.
-    Raises InputError if there are none, or a pattern matches nothing.
     """
     given: Iterable[Any] = [paths]
     if isinstance(paths, Iterable) and not isinstance(paths, str | os.PathLike):

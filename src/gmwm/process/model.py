@@ -259,11 +259,7 @@ def _kinds() -> dict[str, type[Process]]:
 
 
 def model_from_list(content: Sequence[Mapping[str, Any]]) -> Model:
-    """The model whose terms were written with ``to_dict``.
-
-    Raises InputError for a process that is neither built in nor defined in a module imported so
-        far, or parameters it does not have.
-    """
+    """The model whose terms were written with ``to_dict``."""
     kinds, terms = _kinds(), []
     for item in content:
         arguments = dict(item)

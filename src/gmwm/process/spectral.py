@@ -59,10 +59,7 @@ class Quadrature:
 
 
 def evaluated(psd: PSD, f: FloatArray, dt: float) -> FloatArray:
-    """``psd(f, dt)``, checked: a user's own may be anything.
-
-    Raises InputError if it is not one finite, non-negative number a frequency.
-    """
+    """``psd(f, dt)``, checked: a user's own may be anything."""
     density = np.asarray(psd(f, dt), dtype=float)
     if density.shape != f.shape:
         raise InputError(

@@ -117,7 +117,6 @@ def wavelet(name: str) -> Wavelet:
 
     name: As in PyWavelets: "haar" (or "db1"), "db2" to "db10", "sym2" to "sym10", "coif1" to
         "coif5". The number is that of vanishing moments, for "coif" half of it.
-    Raises InputError for a name that is not known.
     """
     if not isinstance(name, str) or name not in NAMES:
         raise InputError(

@@ -148,10 +148,7 @@ def with_temperature(recording: Recording, table: Table) -> Recording:
 
 
 def with_thermometer(recording: Recording, table: Table) -> Recording:
-    """A recording with the temperatures of another file, whose times count from its first sample.
-
-    Raises InputError if the table has no temperatures by time, or none during the recording.
-    """
+    """A recording with the temperatures of another file, whose times count from its first one."""
     found = with_temperature(replace(recording, start=0.0), table)
     added = found.channels[len(recording.channels) :]
     if not added or all(channel.missing == channel.n for channel in added):
@@ -270,7 +267,6 @@ def read_imus(
     """The recordings of all IMUs of a bag or a flight log, by instance or topic; see `read`.
 
     topic: Those to read; by default all of the first kind that several IMUs have.
-    Raises InputError if there is one IMU.
     """
     wanted = Wanted(tuple(topic), clock, "channels" in given, damaged, every_imu=True)
     by_imu: dict[str, list[Table]] = {}

@@ -39,10 +39,7 @@ _MOST_ROWS = 300  # of a table on the page: 3,000 units would take a browser 20 
 
 @page_of(Fleet)
 def write_fleet_report(fleet: Fleet, path: str | os.PathLike[str]) -> Path:
-    """Write the report of a fleet as one HTML file that needs no network.
-
-    Raises InputError if the file cannot be written.
-    """
+    """Write the report of a fleet as one HTML file that needs no network."""
     path = writable_file(path)
     # Without those that say nothing, or that the page has elsewhere.
     given = {key: each for key, each in fleet.options.items() if key != "version"}

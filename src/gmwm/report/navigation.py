@@ -35,10 +35,7 @@ _COVERED = ("horizontal", "vertical")
 
 @page_of(Validation)
 def write_validation_report(validation: Validation, path: str | os.PathLike[str]) -> Path:
-    """Write the report of a validation as one HTML file that needs no network.
-
-    Raises InputError if the file cannot be written.
-    """
+    """Write the report of a validation as one HTML file that needs no network."""
     path = writable_file(path)
     study, experiment = validation.study, validation.experiment
     outages = [_outage(validation, i) for i in range(len(study.outages))]
@@ -154,10 +151,7 @@ def _judged(found: Sequence[Ratio]) -> str:
 
 @page_of(Navigated)
 def write_navigated_report(navigated: Navigated, path: str | os.PathLike[str]) -> Path:
-    """Write the report of a solution as one HTML file that needs no network.
-
-    Raises InputError if the file cannot be written.
-    """
+    """Write the report of a solution as one HTML file that needs no network."""
     path = writable_file(path)
     measured, alignment = navigated.measured, navigated.alignment
     imu, sensors = measured.imu, measured.sensors
@@ -178,10 +172,7 @@ def write_navigated_report(navigated: Navigated, path: str | os.PathLike[str]) -
 
 @page_of(Comparison)
 def write_comparison_report(comparison: Comparison, path: str | os.PathLike[str]) -> Path:
-    """Write the report of a comparison of sensor models as one HTML file.
-
-    Raises InputError if the file cannot be written.
-    """
+    """Write the report of a comparison of sensor models as one HTML file."""
     path = writable_file(path)
     return write_page(path, "comparison.html", c=comparison, errors=svg(comparison.plot()))
 
@@ -191,10 +182,7 @@ _SIZE = (4.4, 3.4)  # in, of a picture; two or three stand side by side
 
 @page_of(InMotion)
 def write_motion_report(found: InMotion, path: str | os.PathLike[str]) -> Path:
-    """Write noise in motion as one HTML file that needs no network.
-
-    Raises InputError if the file cannot be written.
-    """
+    """Write noise in motion as one HTML file that needs no network."""
     path = writable_file(path)
     channels = dict.fromkeys(each.channel for each in found.curves)
     return write_page(

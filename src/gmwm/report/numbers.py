@@ -217,10 +217,7 @@ def _sentence(known: ErrorBudget, unknown: ErrorBudget) -> str:
 def write_sheet_report(
     sheet: Datasheet, path: str | os.PathLike[str], numbers: FilterNumbers, answer: str = ""
 ) -> Path:
-    """Write what a data sheet says as one HTML file that needs no network.
-
-    Raises InputError if the file cannot be written.
-    """
+    """Write what a data sheet says as one HTML file that needs no network."""
     import matplotlib.pyplot as plt
 
     path = writable_file(path)

@@ -77,10 +77,7 @@ def quantity_text(value: float, unit: str, fit: Fit) -> dict[str, str]:
 
 
 def write_page(path: str | os.PathLike[str], template: str, **values: Any) -> Path:
-    """Write a page from its template; see `rendered`.
-
-    Raises InputError if the file cannot be written.
-    """
+    """Write a page from its template; see `rendered`."""
     return write_text(path, rendered(template, **values))
 
 

@@ -53,11 +53,7 @@ def summary_text(calibration: Calibration, files: Iterable[str] = ()) -> str:
 
     At most 30 lines of 80 columns, unless six axes or what is said of files need more.
 
-    Parameters
-    ----------
-    calibration : Calibration
-    files : iterable of str, optional
-        Lines about the files that were written.
+    files: Lines about the files that were written.
     """
     first, last, texts = wrapped(verdict_line(calibration)), list(files), actions(calibration)
     first += [line for text in curve_lines(calibration) for line in wrapped(text, indent=2)]

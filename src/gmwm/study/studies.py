@@ -309,8 +309,6 @@ def run_study(
     interrupted.
 
     Returns: one row a run and method: estimates, intervals, validity, seconds.
-    Raises InputError if a method is unknown, or the folder holds runs and ``resume`` is not set, or
-        it is and they are not of the same study.
     """
     chosen = tuple(methods or study.methods)
     for method in chosen:

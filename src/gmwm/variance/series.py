@@ -161,11 +161,7 @@ def where_of(channel: Channel) -> str:
 
 
 def checked_samples(channel: Channel) -> tuple[FloatArray, Runs, float]:
-    """The samples of a channel, which of them exist, and their mean.
-
-    Raises InputError if they are no series of numbers, too few, infinite, constant or of no
-        sensor's size, or the sampling interval is not positive.
-    """
+    """The samples of a channel, which of them exist, and their mean."""
     where = where_of(channel)
     checks.sampling_interval(channel.dt)
     values = np.ascontiguousarray(checks.real_numbers(channel.values, where))
@@ -210,10 +206,7 @@ def as_wavelet_variance(
     *,
     data_covariance: str | None = None,
 ) -> WaveletVariance:
-    """A wavelet variance as it is, or that of a series.
-
-    Raises InputError if a sampling interval is given for a wavelet variance, which has its own.
-    """
+    """A wavelet variance as it is, or that of a series."""
     if not isinstance(data, WaveletVariance):
         return wavelet_variance(data, dt, data_covariance=data_covariance)
     if dt is not None:
@@ -224,10 +217,7 @@ def as_wavelet_variance(
 def as_channel(
     data: Channel | FloatArray | Sequence[float], dt: float | None, rate: float | None = None
 ) -> Channel:
-    """A channel as it is, or one without a name from an array and its interval (s) or rate (Hz).
-
-    Raises InputError if either is not usable.
-    """
+    """A channel as it is, or one without a name from an array and its interval (s) or rate (Hz)."""
     if isinstance(data, Channel):
         return data
     if isinstance(data, WaveletVariance):

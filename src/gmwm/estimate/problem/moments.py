@@ -170,10 +170,7 @@ class Moments:
 
     @classmethod
     def of(cls, wv: WaveletVariance, model: Model, scales: Scales | None = None) -> Moments:
-        """Moments before a first fit, with a least-squares slope where the model has a ramp.
-
-        Raises InputError if it has one beside a curve.
-        """
+        """Moments before a first fit, with a least-squares slope where the model has a ramp."""
         scales = scales or Scales.of(wv)
         ramp = next((term for term in model.terms if term.is_drift), None)
         if wv.regressors is not None:

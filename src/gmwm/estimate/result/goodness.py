@@ -222,19 +222,9 @@ def left_open(fit: Fit, level: float = 0.95) -> tuple[Model, ...]:
     A selection includes a further Gauss-Markov process only if it exceeds some four standard
     errors. The selected model lacks smaller ones, and its intervals do not cover them.
 
-    Parameters
-    ----------
-    fit : Fit
-    level : float, optional
-        Of the interval of the added variance, whose upper end is taken.
+    level: Of the interval of the added variance, whose upper end is taken.
+    Returns: One for each of some correlation times over the range of the data.
 
-    Returns
-    -------
-    tuple of Model
-        One for each of some correlation times over the range of the data.
-
-    Notes
-    -----
     With the whitened derivatives D of the fitted wavelet variances, their residual r and the curve
     g of the added process, all orthogonal to D, the added variance is estimated by g'r / g'g with
     variance 1 / g'g; the other parameters give way by D^+ g. A negative estimate is cut off at zero

@@ -89,10 +89,7 @@ def fit_joint(
     estimate: Callable[[Model, WaveletVariance], Fit],
     whole: Fit | None = None,
 ) -> JointFit:
-    """Fit one model to several recordings together, and to each alone.
-
-    Raises InputError if the model has a rate ramp.
-    """
+    """Fit one model to several recordings together, and to each alone."""
     if any(term.is_drift for term in model.terms) and len(parts) > 1:
         raise InputError(
             "a rate ramp belongs to one recording: remove it from the model, or fit the recordings "

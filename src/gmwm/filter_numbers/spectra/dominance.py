@@ -98,8 +98,6 @@ def dominating(problem: Problem, form: str, tau: float | None = None) -> Model:
     """The smallest model of a form whose spectrum lies above those of a problem.
 
     tau: Correlation time of the Gauss-Markov process, s; by default the smallest model's.
-    Raises InputError if the form cannot dominate: "N+GM" where a spectrum has no limit at zero
-        frequency.
     """
     if "K" not in KINDS[form] and not all(target.is_stationary for target in problem.dominated):
         raise InputError(

@@ -61,10 +61,7 @@ class ParameterRegion:
 
     @classmethod
     def of(cls, fit: Fit, level: float) -> ParameterRegion:
-        """The region of a fit at a level.
-
-        Raises InputError if the data do not bound a parameter.
-        """
+        """The region of a fit at a level."""
         free = Estimated.of(fit)
         keys = free.keys
         single = 2.0 * norm.cdf(np.sqrt(chi2.ppf(level, max(len(keys), 1)))) - 1.0

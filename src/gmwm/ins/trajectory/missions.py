@@ -7,7 +7,6 @@ from itertools import cycle
 from scipy.optimize import brentq
 
 from gmwm._core.checks import positive
-from gmwm.errors import InputError
 from gmwm.ins.trajectory.manoeuvres import (
     Accelerate,
     Climb,
@@ -23,7 +22,7 @@ from gmwm.ins.trajectory.manoeuvres import (
 from gmwm.ins.trajectory.trajectory import Trajectory
 
 _START = (math.radians(46.52), math.radians(6.57), 400.0)
-_RAMP = 2.0  # s, of the helicopter's turns
+_RAMP, _SPACING = 2.0, 300.0  # s, of the helicopter's turns; m, between its strips
 _CORNER, _CORNER_RATE = 0.5 * math.pi, math.radians(22.0)  # of streets
 _BLOCKS = ((12.0, 15.0, 1.0), (20.0, 0.0, 1.0), (8.0, 35.0, -1.0), (15.0, 5.0, 1.0))
 """Streets of a town: s straight on, s at a light, side of the corner."""
@@ -38,14 +37,11 @@ def helicopter_mapping(
     dt: float = 0.01,
     start: Lla = _START,
     heading: float = 0.5,
-    speed: float = 30.0,
     strip: float = 3000.0,
-    spacing: float = 300.0,
 ) -> Trajectory:
     """Airborne laser scanning: a vertical climb, then parallel strips flown to and fro.
 
-    Raises InputError if an argument is not positive, or the spacing is wider than the diameter of a
-    turn.
+    Raises InputError if an argument is not positive.
 
     Parameters
     ----------
@@ -53,17 +49,12 @@ def helicopter_mapping(
         s.
     start : (3,) sequence, optional
         Latitude, longitude, rad, and height, m.
-    heading, speed : float, optional
-        Of the first strip, rad, and m/s.
+    heading : float, optional
+        Of the first strip, rad.
     strip : float, optional
         Length that each strip and the next have beside each other, m.
-    spacing : float, optional
-        Distance of one strip from the next, m. If it is less than the diameter of a turn at
-        6 deg/s, the turn begins to the other side.
     """
-    rate = math.radians(6.0)
-    strip, spacing = positive("strip", strip), positive("spacing", spacing)
-    speed = positive("speed", speed)
+    rate, speed, strip = math.radians(6.0), 30.0, positive("strip", strip)
 
     def end_of_turn(away: float) -> tuple[float, float]:
         """How far out and aside a turn ends that first turns away, m."""
@@ -71,13 +62,8 @@ def helicopter_mapping(
         more, back = displacement(Pulse(math.pi + away, rate, _RAMP), -away, speed)
         return ahead + more, aside + back
 
-    widest = end_of_turn(0.0)[1]
-    if spacing > widest:
-        raise InputError(
-            f"spacing = {spacing:g}: turns at {speed:g} m/s are {widest:.0f} m wide; give at most "
-            "that"
-        )
-    away = float(brentq(lambda angle: end_of_turn(angle)[1] - spacing, 0.0, 0.75 * math.pi))
+    # Strips are closer than a turn is wide, which therefore begins to the other side.
+    away = float(brentq(lambda angle: end_of_turn(angle)[1] - _SPACING, 0.0, 0.75 * math.pi))
     # A turn ends farther out than it began by the overshoot, and so does every other strip.
     length = strip + max(end_of_turn(away)[0], 0.0)
 
@@ -125,21 +111,12 @@ def fixed_wing_loiter(
     dt: float = 0.01,
     start: Lla = _START,
     heading: float = 0.0,
-    speed: float = 22.0,
-    radius: float = 200.0,
 ) -> Trajectory:
     """A small fixed-wing aircraft that circles, now right, now left, with climbs between.
 
-    Raises InputError if an argument is not positive.
-
-    Parameters
-    ----------
-    duration, dt, start, heading : optional
-        See `helicopter_mapping`.
-    speed, radius : float, optional
-        Speed, m/s, and radius of the circles, m.
+    The arguments are those of `helicopter_mapping`.
     """
-    rate = positive("speed", speed) / positive("radius", radius)
+    speed, rate = 22.0, 0.11  # m/s, rad/s: circles of 200 m
 
     def manoeuvres() -> Iterator[Manoeuvre]:
         yield from (Straight(20.0), Climb(60.0, 2.0))

@@ -183,11 +183,7 @@ _LIMITS |= dict.fromkeys(("longitude", "roll", "yaw"), _MANY_TURNS)
 
 
 def read_log(path: Path) -> tuple[float, float, FloatArray, FloatArray]:
-    """First time stamp, sampling interval, s, positions and attitudes, (n + 1, 3), of a log.
-
-    Raises InputError if a column is missing, a value is missing or impossible, or the time stamps
-        are not even.
-    """
+    """First time stamp, sampling interval, s, positions and attitudes, (n + 1, 3), of a log."""
     log = LogColumns.find(path, _quantities, (TIME, *_LIMITS, "height"), _HEADER)
     values = log.load()
     for name, column in values.items():
@@ -251,10 +247,7 @@ def unwrapped_longitudes(lla: FloatArray) -> FloatArray:
 
 
 def unwrapped_angles(rpy: FloatArray) -> FloatArray:
-    """Roll, pitch and yaw, (n + 1, 3), rad, that do not jump at +-180 deg.
-
-    Raises InputError if roll or yaw still turn by more than 90 deg between epochs.
-    """
+    """Roll, pitch and yaw, (n + 1, 3), rad, that do not jump at +-180 deg."""
     result = np.unwrap(np.asarray(rpy, dtype=float), axis=0)
     result[:, 1] = rpy[:, 1]
     steps = np.abs(np.diff(result, axis=0))
