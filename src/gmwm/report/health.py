@@ -56,7 +56,7 @@ def findings(calibration: Calibration) -> list[Notice]:
         for name, fit in calibration.items()
         for notice in fit.notices
         if notice.issue.topic == "departure"
-        or notice.code == "noise-scales"
+        or notice.code in ("noise-scales", "curve-lags")
         or (notice.severity == "bad" and notice.code not in known)
     ]
     if calibration.is_examined:

@@ -333,7 +333,7 @@ def actions(calibration: Calibration) -> list[str]:
     found.sort(key=lambda n: (n not in units, not n.issue.spoils, n.code not in _DEPARTURES))
     departed = any(each.issue.topic == "departure" for each in found)
     late = any(each.code == "curve-lags" for each in found)
-    consequences = ("unsteady",) * departed + tuple(_DEPARTURES) * late
+    consequences = ("unsteady",) * departed + (*_DEPARTURES, "misfit", "level-missed") * late
     for notice in worst_first(found):
         key = "departure" if notice.code in _DEPARTURES else notice.code
         done = notice.code in _DONE and notice.severity != "bad"

@@ -208,3 +208,17 @@ def test_white_noise_behind_a_low_pass_is_one_row(capsys):
     assert f"N {cal.numbers['gyro_x'].text('N')} " in row
     assert float(found[3]) == pytest.approx(10.0, rel=0.1)
     assert "low-pass noise   " not in text and "All notices" in text
+
+
+def test_a_thermometer_that_is_late_is_the_first_thing_to_mend():
+    """The screen said only: slow period, find the cause, such as the temperature."""
+    phase = 4.0 * np.pi * np.arange(4096) / 4096
+    bias = 0.02 * -np.cos(phase) + 0.008 * np.cos(phase) ** 2
+    x = bias + (WhiteNoise(1e-3) + RandomWalk(5e-5)).simulate(4096, 0.5, 3)
+    arrays = {"gyro_x": x, "temperature": 45.0 - 20.0 * np.cos(phase - 0.4)}
+    rec = Recording.from_arrays(arrays, 2.0, {"gyro": "rad/s", "temperature": "degC"})
+    cal = gmwm.calibrate(rec, "N + K", covariates={"temperature": "auto"}, jobs=1)
+    to_do = " ".join(summary_text(cal).partition("What to do")[2].split())
+    assert "1. gyro_x: the bias and temperature are not in step" in to_do
+    assert "check the thermometer's clock" in to_do
+    assert "slow period" not in to_do
