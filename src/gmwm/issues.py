@@ -8,15 +8,13 @@ sentence and the hint that people read. Programs decide by codes, values and the
 To add an issue, add its entry to the section of its room in issues.toml and report it by `notice`.
 """
 
-from __future__ import annotations
-
 import math
 import tomllib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, fields
 from pathlib import Path
 from string import Formatter
-from typing import Any, Literal
+from typing import Any, Literal, Self
 
 from gmwm.errors import MissingNameError, printable
 
@@ -129,7 +127,7 @@ class Notice:
         return {**vars(self), "values": values}
 
     @classmethod
-    def from_dict(cls, content: Mapping[str, Any]) -> Notice:
+    def from_dict(cls, content: Mapping[str, Any]) -> Self:
         """Inverse of `to_dict`.
 
         Raises ValueError if the content is not a notice.

@@ -1,12 +1,10 @@
 """What a file is written from: the numbers of an IMU, found by `bound` or `reduce`, or given."""
 
-from __future__ import annotations
-
 import re
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -60,7 +58,7 @@ class Axis:
         """Standard deviation of the start bias with the Gauss-Markov process, u."""
         return float(np.hypot(self.sigma, self.initial_sd))
 
-    def moved(self, tau: float) -> Axis:
+    def moved(self, tau: float) -> Self:
         """With a Gauss-Markov process of another correlation time that bounds its own.
 
         The spectral density of (sigma, tau) is below that of (sigma', tau') at all frequencies if
@@ -167,7 +165,7 @@ class ImuNumbers:
     topic: str = ""
     reserved: tuple[str, ...] = ()
 
-    def by_axis(self) -> ImuNumbers:
+    def by_axis(self) -> Self:
         """The same for a file that has the numbers of each axis."""
         gyro, accel = (replace(each, common=None, shared_nees=None) for each in self.triads)
         return replace(self, gyro=gyro, accel=accel)

@@ -1,10 +1,8 @@
 """The axes that filter numbers are made for: one error model each, from any source."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Concatenate, ParamSpec, Protocol, cast, overload
+from typing import Concatenate, ParamSpec, Protocol, Self, cast, overload
 
 import numpy as np
 
@@ -101,7 +99,7 @@ class SensorAxes:
     @classmethod
     def of(
         cls, source: One | Several, dt: float | None, bias_sd: Sd, rate: float | None = None
-    ) -> SensorAxes:
+    ) -> Self:
         """Axes of a model, a fit, a calibration or a mapping."""
         dt = checks.sampling_interval(DT if dt is rate is None else dt, rate)
         is_file = isinstance(source, str) and source.endswith(".json")

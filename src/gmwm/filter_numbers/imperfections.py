@@ -1,9 +1,8 @@
 """Errors that static data cannot show and motion brings, as terms of an error model."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
+from typing import Self
 
 import numpy as np
 
@@ -31,7 +30,7 @@ class Motion:
     memory: float
 
     @classmethod
-    def of(cls, motion: str | Motion | Recording) -> Motion:
+    def of(cls, motion: str | Self | Recording) -> Self:
         """A usual motion by name, or the motion of a recording.
 
         Raises

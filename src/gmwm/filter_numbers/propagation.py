@@ -8,12 +8,11 @@ whose time-invariant case this is. The error of a process without states is inte
 spectrum.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from math import factorial
+from typing import Self
 
 import numpy as np
 from scipy.special import gamma
@@ -64,18 +63,18 @@ class Chain:
     is_gained: bool = False
 
     @classmethod
-    def usual(cls, quantity: str) -> Chain:
+    def usual(cls, quantity: str) -> Self:
         """The chain of a gyro, an accelerometer or an unknown axis."""
         return cls(tuning.ORDER[quantity], tuning.FIX_SD[quantity])
 
     @classmethod
-    def of_poses(cls, quantity: str, keyframe: float) -> Chain:
+    def of_poses(cls, quantity: str, keyframe: float) -> Self:
         """The chain of relative poses, an interval (s) apart."""
         order, sd = tuning.KEYFRAME_ORDER[quantity], tuning.KEYFRAME_SD[quantity]
         return cls(order, sd, tuning.KEYFRAMES * keyframe, keyframe, is_relative=True)
 
     @property
-    def judged(self) -> list[Chain]:
+    def judged(self) -> list[Self]:
         """The chain; of one integral, also its gain since the last fix.
 
         An absolute fix of half a degree hides the gain of a minute, which is what counts for dead

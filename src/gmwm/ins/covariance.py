@@ -1,12 +1,10 @@
 """Covariance analysis: the true errors of a filter with a wrong model, without Monte Carlo."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from scipy.linalg import block_diag, eigh
@@ -128,7 +126,7 @@ class Course:
     track: Track
 
     @classmethod
-    def of(cls, scenario: Scenario, imu: Imu | None = None) -> Course:
+    def of(cls, scenario: Scenario, imu: Imu | None = None) -> Self:
         """Cut a scenario; ``imu`` is that of its trajectory, error-free."""
         trajectory = scenario.trajectory
         imu = emulate(trajectory) if imu is None else imu

@@ -4,10 +4,9 @@ Structures of models differ between recordings of one sensor far more than curve
 uses the models only for the covariances of the wavelet variances.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,7 +45,7 @@ class Curve:
     relative: FloatArray
 
     @classmethod
-    def of(cls, fit: Fit, noises: Sequence[Model], *, drifting: bool) -> Curve:
+    def of(cls, fit: Fit, noises: Sequence[Model], *, drifting: bool) -> Self:
         """The data of a fit, up to the last level that is known well enough.
 
         Covariances are those of the mean spectrum of all recordings. If they are equal, it is
@@ -148,7 +147,7 @@ class Equality:
         return tuple(sorted(found, key=lambda each: -each.sigma))
 
     @classmethod
-    def of(cls, fits: Sequence[Fit]) -> Equality:
+    def of(cls, fits: Sequence[Fit]) -> Self:
         """The test for fits to several recordings of one channel at one rate."""
         drifting = any(term.is_drift for fit in fits for term in fit.model.terms)
         terms = [tuple(t for t in fit.model.terms if not t.is_drift) for fit in fits]

@@ -1,7 +1,5 @@
 """Which recordings a fleet has, how each is calibrated, here or elsewhere, and where it is kept."""
 
-from __future__ import annotations
-
 import glob
 import hashlib
 import json
@@ -14,7 +12,7 @@ from dataclasses import dataclass, replace
 from inspect import signature
 from itertools import count
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, NamedTuple
+from typing import Annotated, Any, ClassVar, NamedTuple, Self
 
 from pydantic import StringConstraints
 
@@ -61,7 +59,7 @@ class Task:
     version: str
 
     @classmethod
-    def of(cls, model: Any, options: Mapping[str, Any]) -> Task:
+    def of(cls, model: Any, options: Mapping[str, Any]) -> Self:
         """The task of `fleet`, with its options checked before any work."""
         from gmwm._core import __version__
 

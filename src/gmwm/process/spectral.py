@@ -10,12 +10,11 @@ levels: a spectrum is evaluated once, and all variances are one matrix product. 
 weights of their own (`gmwm.process.wavelets`); docs/derivations.md has both.
 """
 
-from __future__ import annotations
-
 from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache, wraps
+from typing import Self
 
 import numpy as np
 import numpy.typing as npt
@@ -215,7 +214,7 @@ class Panels:
     share: FloatArray
 
     @classmethod
-    def of(cls, nodes: FloatArray, width: float = PANEL) -> Panels:
+    def of(cls, nodes: FloatArray, width: float = PANEL) -> Self:
         """Those of nodes (K,), panel by panel: log tan(pi f) of each, f in cycles per sample."""
         panel = np.floor(nodes / width)
         starts = np.flatnonzero(np.diff(panel, prepend=-np.inf))

@@ -1,10 +1,9 @@
 """Linear state-space form of an error process, as a Kalman filter wants it."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 
@@ -61,7 +60,7 @@ class StateSpace:
         output: Sequence[float] | FloatArray | None = None,
         mean: Sequence[float] | None = None,
         measurement_noise: float = 0.0,
-    ) -> StateSpace:
+    ) -> Self:
         """States without noise that start at zero, and whose output is the first, but as given."""
         p = len(names)
         return cls(
@@ -75,17 +74,17 @@ class StateSpace:
         )
 
     @classmethod
-    def white(cls, variance: float) -> StateSpace:
+    def white(cls, variance: float) -> Self:
         """No states, measurement noise only."""
         return cls.of((), np.zeros(0), output=(), measurement_noise=variance)
 
     @classmethod
-    def scalar(cls, name: str, phi: float, q: float, p0: float) -> StateSpace:
+    def scalar(cls, name: str, phi: float, q: float, p0: float) -> Self:
         """One state with transition ``phi``, driving variance ``q``, initial variance ``p0``."""
         return cls.of((name,), np.array([phi]), np.array([q]), np.array([p0]))
 
     @classmethod
-    def stack(cls, parts: Sequence[StateSpace]) -> StateSpace:
+    def stack(cls, parts: Sequence[Self]) -> Self:
         """The state space of a sum of independent processes."""
         return cls(
             block_diagonal([part.transition for part in parts]),

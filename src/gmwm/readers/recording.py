@@ -1,11 +1,9 @@
 """A static recording: named channels, of equal rate or each at its own; missing samples."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -38,7 +36,7 @@ class Missing:
     longest: int = 0
 
     @classmethod
-    def of(cls, values: FloatArray) -> Missing:
+    def of(cls, values: FloatArray) -> Self:
         """Count NaN."""
         gone = np.isnan(values)
         edges = np.flatnonzero(np.diff(gone, prepend=False, append=False))
@@ -273,7 +271,7 @@ class Recording(Mapping[str, Channel], Printed):
         units: Mapping[str, str],
         source: str = "",
         notices: Sequence[Notice] = (),
-    ) -> Recording:
+    ) -> Self:
         """Build a recording from arrays in any unit.
 
         Parameters
@@ -348,7 +346,7 @@ class Recording(Mapping[str, Channel], Printed):
     def _fastest(self) -> Channel:
         return max(self.inertial or self.channels, key=lambda channel: channel.n)
 
-    def by_rate(self) -> tuple[Recording, ...]:
+    def by_rate(self) -> tuple[Self, ...]:
         """The recordings of one sampling rate each that make up this one; usually itself.
 
         The auxiliary channels, which explain the others, are in all of them.
@@ -362,7 +360,7 @@ class Recording(Mapping[str, Channel], Printed):
 
         return tuple(replace(self, channels=channels(kind)) for kind in kinds)
 
-    def of_one_rate(self, what: str) -> Recording:
+    def of_one_rate(self, what: str) -> Self:
         """The recording, if its sensors have one sampling rate, which ``what`` needs."""
         parts = self.by_rate()
         if len(parts) > 1:
@@ -377,7 +375,7 @@ class Recording(Mapping[str, Channel], Printed):
         """Length, s."""
         return self.n * self.dt
 
-    def part(self, start: float = 0.0, stop: float | None = None) -> Recording:
+    def part(self, start: float = 0.0, stop: float | None = None) -> Self:
         """The recording between two times, whose own times count from ``start``.
 
         Parameters

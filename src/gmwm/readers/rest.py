@@ -1,11 +1,9 @@
 """Units, columns and scales that gravity, its turns, or the noise at rest contradict."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -192,7 +190,7 @@ class _Sensor:
         self.size_error = self.scatter * math.sqrt(len(axes) / axes[0].size)
 
     @classmethod
-    def of(cls, recording: Recording, unit_of: Mapping[str, str], sensor: str) -> _Sensor | None:
+    def of(cls, recording: Recording, unit_of: Mapping[str, str], sensor: str) -> Self | None:
         """None if axes are absent, empty (an accelerometer needs all three) or differ in unit."""
         names = [name for axis in AXES if (name := f"{sensor}_{axis}") in recording]
         units = {unit_of[name] for name in names if name in unit_of}

@@ -6,9 +6,8 @@ not matter, and is then one term of given shape for the ranking; the fit of the 
 estimates it anew.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 
@@ -92,7 +91,7 @@ class _Beside:
         covariance: FloatArray,
         fastest: float,
         left_out: type[Process] | None = None,
-    ) -> _Beside:
+    ) -> Self:
         """With Gauss-Markov processes slower than ``fastest`` samples, and without a kind."""
         scales, root = Scales.of(wv), weight_root(covariance)
         design, atoms, matrix = dictionary(scales, extra)

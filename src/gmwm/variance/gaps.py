@@ -7,11 +7,10 @@ them are left out. What the others have too much variance by is known without a 
 subtracted level by level; see docs/derivations.md.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Self
 
 import numpy as np
 
@@ -33,7 +32,7 @@ class Runs:
     n: int
 
     @classmethod
-    def of(cls, values: FloatArray) -> Runs:
+    def of(cls, values: FloatArray) -> Self:
         """The runs of a series (n,) in which NaN stands for missing samples."""
         present = np.concatenate([[False], ~np.isnan(values), [False]])
         edges = np.flatnonzero(present[1:] != present[:-1])

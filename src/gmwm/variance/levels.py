@@ -1,12 +1,11 @@
 """The levels of a series, their coefficients, and the spectrum that they imply."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
+from typing import Self
 
 import numpy as np
 
@@ -224,7 +223,7 @@ class Levels:
     @classmethod
     def of(
         cls, values: FloatArray, runs: Runs, wavelet: str, apart: BoolArray | None = None
-    ) -> Levels:
+    ) -> Self:
         """The levels of a series about its mean; gaps apart are found unless they are given."""
         if wavelet != "haar":
             number = known_wavelet(wavelet).levels(runs.longest)

@@ -1,11 +1,10 @@
 """The spectrum of a series, for the uncertainty of its variances: power laws and what they miss."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property, lru_cache, partial
+from typing import Self
 
 import numpy as np
 from scipy import fft
@@ -41,7 +40,7 @@ class Periodogram:
     block: Array
 
     @classmethod
-    def of(cls, values: FloatArray, integral: FloatArray) -> Periodogram:
+    def of(cls, values: FloatArray, integral: FloatArray) -> Self:
         """From a complete series, by sine tapers (Riedel & Sidorenko 1995).
 
         values: (n,), about their mean.

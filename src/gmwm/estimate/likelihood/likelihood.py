@@ -9,11 +9,9 @@ Whittle's likelihood (1953, *Arkiv for Matematik* 2, 423-434) is that of the inn
 series under starting values that are close, which leaves no leakage; see docs/derivations.md.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -60,7 +58,7 @@ class Regression:
     log_determinant: float
 
     @classmethod
-    def of(cls, products: FloatArray) -> Regression:
+    def of(cls, products: FloatArray) -> Self:
         """From the (1 + k, 1 + k) products of the whitened series and regressors."""
         information = products[1:, 1:]
         beta = np.linalg.solve(information, products[1:, 0])
@@ -111,7 +109,7 @@ class Columns:
         self.matrix = np.column_stack(columns)
 
     @classmethod
-    def without_regressors(cls, values: FloatArray, dt: float) -> Columns:
+    def without_regressors(cls, values: FloatArray, dt: float) -> Self:
         """A series of zero mean alone."""
         columns = cls(values, dt, None, False)
         columns.matrix = np.ascontiguousarray(values[:, None])
@@ -308,7 +306,7 @@ class Series:
     @classmethod
     def of(
         cls, model: Model, channel: Channel, start: Process | Model | None, *, exact: bool
-    ) -> Series:
+    ) -> Self:
         """Check the samples and find starting values.
 
         exact: Whether for an exact likelihood, which needs state spaces and copes with gaps.

@@ -8,10 +8,8 @@ equals its degrees of freedom (the moment estimator of a random effect, DerSimon
 *Controlled Clinical Trials* 7, 177-188). It stays zero where the model is right.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Self
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -46,7 +44,7 @@ class Weights:
     is_literal: bool = False
 
     @classmethod
-    def of(cls, name: str, wv: WaveletVariance, is_literal: bool = False) -> Weights:
+    def of(cls, name: str, wv: WaveletVariance, is_literal: bool = False) -> Self:
         """Weights for these wavelet variances.
 
         Raises InputError if they are "data" and the variances come without a covariance of their

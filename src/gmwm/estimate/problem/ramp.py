@@ -10,11 +10,10 @@ beside the noise. The weight of each is the restricted likelihood of the block m
 slope has no part (Harville 1974, *Biometrika* 61, 383-385).
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -174,7 +173,7 @@ class Walks:
     likelihoods: FloatArray
 
     @classmethod
-    def beside(cls, wv: WaveletVariance, psd: PSD, largest: float = 0.0) -> Walks | None:
+    def beside(cls, wv: WaveletVariance, psd: PSD, largest: float = 0.0) -> Self | None:
         """Beside a noise of spectrum ``psd``, at least up to K = ``largest``.
 
         Returns: ``None`` where too few blocks exist.

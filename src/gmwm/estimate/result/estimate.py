@@ -1,11 +1,9 @@
 """One estimated parameter, and where in an Allan plot it was read."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
 from annotated_types import Ge, Le
@@ -81,7 +79,7 @@ class Estimate:
         stderr: float | None,
         interval: tuple[float, float],
         wv: WaveletVariance,
-    ) -> Estimate:
+    ) -> Self:
         """An estimate of the parameter of a process that has one, SI; ``wv`` has the units."""
         (parameter,) = process.parameters
         unit, meaning = parameter.unit, parameter.meaning

@@ -1,9 +1,8 @@
 """The confidence region of a fit, and the largest spectrum in it at each frequency."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 from scipy.optimize import minimize
@@ -29,7 +28,7 @@ class Estimated:
     covariance: FloatArray
 
     @classmethod
-    def of(cls, fit: Fit) -> Estimated:
+    def of(cls, fit: Fit) -> Self:
         """The parameters of a fit: amplitudes at upper limits and rate ramps count as known."""
         drifts = {p.key for p in fit.model.parameters if fit.model.terms[p.term].is_drift}
         known = drifts | set(fit.upper_bounds)
@@ -60,7 +59,7 @@ class ParameterRegion:
     root: FloatArray
 
     @classmethod
-    def of(cls, fit: Fit, level: float) -> ParameterRegion:
+    def of(cls, fit: Fit, level: float) -> Self:
         """The region of a fit at a level."""
         free = Estimated.of(fit)
         keys = free.keys
@@ -132,7 +131,7 @@ class _Spectrum:
     dt: float
 
     @classmethod
-    def of(cls, region: ParameterRegion, dt: float) -> _Spectrum:
+    def of(cls, region: ParameterRegion, dt: float) -> Self:
         model = region.model
         counted = [i for i, t in enumerate(model.terms) if not (t.is_line or t.is_drift)]
         found = {p.key: (p.term, p.parameter.name) for p in model.parameters}

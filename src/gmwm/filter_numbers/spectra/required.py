@@ -1,9 +1,8 @@
 """The part of an error model that the numbers of a small filter dominate, and the rest."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 
@@ -41,7 +40,7 @@ class RequiredSpectrum:
     notices: tuple[Notice, ...]
 
     @classmethod
-    def of(cls, model: Model, dt: float, horizon: float, unit: str = "u") -> RequiredSpectrum:
+    def of(cls, model: Model, dt: float, horizon: float, unit: str = "u") -> Self:
         """Sort the terms of a model with given parameters; the unit is for notices.
 
         Raises InputError if a term can only be simulated, or nothing is left.

@@ -1,9 +1,8 @@
 """What aids an inertial navigator: GNSS fixes, barometric heights, standstills; and outages."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 
@@ -103,7 +102,7 @@ class Fixes:
         """Class of the kind."""
         return MEASUREMENTS[KINDS[self.kind]]
 
-    def part(self, kept: BoolArray) -> Fixes:
+    def part(self, kept: BoolArray) -> Self:
         """Some of the fixes."""
         return replace(self, time=self.time[kept], value=self.value[kept], sd=self.sd[kept])
 
@@ -157,7 +156,7 @@ class Aiding:
         if self.gate is not None:
             checks.share("gate", self.gate, tuning.GATE)
 
-    def __add__(self, other: Aiding) -> Aiding:
+    def __add__(self, other: Self) -> Self:
         """Both together; the antenna and the noise of the first, or the other's barometer."""
         own = self if self.barometer_sd else other
         sd, tau, fixes = own.barometer_sd, own.barometer_tau, (*self.fixes, *other.fixes)
@@ -167,7 +166,7 @@ class Aiding:
         """The first fixes of a kind, ``None`` if there are none."""
         return next((each for each in self.fixes if each.kind == kind and each.time.size), None)
 
-    def without(self, outages: Iterable[Outage]) -> Aiding:
+    def without(self, outages: Iterable[Outage]) -> Self:
         """The same without the GNSS fixes of the outages."""
         spans = [(o.start + tuning.SAME_TIME, o.end - tuning.SAME_TIME) for o in outages]
         result = []
@@ -182,11 +181,11 @@ class Aiding:
             result.append(replace(fixes, sd=sd).part(kept))
         return replace(self, fixes=tuple(result))
 
-    def unused(self) -> Aiding:
+    def unused(self) -> Self:
         """The same fixes without a component that is used: times alone."""
         return replace(self, fixes=tuple(replace(f, sd=np.zeros_like(f.sd)) for f in self.fixes))
 
-    def noisy(self, rng: np.random.Generator) -> Aiding:
+    def noisy(self, rng: np.random.Generator) -> Self:
         """The same with noise added to error-free fixes, the coloured one included."""
         fixes = []
         for each in self.fixes:
@@ -281,35 +280,21 @@ def standstills(trajectory: Trajectory, interval: float = 1.0, sd: float = 0.01)
     return Aiding((fixes.part(speed < _STANDSTILL),))
 
 
-def poses(
-    trajectory: Trajectory,
-    interval: float = 1.0,
-    *,
-    position_sd: float | Sequence[float] = tuning.POSE_SD[0],
-    attitude_sd: float | Sequence[float] = tuning.POSE_SD[1],
-) -> Aiding:
-    """Error-free absolute poses, as of a lidar in a map; m and rad; see `gnss`."""
-    return _along(trajectory, interval, {"position": position_sd, "attitude": attitude_sd})
+def poses(trajectory: Trajectory, interval: float = 1.0) -> Aiding:
+    """Error-free absolute poses, as of a lidar in a map; see `gnss`."""
+    position, attitude = tuning.POSE_SD
+    return _along(trajectory, interval, {"position": position, "attitude": attitude})
 
 
-def odometry(
-    trajectory: Trajectory,
-    interval: float = 1.0,
-    *,
-    way_sd: float | Sequence[float] = tuning.ODOMETRY_SD[0],
-    turn_sd: float | Sequence[float] = tuning.ODOMETRY_SD[1],
-) -> Aiding:
-    """Error-free relative poses between keyframes, of cameras or a lidar; m, rad; see `gnss`."""
-    return _along(trajectory, interval, {"displacement": way_sd, "rotation": turn_sd})
+def odometry(trajectory: Trajectory, interval: float = 1.0) -> Aiding:
+    """Error-free relative poses between keyframes, of cameras or a lidar; see `gnss`."""
+    way, turn = tuning.ODOMETRY_SD
+    return _along(trajectory, interval, {"displacement": way, "rotation": turn})
 
 
-def wheels(
-    trajectory: Trajectory,
-    interval: float = 0.1,
-    sd: float | Sequence[float] = tuning.WHEEL_SD,
-) -> Aiding:
+def wheels(trajectory: Trajectory, interval: float = 0.1) -> Aiding:
     """Error-free velocities forward, right and down of a car that does not slip; see `gnss`."""
-    return _along(trajectory, interval, {"odometer": sd})
+    return _along(trajectory, interval, {"odometer": tuning.WHEEL_SD})
 
 
 def _along(

@@ -12,12 +12,10 @@ The textbook form subtracts numbers of order m a from each other and loses all d
 here both terms are of third order in a and computed as such.
 """
 
-from __future__ import annotations
-
 import cmath
 import math
 from math import factorial
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
@@ -70,7 +68,7 @@ class GaussMarkov(Process):
         super().__init__(sigma, tau)
 
     @classmethod
-    def of_peak(cls, deviation: float, averaging: float) -> GaussMarkov:
+    def of_peak(cls, deviation: float, averaging: float) -> Self:
         """The process whose Allan deviation has its top at a height (u) and a place (s)."""
         return cls(deviation / _PEAK, averaging / _PEAK_AT)
 

@@ -4,13 +4,12 @@ A layout says how one record is laid out. Those with a name are the formats of s
 users write them (increments over the sampling interval, native order), and that of KF-GINS.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Self
 
 import numpy as np
 
@@ -84,7 +83,7 @@ class BinaryTable(Table):
     layout: BinaryLayout
 
     @classmethod
-    def open(cls, path: Path, layout: BinaryLayout) -> BinaryTable:
+    def open(cls, path: Path, layout: BinaryLayout) -> Self:
         """Look at the size of a file and its first times."""
         record, size = layout.record.itemsize, path.stat().st_size
         count, rest = divmod(size, record)
