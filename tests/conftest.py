@@ -117,10 +117,11 @@ def no_pages(monkeypatch):
     from gmwm.calibration.calibration import Calibration
     from gmwm.ins import Navigated
     from gmwm.ins.simulation.validation import Validation
+    from gmwm.motion import InMotion
 
     def empty(self, path, *_, **__):
         Path(path).touch()
         return path
 
-    for each in (Calibration, Navigated, Validation):
+    for each in (Calibration, InMotion, Navigated, Validation):
         monkeypatch.setattr(each, "report", empty)

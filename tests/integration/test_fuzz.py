@@ -11,7 +11,7 @@ from marks import slow
 
 SOME = {"npy": 150, "odd": 2, "document": 10, "study": 6, "field": 12, "fleet": 2}
 SOME |= {"gzip": 40, "datasheet": 60}
-SOME |= {"mat": 3, "mat73": 5, "hdf5": 3}  # each is first tried in a process of its own
+SOME |= {"mat": 2, "mat73": 5, "hdf5": 2}  # each is first tried in a process of its own
 
 
 @pytest.mark.parametrize("name", sorted(fuzz.KINDS))
@@ -25,7 +25,7 @@ FOUND = [
     ("text", 0, 60),  # every chosen channel was auxiliary
     ("odd", 0, 2),  # 1e-200
     slow("odd", 0, 4),  # alternating values
-    ("odd", 0, 13),  # a square wave
+    slow("odd", 0, 13),  # a square wave
     ("odd", 0, 29),  # a spike of 1e100
     ("records", 2, 30),  # numbers beyond all in the unit of the layout
     ("datasheet", 2, 46),  # a boolean that is none
@@ -34,7 +34,7 @@ FOUND = [
     slow("odd", 2, 2),  # a term that the others explain
     ("feather", 1, 268),  # a name that is no text
     ("fleet", 1, 50),  # a list in place of a mapping
-    ("odd", 1, 12),  # a ramp without any noise
+    slow("odd", 1, 12),  # a ramp without any noise
     ("document", 1, 3381),  # a variance of 1e308
     slow("odd", 0, 136),  # half of the record without any error of prediction
     slow("odd", 11, 7),  # noise without slow parts, which leaves no drift

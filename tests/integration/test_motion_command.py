@@ -112,7 +112,7 @@ def test_command_rejects_increments_that_the_logger_thinned(run, samples, tmp_pa
     assert "each row of vehicle_imu covers 5 ms, and rows are 500 ms apart" in error
 
 
-def test_command_gives_numbers_of_a_class(run, files):
+def test_command_gives_numbers_of_a_class(run, files, no_pages):
     """And exports them."""
     code, out, error = run("motion", *files, "--at", "low", "-o", "low.json", "--report", "a.html")
     assert (code, error) == (0, "")

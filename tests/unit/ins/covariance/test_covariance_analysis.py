@@ -16,6 +16,7 @@ from gmwm.ins.sensors import SensorModels
 from gmwm.ins.simulation.consistency import GROUPS
 from gmwm.ins.simulation.trials import Scenario, Simulated, monte_carlo
 from gmwm.ins.trajectory.missions import car_drive, fixed_wing_loiter, helicopter_mapping
+from marks import slow
 
 DT = 0.05
 TRUTH = helicopter_mapping(duration=270.0, dt=DT).segment(70.0, 270.0)
@@ -281,7 +282,7 @@ def assert_agree(squares, chance=1e-5):
     assert np.abs(score).max() < t.isf(chance / components, runs - 1)
 
 
-@pytest.mark.parametrize("believed", [SLOW_ONLY, STATELESS])
+@pytest.mark.parametrize("believed", [SLOW_ONLY, slow(STATELESS)])
 def test_wrong_models_agree_with_monte_carlo(believed):
     aiding = gnss(TRUTH, coloured_sd=(0.5, 0.5, 1.0), coloured_tau=30.0) + barometer(TRUTH, 2.0)
     squares, study, found = agreement(replace(PLAIN, aiding=aiding), FULL, believed, 60, 1)

@@ -28,6 +28,12 @@ def alike(drive):
     return compare(drive[0], {"a": sensors(), "b": sensors(), "c": sensors(slow=1.01)})
 
 
+@pytest.fixture(scope="module")
+def equal(drive):
+    """Two equal models."""
+    return compare(drive[0], {"right": sensors(), "sure": sensors()})
+
+
 def replay_of(log):
     alignment = align(log)
     return Replay.of(log, alignment), alignment
@@ -84,35 +90,33 @@ def test_an_overconfident_model_with_the_same_errors_is_less_honest(drive):
     assert found.pairs["right", "sure"].score < 0.0
 
 
-def test_a_tie_names_the_models_whose_own_prediction_is_contradicted(drive):
+def test_a_tie_names_the_models_whose_own_prediction_is_contradicted(equal):
     """Errors that are as large, of which one model predicts half: it was "as good as the other"."""
-    found = compare(drive[0], {"right": sensors(), "sure": sensors()})
     honest = Ratio(1.0, 0.8, 1.2, 1.0)
     outcomes = {
-        "right": replace(found.outcomes["right"], nees=honest),
-        "sure": replace(found.outcomes["sure"], nees=replace(honest, value=1.64)),
+        "right": replace(equal.outcomes["right"], nees=honest),
+        "sure": replace(equal.outcomes["sure"], nees=replace(honest, value=1.64)),
     }
-    verdict = replace(found, outcomes=outcomes).verdict
+    verdict = replace(equal, outcomes=outcomes).verdict
     assert (verdict.code, verdict.values["contradicted"]) == ("tie", "sure")
     assert "but sure is overconfident, NEES 1.64." in verdict.text
     assert "right is" not in verdict.text
     outcomes["right"] = replace(outcomes["right"], nees=replace(honest, value=0.5))
-    assert "right is conservative, NEES 0.5; sure" in replace(found, outcomes=outcomes).verdict.text
+    assert "right is conservative, NEES 0.5; sure" in replace(equal, outcomes=outcomes).verdict.text
     outcomes = {name: replace(each, nees=honest) for name, each in outcomes.items()}
-    assert "NEES" not in replace(found, outcomes=outcomes).verdict.text
+    assert "NEES" not in replace(equal, outcomes=outcomes).verdict.text
 
 
-def test_a_model_that_predicts_its_errors_badly_is_no_tie(drive):
+def test_a_model_that_predicts_its_errors_badly_is_no_tie(equal):
     """The headline was a tie, with a NEES of 3.4 behind it."""
-    found = compare(drive[0], {"right": sensors(), "sure": sensors()})
     honest = Ratio(1.0, 0.8, 1.2, 1.0)
-    outcomes = {name: replace(each, nees=honest) for name, each in found.outcomes.items()}
+    outcomes = {name: replace(each, nees=honest) for name, each in equal.outcomes.items()}
     outcomes["sure"] = replace(outcomes["sure"], nees=replace(honest, value=3.4))
-    verdict = replace(found, outcomes=outcomes).verdict
+    verdict = replace(equal, outcomes=outcomes).verdict
     assert (verdict.code, verdict.where) == ("more-honest", "right")
     assert "sure is overconfident, NEES 3.4" in verdict.text
     outcomes["right"] = replace(outcomes["right"], nees=replace(honest, value=0.2))
-    verdict = replace(found, outcomes=outcomes).verdict
+    verdict = replace(equal, outcomes=outcomes).verdict
     assert verdict.text.startswith("Use none of right and sure")
 
 

@@ -131,7 +131,7 @@ def test_fixes_along_the_track_are_as_good_as_stamps_where_a_vehicle_rolls(by):
 )
 def test_noise_that_no_sensor_has_explains_nothing(spoil):
     """White noise of the gyros 200 to 600 times the model's was said to explain all."""
-    log, _ = emulated_log(5, duration=100.0, rate=10.0)
+    log, _ = emulated_log(5, duration=80.0, rate=10.0)
     navigated = Navigated.of(replace(log, imu=spoil(log.imu)))
     assert not navigated.faults.explained
     assert navigated.verdict.code == "lost"
