@@ -247,9 +247,10 @@ def thermometer_fails(means: FloatArray, samples: FloatArray) -> BoolArray:
 
     A temperature does neither: soaks end without a jump or, of steps, with one to another soak.
     """
-    there = np.flatnonzero(~np.isnan(means))
-    steps = np.abs(np.diff(samples[: tuning.SAMPLES_OF_STEP]))
-    x, found = means[there], np.zeros(means.size, dtype=bool)
+    there, found = np.flatnonzero(~np.isnan(means)), np.zeros(means.size, dtype=bool)
+    if there.size == 0:
+        return found
+    x, steps = means[there], np.abs(np.diff(samples[: tuning.SAMPLES_OF_STEP]))
     usual = ndimage.median_filter(x, 2 * tuning.WIDEST_SPIKE + 1, mode="nearest")
     least = tuning.USUAL_STEPS * np.median(np.append(steps[steps > 0.0], 0.0))
     least = max(least, tuning.LEAST_JUMP * np.ptp(usual))

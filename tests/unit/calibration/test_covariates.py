@@ -233,9 +233,10 @@ def test_what_cannot_be_a_covariate_is_said(covariates, said):
         gmwm.calibrate(recording(), MODEL, covariates=covariates, jobs=1)
 
 
-def test_a_constant_temperature_is_no_covariate():
-    with pytest.raises(gmwm.InputError, match="temperature does not change"):
-        calibrated(recording(temperature=np.full(SIZE, 30.0)))
+@pytest.mark.parametrize(("value", "said"), [(30.0, "does not change"), (np.nan, "has no values")])
+def test_a_constant_temperature_is_no_covariate(value, said):
+    with pytest.raises(gmwm.InputError, match=f"temperature {said}"):
+        calibrated(recording(temperature=np.full(SIZE, value)))
 
 
 @pytest.mark.slow
