@@ -102,7 +102,7 @@ MOST_FAULTS = 4  # at once: with more, nothing can be known
 ROUNDS, SETTLED_GAIN = 6, 0.05  # Gauss-Newton steps; the gain in log-likelihood that ends them
 # Shares of LARGEST_OFFSET and times LARGEST_ARM from which more of a time offset may be behind it.
 FAR_OFFSET, FAR_ARM = 0.9, 2.0
-AMBIGUOUS = 3.0  # of log-likelihood, within which two faults explain a log equally well
+AMBIGUOUS = 3.0  # of log-likelihood, within which two signs explain a log equally well
 MOST_OUTLIERS = 0.1  # fraction of the fixes, above which the filter and not the fixes is wrong
 # m, 1 sigma of a start whose fix is an outlier: farther ones count as outliers too, and more would
 # make the filter allow for products of errors.

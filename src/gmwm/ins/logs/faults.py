@@ -46,7 +46,7 @@ class Fault:
         left: where something else is wrong too, everything explains a part of it.
     cost: Gain that chance exceeds with the probability of a false alarm.
     values, errors: Estimates, in SI units, and standard errors.
-    rivals: Codes of other faults that explain the log equally well.
+    rivals: Codes of other faults that explain the log nearly as well.
     """
 
     code: str
@@ -242,7 +242,10 @@ def fitted(
             columns = _columns(along, partial(changed, base, is_smooth=True), theta, own)
             covariance = gauss_newton(along, columns, theta[own], own)[1]
         # The gain of the stamps is the exact one; it counts if it does not come of other noise.
-        gain = gain if regular > price + unusual else min(gain, regular - unusual)
+        least = price + unusual
+        if len(codes) > 1 and (arm := fitted(base, base, codes[1:])):  # explains most by itself
+            least = difference(arm[0].replay, base) + cost(1)
+        gain = gain if regular > least else min(gain, regular - unusual)
     gain, errors = relative_gain(gain, here), np.zeros(_CODES.size)
     errors[own] = np.sqrt(np.diag(covariance))
     if start != 0.0:
@@ -357,14 +360,12 @@ class Faults:
                     tried.append(far_heading(here))
                 if "clock-rate" not in known:
                     tried.append(far_rate(here))
-            # One that explains all comes before two, of which one may only be of the noise.
-            alone = [e for e in tried if len(e) == 1 and not contradicted(e[0].replay)]
-            best = max(filter(None, alone or tried), key=lambda e: e[0].excess, default=())
+            best = max(filter(None, tried), key=lambda faults: faults[0].excess, default=())
             if not best or best[0].excess <= 0.0:
                 break
             codes = {each.code for each in best}
             close = (each[0] for each in tried if each and codes.isdisjoint(e.code for e in each))
-            least = best[0].excess - tuning.AMBIGUOUS
+            least = best[0].excess - cost(1)
             rivals = [each.code for each in close if each.excess > least]
             if np.cos(best[0].replay.state.rpy[0]) < 0.0 and "axis-signs" not in codes:
                 rivals.append("axis-signs")  # no vehicle starts upside down
@@ -411,7 +412,7 @@ def fault_notice(fault: Fault, start: float) -> Notice:
     found = notice(fault.code, fault.where, values, severity="bad", variant=variant, **words)
     if not also:
         return found
-    text = f"{found.text}, or another fault that explains the log equally well ({also})"
+    text = f"{found.text}, or another fault that explains the log nearly as well ({also})"
     return replace(found, text=text, values={**values, "rivals": also})
 
 
