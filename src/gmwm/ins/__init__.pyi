@@ -21,7 +21,6 @@ from .filter.filter import (
     Solution as Solution,
     navigate as navigate,
 )
-from .filter.filter_kernels import integrate as integrate
 from .increments import (
     Imu as Imu,
     Preintegration as Preintegration,

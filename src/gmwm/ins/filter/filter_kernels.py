@@ -44,16 +44,12 @@ from gmwm.ins.geometry import (
     SEMI_MAJOR_AXIS,
     gravity,
     gravity_at,
-    matrix_from_rpy,
     orthonormalise,
     radii_at,
     rotate,
     rotation_coefficients,
-    rpy_from_matrix,
     turn_navigation,
 )
-from gmwm.ins.increments import Imu
-from gmwm.ins.trajectory.trajectory import NavState, Trajectory, check_latitudes
 
 
 @compiled()
@@ -125,44 +121,6 @@ def step(
     rotate(C, rx, ry, rz, sine, half)
     turn_navigation(C, zn, ze, zd)
     return fn, fe, fd
-
-
-@compiled()
-def _run(
-    samples: Samples, at: Kinematics, lla: FloatArray, velocity: FloatArray, C: FloatArray
-) -> None:
-    """Fill the epochs after the first one, where the solution is ``at``."""
-    a, f = samples.rotation, samples.velocity
-    now = Increments(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    for i in range(a.shape[0]):
-        before = now
-        now = Increments(a[i, 0], a[i, 1], a[i, 2], f[i, 0], f[i, 1], f[i, 2])
-        step(at, now, now if i == 0 else before, samples.dt)
-        if (i + 1) % _CLEAN_EVERY == 0:
-            orthonormalise(at.C)
-        set_vector(lla[i + 1], at.lla)
-        set_vector(velocity[i + 1], at.v)
-        set_matrix(C[i + 1], at.C)
-
-
-def integrate(imu: Imu, initial: NavState) -> Trajectory:
-    """Free inertial navigation: nothing but an IMU and where it started.
-
-    The n increments give n + 1 epochs; roll and yaw are within [-pi, pi], the longitude runs on
-    past 180 deg. The height of an unaided navigator is unstable: an error grows by a factor e in
-    about 570 s.
-
-    Raises InputError if it starts closer than 1 deg to a pole, where north cannot be steered by.
-    """
-    check_latitudes(initial.lla[None, :], "initial")
-    lla, velocity = np.empty((imu.n + 1, 3)), np.empty((imu.n + 1, 3))
-    matrix = np.empty((imu.n + 1, 3, 3))
-    lla[0], velocity[0], matrix[0] = initial.lla, initial.velocity, matrix_from_rpy(initial.rpy)
-    at = Kinematics(matrix[0].copy(), initial.velocity.copy(), initial.lla.copy())
-    _run(Samples(imu.rotation, imu.velocity, imu.dt), at, lla, velocity, matrix)
-    rpy = rpy_from_matrix(matrix)
-    rpy[0] = initial.rpy
-    return Trajectory(imu.dt, lla, velocity, rpy)
 
 
 PAUSED = -2  # returned by `run` when it is to be called again

@@ -5,8 +5,9 @@ import pytest
 from scipy.linalg import block_diag, expm
 
 import gmwm
+from free_inertial import integrate
 from gmwm import GaussMarkov, RandomWalk, RateRamp, Resonance, Sinusoid, WhiteNoise
-from gmwm.ins import Imu, NavState, SensorModels, integrate
+from gmwm.ins import Imu, NavState, SensorModels
 from gmwm.ins.filter.covariance_kernels import (
     error_rates,
     measurement_update,

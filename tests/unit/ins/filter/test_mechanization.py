@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 
 import gmwm
-from gmwm.ins import Trajectory, emulate, fixed_wing_loiter, helicopter_mapping, integrate
+from free_inertial import integrate
+from gmwm.ins import Trajectory, emulate, fixed_wing_loiter, helicopter_mapping
 from gmwm.ins.filter.filter_kernels import step
 from gmwm.ins.filter.records import Increments, Kinematics
 from gmwm.ins.geometry import RATE, matrix_from_rotation_vector, matrix_from_rpy, ned_difference
