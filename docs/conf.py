@@ -37,6 +37,7 @@ ROOMS = {
     "readers": "Recordings", "diagnosis": "Health of a recording",
     "variance": "Wavelet and Allan variance", "process": "Processes and models",
     "estimate": "Estimation", "selection": "Selection", "calibration": "Calibration",
+    "datasheet": "Data sheets", "motion": "Noise in motion",
     "population": "Several recordings, many units",
     "filter_numbers": "Filter numbers and error budget", "export": "Files for other programs",
     "ins": "Navigation", "errors": "Errors",

@@ -17,15 +17,15 @@ HEADING = re.compile(r"^#+ (.*)$", re.MULTILINE)
 LARGEST_FIGURE = 100_000  # bytes of an SVG
 
 
-def _load():
-    spec = importlib.util.spec_from_file_location("pages", DOCS / "pages.py")
+def _load(name):
+    spec = importlib.util.spec_from_file_location(name, DOCS / f"{name}.py")
     module = importlib.util.module_from_spec(spec)
-    sys.modules["pages"] = module
+    sys.modules[name] = module
     spec.loader.exec_module(module)
     return module
 
 
-pages = _load()
+pages = _load("pages")
 PAGES = {page.name: page for page in pages.PAGES}
 RUN = [name for name, page in PAGES.items()
        if any(each.kind in ("python", "sh") for each in pages.blocks_of(page))]  # fmt: skip
@@ -90,3 +90,10 @@ def test_files_of_the_source_are_called_so(name):
 def test_every_page_is_on_the_site():
     listed = set(re.findall(r"^[\w-]+$", (DOCS / "index.md").read_text(), re.MULTILINE))
     assert {page.stem for page in DOCS.glob("*.md")} - {"index"} <= listed
+
+
+def test_every_room_of_the_reference_has_a_title(monkeypatch):
+    monkeypatch.setattr(sys, "path", sys.path[:])
+    conf = _load("conf")
+    rooms = conf.public_names(REPOSITORY / "src" / "gmwm" / "__init__.pyi")
+    assert set(rooms) <= set(conf.ROOMS)
