@@ -43,8 +43,7 @@ def _shown(found: Navigated) -> str:
             f"{name} {value:.3g}" + (f" ({fault.errors[name]:.1g})" if name in fault.errors else "")
             for name, value in fault.values.items()
         )
-        where = f" {fault.where}" if fault.where else ""
-        parts.append(f"{fault.code}{where}: {numbers}")
+        parts.append(f"{' or '.join((fault.name, *fault.rivals))}: {numbers}")
     rest = "" if found.faults.explained else "; not all is explained"
     return ("; ".join(parts) or found.verdict.code) + rest
 

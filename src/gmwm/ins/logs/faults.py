@@ -46,7 +46,7 @@ class Fault:
         left: where something else is wrong too, everything explains a part of it.
     cost: Gain that chance exceeds with the probability of a false alarm.
     values, errors: Estimates, in SI units, and standard errors.
-    rivals: Codes of other faults that explain the log nearly as well.
+    rivals: Names of other faults that explain the log nearly as well.
     """
 
     code: str
@@ -57,6 +57,11 @@ class Fault:
     values: dict[str, float] = field(default_factory=dict)
     errors: dict[str, float] = field(default_factory=dict)
     rivals: tuple[str, ...] = ()
+
+    @property
+    def name(self) -> str:
+        """What is wrong with what."""
+        return f"{self.code} {self.where}".strip()
 
     @property
     def excess(self) -> float:
@@ -352,7 +357,7 @@ class Faults:
         """Faults one after the other, each the most probable, while they are beyond chance."""
         here, found = base, list[Fault]()
         while len(found) < tuning.MOST_FAULTS:
-            known = {f"{each.code} {each.where}".strip() for each in found}
+            known = {each.name for each in found}
             tried = [*constant_errors(here, known), *((each,) for each in outliers(here))]
             if contradicted(here, tuning.SUSPECTED) and here.is_lost:  # these are costly
                 tried += [(each,) for each in wrong_signs(here)]
@@ -363,11 +368,10 @@ class Faults:
             best = max(filter(None, tried), key=lambda faults: faults[0].excess, default=())
             if not best or best[0].excess <= 0.0:
                 break
-            codes = {each.code for each in best}
-            close = (each[0] for each in tried if each and codes.isdisjoint(e.code for e in each))
-            least = best[0].excess - cost(1)
-            rivals = [each.code for each in close if each.excess > least]
-            if np.cos(best[0].replay.state.rpy[0]) < 0.0 and "axis-signs" not in codes:
+            own, least = {each.name for each in best}, best[0].excess - cost(1)
+            close = (each[0] for each in tried if each and own.isdisjoint(e.name for e in each))
+            rivals = [each.name for each in close if each.excess > least]
+            if np.cos(best[0].replay.state.rpy[0]) < 0.0 and best[0].code != "axis-signs":
                 rivals.append("axis-signs")  # no vehicle starts upside down
             found += [replace(each, rivals=tuple(dict.fromkeys(rivals))) for each in best]
             here = best[0].replay
