@@ -88,7 +88,7 @@ def calibrate(
     remove_departures : bool, optional
         Whether evident steps, transients at the start and slow periods are subtracted and the rest
         is fitted again, three times at most. Samples around a step are left out. The noise that the
-        estimated sizes remove is added back to the wavelet variances.
+        estimated sizes remove is added back to the wavelet variances. Not beside covariates.
     covariates : mapping, optional
         What the bias depends on: ``{"temperature": "cubic, lag", "settling": "auto"}``. The name of
         a channel of the recording, "time" or "settling" (at switch-on, when the recording begins)
@@ -115,6 +115,11 @@ def calibrate(
     parts: list[Any] = list(recording) if not alone and np.iterable(recording) else [recording]
     given: list[Recording] = [read(each) if is_frame(each) else each for each in parts]
     beside = wanted(covariates)
+    if beside and remove_departures:
+        raise InputError(
+            "departures cannot be removed beside covariates, whose curve they would take with them:"
+            " leave one of the two out, or calibrate a part without departures"
+        )
     _check_together(given)
     size = sum(each.n * len(each.inertial) for each in given)
     others = workers.extra_workers(jobs, max(len(each.inertial) for each in given))

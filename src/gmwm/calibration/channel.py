@@ -107,8 +107,8 @@ class ChannelTask:
             if not left or not any(there):
                 break
             removed = [gone + more for gone, more in zip(removed, there, strict=True)]
-        beside = () if self.design is None else self.design.notices
-        fit, removing = found.fit, self.removals > 0 or bool(beside)
+        # Beside a curve nothing can be subtracted: it would take the curve with it.
+        fit, removing = found.fit, self.removals > 0 or self.design is not None
         records = list(zip(there, removed, before, after, strict=True))
         notices = [departure_notices(fit, *each, removing=removing) for each in records]
         changes = [steadiness_notice(fit, wv, known) for known, _, _, wv in records]
@@ -121,7 +121,7 @@ class ChannelTask:
         ]
         curve = None
         if self.design is not None:
-            named += beside
+            named += self.design.notices
             one = next(iter(self.design.covariates), None)
             growth = self.design.scaling(self.parts, self.places)
             found_curve = self.design.curve(fit, may_lack=self.model is None)

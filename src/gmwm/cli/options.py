@@ -157,7 +157,8 @@ def with_option(notice: Notice, span: Span = None, lost: float = 0.0, longest: s
         ends = (last, length) if length - last >= first else (0.0, first)
         if ends[1] - ends[0] > _LEAST_KEPT * length:
             hint = _rerun(_cut(ends[0], ends[1], span), ends[1] - ends[0], length)
-    cause = "find the cause, such as the temperature" * (notice.code == "slow-period")
+    cause = "find the cause, such as the temperature or a failing thermometer"
+    cause *= notice.code == "slow-period"
     return replace(notice, hint="; ".join(filter(None, [hint, cause])) or notice.hint)
 
 

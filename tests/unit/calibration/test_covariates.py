@@ -381,3 +381,15 @@ def test_thermometers_that_round_and_soaks_do_not_fail(step, is_soaked):
         temperature = step * np.round(temperature / step)
     cal = calibrated(recording(8, temperature))
     assert not any(each.code == "thermometer-fails" for each in cal.notices)
+
+
+def test_departures_are_not_removed_beside_a_curve():
+    """A slow period took the curve with it: a fifth was left of it, in a fit that was valid."""
+    temperature = 45.0 - 20.0 * np.cos(4.0 * np.pi * np.arange(SIZE) / SIZE)
+    rec = recording(5, temperature, 0.004 * np.sin(12.0 * np.pi * np.arange(SIZE) / SIZE))
+    found = calibrated(rec)["gyro_x"].notices
+    departed = [each for each in found if each.issue.topic == "departure"]
+    assert departed
+    assert not any("remove_departures" in each.hint for each in departed)
+    with pytest.raises(gmwm.InputError, match="cannot be removed beside covariates"):
+        calibrated(rec, remove_departures=True)
