@@ -1,6 +1,5 @@
 """The spectrum of a series, for the uncertainty of its variances: power laws and what they miss."""
 
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property, lru_cache, partial
@@ -193,11 +192,7 @@ def _fitted(
     number = laws.shape[0]
     powers = np.zeros(number)
     for k in range(number):
-        total = whole = 0.0
-        for b in range(seen.size):
-            total += seen[b]
-            whole += laws[k, b]
-        powers[k] = total / whole / number
+        powers[k] = np.sum(seen) / np.sum(laws[k]) / number
     for step in range(2 * steps):
         pull, share = np.zeros(number), np.zeros(number)
         for b in range(seen.size):
@@ -212,7 +207,7 @@ def _fitted(
                 share[k] += part
                 pull[k] += part * ratio
         for k in range(number):
-            powers[k] *= math.sqrt(pull[k] / share[k])
+            powers[k] *= np.sqrt(pull[k] / share[k])
     return powers
 
 

@@ -4,8 +4,7 @@ The state-space form is ``y[k] = h' x[k] + v[k]``, ``x[k+1] = F x[k] + w[k]`` wi
 covariance P0 (`gmwm.StateSpace`). Several columns Y (n, m) are filtered at once with the same
 gains: the series, and regressors (a constant, a ramp) whose coefficients are profiled out
 afterwards (Rosenberg 1973, *Annals of Economic and Social Measurement* 2, 399-428; de Jong 1991,
-*Annals of Statistics* 19, 1073-1083). A NaN in the first column is a missing sample. Arrays are
-copied by loops: numba takes seconds to compile assignments of arrays.
+*Annals of Statistics* 19, 1073-1083). A NaN in the first column is a missing sample.
 """
 
 import math
@@ -154,20 +153,17 @@ def filtered(space: Space, Y: FloatArray, A0: FloatArray, U: FloatArray) -> Filt
     updated, half, Ph = np.zeros((p, p)), np.zeros((p, p)), np.zeros(p)
     for k in range(n):
         missing = math.isnan(Y[k, 0])
-        s = math.inf if missing else _innovation(P, h, r, Ph)
-        S[k] = s
+        S[k] = s = math.inf if missing else _innovation(P, h, r, Ph)
         for i in range(p):
             for j in range(p):
                 PP[k, i, j] = P[i, j]
                 updated[i, j] = P[i, j] if missing else P[i, j] - Ph[i] * Ph[j] / s
                 G[k, i] += 0.0 if missing else F[i, j] * Ph[j] / s
         for c in range(m):
+            V[k, c] = 0.0 if missing else Y[k, c]
             for i in range(p):
                 X[k, c, i] = x[c, i]
-            if not missing:
-                V[k, c] = Y[k, c]
-                for i in range(p):
-                    V[k, c] -= h[i] * X[k, c, i]
+                V[k, c] -= 0.0 if missing else h[i] * x[c, i]
             for i in range(p):
                 x[c, i] = U[c, i] + G[k, i] * V[k, c]
                 for j in range(p):

@@ -92,8 +92,7 @@ def projected(
                 weighted[i, k] += root[i, j] * slopes[j, k] * factor[k]
     size = 0
     for k in range(x.size):
-        if x[k] > 0.0:
-            size += 1
+        size += x[k] > 0.0
     present = np.empty((rows, size))
     at = 0
     for k in range(x.size):
@@ -187,8 +186,7 @@ def linearized(
     if is_known:
         is_known, slopes = _slopes(z, terms, shapes, fixed.shape[0])
     if not is_known:
-        nothing = np.zeros(0)
-        return False, nothing, nothing, fixed
+        return False, z[:0], z[:0], fixed
     columns, x, residual = profiled(problem, curves)
     factor = np.empty(z.size)
     for k in range(z.size):

@@ -19,8 +19,7 @@ def solve_nonnegative(columns: FloatArray, y: FloatArray) -> tuple[FloatArray, F
 
 def objectives_with(columns: FloatArray, candidates: FloatArray, y: FloatArray) -> FloatArray:
     """Sums of squares (G,) of y (J,) that each candidate (J, G) leaves beside columns (J, k)."""
-    arrays = (np.ascontiguousarray(each) for each in (columns, candidates, y))
-    return np.asarray(_each(*arrays))
+    return np.asarray(_each(*map(np.ascontiguousarray, (columns, candidates, y))))
 
 
 @compiled()

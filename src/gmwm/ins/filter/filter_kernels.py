@@ -309,9 +309,8 @@ def _look(
         if table.axis[k] >= 0:
             sensed[table.axis[k]] -= table.output[k] * x[k]
     there = Kinematics(at.C.copy(), at.v.copy(), at.lla.copy())
-    a, b = sensed[0] * offset, sensed[1] * offset
-    c, d = sensed[2] * offset, sensed[3] * offset
-    now = Increments(a, b, c, d, sensed[4] * offset, sensed[5] * offset)
+    a, b, c = sensed[0] * offset, sensed[1] * offset, sensed[2] * offset
+    now = Increments(a, b, c, sensed[3] * offset, sensed[4] * offset, sensed[5] * offset)
     step(there, now, now, offset)
     transition(at, offset, change)
     return there, sensed[:3]
