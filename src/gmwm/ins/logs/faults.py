@@ -336,12 +336,12 @@ class Faults:
         return near._without_doubtful(base)
 
     def _without_doubtful(self, base: Replay) -> Faults:
-        """No findings where many, or ones that leave a misfit, do not explain all."""
+        """No findings where three, or ones that leave a misfit, do not explain all."""
         if self.explained or not self.found:
             return self
         left, before = (each.test().nis.value for each in (self.replay, base))
         most = np.fmin(tuning.MOST_LEFT, 0.5 * (1.0 + before))  # NaN if the filter diverged
-        is_sure = left <= most and not self._is_far and len(self.found) < tuning.MOST_FAULTS
+        is_sure = left <= most and not self._is_far and 2 * len(self.found) <= tuning.MOST_FAULTS
         return self if is_sure else replace(self, found=(), replay=base)
 
     @property

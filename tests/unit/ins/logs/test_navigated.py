@@ -15,7 +15,6 @@ from gmwm.ins.fields import sensor_models
 from gmwm.ins.filter import KINDS
 from gmwm.ins.geometry import ned_difference
 from gmwm.ins.logs.replay import innovation_sizes
-from marks import slow
 
 RATE, START = 10.0, 1000.0
 SENSORS = {
@@ -166,7 +165,7 @@ def test_a_vehicle_that_never_moves_has_no_heading_unless_its_gyros_feel_the_ear
 @pytest.mark.parametrize(
     ("changes", "verdict"),
     [
-        slow({"sensors": WRONG, "bias": {"gyro": 0, "accel": 0}}, "lost"),
+        ({"sensors": WRONG, "bias": {"gyro": 0, "accel": 0}}, "lost"),
         ({"sensors": {"gyro": {"N": "1 deg/s/sqrt(Hz)"}, "accel": {"N": "30000 ug/sqrt(Hz)"}}},
          "too-small"),
         ({"position_sd": 0.3}, "too-large"),
