@@ -379,8 +379,8 @@ def _action(group: Sequence[Notice], calibration: Calibration) -> str:
         where = "; ".join(f"{kind}: {_places(on, calibration)}" for kind, on in kinds.items())
         return "; ".join(filter(None, [where, hint]))
     if len({notice.text for notice in group}) > 1:
-        own = _places({*first.where.split(", ")}, calibration)
-        text = first.issue.reason or f"{text} in {own}"
+        own = _places({*first.where.split(", ")}, calibration) or _shortened(first.source, _SOURCE)
+        text = first.issue.reason or " in ".join(filter(None, [text, own]))
     if not hint and first.severity == "bad":
         hint = "look at the plot in the report"
     return "; ".join(filter(None, [f"{where}: {text}" if where else text, hint]))

@@ -222,3 +222,18 @@ def test_a_thermometer_that_is_late_is_the_first_thing_to_mend():
     assert "1. gyro_x: the bias and temperature are not in step" in to_do
     assert "check the thermometer's clock" in to_do
     assert "slow period" not in to_do
+
+
+def test_a_thermometer_that_fails_is_named_with_its_recording():
+    """The place was empty: in all in ; check the thermometer."""
+    parts = []
+    for k, spikes in enumerate((1, 2)):
+        temperature = np.linspace(25.0, 65.0, 4096)
+        x = 1e-4 * temperature + WhiteNoise(1e-3).simulate(4096, 0.5, k)
+        temperature[1000 : 1000 * spikes + 1 : 1000] = -127.0
+        arrays = {"gyro_x": x, "temperature": temperature}
+        rec = Recording.from_arrays(arrays, 2.0, {"gyro": "rad/s", "temperature": "degC"})
+        parts.append(replace(rec, source=f"r{k}.csv"))
+    cal = gmwm.calibrate(parts, "N", covariates={"temperature": "linear"}, jobs=1)
+    to_do = " ".join(summary_text(cal).partition("What to do")[2].split())
+    assert re.search(r"temperature jumps or is stuck for \S+ s in r[01].csv; check", to_do)
