@@ -111,11 +111,15 @@ def _coarse(rates: tuple[FloatArray, FloatArray], dt: tuple[float, float]) -> fl
     size = len(lengths[0]) + len(lengths[1])
     spectra = [np.fft.rfft(each, size) for each in lengths]
     product = np.fft.irfft(np.conj(spectra[0]) * spectra[1], size)
-    norm = float(np.linalg.norm(lengths[0]) * np.linalg.norm(lengths[1]))
     best = int(np.argmax(product))
-    if not product[best] > tuning.CORRELATED * norm:
-        return None
-    return (best if best < len(lengths[1]) else best - size) * dt[0]
+    late = best if best < len(lengths[1]) else best - size
+    # Over what both have, if that is enough: they may have started far apart.
+    one, other = lengths[0][max(-late, 0) :], lengths[1][max(late, 0) :]
+    shared = min(len(one), len(other))
+    is_enough = shared > tuning.LEAST_SHARED * min(map(len, lengths))
+    one, other = (one[:shared], other[:shared]) if is_enough else lengths
+    norm = float(np.linalg.norm(one) * np.linalg.norm(other))
+    return late * dt[0] if product[best] > tuning.CORRELATED * norm else None
 
 
 def _check_steady(

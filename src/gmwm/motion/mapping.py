@@ -91,8 +91,21 @@ class Signals:
             left = means(target - self.mapped(parameters), size).var(axis=0).sum()
             is_explained = left < tuning.MOST_LEFT * means(target, size).var(axis=0).sum()
             return bool(is_explained and np.abs(parameters[:_LAG]).max() < tuning.MOST_CORRECTED)
-        apart = np.linalg.norm((self.values - target).mean(axis=0))
-        return bool(apart < tuning.MOST_APART)
+        if np.linalg.norm((self.values - target).mean(axis=0)) > tuning.MOST_APART:
+            return False
+        # Without a spread before the data, a matrix far from the identity has other axes or scales.
+        own, wanted = (
+            each - each.mean(axis=0)
+            for each in (means(self.values + self.arms @ parameters[-_AXES:], size),
+                         means(target, size))
+        )  # fmt: skip
+        free = np.linalg.lstsq(own, wanted, rcond=None)[0]
+        left = (wanted - own @ free).var(axis=0)
+        inverse = np.diag(np.linalg.pinv(own.T @ own))
+        error = np.sqrt(tuning.CORRELATION * np.outer(inverse, left))
+        off = np.abs(free - np.eye(_AXES))
+        is_sure = (off > tuning.SURE * error) & (left < tuning.NOISE_LEFT * wanted.var(axis=0))
+        return not np.any(is_sure & (off > tuning.MOST_TURNED))
 
     def mapped(self, parameters: FloatArray) -> FloatArray:
         """(n, 3) as the target measures them, but for a constant."""
@@ -107,6 +120,14 @@ def rotation_to(target: FloatArray, rates: FloatArray) -> FloatArray:
     """The rotation that turns rates into those of the target best (Wahba's problem)."""
     left, _, right = np.linalg.svd((target - target.mean(0)).T @ (rates - rates.mean(0)))
     return np.asarray(left @ np.diag([1.0, 1.0, np.linalg.det(left @ right)]) @ right)
+
+
+def tilt_error(target: FloatArray, turned: FloatArray) -> float:
+    """Standard error of a rotation about the axis of the largest rates, rad."""
+    centred, left = target - target.mean(axis=0), target - turned
+    spread = np.median(np.abs(left - np.median(left, axis=0))) / QUARTILE
+    power = np.linalg.eigvalsh(centred.T @ centred)[-2]
+    return float(spread * np.sqrt(tuning.CORRELATION / max(power, np.finfo(float).tiny)))
 
 
 def arms_of(rates: FloatArray, slopes: FloatArray) -> FloatArray:

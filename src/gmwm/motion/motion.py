@@ -29,6 +29,7 @@ from gmwm.motion.mapping import (
     far_out,
     map_onto,
     rotation_to,
+    tilt_error,
     vibration_of,
 )
 from gmwm.motion.reference import over_samples, rates_of, read_attitude, without_reference
@@ -135,6 +136,7 @@ def motion(
             for sensor, own in found.items():
                 differences.setdefault((labels[k], sensor), []).append(own)
     curves = _curves(differences, flights[0][0].dt, static)
+    _check_copies(curves, labels)
     classes = _classes(differences, flights[0][0].dt, static, limits)
     if count := sum(events.values()):
         notices.append(notice("motion-events", values={"events": count}))
@@ -183,7 +185,9 @@ def _against(sources: Any, references: Any, static: Mapping[str, Any] | None) ->
             seen = [back.apply(each) for each in found["gyro"].differences]
             found["gyro"] = replace(found["gyro"], differences=seen)
         # Of an even number of samples, the middle is between two.
-        clocks.append(replace(clock, offset=clock.offset - 0.5 * (1 - times % 2) * imu.dt))
+        # And rates of the reference stand in the middle of two attitudes.
+        late = 0.5 * dt - 0.5 * (1 - times % 2) * imu.dt
+        clocks.append(replace(clock, offset=clock.offset + late))
         own.append(found["gyro"])
         durations.append(float(imu.time[-1]))
         intervals.append(dt)
@@ -250,6 +254,14 @@ def _imu(where: str, label: str, given: Any) -> tuple[_Imu, int]:
                 raise InputError(f"{where}: there is no {missing[0]}: give all three axes")
             continue
         values = np.array(np.stack([recording[name].values for name in names], axis=1))
+        for name, column in zip(names, values.T, strict=True):
+            changes = np.flatnonzero(np.diff(column, prepend=np.inf, append=np.inf) != 0.0)
+            stuck = (np.max(np.diff(changes)) - 1) * recording.dt
+            if stuck > tuning.STUCK:
+                raise InputError(
+                    f"{where}: {name} stays at one value for {stuck:.3g} s: leave this "
+                    "IMU out, or give a part without"
+                )
         gone = np.isnan(values)
         for axis in np.flatnonzero(gone.any(axis=0)):
             there = np.flatnonzero(~gone[:, axis])
@@ -289,6 +301,7 @@ def _of_target(
     found: dict[str, Flight] = {}
     mountings, events = [], 0
     turns: list[FloatArray] = []
+    tilts: list[float] = []
     arms: list[FloatArray | None] = [None] * len(others)
     for sensor, samples in target.samples.items():
         wanted, signals = samples[inside], []
@@ -301,7 +314,9 @@ def _of_target(
             slopes = (8.0 * (ahead - behind) - ahead2 + behind2) / (12.0 * imu.dt)
             if sensor == "gyro":
                 sure = means(good.astype(float), size) == 1.0
-                turns.append(rotation_to(means(wanted, size)[sure], means(values, size)[sure]))
+                both = [means(each, size)[sure] for each in (wanted, values)]
+                turns.append(rotation_to(*both))
+                tilts.append(tilt_error(both[0], both[1] @ turns[j].T))
             values, slopes = values @ turns[j].T, slopes @ turns[j].T
             # A lag times the slopes of vibration, beyond the means that give it, would be noise.
             steady = uniform_filter1d(slopes, size, axis=0)
@@ -313,8 +328,14 @@ def _of_target(
             if not signal.is_close(wanted, found_one, size):
                 raise InputError(
                     f"flight {flight}: {sensor} of {imu.label} and {target.label} differ by more "
-                    "than IMUs do: check units, and the order and signs of axes"
+                    "than IMUs do: check units, order and signs of axes, and for clipped or stuck "
+                    "channels or a noisy reference"
                 )
+        if max(tilts) > tuning.MOST_TILT:
+            raise InputError(
+                f"flight {flight}: the IMUs turn about one axis only, which leaves their rotation "
+                "about it open: give a motion about two"
+            )
         if np.any(away := far_out(mapped, target.dt)):
             good = good & ~away
             events += int(np.count_nonzero(np.diff(away, prepend=False) & away))
@@ -403,6 +424,20 @@ def _by_axis(
         own += [at_rest, curves.exponent, curves.exponent_error]
         found.append(MotionCurve(label, channel, sensor, curves.tau, *own))
     return found
+
+
+def _check_copies(curves: Sequence[MotionCurve], labels: Sequence[str]) -> None:
+    """Raise InputError if the gyros of two IMUs hardly differ while others do."""
+    gyros = [each for each in curves if each.quantity == "gyro"]
+    for label in labels:
+        first = [each.differences[:, 0] for each in gyros if each.imu == label]
+        share = np.max(first, axis=0) / np.max(
+            [each.differences[:, 0] for each in gyros], axis=None
+        )
+        others = [each for each in labels if each != label]
+        for other, small in zip(others, share < tuning.COPY, strict=True):
+            if small:
+                raise InputError(f"{label} and {other} have the same errors: give each IMU once")
 
 
 def _together(

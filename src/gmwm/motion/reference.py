@@ -61,7 +61,9 @@ def rates_of(time: FloatArray, quaternions: FloatArray) -> tuple[float, FloatArr
     turned = Slerp(time, Rotation.from_quat(quaternions[first]))(grid)
     gap = steps[np.clip(np.searchsorted(time, grid, "right") - 1, 0, steps.size - 1)] > 1.5 * dt
     if gap.mean() > tuning.MOST_FILLED:
-        raise InputError(f"the reference has gaps of {gap.sum() * dt:.3g} s: give a part without")
+        raise InputError(
+            f"the reference has gaps, {gap.sum() * dt:.3g} s in all: give a part without"
+        )
     return dt, (turned[:-1].inv() * turned[1:]).as_rotvec() / dt, gap[1:]
 
 
@@ -104,7 +106,7 @@ def without_reference(curves: Curves, dt: float, where: str) -> tuple[Curves, fl
             reach = np.hypot(given[axis] - total[axis], unsure)
             end[axis, seen] = np.maximum(left + sign * reach, 0.0)[seen]
         angles.append(float(np.sqrt(found[0])))
-    if not np.any(np.isfinite(variance)):
+    if np.max(np.sum(np.isfinite(variance), axis=1)) < tuning.FEWEST_OCTAVES:
         known = np.max(np.maximum(pairs / total, 0.0) ** 2, axis=0)
         by_octave = ", ".join(
             f"{per_cent(share, 1)} at {brief(t)} s"

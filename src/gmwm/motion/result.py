@@ -424,7 +424,9 @@ class InMotion(Document, Printed):
             own_texts = (brief(scale * np.sqrt(mean[k])) if seen[k] else "-" for k in chosen)
             rows.append((imu, *own_texts))
         reach = _median([np.sqrt(np.maximum(c.upper, 0.0)) / c.deviation for c in own])
-        rows.append(("95 %", *(f"x/{reach[k]:.2f}" if reach[k] > 0.0 else "-" for k in chosen)))
+        rows.append(
+            ("95 %, median", *(f"x/{reach[k]:.2f}" if reach[k] > 0.0 else "-" for k in chosen))
+        )
         if len(self.imus) != 2:
             # Of one IMU, the Fisher information against that of a perfect reference.
             name, power = ("information", 2) if len(self.imus) == 1 else ("coherence", 1)
@@ -469,7 +471,9 @@ class InMotion(Document, Printed):
         heads = [f"{sensor} {key}" for sensor in self.sensors for key in "NK"]
         least = f"{per_cent(tuning.LEAST_WALK)} of the variance at the outage"
         table = plain_table(("largest axis and IMU, SI", *heads), rows)
-        return f"{table}\nK, if no walk is seen: {least}" if rows else ""
+        if not rows:
+            return "no numbers for filters: the flights are too short"
+        return f"{table}\nK, if no walk is seen: {least}"
 
     def factor(self, sensor: str) -> FloatArray:
         """(J,) Median over IMUs and axes of the deviation in motion over that at rest."""

@@ -6,6 +6,7 @@ EDGE = 3  # samples at each end, where a cubic spline has neighbours on one side
 # -- clocks ---------------------------------------------------------------------------------------
 
 CORRELATED = 0.5  # of the lengths of the rates: flights have 0.998 and more, noise up to 0.24
+LEAST_SHARED = 0.2  # of the shorter recording
 MOVING = 0.01  # rad/s rms of means over 0.1 s; noise of the same IMUs at rest has 0.0004
 PART = 5.0  # s: parts whose own delays tell a clock that wanders from a steady one
 # Share of the variance of residuals that delays of the parts explain beyond a steady clock: 14
@@ -20,6 +21,14 @@ PASSES, CLOSE = 12, 1e-7  # of the delay, s
 SCALE_SPREAD, LAG_SPREAD, ARM_SPREAD = 0.03, 0.003, 0.3  # share, s, m
 # Share in rates (14 flights have up to 0.023), and m/s^2 of mean forces: more are wrong axes.
 MOST_CORRECTED, MOST_APART = 0.1, 3.0
+# Of the free matrix of mean forces: entries beside the identity that are wrong axes or scales, if
+# they are so many standard errors and noise is at most a fifth of the variance.
+MOST_TURNED, SURE, NOISE_LEFT = 0.35, 5.0, 0.2
+MOST_TILT = (
+    0.07  # rad: standard error of a rotation; 0.05 where other axes have a hundredth of the rates
+)
+STUCK = 5.0  # s at one value: rounded noise at rest changes sooner
+COPY = 0.01  # of the largest difference: neighbours that share all vibration have a tenth
 MOST_LEFT = 0.3  # share of the variance of rates that a mapping may leave: flights have 0.001
 # Residuals of means are correlated: their variance counts so often against the spread.
 CORRELATION = 3.0
@@ -51,5 +60,6 @@ USES = ((0.1, 1.0), (1.0, 2.0))  # intervals and horizons that are printed; fixe
 VIBRATION, VIBRATION_OVER = (20.0, 60.0), 1.0
 SHORTEST_CLASS = 5.0  # s
 CLASSES = ("low", "middle", "high")  # of vibration, by default a third of the time each
+FEWEST_OCTAVES = 2  # at which a reference lets the noise of a gyro be seen
 UNIT_LENGTH = 0.01  # by which lengths of quaternions may be off, as of rounding
 LEVEL_OVER = 2.0  # s, whose mean stands for what is left out

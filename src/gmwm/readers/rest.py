@@ -250,7 +250,7 @@ def _gravity(
     recording: Recording, force: _Sensor | None, given: Mapping[str, str], has_layout: bool
 ) -> tuple[Notice, ...]:
     """A mean that is gravity in another unit than the one used, or has a wrong scale."""
-    if force is None or _is_gravity(force.size):
+    if force is None or _is_gravity(force.size) or _is_gravity(force.usual):  # it may turn over
         return ()
     in_file = force.size / factor(force.unit, SI_UNIT["accel"])
     likely = _gravity_units(in_file)

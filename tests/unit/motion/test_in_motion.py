@@ -280,6 +280,62 @@ def test_other_units_and_signs_are_rejected(sensor, wrong):
         gmwm.motion(recordings)
 
 
+def changed(kind, values):
+    """Samples of an IMU that is mounted, wired or read wrongly."""
+    if kind == "swapped":
+        return values[:, [0, 1, 2, 4, 3, 5]]
+    if kind == "mirrored":
+        return values * [1, 1, 1, -1, 1, 1]
+    if kind == "stuck":
+        return np.where(np.arange(len(values))[:, None] > 2000, values[2000], values)
+    return np.round(values, 5)
+
+
+@pytest.mark.parametrize(
+    ("kind", "message"),
+    [
+        ("swapped", "accel of imu 2 and imu 1 differ by more than"),
+        ("mirrored", "accel of imu 2 and imu 1 differ by more than"),
+        ("stuck", "imu 2: gyro_x stays at one value for .* s"),
+        ("copied", "imu 2 and imu 3 have the same errors"),
+    ],
+)
+def test_channels_that_gravity_does_not_show_to_be_wrong_are_rejected(kind, message):
+    """Level, all horizontal axes have a mean force of zero."""
+    recordings = imus(np.random.default_rng(22), 3)
+    of = 2 if kind == "copied" else 1
+    values = np.stack([recordings[of][name].values for name in AXES], axis=1)
+    recordings[1] = recording(changed(kind, values))
+    with pytest.raises(gmwm.InputError, match=message):
+        gmwm.motion(recordings)
+
+
+def test_turns_about_one_axis_leave_the_rotation_about_it_open():
+    rng = np.random.default_rng(23)
+    body, errors = motion_of(rng), white(rng, 3)
+
+    def flat(time, order=0):
+        return body(time, order) * [1e-3, 1e-3, 1.0, 1.0, 1.0, 1.0]
+
+    with pytest.raises(gmwm.InputError, match="turn about one axis only"):
+        gmwm.motion([imu(flat, own, **pose) for own, pose in zip(errors, POSES, strict=False)])
+
+
+def test_imus_may_start_more_than_half_a_recording_apart():
+    rng = np.random.default_rng(24)
+    body, errors = motion_of(rng), white(rng, 3)[:, :2000]
+    found = gmwm.motion([imu(body, own, offset=-15.0 * k) for k, own in enumerate(errors)])
+    assert found.clocks[1].offset == pytest.approx(-30.0, abs=2e-3)
+
+
+def test_a_walk_that_dominates_has_numbers_with_an_n_above_zero():
+    rng = np.random.default_rng(25)
+    walks = np.cumsum(0.05 * white(rng, 3), axis=1)
+    found = gmwm.motion(imus(rng, 3, walks + 0.01 * white(rng, 3)))
+    assert "largest axis" in str(found)
+    assert all(model.params["N"] > 0.0 for model in found.numbers().values())
+
+
 @pytest.mark.parametrize(
     ("sources", "message"),
     [
