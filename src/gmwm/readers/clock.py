@@ -240,7 +240,7 @@ def _check_jumps(clock: Clock, found: Grid, seconds: float) -> None:
             place = f"{clock.source}, {clock.column}, near {clock.where(found.change.row)}"
             text = f"{place}: the sampling rate goes from {first:.4g} to {then:.4g} Hz"
             raise InputError(text, "rate-changes", "use the part before or after")
-    if jumps.are_rounding or (found.uneven is None and jumps.have_rhythm):
+    if jumps.are_rounding or (found.uneven or jumps).have_rhythm:
         text = f"a step of two intervals, and {jumps.rows.size - 1:,} more such at even distances"
         raise clock.error(int(jumps.rows[0]), f"{text}, as if the stamps were rounded too coarsely")
     if off_grid > tuning.MOST_OFF_GRID * n and found.uneven is None:
@@ -306,6 +306,9 @@ def _notices(clock: Clock, found: Grid, seconds: float, *, is_guess: bool) -> li
         row, time = clock.where(found.change.row), when(found.change.row)
         values = {"before": before, "after": after, "rate": rate, "time": time}
         notices.append(notice("rate-changes", "", values, row=row))
+    if uneven is not None and uneven.is_coarse:
+        shared = clock.stamps.size / uneven.last.size
+        notices.append(notice("stamps-coarse", "", {"rows": shared}))
     if uneven is not None and uneven.burst > 1:
         notices.append(notice("stamps-in-bursts", "", {"rows": uneven.burst}))
     if uneven is not None:

@@ -107,6 +107,14 @@ class Uneven:
     last: IntArray  # (m,), last row that has the stamp
     burst: int  # rows that have one stamp, usually
     jitter: float  # standard deviation of the steps without losses, in sampling intervals
+    is_coarse: bool  # whether stamps are rounded to more than the interval, and no row is missing
+
+    @property
+    def have_rhythm(self) -> bool:
+        """Whether stamps with losses come in a rhythm, as those of rounding do."""
+        rows = self.jumps.rows
+        fewest = max(tuning.MANY_LOST * self.last.size, tuning.BINS_OF_RHYTHM)
+        return rows.size > fewest and _has_rhythm(np.searchsorted(self.last, rows))
 
 
 @dataclass(frozen=True)
@@ -332,7 +340,14 @@ def place_uneven(stamps: FloatArray) -> Uneven | int | None:
             return None
         interval = float(np.mean(slopes[alike]))
     finest = float(np.spacing(np.max(np.abs(stamps))))
-    for _ in range(tuning.ROUNDS_OF_GRID):
+    lost, line = np.zeros(last.size, dtype=np.int64), interval_of(time, last)
+    # The last row of a rounded stamp is within an interval of an even clock that loses none. The
+    # last stamp may be cut off. Bursts have one size but for losses, which add up.
+    fewest = max(tuning.MANY_LOST * last.size, tuning.FEWEST_BESIDE)
+    is_coarse = np.count_nonzero(sizes != np.median(sizes)) > fewest
+    is_coarse = bool(is_coarse and np.ptp((time / line - last)[:-1]) < tuning.ROUNDED)
+    interval, number = (line, last) if is_coarse else (interval, last)
+    for _ in range(0 if is_coarse else tuning.ROUNDS_OF_GRID):
         if not 10.0 * finest < interval < np.inf:
             return None
         lost, set_back = _losses(time / interval - last)
@@ -356,7 +371,7 @@ def place_uneven(stamps: FloatArray) -> Uneven | int | None:
     jumps = Jumps(last[some] - sizes[some] + 1, steps, missing, interval)
     is_burst = 2 * int(np.sum(sizes[sizes > 1])) > stamps.size
     burst = int(np.median(np.repeat(sizes, sizes))) if is_burst else 1
-    return Uneven(jumps, late, last, burst, jitter)
+    return Uneven(jumps, late, last, 1 if is_coarse else burst, jitter, is_coarse)
 
 
 def _losses(late: FloatArray) -> tuple[IntArray, int | None]:

@@ -94,7 +94,7 @@ LONGEST_OF_WRAP = 100.0  # steps within which a counter that ran over goes on
 # are alike, above which half of them: of one of a hundred rows lost at random, 0.4 % of recordings
 # have as many alike at most.
 FEWEST_IN_RHYTHM, ALL_IN_RHYTHM = 4, 6
-ROUNDED = 1.2  # shortest steps between the earliest and the latest stamp: one, and a line's error
+ROUNDED = 1.2  # steps between the earliest and the latest rounded stamp: one, and a line's error
 
 # Intervals from a whole number beyond which a step may as well have the next one: where the unit of
 # stamps is half of the interval, each slip of the rounding is such a step.

@@ -86,7 +86,7 @@ def recorded(tmp_path):
     """Write noise with these stamps; the recording, and the samples, NaN where one is missing."""
 
     def _recorded(clock):
-        noise = np.random.default_rng(9).normal(size=N)
+        noise = np.random.default_rng(9).normal(size=clock.number[-1] + 1)
         path = tmp_path / "log.npz"
         np.savez(path, time_s=clock.stamps, gx=noise[clock.number])
         truth = np.full(clock.number[-1] + 1, np.nan)
@@ -151,6 +151,26 @@ def test_stamps_in_whole_milliseconds_repeat(recorded, rate):
     found, truth = recorded(clock)
     np.testing.assert_array_equal(found["gyro_x"].values, truth)
     assert found.rate == pytest.approx(rate, rel=1e-5)
+
+
+@pytest.mark.parametrize("rate", [1600.0, 1660.0, 1800.0, 1900.0, 3200.0])
+@pytest.mark.parametrize("rounded", [np.round, np.floor])
+def test_stamps_coarser_than_the_interval_give_the_mean_rate(recorded, rate, rounded):
+    clock = Simulated(3, rate)
+    clock.stamps = rounded(1e3 * clock.number / rate) / 1e3
+    found, truth = recorded(clock)
+    np.testing.assert_array_equal(found["gyro_x"].values, truth)
+    assert found.rate == pytest.approx(rate, rel=2e-5)
+    assert "stamps-coarse" in {each.code for each in found.notices}
+
+
+@pytest.mark.parametrize(("rate", "loss"), [(1600.0, 0.001), (1800.0, 0.01), (1990.0, 0.01)])
+def test_stamps_coarser_than_the_interval_hide_no_rhythm(recorded, rate, loss):
+    clock = Simulated(0, rate, 20_000)
+    clock.lose(loss)
+    clock.stamps = np.round(1e3 * clock.number / rate) / 1e3
+    with pytest.raises(InputError, match="rounded too coarsely"):
+        recorded(clock)
 
 
 def test_coarse_stamps_with_a_loss_are_refused_as_without(recorded):
