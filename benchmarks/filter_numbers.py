@@ -58,7 +58,7 @@ TRUTHS = {
     "flicker": WhiteNoise(1e-4) + BiasInstability(5e-5),
     "slow GMs only": Model((GaussMarkov(4e-5, 60.0), GaussMarkov(3e-4, 6e5))),
     "fast GMs only": Model((GaussMarkov(1e-2, 0.02), GaussMarkov(3e-3, 0.3))),
-    "demo gyro": TABLE_6.models["gyro_x"],
+    "paper gyro": TABLE_6.models["gyro_x"],
 }
 QUIET = SensorModels.of(
     {
@@ -70,7 +70,7 @@ HORIZONS = (1.0, 10.0, 60.0, 600.0)
 OUTAGES = (10.0, 30.0, 60.0)
 
 
-SENSORS = ("1 GM", "demo gyro", "3 GM", "3 GM, other")
+SENSORS = ("1 GM", "paper gyro", "3 GM", "3 GM, other")
 
 
 def _least_error(truth: Model, hours: int) -> float:
@@ -121,7 +121,7 @@ def errors() -> None:
     print(f"{'truth':<14}{'hours':>6}{'runs':>6}{'with':>6}" + "".join(
         f"{f'{key}: {head}':>11}" for key in "NK" for head in ("error", "mean", "spread", "held")
     ))  # fmt: skip
-    for name, hours, runs in (("1 GM", 1, 100), ("walk + GM", 4, 100), ("demo gyro", 16, 50)):
+    for name, hours, runs in (("1 GM", 1, 100), ("walk + GM", 4, 100), ("paper gyro", 16, 50)):
         truth = TRUTHS[name]
         right = gmwm.bound(truth, dt=0.1)
         found = []
@@ -307,7 +307,7 @@ def rules() -> None:
 
 def flight() -> None:
     """The whole navigation filter on a loiter: worst direction and horizontal error."""
-    for name, truth in (("demo sensor", TABLE_6), ("slow terms of 30 and 60 s alone", QUIET)):
+    for name, truth in (("paper sensor", TABLE_6), ("slow terms of 30 and 60 s alone", QUIET)):
         print(f"INS/GNSS on a loiter, {name}, at the end of outages")
         _flown(truth)
     print("after 30 s of the last, N+K for some axes and the full model for the others")

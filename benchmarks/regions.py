@@ -27,7 +27,7 @@ FITS = {
     "1 GM": (WhiteNoise(8e-5) + GaussMarkov(4e-5, 60.0), 1),
     "2 GM": (WhiteNoise(5e-5) + GaussMarkov(4e-4, 5.0) + GaussMarkov(1e-4, 300.0), 16),
     "walk + GM": (WhiteNoise(1e-4) + RandomWalk(2e-6) + GaussMarkov(1e-4, 30.0), 16),
-    "demo gyro": (TABLE_6.models["gyro_x"], 16),
+    "paper gyro": (TABLE_6.models["gyro_x"], 16),
 }
 """Truth, and hours of its record."""
 

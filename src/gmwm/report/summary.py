@@ -309,14 +309,15 @@ def unusable(fits: Mapping[str, Fit]) -> str:
 
 def covers(triad: Triad, numbers: SensorNumbers) -> str:
     """The largest term that makes N or K exceed the table's, in a line; empty if none does."""
-    excess, axis = [], triad.slowest
+    larger, axis = [], triad.slowest
     for letter in KEYS:
         own = max(getattr(numbers[axis.name], letter).value for axis in triad.axes)
         ratio = getattr(triad, letter) / own if own else np.inf
-        times = f", {brief(ratio)} times the table's," if own else ""
-        text = f"{triad.quantity} {letter}{times} also carries {axis.covers}"
-        excess.append((ratio, f"{text} ({_shortened(axis.name, _NAME)})" if axis.covers else ""))
-    return max(excess)[1] if max(excess)[0] > _NOTABLE else ""
+        if ratio > _NOTABLE:
+            larger.append(letter + (f" ({brief(ratio)} times the table's)" if own else ""))
+    verb = "also carries" if len(larger) == 1 else "carry"
+    text = f"{triad.quantity} {' and '.join(larger)} {verb} {axis.covers}"
+    return f"{text} ({_shortened(axis.name, _NAME)})" if larger and axis.covers else ""
 
 
 # -- what to do ------------------------------------------------------------------------------------

@@ -99,7 +99,7 @@ def test_a_region_does_not_go_across_a_process_that_bends_it_a_little():
 def test_where_a_ramp_hides_the_random_walk_none_is_invented(drifting):
     assert all({"N", "R"} <= set(fit.keys) for fit in drifting)
     assert sum(len(fit.keys) > 2 for fit in drifting) <= RARE
-    text = "K: the Allan plot has no region of slope +1/2, so it is not estimated"
+    text = "K: the Allan plot has no region of slope +1/2: that term is not estimated"
     assert sum(text in map(str, fit.notices) for fit in drifting) >= len(drifting) - RARE
     assert not any(fit.valid for fit in drifting)
 

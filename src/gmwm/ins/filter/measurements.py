@@ -157,7 +157,7 @@ class Velocity(Measurement):
         if not np.any(arm):
             return velocity
         if imu is None:
-            raise InputError("velocity fixes with a lever arm: give the error-free imu too")
+            raise InputError("velocity fixes with a lever arm need rates: give imu, without errors")
         matrix, rate = matrix_from_rpy(truth.rpy[index]), imu.rotation[index - 1] / imu.dt
         return np.asarray(velocity + np.einsum("kij,kj->ki", matrix, np.cross(rate, arm)))
 

@@ -159,7 +159,7 @@ def test_what_cannot_be_used_is_said_in_one_sentence(make, words):
         ({"position_sd": 0.0}, "give positive numbers"),
         ({"position_sd": (1.0, 2.0)}, "standard deviation"),
         ({"velocity_sd": -0.1}, "give positive numbers"),
-        ({"velocity_sd": 0.1, "lever_arm": (1.0, 0.0, 0.0)}, "give the error-free imu too"),
+        ({"velocity_sd": 0.1, "lever_arm": (1.0, 0.0, 0.0)}, "need rates: give imu"),
     ],
 )
 def test_wrong_options_of_gnss(car, options, words):
