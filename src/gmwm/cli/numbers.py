@@ -68,21 +68,17 @@ _number_options = options(
 def bound(file: Path, temperature: float | None, **options: Any) -> None:
     """Find the smallest numbers that are never overconfident.
 
-    FILE is a calibration.json. If no random walk was found, K is its 95 % upper limit.
+    FILE is a calibration.json. K covers a random walk that was not found up to its 95 % limit.
 
     \b
     Example:
       gmwm bound out/calibration.json --horizon 10 -o numbers.json
     """
     from gmwm.calibration import Calibration
-    from gmwm.filter_numbers import bound as run, usable
+    from gmwm.filter_numbers import bound as run
 
     calibration = _at(Calibration.load(file), temperature)
-    find: Callable[..., FilterNumbers] = run
-    if options["form"] == "N+K" and options["level"] is None:
-        del options["level"]
-        find = usable  # filters divide by K: its limit in place of zero
-    _show(lambda **given: find(calibration, **given), **options)
+    _show(lambda **given: run(calibration, **given), **options)
 
 
 @click.command()

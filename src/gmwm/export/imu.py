@@ -2,7 +2,7 @@
 
 import re
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Self
 
@@ -103,15 +103,14 @@ class Triad:
         return max(self.axes, key=lambda axis: (axis.K, axis.N))
 
     def is_upper(self, letter: str) -> bool:
-        """Whether no axis has the term."""
-        return all(letter in axis.upper for axis in self.axes)
+        """Whether the one for all axes is the upper limit of a term that was not found."""
+        if self.common is not None:
+            return letter in self.common.upper
+        return letter in max(self.axes, key=lambda axis: float(getattr(axis, letter))).upper
 
     def _for_all(self, name: str) -> float:
-        """The bound over the axes; the largest of their upper limits if no axis has the term."""
-        if self.common is not None and not self.is_upper(name):
-            return float(getattr(self.common, name))
-        found = [axis for axis in self.axes if name not in axis.upper]
-        return max(getattr(axis, name) for axis in found or self.axes)
+        """The bound over the axes, or the largest of their numbers or upper limits."""
+        return max(float(getattr(e, name)) for e in ([self.common] if self.common else self.axes))
 
     @property
     def rate(self) -> float:
@@ -301,7 +300,8 @@ def numbers_for(
     if not one_tau or len({one.tau for each in found for one in each.values()}) == 1:
         return found
     models = {n: one if isinstance(one, Fit) else one.model for s in given for n, one in s.items()}
-    moved = usable(models, form, horizons[0], tau="shared")
+    joined = _joined([each for each in given if isinstance(each, Calibration)], names)
+    moved = usable(joined or models, form, horizons[0], tau="shared")
     for place, (source, each) in enumerate(zip(given, found, strict=True)):
         own: dict[str, AxisFilterNumbers] = {name: moved[name] for name in each}
         if not isinstance(source, Calibration):
@@ -336,7 +336,9 @@ def imu_of(
         for quantity in SENSORS
     )
     if shared:
-        gyro, accel = (_with_shared(each, fits, form, first.horizon) for each in (gyro, accel))
+        gyro, accel = (
+            _with_shared(each, calibrations, form, first.horizon) for each in (gyro, accel)
+        )
     lengths = [f", {each.duration:.0f} s recorded" * (each.duration > 0.0) for each in sources]
     return ImuNumbers(
         gyro,
@@ -373,10 +375,21 @@ def _triad(quantity: str, own: Sequence[Axis], form: str) -> Triad:
     return Triad(quantity, tuple(own))
 
 
-def _with_shared(triad: Triad, fits: Mapping[str, Fit], form: str, horizon: float) -> Triad:
+def _joined(calibrations: Sequence[Calibration], names: Collection[str]) -> Calibration | None:
+    """One calibration with the channels of these names; None if any is in none of several."""
+    fits = {name: fit for each in calibrations for name, fit in each.items() if name in names}
+    rivals = {name: models for each in calibrations for name, models in each.rivals.items()}
+    if len(fits) < len(names):
+        return None
+    return replace(calibrations[0], fits=fits, rivals=rivals)
+
+
+def _with_shared(
+    triad: Triad, calibrations: Sequence[Calibration], form: str, horizon: float
+) -> Triad:
     """With one value for all axes, and how consistent each axis is with it."""
-    if all(axis.name in fits for axis in triad.axes):
-        own = {axis.name: fits[axis.name] for axis in triad.axes}
+    own = _joined(calibrations, [axis.name for axis in triad.axes])
+    if own is not None:
         together = usable(own, form, horizon, shared=True)
         shared = {name: one.nees for name, one in together.items()}
         return replace(triad, common=next(iter(together.values())), shared_nees=shared)

@@ -1,6 +1,7 @@
 """Numbers with which a small filter is never overconfident."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import lru_cache
 from typing import Any
 
@@ -8,7 +9,9 @@ import numpy as np
 
 from gmwm._core import checks
 from gmwm._core.text import per_cent
+from gmwm.calibration import upper_limit
 from gmwm.errors import InputError
+from gmwm.estimate import Fit
 from gmwm.filter_numbers import tuning
 from gmwm.filter_numbers.axes import AxisModel, One, Sd, SensorAxes, Several, given_tau, per_axis
 from gmwm.filter_numbers.propagation import Chain
@@ -24,7 +27,7 @@ from gmwm.filter_numbers.spectra.dominance import (
 from gmwm.filter_numbers.spectra.region import Estimated, region_spectra
 from gmwm.filter_numbers.spectra.required import RequiredSpectrum
 from gmwm.issues import Notice, notice
-from gmwm.process import Model, RandomWalk, WhiteNoise
+from gmwm.process import GaussMarkov, Model, RandomWalk, WhiteNoise
 
 
 @per_axis
@@ -54,7 +57,8 @@ def bound(
     level : float, optional
         Level of the confidence region of a fit, e.g. 0.95. The numbers then cover all models in it,
         those of a calibration that fit equally well, and one more Gauss-Markov process that the
-        data leave open (`Fit.deviation_interval`). By default they cover the estimate only.
+        data leave open (`Fit.deviation_interval`). By default they cover the estimate, and the 95 %
+        upper limit of a random walk that it lacks (notice "upper-limit").
     bias_sd : float or mapping, optional
         Standard deviation of a constant bias, such as the turn-on bias, in u; by axis or kind
         ("gyro", "accel") if a mapping.
@@ -75,7 +79,8 @@ def bound(
     ------
     InputError
         If a parameter is free, a term can only be simulated, the form cannot cover the model,
-        ``level`` is given without a fit, or ``tau`` without one Gauss-Markov process.
+        ``level`` is given without a fit, or ``tau`` without one Gauss-Markov process, or a record
+        is too short for an upper limit.
 
     Notes
     -----
@@ -101,7 +106,12 @@ def bound(
     if isinstance(tau, str):
         tau = _shared_time(axes.sharing(shared), form, horizon, level)
     given = (form, horizon, level, tau)
-    return axes.as_given(axes.numbers(lambda group: bound_of(group, *given), shared))
+
+    def found(group: tuple[AxisModel, ...]) -> list[AxisFilterNumbers]:
+        alone = zip(group, bound_of(group, *given), strict=True)
+        return [with_limits(a, group, n, tau) if level is None else n for a, n in alone]
+
+    return axes.as_given(axes.numbers(found, shared))
 
 
 @lru_cache(maxsize=64)
@@ -153,6 +163,59 @@ def bound_of(
         about = (form, model, horizon, sd, "bound", found, tuple(notices), axis.quantity, stderr)
         numbers.append(AxisFilterNumbers(*about, turn_on_sd=axis.bias_sd))
     return tuple(numbers)
+
+
+def with_limits(
+    axis: AxisModel, group: tuple[AxisModel, ...], numbers: AxisFilterNumbers, tau: float | None
+) -> AxisFilterNumbers:
+    """The numbers of an axis with 95 % upper limits of terms that are not there, or left open.
+
+    group: Axes with the same numbers.
+    tau: Correlation time of the Gauss-Markov process, s; by default that of the bound.
+    """
+    model, walk = numbers.model, max(open_walk(each, numbers.horizon) for each in group)
+    white = [_limit(a.fit, "N") for a in group if a.fit is not None and numbers.N == 0.0]
+    upper = {"N": max(white)} if white else {}
+    if "K" in numbers.form and walk > numbers.K:
+        upper["K"] = walk
+    elif "K" not in numbers.form and walk > 0.0:
+        # At high frequencies this process rises as a random walk of that K does.
+        slow = GaussMarkov(walk * float(np.sqrt(numbers.horizon / 2.0)), numbers.horizon)
+        model = Model((model.terms[0], slow))
+        if numbers.sigma[0] > 0.0 or tau is not None:
+            both = tuple(replace(a, model=Model((*a.model.terms, slow)), fit=None) for a in group)
+            model = bound_of(both, numbers.form, numbers.horizon, None, tau)[0].model
+        upper["sigma"] = float(model.params["sigma"] or 0.0)
+    if not upper:
+        return numbers
+    model = model.with_params(upper)
+    again = predicted(axis, axis.chain, model, numbers.initial_sd, [*numbers.nees])
+    # What a number of the estimate covers, and how loosely, does not hold for a limit.
+    is_of = {"N": "more-than-white-noise", "K": "more-than-random-walk"}
+    gone = ["loose-form", *(is_of[key] for key in upper if key in is_of)]
+    kept = [each for each in numbers.notices if each.code not in gone]
+    notices = (*kept, notice("upper-limit", "", upper, letters=", ".join(upper)))
+    known = {key: error for key, error in numbers.stderr.items() if key not in upper}
+    return replace(numbers, model=model, predicted=again, notices=notices, stderr=known)
+
+
+def open_walk(axis: AxisModel, horizon: float) -> float:
+    """The largest K that the data of an axis leave open, u/s/sqrt(Hz); 0 where its walk is known.
+
+    That of a calibration's rivals, or of a fit without any slow term.
+    """
+    if (axis.model.params.get("K") or 0.0) > 0.0:
+        return 0.0
+    known = float(axis.rivals[-1].params.get("K") or 0.0) if axis.rivals else 0.0
+    if known or axis.fit is None or bound_of((axis,), "N+K", horizon, None)[0].K > 0.0:
+        return known
+    return _limit(axis.fit, "K")
+
+
+@lru_cache(maxsize=64)
+def _limit(fit: Fit, letter: str) -> float:
+    """`upper_limit`, which takes a fit of its own."""
+    return upper_limit(fit, letter)
 
 
 def _standard_errors(

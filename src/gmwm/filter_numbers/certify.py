@@ -16,7 +16,7 @@ from gmwm._core.units import SI_UNIT, factor
 from gmwm.errors import InputError
 from gmwm.filter_numbers import tuning
 from gmwm.filter_numbers.axes import SHARED, AxisModel, One, Sd, SensorAxes, Several, given_times
-from gmwm.filter_numbers.bound import bound_of
+from gmwm.filter_numbers.bound import bound_of, open_walk, with_limits
 from gmwm.filter_numbers.imperfections import Imperfections, Motion
 from gmwm.filter_numbers.propagation import Chain
 from gmwm.filter_numbers.reduce import usable
@@ -195,13 +195,19 @@ class Certificate(Document, InUnits):
         found = (each.where for each in self.checks if each.nees > tuning.INCONSISTENT)
         return list(dict.fromkeys(found))
 
+    @property
+    def _is_open(self) -> bool:
+        """Whether the numbers are overconfident if a walk is as large as the record allows."""
+        return any(each.code == "walk-not-covered" for each in self.notices)
+
     def _verdict(self) -> str:
         source = self.recommended.source.partition(":")[0] or "these error models"
         wrong = [name for name in self._overconfident() if name in self.numbers]
         where = "on all axes" if len(wrong) == len(self.numbers) else f"on {', '.join(wrong)}"
         if not wrong:
             where = "in the whole filter" if self._overconfident() else ""
-        verdict = f"too small {where}: overconfident" if where else "safe on all axes"
+        left = ", but only without the random walk that is left open" * self._is_open
+        verdict = f"too small {where}: overconfident" if where else f"safe on all axes{left}"
         source += " and those in motion" * bool(self.of("motion"))
         return f"The numbers in use are {verdict}, if the errors are those of {source}."
 
@@ -243,7 +249,7 @@ class Certificate(Document, InUnits):
             for quantity, each in needed.items()
         )
         loose = [each for each in needed.values() if max(each.N_factor, each.K_factor) < _LOOSE]
-        if self._overconfident():
+        if self._overconfident() or self._is_open:
             times = f"{self.recommended.horizon:g} s"
             times += f" at rest, {HORIZON:g} s in motion" * (_MOTION in names)
             text = f"take {row}, for outages of {times}: {values} (SI, as gmwm export writes them)"
@@ -346,6 +352,7 @@ def certify(
     in_flight, notices = _in_flight(axes, own, times, (reference, aiding, keyframe))
     causes: list[Cause] = []
     for group in axes.groups:
+        notices += _left_open(group, own, times, keyframe)
         rows, advice = _causes(group, own, horizon, known, moved)
         causes += rows
         notices += advice
@@ -359,6 +366,23 @@ def certify(
         seen = ", ".join(measured.numbers())
         raise InputError(f"the motion shows {seen}: give models and numbers of some of these axes")
     return Certificate(own, safe, (*found, *in_flight), tuple(causes), tuple(notices))
+
+
+def _left_open(
+    group: Sequence[AxisModel], numbers: FilterNumbers, times: Sequence[float], keyframe: float
+) -> list[Notice]:
+    """Whether numbers would be overconfident with the largest walks that the data leave open."""
+    found = {}
+    for axis in group:
+        if (walk := open_walk(axis, times[-1])) > numbers[axis.name].K:
+            terms = (*(term for term in axis.model.terms if not term.is_walk), RandomWalk(walk))
+            checks = _of_axis(replace(axis, model=Model(terms)), numbers, times, keyframe)
+            found[axis.name] = max(each.nees for each in checks), walk
+    found = {name: each for name, each in found.items() if each[0] > tuning.INCONSISTENT}
+    kind, (nees, walk) = group[0].quantity, max(found.values(), default=(0.0, 0.0))
+    unit, scale = shown_unit("K", kind, "field")
+    words: dict[str, Any] = {"axes": ", ".join(found), "shown": f"{walk * scale:.3g} {unit}"}
+    return [notice("walk-not-covered", kind, {"K": walk, "nees": nees}, **words)] if found else []
 
 
 def _in_motion(
@@ -501,11 +525,12 @@ def _causes(
     kind = group[0].quantity
 
     def least(axes: tuple[AxisModel, ...], level: float | None = None) -> AxisFilterNumbers:
-        return bound_of(axes, "N+K", horizon, level)[0]
+        found = bound_of(axes, "N+K", horizon, level)[0]
+        return found if level is not None else with_limits(axes[0], axes, found, None)
 
     def row(name: str, found: AxisFilterNumbers, over: tuple[float, float]) -> Cause:
-        factors = _ratio(found.N, over[0]), _ratio(found.K, over[1])
-        return Cause(kind, name, found.N, found.K, *factors)
+        K = max(found.K, first.K if "K" in first.upper else 0.0)
+        return Cause(kind, name, found.N, K, _ratio(found.N, over[0]), _ratio(K, over[1]))
 
     in_use = [numbers[axis.name] for axis in group]
     N, K = max(each.N for each in in_use), max(each.K for each in in_use)

@@ -1,7 +1,7 @@
 """Numbers with which a small filter is consistent, and those that a file can hold."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
@@ -10,8 +10,6 @@ from scipy.optimize import minimize, minimize_scalar
 
 from gmwm._core import checks
 from gmwm._core.typing import FloatArray, Progress
-from gmwm.calibration import upper_limit
-from gmwm.estimate import Fit
 from gmwm.filter_numbers import tuning
 from gmwm.filter_numbers.axes import (
     AxisModel,
@@ -36,7 +34,7 @@ from gmwm.filter_numbers.result import FORMS, AxisFilterNumbers, FilterNumbers, 
 from gmwm.filter_numbers.spectra.dominance import Problem, with_correlation_times
 from gmwm.filter_numbers.spectra.required import RequiredSpectrum
 from gmwm.issues import Notice, notice
-from gmwm.process import GaussMarkov, Model, RandomWalk, WhiteNoise
+from gmwm.process import Model
 
 _TIMES = {"N+K": (), "N+GM": (1.0,), "N+K+GM": (1.0,), "N+2GM": (0.1, 3.0)}
 """Correlation times at the start of the search, over the longest outage."""
@@ -249,75 +247,16 @@ def _overconfidence(found: Sequence[Predicted], longest: float) -> list[Notice]:
 
 
 def usable(
-    source: Several,
-    form: str = "N+K",
-    horizon: float = tuning.HORIZON,
-    *,
-    shared: bool = False,
-    tau: float | str | None = None,
-    bias_sd: Sd = 0.0,
-    dt: float | None = None,
-    rate: float | None = None,
+    source: Several, form: str = "N+K", horizon: float = tuning.HORIZON, **options: Any
 ) -> FilterNumbers:
-    """Numbers of `bound`, with 95 % upper limits in place of terms that no axis has.
+    """Numbers of `bound`; N+GM of models with a random walk, which it cannot bound, of `reduce`.
 
-    Filters divide by them. The notice "upper-limit" has them by letter. No stationary process
-    bounds a random walk: N+GM of models with one are of `reduce`. Parameters and errors are those
-    of `bound`.
+    Options and errors are those of `bound`.
     """
-    axes = SensorAxes.of(source, dt, bias_sd, rate)
-    terms = (term for each in axes.axes for term in each.model.terms)
-    options: Any = {"bias_sd": bias_sd, "shared": shared, "tau": tau, "dt": dt, "rate": rate}
+    terms = (term for axis in SensorAxes.of(source, None, 0.0).axes for term in axis.model.terms)
     if form == "N+GM" and any(term.is_walk or term.is_flicker for term in terms):
-        found = reduce(source, form, [share * horizon for share in tuning.OUTAGES], **options)
-    else:
-        found = bound(source, form, horizon, **options)
-    if form not in ("N+K", "N+GM") or any(each.fit is None for each in axes.axes):
-        return found
-    slow = (each.tau[0] for each in found.values() if tau is not None and each.sigma[0] > 0.0)
-    time = next(slow, horizon)
-    filled = {
-        axis.name: _filled(axis, group, found[axis.name], time)
-        for group in axes.sharing(shared)
-        for axis in group
-    }
-    return replace(found, axes={name: filled[name] for name in found})
-
-
-def _filled(
-    axis: AxisModel, group: Sequence[AxisModel], numbers: AxisFilterNumbers, tau: float
-) -> AxisFilterNumbers:
-    """The numbers of an axis without zeros; ``group``: axes with the same numbers."""
-    upper = dict[str, float]()
-
-    def largest(letter: str) -> float:
-        return max(_limit(each.fit, letter) for each in group if each.fit is not None)
-
-    def positive(letter: str, value: float) -> float:
-        return value if value > 0.0 else upper.setdefault(letter, largest(letter))
-
-    N = positive("N", numbers.N)
-    if numbers.form == "N+K":
-        model = WhiteNoise(N) + RandomWalk(positive("K", numbers.K))
-    elif numbers.sigma[0] > 0.0:
-        model = WhiteNoise(N) + GaussMarkov(numbers.sigma[0], numbers.tau[0])
-    else:
-        # At high frequencies this process rises as a random walk of that K does.
-        upper["sigma"] = largest("K") * float(np.sqrt(tau / 2.0))
-        model = WhiteNoise(N) + GaussMarkov(upper["sigma"], tau)
-    if not upper:
-        return numbers
-    again = predicted(axis, axis.chain, model, numbers.initial_sd, [*numbers.nees])
-    limits = notice("upper-limit", "", upper, letters=", ".join(upper))
-    known = {key: error for key, error in numbers.stderr.items() if key not in upper}
-    notices = (*numbers.notices, limits)
-    return replace(numbers, model=model, predicted=again, notices=notices, stderr=known)
-
-
-@lru_cache(maxsize=64)
-def _limit(fit: Fit, letter: str) -> float:
-    """`upper_limit`, which takes a fit of its own."""
-    return upper_limit(fit, letter)
+        return reduce(source, form, [share * horizon for share in tuning.OUTAGES], **options)
+    return bound(source, form, horizon, **options)
 
 
 def _smallest_score(

@@ -14,7 +14,6 @@ from gmwm._core.text import brief
 from gmwm.calibration import Calibration
 from gmwm.datasheet import Datasheet
 from gmwm.errors import InputError
-from gmwm.estimate import Fit
 from gmwm.export import SENSORS, TARGETS, Axis, ImuFile, Triad, axis_of, imu_of
 from gmwm.filter_numbers import (
     FIELD_UNITS,
@@ -65,12 +64,13 @@ def certified(calibration: Calibration) -> Certified:
     problem = ""
     for name, fitted in calibration.items():
         try:
-            axes[name] = axis_of(name, usable({name: fitted})[name], float("nan"), fitted)
+            one = usable(replace(calibration, fits={name: fitted}))[name]
+            axes[name] = axis_of(name, one, float("nan"), fitted)
         except InputError as error:
             problem = f"{name}: {error}"
     fits = {name: calibration[name] for name in axes if calibration[name].wv.quantity in SENSORS}
     triads = tuple(
-        triad_of(quantity, own)
+        triad_of(quantity, replace(calibration, fits=own))
         for quantity in SENSORS
         if (own := {name: fit for name, fit in fits.items() if fit.wv.quantity == quantity})
     )
@@ -88,13 +88,13 @@ def certified(calibration: Calibration) -> Certified:
     return Certified(axes, triads, problem, texts, why)
 
 
-def triad_of(quantity: str, fits: Mapping[str, Fit]) -> Triad:
+def triad_of(quantity: str, calibration: Calibration) -> Triad:
     """The axes of a sensor with their numbers, and one value for all of them.
 
     Raises InputError if an axis has none.
     """
-    own, shared = (usable(fits, shared=each) for each in (False, True))
-    axes = tuple(axis_of(name, one, own.rate, fits[name]) for name, one in own.items())
+    own, shared = (usable(calibration, shared=each) for each in (False, True))
+    axes = tuple(axis_of(name, one, own.rate, calibration[name]) for name, one in own.items())
     return Triad(quantity, axes, next(iter(shared.values())))
 
 

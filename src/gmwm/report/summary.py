@@ -1,6 +1,7 @@
 """The answer in a page of text: sensor numbers, filter numbers, and what to do."""
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import PurePath
 
 import numpy as np
@@ -231,7 +232,7 @@ def _filter(calibration: Calibration) -> tuple[list[str], list[list[str]]]:
     for quantity in (q for q in SENSORS if q in {f.wv.quantity for f in calibration.values()}):
         fits = {name: fit for name, fit in calibration.items() if fit.wv.quantity == quantity}
         try:
-            triad = triad_of(quantity, fits)
+            triad = triad_of(quantity, replace(calibration, fits=fits))
         except InputError as error:
             lines += wrapped(f"no filter numbers: {error}", f"{quantity:<6} ", 7)[:2]
             continue

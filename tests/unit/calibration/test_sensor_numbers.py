@@ -77,6 +77,12 @@ def test_B_is_an_upper_limit_where_the_deviation_falls_to_the_end():
     assert white < numbers.B.upper * PLATEAU < 1.1 * np.hypot(white, walk)
 
 
+def test_numbers_without_a_standard_error_print():
+    B = axis_numbers(fitted(WhiteNoise(2.0) + RandomWalk(0.5))).B
+    assert B.kind == "estimated" and B.stderr is None
+    assert str(B).startswith("B  ") and " .. " in str(B)
+
+
 def test_what_the_model_lacks_has_an_upper_limit():
     numbers = axis_numbers(fitted(WhiteNoise(1.0)))
     assert numbers.K.kind == "bound"

@@ -328,8 +328,62 @@ def test_consistency_is_that_of_the_limit_where_the_file_holds_one(calibration):
     found = usable(calibration)["accel_x"]
     assert np.sqrt(float(squares.split(",")[0])) == pytest.approx(found.K, rel=1e-5)
     # More walk than none is more cautious.
-    without = bound(calibration["accel_x"], "N+K", 60.0)
+    without = bound(calibration["accel_x"].model, "N+K", 60.0, dt=DT)
     assert all(found.nees[time] < nees for time, nees in without.nees.items())
+
+
+@pytest.fixture(scope="module")
+def open_walks():
+    """Without a walk; one gyro has a fast Gauss-Markov term, beside which a walk is left open."""
+    gyro = WhiteNoise(N_GYRO) + GaussMarkov(N_GYRO, 0.1)
+    found = gmwm.calibrate(recording(gyro, WhiteNoise(N_ACCEL)), WhiteNoise())
+    fit = replace(found["gyro_x"], model=gyro)
+    return replace(found, fits={**found.fits, "gyro_x": fit}, rivals={"gyro_x": (gyro + WALK,)})
+
+
+WALK = RandomWalk(4e-5)
+
+
+def test_one_value_for_all_covers_the_walk_that_each_axis_leaves_open(open_walks):
+    closed = replace(open_walks, rivals={})
+    limit = gmwm.calibration.upper_limit(closed["gyro_y"], "K")
+    assert 0.0 < bound(closed["gyro_x"], "N+K", 60.0).K < 0.1 * limit
+    text = kalibr_text(closed)
+    assert yaml.safe_load(text)["gyroscope_random_walk"] == pytest.approx(limit, rel=1e-5)
+    assert "no such term was found: gyro K, accel K" in text
+    shared = bound(closed, shared=True)["gyro_x"]
+    assert limit == shared.K and "K" in shared.upper and "K" not in shared.stderr
+
+
+@pytest.mark.parametrize("form", ["N+K", "N+K+GM", "N+GM"])
+def test_the_numbers_of_an_axis_cover_the_walk_that_a_fast_term_leaves_open(open_walks, form):
+    found = bound(open_walks, form)["gyro_x"]
+    assert found.upper == {"K" if "K" in form else "sigma"}
+    f = np.geomspace(1.0 / 60.0, 50.0, 50)
+    with_walk = open_walks["gyro_x"].model + WALK
+    assert np.all(found.model.psd(f, DT) > 0.7 * with_walk.psd(f, DT))
+    assert bound(open_walks, form).to_dict() == usable(open_walks, form).to_dict()
+
+
+def test_the_library_has_the_limit_of_a_walk_as_files_have(calibration):
+    fit = calibration["accel_x"]
+    for found in (bound(fit), bound(calibration)["accel_x"], usable(calibration)["accel_x"]):
+        assert gmwm.calibration.upper_limit(fit, "K") == pytest.approx(found.K)
+        assert found.upper == {"K"}
+
+
+def test_numbers_that_do_not_cover_an_open_walk_are_not_called_safe(open_walks):
+    small, right = (
+        gmwm.certify(
+            open_walks, {"gyro": (1.2 * N_GYRO, K), "accel": (N_ACCEL, 1e-3)}, keyframe=1.0
+        )
+        for K in (1e-9, 1e-3)
+    )
+    assert "but only without the random walk that is left open" in " ".join(str(small).split())
+    assert "- take the row 'error model'" in str(small)
+    (told,) = (each for each in small.notices if each.code == "walk-not-covered")
+    assert told.where == "gyro" and told.values["nees"] > 1.2
+    assert "safe on all axes, if" in " ".join(str(right).split())
 
 
 @pytest.mark.parametrize("tau", [None, 7.0])

@@ -117,7 +117,7 @@ class Estimate:
             interval = f"<= {shown.upper:.4g}"
         else:
             interval = f"{shown.lower:.4g} .. {shown.upper:.4g}"
-            error = f"{self.to_dict(units)['stderr']:.2g}"
+            error = "" if self.stderr is None else f"{self.to_dict(units)['stderr']:.2g}"
         return self.key, value, error, interval, shown.unit
 
     def __str__(self) -> str:
