@@ -245,7 +245,7 @@ BAD = {
     "a clock that stops": (with_time(0.0, 0.0), SI,
         ("f.csv, column 'time_s', line 123", "repeats the one before", "--rate 100 --time none")),
     "a clock that runs backwards": (with_time(0.0, -1.0), SI,
-        ("column 'time_s', line 123", "goes back", "and 78 more", "--rate 100 --time none")),
+        ("column 'time_s', line 123", "goes back", "and 78 more", "--rate HZ --time none")),
     "all channels constant": (["gyro_x,accel_x", *["0.5,9.8"] * ROWS], ALL,
         ("f.csv: every channel is constant", "check the sensor and the columns")),
 }  # fmt: skip

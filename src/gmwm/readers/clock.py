@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gmwm._core.typing import BoolArray, FloatArray, IntArray, known_of, median
+from gmwm._core.typing import BoolArray, FloatArray, IntArray, median
 from gmwm.errors import InputError
 from gmwm.issues import Notice, notice
 from gmwm.readers import tuning
@@ -39,20 +39,11 @@ class Clock:
     def error(self, row: int | None, text: str, hint: str = _WAY_OUT) -> InputError:
         """An error about the stamps, with the file, the column and the place."""
         place = "" if row is None else f", {self.where(row)}"
-        rate, values = self.usual_rate, dict[str, float | str]()
-        if rate is not None:
-            values["rate"] = rate
-        given = "the sampling rate, rate=" if rate is None else f"rate={rate:.6g}"
+        rate = mean_rate(self.stamps, self.seconds)
+        values: dict[str, float | str] = {} if rate is None else {"rate": rate}
+        given = "the sampling rate of the sensor, rate=HZ," if rate is None else f"rate={rate:.6g}"
         text = f"{self.source}, {self.column}{place}: {text}"
         return InputError(text, "clock", hint.replace("{}", given), values)
-
-    @property
-    def usual_rate(self) -> float | None:
-        """Rate (Hz) of the usual steps; None without a unit."""
-        with np.errstate(all="ignore"):
-            step = usual_step(np.sort(known_of(self.stamps))) * (self.seconds or 1.0)
-        is_likely = tuning.LEAST_STEP <= step < tuning.LARGEST_STEP
-        return 1.0 / step if step > 0.0 and (is_likely or self.seconds is not None) else None
 
 
 @dataclass(frozen=True)
@@ -66,13 +57,39 @@ class Timing:
 
 
 def usual_step(stamps: FloatArray) -> float:
-    """Sampling interval of sorted stamps: mean of usual steps, of all where most are none."""
+    """Sampling interval of stamps: mean of usual steps, of all where many are none."""
     steps = np.diff(stamps)
-    usual = median(steps) if steps.size else 0.0
-    if usual > 0.0 and np.min(steps) > 0.0 and (lattice := find_lattice(stamps)):
+    usual = median(steps)
+    if np.min(steps) > 0.0 and (lattice := find_lattice(stamps)):
         return lattice.interval
     some = steps[(steps > 0.5 * usual) & (steps <= tuning.USUAL_STEP * usual)]
-    return float(np.mean(some if usual > 0.0 else steps)) if steps.size else 0.0
+    return float(np.mean(some if np.quantile(steps, tuning.MANY_ALIKE) > 0.0 else steps))
+
+
+def mean_rate(stamps: FloatArray, seconds: float | None) -> float | None:
+    """Rate (Hz) of the rows over the time that they cover, in the digits that are sure.
+
+    It is that of most parts of the recording: a gap, or a clock that is set, changes that of one.
+    None if fewer than half have the same, or without a unit (s) where it is no rate of a sensor.
+    """
+    there = np.flatnonzero(~np.isnan(stamps))
+    if there.size < 2:
+        return None
+    edges = there[np.linspace(0, there.size - 1, tuning.RATE_PARTS + 1).astype(int)]
+    unit, (least, most) = seconds or 1.0, tuning.PARTS_AGREE
+    with np.errstate(all="ignore"):
+        rows, spans = np.diff(edges), np.diff(stamps[edges]) * unit
+        usual = np.median(spans / rows)
+        tails = np.quantile(np.diff(stamps[there]), tuning.TAILS_OF_STEPS) * unit
+        bound = 2.0 * np.ptp(tails) / np.min(rows) / usual
+        alike = np.abs(spans / rows / usual - 1.0) <= max(bound, least)
+    is_likely = seconds is not None or tuning.LEAST_STEP <= usual < tuning.LARGEST_STEP
+    is_known = 0.0 <= bound < most and 2 * np.count_nonzero(alike) > alike.size
+    if not (is_likely and is_known and usual > 0.0):
+        return None
+    span = float(np.sum(spans[alike]))
+    digits = math.ceil(-math.log10(max(float(np.ptp(tails)) / span, 1e-6)))
+    return float(f"{float(np.sum(rows[alike])) / span:.{max(digits, 3)}g}")
 
 
 def agree(rate: float, other: float) -> bool:
@@ -175,7 +192,11 @@ def _unwrapped(stamps: FloatArray, unit: float) -> FloatArray | None:
 def _not_even(clock: Clock, found: NoGrid) -> InputError:
     """The error about the first stamp that is on no grid."""
     if not found.stamp:
-        back = "the clock goes back: from here on stamps are early, or the rows are not in order"
+        early = "from here on stamps are early"
+        if np.all(np.diff(clock.stamps) >= 0.0):
+            text = f"{early}, as if they jittered by intervals or were rounded too coarsely"
+            return clock.error(found.row, text)
+        back = f"the clock goes back: {early}, or the rows are not in order"
         return clock.error(found.row, back, f"use the part before or after, or, {_WAY_OUT}")
     stamp = f"time stamp {clock.stamps[found.row]:.15g} {found.stamp}{more_such(found.count)}"
     hint = f"sort the rows or use a part with an even clock, or, {_WAY_OUT}"

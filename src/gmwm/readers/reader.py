@@ -397,11 +397,12 @@ def _contradicted(table: Table, rate: float) -> list[Notice]:
     stamped = (i for i, each in enumerate(table.meanings) if each.role == TIME and each.seconds)
     index = next(stamped, None)
     if index is not None:
-        with suppress(InputError, ZeroDivisionError):
-            stamps = np.sort(known_of(load_columns(table, [index])[index]))
+        with suppress(InputError, ZeroDivisionError, ValueError):  # few stamps, or no step
+            stamps = known_of(load_columns(table, [index])[index])
             unit = table.meanings[index].seconds or 1.0
             own = 1.0 / (clocks.usual_step(stamps) * unit)
-            mean = (stamps.size - 1) / (float(stamps[-1] - stamps[0]) * unit)
+            known = clocks.mean_rate(stamps, unit) if np.min(np.diff(stamps)) < 0.0 else None
+            mean = known or (stamps.size - 1) / (float(np.ptp(stamps)) * unit)
             if not (clocks.agree(rate, own) and clocks.agree(rate, mean)):
                 values = {"rate": rate, "own": own, "mean": mean}
                 column = table.column(index)

@@ -114,6 +114,11 @@ ROWS_OF_STRAYING, MOST_STRAYING = 64, 0.75
 
 ROUNDS_OF_LINE, LINE_SETTLED = 20, 1e-9  # of the robust line; relative change that ends them
 
+# Relative difference of the mean rates of parts that are alike, at least and at most: what rounding
+# and jitter cause, by these quantiles of the steps. Share of the steps that are none from which the
+# usual one is not the interval.
+PARTS_AGREE, TAILS_OF_STEPS, MANY_ALIKE = (2e-3, 0.2), (0.01, 0.99), 0.05
+
 # -- uneven clocks --------------------------------------------------------------------------------
 
 # Rows over which the interval is known to 2 % with jitter of 0.4, and of which most have no loss

@@ -264,6 +264,48 @@ def test_stamps_in_no_order_are_refused(recorded, seed):
     with pytest.raises(InputError, match="goes back") as caught:
         recorded(clock)
     assert caught.value.code == "clock"
+    assert "give the sampling rate of the sensor, rate=HZ," in str(caught.value)
+
+
+def _refused(kind, clock):
+    number = clock.number
+    if kind == "milliseconds":
+        clock.rate = 900.0
+        clock.stamps = np.round(number / 0.9) / 1e3
+    elif kind == "milliseconds and a loss":
+        clock.rate = 1660.0
+        clock.stamps = np.round((number + (number > 2000)) / 1.66) / 1e3
+    elif kind == "bursts":
+        clock.stamps = number // 20 * 20 / 200.0 + number % 20 * 1e-4
+    elif kind == "set to zero":
+        clock.stamps[N // 2 :] -= clock.stamps[N // 2]
+    elif kind == "jitter":
+        clock.jitter(3.0)
+        clock.stamps.sort()
+    elif kind == "an hour's gap":
+        clock.step(3600.0)
+
+
+REFUSED = ("milliseconds", "milliseconds and a loss", "bursts", "set to zero", "jitter")
+
+
+@pytest.mark.parametrize("kind", [*REFUSED, "an hour's gap"])
+def test_a_refusal_names_the_mean_rate_of_the_rows(recorded, kind):
+    clock = Simulated(3, 200.0)
+    _refused(kind, clock)
+    with pytest.raises(InputError, match="give rate=") as caught:
+        recorded(clock)
+    assert caught.value.values["rate"] == pytest.approx(clock.rate, rel=5e-3)
+    assert ("goes back" in str(caught.value)) == (kind == "set to zero")
+
+
+def test_a_refusal_names_no_rate_of_two(recorded):
+    clock = Simulated(3, 200.0)
+    clock.stamps[N // 2 :] = clock.stamps[N // 2] + np.arange(N - N // 2) / 350.0
+    clock.stamps[5000:] -= 3.0
+    with pytest.raises(InputError) as caught:
+        recorded(clock)
+    assert "rate" not in caught.value.values
 
 
 def test_a_stopped_clock_is_refused(recorded):
