@@ -383,7 +383,8 @@ def _design(
         tested((*chosen, lag))
         for each in given
         if each.constants == () and each.name != "time"
-        for _, lag in Wanted(each.name, (1,), None).choices(length)
+        for _, *lags in Wanted(each.name, (1,), None).choices(length)
+        for lag in lags  # none of a short record
     ]
     better, (*_, lag), _ = min(late, key=lambda each: each[0], default=(least, chosen, removed))
     notices = list[Notice]()
