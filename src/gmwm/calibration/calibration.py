@@ -239,6 +239,11 @@ class Calibration(ByName[Fit], Document):
     def derived(self) -> dict[str, Any]:
         return {"numbers": self.numbers.to_dict()}
 
+    def check_content(self) -> None:
+        for name, fit in self.fits.items():
+            if fit.wv.name != name:
+                raise ValueError(f"the fit of {name} is of channel {fit.wv.name!r}")
+
     def beside(self, path: Path) -> Calibration:
         files = ", ".join(of_other_runs(path, COMPANIONS))
         if not files:

@@ -173,3 +173,20 @@ def test_threads_side_by_side_have_one_pool():
     for each in threads:
         each.join()
     assert sum(pool is not None for pool in pools) == 1
+
+
+@pytest.mark.parametrize(("edit", "message"), [
+    ("swapped", "the fit of gyro_x is of channel 'accel_x'"), ("covariance", "stderr of N"),
+])  # fmt: skip
+def test_an_edited_calibration_is_rejected(calibration, tmp_path, edit, message):
+    content = calibration.to_dict()
+    (fits,) = (each for each in content.values() if isinstance(each, dict) and "gyro_x" in each
+               and "covariance" in each["gyro_x"])  # fmt: skip
+    if edit == "swapped":
+        fits["gyro_x"] = fits["accel_x"]
+    else:
+        fits["gyro_x"]["covariance"] = [[4.0 * fits["gyro_x"]["covariance"][0][0]]]
+    path = tmp_path / "edited.json"
+    path.write_text(json.dumps(content))
+    with pytest.raises(InputError, match=message):
+        gmwm.load(path)

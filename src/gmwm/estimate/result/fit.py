@@ -477,6 +477,9 @@ class Fit(Document, Printed):
         found = super().from_content(content)
         if content["params"] != found.params:
             raise InputError(f"its parameters are not those of its model {found.model!r}")
+        for key, error in content.get("stderr", {}).items():
+            if not np.isclose(error, found.stderr[key], rtol=1e-6, atol=0.0, equal_nan=True):
+                raise InputError(f"stderr of {key} = {error} is not that of its covariance")
         return found
 
 
