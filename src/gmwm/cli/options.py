@@ -124,6 +124,7 @@ def with_option(notice: Notice, span: Span = None, lost: float = 0.0, longest: s
 
     values = notice.values
     always = {
+        "time-column": "to choose another, give --time",
         "sd-assumed": f"give --{notice.where}-sd",
         "axis-up": "correct if the sensor is mounted upside down. If z points up give --channel "
         "gyro_z=-NAME --channel accel_z=-NAME, and also y if it points left; if accelerometers "

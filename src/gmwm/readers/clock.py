@@ -19,6 +19,7 @@ UNITS = {86400.0: "days", 3600.0: "hours", 60.0: "minutes", 1.0: "seconds"}
 UNITS |= {1e-3: "milliseconds", 1e-6: "microseconds", 1e-9: "nanoseconds"}
 _SHORT = dict(zip(UNITS, ("days", "h", "min", "s", "ms", "us", "ns"), strict=True))
 _WAY_OUT = "if the samples are evenly spaced all the same, give {} and time=False"
+_CUT = f"cut the file at this row and use one part, or, {_WAY_OUT}"
 _SHORTEST_SHOWN = 1e-3  # s; less is given in microseconds
 _SHORTEST_STEP = 1e-100  # in any unit; shorter ones only leave the range of floating point
 _DAY = 86400.0
@@ -197,7 +198,7 @@ def _not_even(clock: Clock, found: NoGrid) -> InputError:
             text = f"{early}, as if they jittered by intervals or were rounded too coarsely"
             return clock.error(found.row, text)
         back = f"the clock goes back: {early}, or the rows are not in order"
-        return clock.error(found.row, back, f"use the part before or after, or, {_WAY_OUT}")
+        return clock.error(found.row, back, _CUT)
     stamp = f"time stamp {clock.stamps[found.row]:.15g} {found.stamp}{more_such(found.count)}"
     hint = f"sort the rows or use a part with an even clock, or, {_WAY_OUT}"
     return clock.error(found.row, f"{stamp}, so that no even clock fits most of them", hint)
@@ -260,7 +261,7 @@ def _check_jumps(clock: Clock, found: Grid, seconds: float) -> None:
         if max(first / then, then / first) > tuning.SHARP_CHANGE:
             place = f"{clock.source}, {clock.column}, near {clock.where(found.change.row)}"
             text = f"{place}: the sampling rate goes from {first:.4g} to {then:.4g} Hz"
-            raise InputError(text, "rate-changes", "use the part before or after")
+            raise InputError(text, "rate-changes", "cut the file there and use one part")
     if jumps.are_rounding or (found.uneven or jumps).have_rhythm:
         text = f"a step of two intervals, and {jumps.rows.size - 1:,} more such at even distances"
         raise clock.error(int(jumps.rows[0]), f"{text}, as if the stamps were rounded too coarsely")
@@ -291,8 +292,7 @@ def _check_jumps(clock: Clock, found: Grid, seconds: float) -> None:
         text = f"the clock jumps by {jumps.missing[longest]:,.6g} sampling intervals, and in all"
         text += f" {jumps.total:,.6g} samples are missing, with {n:,} present: more than half of"
         text += " the recording"
-        hint = f"use the part before or after, or, {_WAY_OUT}"
-        raise clock.error(int(jumps.rows[longest]), text, hint)
+        raise clock.error(int(jumps.rows[longest]), text, _CUT)
 
 
 def _notices(clock: Clock, found: Grid, seconds: float, *, is_guess: bool) -> list[Notice]:

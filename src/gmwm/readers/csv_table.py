@@ -249,10 +249,10 @@ class CsvTable(Table):
                 cell = cell if len(cell) <= 30 else f"{cell[:27]}..."
                 place = f"line {line}, column {label(self.names, column)}: {cell!r}"
                 if value is None:
-                    hint = "correct the line, or choose other columns with channels= and time="
+                    code, hint = "no-number", "correct the line, or give other channels= and time="
                     if _CHECKSUM.search(fields[column]):
-                        hint = "remove the checksums, *hh, from the ends of the lines"
-                    raise InputError(f"{self.source}, {place} {problem}: {hint}")
+                        code, hint = "", "remove the checksums, *hh, from the ends of the lines"
+                    raise InputError(f"{self.source}, {place} {problem}", code, hint)
                 if math.isinf(value):
                     infinite.append(place)
                 values.append(value)

@@ -23,6 +23,8 @@ ROOT = REPOSITORY / "src" / "gmwm"
          "there is no rate and no unit: give e.g. --rate 100 --gyro-unit deg/s"),
         (("the rates differ", "rate-contradicted", "give time=False"),
          f"the rates differ: {HINTS['rate-contradicted']}"),
+        (("'x' is not a number", "no-number", "give other channels= and time="),
+         f"'x' is not a number: {HINTS['no-number']}"),
         (("wrong", "unknown-code", "do this"), "wrong: do this"),
     ],
 )  # fmt: skip

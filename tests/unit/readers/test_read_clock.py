@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from gmwm.cli.options import with_option
 from gmwm.errors import InputError
 from gmwm.readers import read
 from gmwm.readers.grid import find_change
@@ -158,7 +159,7 @@ def test_a_rate_that_comes_and_goes(long):
 @pytest.mark.parametrize("then", [50.0, 30.0, 200.0, 300.0])
 def test_a_rate_that_changes_so_much_that_rows_seem_to_be_missing(long, then):
     stamps = np.cumsum(np.r_[np.full(5000, 0.01), np.full(7000, 1.0 / then)])
-    with pytest.raises(InputError, match=f"from 100 to {then:g} Hz: use the part before or"):
+    with pytest.raises(InputError, match=f"from 100 to {then:g} Hz: cut the file there and use"):
         read(long(stamps), units=UNITS)
 
 
@@ -295,7 +296,9 @@ def test_several_time_columns(write, samples):
     path = write(np.column_stack([np.arange(80) / 10.0, np.zeros(80), samples[:, 0]]), "t,stamp,gx")
     recording = read(path, units=UNITS)
     assert recording.rate == pytest.approx(10)
-    assert "time stamps are read from column 't'; use time= to choose 'stamp'" in texts(recording)
+    found = next(each for each in recording.notices if each.code == "time-column")
+    assert found.text == "time stamps are read from column 't', not 'stamp'"
+    assert with_option(found).hint == "to choose another, give --time"
 
 
 def test_time_stamps_as_text(tmp_path):

@@ -140,8 +140,13 @@ def test_a_clock_that_is_set_is_rejected_with_its_place(recorded, by, words, siz
     with pytest.raises(InputError, match=words) as caught:
         recorded(clock)
     assert caught.value.code == "clock"
-    assert "use the part before or after" in str(caught.value)
+    assert "cut the file at this row and use one part" in str(caught.value)
     assert "row 2000" in str(caught.value)
+    for part in (slice(None, 2000), slice(2000, None)):
+        cut = Simulated(3, 200.0)
+        cut.number, cut.stamps = clock.number[part] - clock.number[part][0], clock.stamps[part]
+        found, truth = recorded(cut)
+        np.testing.assert_array_equal(found["gyro_x"].values, truth)
 
 
 @pytest.mark.parametrize("rate", [1100.0, 1300.0, 1700.0, 3300.0])
