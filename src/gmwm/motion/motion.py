@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 from scipy.interpolate import CubicSpline
-from scipy.ndimage import uniform_filter1d
+from scipy.ndimage import maximum_filter1d, uniform_filter1d
 from scipy.spatial.transform import Rotation
 
 from gmwm._core import checks
-from gmwm._core.typing import BoolArray, FloatArray, Progress
+from gmwm._core.typing import QUARTILE, BoolArray, FloatArray, Progress
 from gmwm.errors import InputError
 from gmwm.estimate import Fit
 from gmwm.issues import Notice, notice
@@ -255,13 +255,16 @@ def _imu(where: str, label: str, given: Any) -> tuple[_Imu, int]:
             continue
         values = np.array(np.stack([recording[name].values for name in names], axis=1))
         for name, column in zip(names, values.T, strict=True):
-            changes = np.flatnonzero(np.diff(column, prepend=np.inf, append=np.inf) != 0.0)
-            stuck = (np.max(np.diff(changes)) - 1) * recording.dt
-            if stuck > tuning.STUCK:
+            fault = _fault(column, recording.dt)
+            if fault:
                 raise InputError(
-                    f"{where}: {name} stays at one value for {stuck:.3g} s: leave this "
-                    "IMU out, or give a part without"
+                    f"{where}: {name} {fault}: leave this IMU out, or give a part without"
                 )
+            # Less the cubic through four neighbours, which follows a motion.
+            first, second, fourth, last = (column[k : len(column) - 4 + k] for k in (0, 1, 3, 4))
+            away = np.abs(column[2:-2] - (4.0 * (second + fourth) - first - last) / 6.0)
+            least = tuning.SPIKE * max(np.nanmedian(away) / QUARTILE, np.finfo(float).tiny)
+            column[2:-2][(away > least) & (away == maximum_filter1d(away, 5))] = np.nan
         gone = np.isnan(values)
         for axis in np.flatnonzero(gone.any(axis=0)):
             there = np.flatnonzero(~gone[:, axis])
@@ -276,6 +279,18 @@ def _imu(where: str, label: str, given: Any) -> tuple[_Imu, int]:
     near = 2 * round(tuning.BESIDE_LOST / recording.dt) + 1
     lost = np.convolve(lost, np.ones(near), "same") > 0.5
     return _Imu(label, recording.dt, samples, lost), filled
+
+
+def _fault(column: FloatArray, dt: float) -> str:
+    """In words, why a channel (n,) is of no use; empty if it may be used."""
+    changes = np.flatnonzero(np.diff(column, prepend=np.inf, append=np.inf) != 0.0)
+    stuck = (np.max(np.diff(changes)) - 1) * dt
+    if stuck > tuning.STUCK:
+        return f"stays at one value for {stuck:.3g} s"
+    levels, counts = np.unique(column, return_counts=True)
+    end = 0 if counts[0] > counts[-1] else -1
+    is_cut = levels.size > tuning.FEWEST_LEVELS and counts[end] > tuning.CLIPPED * column.size
+    return f"is cut off at {levels[end]:.4g}" if is_cut else ""
 
 
 def _joined(flight: int, first: _Imu, imu: _Imu) -> Clock | None:

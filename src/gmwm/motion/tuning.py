@@ -28,6 +28,9 @@ MOST_TILT = (
     0.07  # rad: standard error of a rotation; 0.05 where other axes have a hundredth of the rates
 )
 STUCK = 5.0  # s at one value: rounded noise at rest changes sooner
+# Share of samples at an end, if there are many levels; 14 flights have at most 0.0004. Robust
+# deviations of a sample from its neighbours that make it a spike; they have at most 12.
+CLIPPED, FEWEST_LEVELS, SPIKE = 0.005, 100, 30.0
 COPY = 0.01  # of the largest difference: neighbours that share all vibration have a tenth
 MOST_LEFT = 0.3  # share of the variance of rates that a mapping may leave: flights have 0.001
 # Residuals of means are correlated: their variance counts so often against the spread.

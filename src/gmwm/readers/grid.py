@@ -344,8 +344,8 @@ def place_uneven(stamps: FloatArray) -> Uneven | int | None:
     # The last row of a rounded stamp is within an interval of an even clock that loses none. The
     # last stamp may be cut off. Bursts have one size but for losses, which add up.
     fewest = max(tuning.MANY_LOST * last.size, tuning.FEWEST_BESIDE)
-    is_coarse = np.count_nonzero(sizes != np.median(sizes)) > fewest
-    is_coarse = bool(is_coarse and np.ptp((time / line - last)[:-1]) < tuning.ROUNDED)
+    is_mixed = np.count_nonzero(sizes != np.median(sizes)) > fewest
+    is_coarse = bool(is_mixed and np.ptp((time / line - last)[:-1]) < tuning.ROUNDED)
     interval, number = (line, last) if is_coarse else (interval, last)
     for _ in range(0 if is_coarse else tuning.ROUNDS_OF_GRID):
         if not 10.0 * finest < interval < np.inf:
