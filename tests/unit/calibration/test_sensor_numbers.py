@@ -83,6 +83,19 @@ def test_numbers_without_a_standard_error_print():
     assert str(B).startswith("B  ") and " .. " in str(B)
 
 
+def test_K_is_a_limit_where_a_model_that_fits_equally_well_has_no_walk():
+    """Of flicker noise the chosen walk's interval held the truth in 0 of 17 records."""
+    fit = fitted(WhiteNoise(1.0) + RandomWalk(0.05))
+    alone = axis_numbers(fit).K
+    without = WhiteNoise(1.0) + gmwm.BiasInstability(0.5)
+    larger = WhiteNoise(1.0) + RandomWalk(2.0 * alone.upper)
+    found = axis_numbers(fit, [without, larger]).K
+    assert (found.kind, found.value, found.upper) == ("bound", 0.0, 2.0 * alone.upper)
+    found = axis_numbers(fit, [larger]).K
+    assert (found.kind, found.value) == ("estimated", alone.value)
+    assert (found.lower, found.upper) == (alone.lower, 2.0 * alone.upper)
+
+
 def test_what_the_model_lacks_has_an_upper_limit():
     numbers = axis_numbers(fitted(WhiteNoise(1.0)))
     assert numbers.K.kind == "bound"

@@ -292,7 +292,8 @@ def test_what_is_copied_is_what_is_exported(calibration):
 def test_models_that_tie_and_the_data_sheet_are_drawn(calibration, tmp_path):
     sheet = tmp_path / "sheet.yaml"
     sheet.write_text("gyro: {N: 1.2 deg/sqrt(h), K: 60 deg/h/sqrt(h)}\n")
-    rivals = {"gyro_x": (WhiteNoise(4e-4) + gmwm.GaussMarkov(1e-3, 30.0),)}
+    slow = gmwm.GaussMarkov(1e-3, 30.0) + gmwm.RandomWalk(1e-4)
+    rivals = {"gyro_x": (WhiteNoise(4e-4) + slow,)}
     shown = Page(page(replace(calibration, rivals=rivals), datasheet=sheet))
     assert set(read_datasheet(sheet).entries) == {"gyro"}  # before there are channels, too
     traces = {trace["name"]: trace for trace in shown.figures()[0]["data"]}
