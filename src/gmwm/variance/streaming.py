@@ -296,11 +296,18 @@ class StreamingVariance:
             dt, confidence = arrays["interval"].tolist()
             made = cls(dt, None if arrays["single"] else units, confidence=confidence)
             for i, series in enumerate(made._series):
-                series.set(
-                    {k.partition(".")[2]: v for k, v in arrays.items() if k.startswith(f"{i}.")}
-                )
+                own = {k.partition(".")[2]: v for k, v in arrays.items() if k.startswith(f"{i}.")}
+                series.set(own)
+                if any(
+                    np.max(np.abs(own[name]), initial=0.0) > checks.LARGEST**4 for name in _SUMS
+                ):
+                    raise ValueError("sums that no samples have")
             return made
         raise InputError(f"{file.name} is not a saved streaming variance: write it with save()")
+
+
+_SUMS = ("data", "levels", "blocks")
+"""Arrays of a series that samples of a sensor bound."""
 
 
 class _Series:
@@ -363,7 +370,7 @@ class _Series:
         fits &= 0 <= run <= missing <= n == origin[0] + filled[0] <= checks.MOST_SAMPLES
         fits &= 0 <= blocks <= kernels.MOST_BLOCKS and 0 <= octave < len(filled)
         numbers = (self.rows.data[: np.sum(used)], self.sums.levels, self.sums.blocks)
-        fits &= all(np.all(np.abs(each) < checks.LARGEST**4) for each in numbers)
+        fits &= not any(np.isnan(each).any() for each in numbers)
         limits = self.sums.totals[[kernels.REFERENCE, kernels.LOWEST, kernels.HIGHEST]]
         fits &= missing == n or bool(np.all(np.isfinite(limits)))
         if not (fits and np.all((gaps >= 0) & (gaps <= n))):
