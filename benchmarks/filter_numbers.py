@@ -1,9 +1,10 @@
-"""Numbers for small filters: how tight, how consistent, and how they go with the record.
+"""Numbers for small filters: tightness, consistency, and dependence on the record.
 
-Run with ``python benchmarks/filter_numbers.py PART``, one of length, errors, balance, coarse,
-tightness, random, rates, rules, flight and whole, or with ``real FOLDER``, of the four ADIS16405
-recordings; the tables of docs/filter-numbers.md and docs/filter-numbers-study.md. All but length
-and errors, which simulate and fit records, and real are exact covariance analyses.
+Prints the tables of docs/filter-numbers.md and docs/filter-numbers-study.md. Run with ``python
+benchmarks/filter_numbers.py PART``, one of length, errors, balance, coarse, tightness, random,
+rates, rules, flight and whole, or with ``real FOLDER``, the folder of the four ADIS16405
+recordings. length and errors simulate and fit records; real uses recordings; all others are exact
+covariance analyses.
 """
 
 from __future__ import annotations
@@ -84,9 +85,10 @@ def _least_error(truth: Model, hours: int) -> float:
 
 def length() -> None:
     """K from records of several lengths, by the old rule, bound and reduce."""
-    print("K [u/s/sqrt(Hz)] for 60 s by length of record, and its relative standard error: least")
-    print("(Cramer-Rao), and as the result has it; random walk: fitted, or its 95 % bound")
-    heads = ("random walk", "bound", "of truth", "least se", "its se", "reduce", "of truth")
+    print("K [u/s/sqrt(Hz)] for 60 s by length of record. random walk: fitted, or its 95 % limit;")
+    print("/ true: over K from the true model; relative standard errors of K by bound: the least")
+    print("(Cramer-Rao) and the stated one")
+    heads = ("random walk", "bound", "/ true", "least se", "stated se", "reduce", "/ true")
     print(f"{'truth':<12}{'hours':>6}" + "".join(f"{head:>12}" for head in heads)
           + f"   NEES of reduce after {', '.join(f'{t:g}' for t in OUTAGES)} s")  # fmt: skip
     chain = Chain.usual("gyro")
@@ -114,10 +116,9 @@ def length() -> None:
 
 def errors() -> None:
     """Whether the standard errors of N and K are right, from many records of each sensor."""
-    print(
-        "records, and those with standard errors; over the numbers of the truth: median of these,"
-    )
-    print("mean and spread (68 %) of what is found; share of 95 % intervals that hold the truth")
+    print("runs: records; with: those with standard errors. Relative to N and K from the true")
+    print("model: median standard error, mean and spread (half the 68 % range) of the estimates.")
+    print("held: share of the 95 % intervals that hold the true value")
     print(f"{'truth':<14}{'hours':>6}{'runs':>6}{'with':>6}" + "".join(
         f"{f'{key}: {head}':>11}" for key in "NK" for head in ("error", "mean", "spread", "held")
     ))  # fmt: skip
@@ -142,11 +143,10 @@ def errors() -> None:
 
 
 def balance() -> None:
-    """What it costs that the NEES of reduced numbers is even."""
-    print(
-        "N+K by gmwm.reduce for 10, 30 and 60 s, all truths as gyro_x, accel_x and gyro_z: NEES by"
-    )
-    print("weight of its evenness; true error at 60 s over that of a filter with the full model")
+    """Cost of a reduced filter whose NEES is the same after all outages."""
+    print("N+K by gmwm.reduce for 10, 30 and 60 s, all truths as gyro_x, accel_x and gyro_z: NEES")
+    print("by weight of the squared log NEES; true error at 60 s over that of a filter with the")
+    print("full model")
     print(f"{'weight':>6}{'10 s':>16}{'30 s':>16}{'60 s':>16}{'error: mean':>14}{'most':>8}")
     for weight in (0.0, 5.0, 10.0, 20.0, 40.0):
         tuning.EVENNESS = weight
@@ -166,9 +166,10 @@ def balance() -> None:
 
 
 def coarse() -> None:
-    """What reduced numbers make of a heading in steps."""
+    """Consistency of reduced numbers for a heading in steps."""
     print("N+K by gmwm.reduce, white noise of 1e-6 rad/sqrt(s) and quantization Q of a heading: N")
-    print("over sqrt(2 Q^2/T), T the longest outage; NEES of the heading, and of what it gains")
+    print("over sqrt(2 Q^2/T), T the longest outage; NEES of the heading and of its gain since the")
+    print("last fix")
     print(f"{'Q [rad]':<9}{'outages [s]':<14}{'N':>6}{'heading':>22}{'gain':>22}")
     for Q in (5e-5, 2e-4, 1e-3):
         for outages in ((60.0,), OUTAGES):
@@ -187,9 +188,10 @@ def coarse() -> None:
 
 def tightness() -> None:
     """Predicted over true standard deviation of bounds at their horizons; the worst direction."""
-    print("tilt-velocity-position chain, two minutes with a fix of 1 m every second before")
-    print("predicted/true standard deviation of position at the horizon; last: worst NEES of any")
-    print("direction of chains of 1 to 3 integrals, settled 0 to 1,200 s, at 0.1 to 10 horizons")
+    print("predicted/true standard deviation of position at the horizon (tilt-velocity-position")
+    print("chain, two minutes with a fix of 1 m every second before). worst: largest NEES in any")
+    print("direction of chains of 1 to 3 integrals, after 0 to 1,200 s of fixes, at 0.1 to 10")
+    print("horizons")
     heads = "".join(f"{f'{t:g} s':>7}" for t in HORIZONS)
     print(f"{'truth':<15}{'form':<8}{heads}   worst")
     total: dict[str, list[float]] = {}
@@ -256,8 +258,8 @@ def random() -> None:
 def rates() -> None:
     """How far bounds move with the sampling rate, which slow models do not know of."""
     rates = (50.0, 100.0, 200.0, 500.0, 1000.0)
-    print(f"bounds for 60 s at {', '.join(f'{rate:g}' for rate in rates)} Hz: the largest over")
-    print("the smallest N, K, and predicted standard deviation at the horizon")
+    print(f"bounds for 60 s at {', '.join(f'{rate:g}' for rate in rates)} Hz: ratio of the largest")
+    print("to the smallest N, K, and predicted standard deviation at the horizon")
     for name in ("1 GM", "2 GM", "3 GM, other", "walk + GM", "flicker"):
         for form in ("N+K", "N+K+GM"):
             found = [gmwm.bound(TRUTHS[name], form, dt=1.0 / rate) for rate in rates]
@@ -267,7 +269,7 @@ def rates() -> None:
 
 
 def _rules(truth: Model, T: float) -> dict[str, tuple[Model, float]]:
-    """Numbers as people have them."""
+    """Numbers by common rules, and by this package."""
     safe = gmwm.bound(truth, horizon=T)
     small = gmwm.reduce({"gyro_x": truth}, outages=(T,))["gyro_x"]
     tau = DT * 2.0 ** np.arange(24)
@@ -291,7 +293,7 @@ def _rules(truth: Model, T: float) -> dict[str, tuple[Model, float]]:
 def rules() -> None:
     """NEES and loss of accuracy with numbers by several rules."""
     print("position by tilt after 60 s: NEES per degree of freedom; true error over that of a")
-    print("filter that has the full model; predicted over true")
+    print("filter with the full model; predicted over true error")
     T, chain = 60.0, Chain.usual("gyro")
     names = list(_rules(ONE, T))
     print(f"{'truth':<15}" + "".join(f"{name:>22}" for name in names))
@@ -310,7 +312,7 @@ def flight() -> None:
     for name, truth in (("paper sensor", TABLE_6), ("slow terms of 30 and 60 s alone", QUIET)):
         print(f"INS/GNSS on a loiter, {name}, at the end of outages")
         _flown(truth)
-    print("after 30 s of the last, N+K for some axes and the full model for the others")
+    print("the same sensor after 30 s, N+K for some axes and the full model for the others")
     numbers, scenario = gmwm.bound(QUIET.models), loiter_with_outages(OUTAGES, DT)
     for some in ({"gyro_x", "gyro_y"}, {"gyro_z"}, {"accel_x", "accel_y", "accel_z"}):
         believed = SensorModels.of(
@@ -349,10 +351,8 @@ def _flown(truth: SensorModels) -> None:
 
 def whole() -> None:
     """The whole navigation filter with the bounds of all truths for all horizons."""
-    print(
-        "INS/GNSS on a loiter, the truth on six axes (u: rad/s, m/s^2), outages of 1, 10 and 60 s:"
-    )
-    print("largest eigenvalue of P_predicted^-1 P_true at any time, with bounds for a horizon")
+    print("INS/GNSS on a loiter with outages of 1, 10 and 60 s, the truth on six axes (u: rad/s,")
+    print("m/s^2): largest eigenvalue of P_predicted^-1 P_true at any time, by horizon of bounds")
     print(f"{'truth':<15}{'form':<8}" + "".join(f"{f'{T:g} s':>10}" for T in HORIZONS))
     scenario = loiter_with_outages((1.0, 10.0, 60.0), DT)
     for name, truth in TRUTHS.items():
@@ -378,7 +378,7 @@ def _filter(numbers: Mapping[str, gmwm.AxisFilterNumbers]) -> SensorModels:
     )
 
 
-# Of the ADIS16405 in u/sqrt(Hz) and u: 2 deg/sqrt(h), 0.007 deg/s; 0.2 m/s/sqrt(h), 0.2 mg.
+# ADIS16405, in u/sqrt(Hz) and u: 2 deg/sqrt(h), 0.007 deg/s; 0.2 m/s/sqrt(h), 0.2 mg.
 _SHEET = {"gyro": (5.8e-4, 1.2e-4), "accel": (3.3e-3, 2.0e-3)}
 
 
@@ -390,8 +390,8 @@ def real(folder: str) -> None:
         for k in (1, 2, 3, 4)
     ]  # fmt: skip
     scenario = loiter_with_outages((10.0, 60.0), DT)
-    print("position error at the end of outages of 10 and 60 s: certified NEES, and measured with")
-    print("the errors of the other three recordings, 24 runs of each")
+    print("position at the end of outages of 10 and 60 s: NEES as certified, and as measured in 24")
+    print("runs with the errors of the other three recordings")
     print(f"{'calibrated':<12}{'numbers':<14}{'certified':>20}{'measured':>20}")
     for k, recording in enumerate(recordings):
         calibration = gmwm.calibrate(recording)

@@ -1,4 +1,4 @@
-"""What errors that come with motion do to attitude: a strapdown beside the terms of a certificate.
+"""Attitude errors from errors that motion brings: a strapdown against the terms of a certificate.
 
 Run with ``python benchmarks/imperfections.py``; the table of docs/filter-numbers.md.
 """
@@ -21,13 +21,13 @@ KNOWN = Imperfections(
 
 
 def _moved(sd: float, steps: int, rng: np.random.Generator) -> np.ndarray:
-    """Of three axes and all runs, (steps, runs, 3)."""
+    """Motion of three axes in all runs, (steps, runs, 3)."""
     series = GaussMarkov(sd, MOTION.memory).simulate((steps + 1000) * RUNS * 3, DT, rng)
     return series.reshape(RUNS * 3, steps + 1000)[:, 1000:].T.reshape(steps, RUNS, 3)
 
 
 def main() -> None:
-    """Root mean square of the errors of attitude over what the terms give."""
+    """Root mean square of the attitude errors over that predicted by the terms."""
     rng = np.random.default_rng(0)
     late, steps = round(KNOWN.time_offset / DT), round(TIMES[-1] / DT)
     rate, accel = (_moved(sd, steps + late, rng) for sd in (MOTION.rate, MOTION.accel))
@@ -40,8 +40,8 @@ def main() -> None:
     }
     terms = KNOWN.terms("gyro", MOTION)
     attitude = {name: Rotation.identity(RUNS) for name in ("", *measured)}
-    print(f"drone, {RUNS} runs: error of attitude by a strapdown, over that of the process of")
-    print("gmwm.certify integrated once; of a time offset also over s d sqrt(2 (1 - exp(-T/tau)))")
+    print(f"drone, {RUNS} runs: attitude error of a strapdown integration over the integral of the")
+    print("process in gmwm.certify. bounded: the time offset's over s d sqrt(2 (1 - exp(-T/tau)))")
     print(f"{'T [s]':<8}" + "".join(f"{name:>15}" for name in measured) + f"{'bounded':>10}")
     for k in range(steps):
         for name, turned in attitude.items():

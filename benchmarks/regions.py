@@ -55,8 +55,9 @@ def chains() -> None:
     """Worst direction of any chain of integrators for any drawn parameter set."""
     _say(
         f"{DRAWS} parameter sets of the {LEVEL:.0%} region of a fit, bounds for {HORIZON:g} s. "
-        "Chains of 1 to 3 integrals, settled 0 and 120 s: largest eigenvalue at 0.1, 1 and 10 "
-        "horizons with the bound of the region and of the estimate; sets that the latter leaves out"
+        "Chains of 1 to 3 integrals, after 0 and 120 s of fixes: largest eigenvalue at 0.1, 1 and "
+        "10 horizons, with the bound of the region and with the bound of the estimate; sets: those "
+        "that the bound of the estimate does not cover"
     )
     print(f"{'truth':<12}{'hours':>6}  {'form':<8}{'region':>10}{'estimate':>10}{'sets':>6}")
     for name, (truth, hours) in FITS.items():
@@ -101,9 +102,9 @@ def flight() -> None:
         f"INS/GNSS on a loiter, N+K for the {LEVEL:.0%} region of fits from an hour; {RUNS} runs "
         f"of each of {SETS} parameter sets. At the end of outages of 10 and 60 s, for position, "
         "velocity and attitude: NEES per degree of freedom and the largest eigenvalue, by "
-        "covariance analysis, and measured. If the filter believed the truth, the standard error "
-        f"of a NEES were {np.sqrt(2.0 / 9.0 / RUNS):.2f}, and all eigenvalues below {limit:.2f} in "
-        "95 % of such tables."
+        "covariance analysis (exact), and measured. For a consistent filter the standard error of "
+        f"a NEES is {np.sqrt(2.0 / 9.0 / RUNS):.2f}, and in 95 % of such tables all measured "
+        f"eigenvalues are below {limit:.2f}."
     )
     heads = f"{'exact':>10}{'largest':>9}{'measured':>10}{'largest':>9}" * len(OUTAGES)
     print(f"{'set':<5}{'gyro sigma, tau':>20}{'accel sigma, tau':>20}" + heads)

@@ -249,9 +249,10 @@ def main() -> None:
     se = [np.sqrt(2.0 / n / options.runs) for n in (3, 6)]
     text = (
         f"{options.runs} runs of {SECONDS} s: NEES per degree of freedom of the last keyframe, and "
-        "of the next pose relative to it (turn; step and velocity), which the IMU alone gives; "
-        f"beside, that of gmwm.certify, of an axis after {KEYFRAMES} keyframes, and after the "
-        f"{SECONDS - 1} here. Standard error of a NEES of 1: {se[0]:.2f}, of the step {se[1]:.2f}."
+        "of the next pose relative to it (turn; step with velocity), predicted from the IMU alone. "
+        f"cert.: the same NEES by gmwm.certify, for one axis after {KEYFRAMES} keyframes; here: "
+        f"after {SECONDS - 1} as in these runs. Standard error of a NEES of 1: {se[0]:.2f}, of the "
+        f"step {se[1]:.2f}."
     )
     print(fill(text, 96))
     print(f"{'truth':<12}{'numbers':<12}" + "".join(f"{head:>8}" for head in HEADS))
