@@ -1,7 +1,7 @@
 """Pages of several units: a fleet with its data sheet and limits, and a comparison of few."""
 
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -10,9 +10,11 @@ import numpy as np
 from gmwm._core.files import writable_file
 from gmwm._core.pages import page_of
 from gmwm._core.text import brief, per_cent, with_error
-from gmwm._core.units import customary_unit
+from gmwm._core.units import customary_unit, shown_unit
 from gmwm.datasheet import Datasheet, read_datasheet
+from gmwm.estimate import Fit
 from gmwm.issues import worst_first
+from gmwm.plotting import COMPONENT_COLOURS, DATA_COLOUR, SUM_COLOUR, literal
 from gmwm.population import (
     CONFIDENCE,
     CONTENT,
@@ -28,12 +30,16 @@ from gmwm.population import (
     needed_units,
     outlier_distance,
 )
-from gmwm.report.page import duration_text, multiple, origin, strip, write_page
+from gmwm.report.page import duration_text, origin, svg, write_page
 
 _TITLES = {"N": "N, random walk", "B": "B, bias instability", "K": "K, rate random walk"}
 _MARKS = {"pass": "good", "FAIL": "bad", "?": "care", "none": "bad"}
 _MOSTLY = 0.5  # of the variance between units, which longer recordings would make less
 _WIDE = 0.05  # spread from which that is worth it
+_SIZE = (4.4, 3.6)  # in, of a picture; several stand side by side
+_APART = "#b3261e"
+_FARTHEST = 3.0  # a limit beyond so many times the largest value is not drawn
+_NAMED = 3  # points of a row that stand apart and have their names beside them
 _MOST_ROWS = 300  # of a table on the page: 3,000 units would take a browser 20 s
 
 
@@ -102,11 +108,42 @@ def _groups(fleet: Fleet) -> list[dict[str, Any]]:
             if own:
                 head = {"title": _TITLES[letter], "unit": own[0].field_unit[0]}
                 rows = [_row(each) for each in own]
-                numbers.append({**head, "picture": strip(own), "rows": rows})
+                numbers.append({**head, "picture": _strip(own), "rows": rows})
         is_free = any(row["free"] for number in numbers for row in number["rows"])
         title = quantity or "other channels"
         groups.append({"quantity": title, "numbers": numbers, "is_free": is_free})
     return groups
+
+
+def _strip(spreads: Sequence[Spread]) -> str:
+    """A row an axis, a point a unit; those that stand apart farthest have their names."""
+    import matplotlib.pyplot as plt
+
+    size = (_SIZE[0], 0.5 + 0.35 * len(spreads))
+    figure, ax = plt.subplots(figsize=size, layout="constrained")
+    scale = spreads[0].field_unit[1]
+    values = scale * np.concatenate([each.values for each in spreads])
+    low, high = values.min(), values.max()
+    for row, each in enumerate(spreads):
+        # Points that touch are spread a little, the same way each time.
+        y = row + 0.5 * ((np.arange(each.n) * 0.618034) % 1.0 - 0.5)
+        is_apart = np.isin(each.devices, [unit.device for unit in each.outliers])
+        for chosen, colour in ((~is_apart, COMPONENT_COLOURS[0]), (is_apart, _APART)):
+            ax.plot(scale * each.values[chosen], y[chosen], "o", color=colour, alpha=0.6, ms=4.0)
+        for unit in each.outliers[:_NAMED]:
+            place = (scale * unit.value, y[each.devices.index(unit.device)])
+            away, side = (-5, "right") if place[0] > np.sqrt(low * high) else (5, "left")
+            name = ax.annotate(literal(unit.device), place, (away, 0), textcoords="offset points")
+            name.set(ha=side, va="center", color=_APART, fontsize="small")
+        ends = (row - 0.35, row + 0.35)
+        ax.vlines(scale * each.median, *ends, color=SUM_COLOUR)
+        if scale * each.normal_limit < _FARTHEST * high:
+            ax.vlines(scale * each.normal_limit, *ends, color=COMPONENT_COLOURS[1], linestyle="--")
+    ax.set_xscale("log" if high > 10.0 * low else "linear")
+    ax.set_yticks(range(len(spreads)), [literal(each.channel) for each in spreads])
+    ax.set_ylim(len(spreads) - 0.5, -0.5)
+    ax.grid(True, axis="x", color="#dddddd", linewidth=0.6)
+    return svg(figure)
 
 
 def _row(spread: Spread) -> dict[str, Any]:
@@ -176,6 +213,10 @@ _ASIDE = ("not-noise", "channel-missing", "channel-skipped")  # the verdicts hav
 _REPEATED = ("curves-differ", "curves-close")  # the verdicts repeat them
 _VERDICTS = {"agree": "good", "close": "good", "differ": "care", "untested": "bad"}
 _LETTERS = ("N", "K")
+_COLOURS = COMPONENT_COLOURS[:8]  # of recordings; further ones begin anew
+_SHEET = "#9a5b00"
+_DODGE = 0.05  # decades between the first and the last recording at a level
+_SURE = 0.1  # relative error of a ratio that counts for the limits of its axis
 
 
 @page_of(SensorComparison)
@@ -211,6 +252,7 @@ def write_sensor_comparison_report(
         axes=[_axis(axis, comparison, sheet) for axis in comparison.values()],
         notices=[n for n in worst_first(list(comparison.notices)) if n.code not in _REPEATED],
         aside=_ASIDE,
+        colours=_COLOURS,
         columns=comparison.labels if len(comparison.labels) <= _SIDE_BY_SIDE else ("range",),
         sheet=sheet,
         stated={
@@ -235,11 +277,63 @@ def _axis(
         "of": axis,
         "state": _VERDICTS[axis.state],
         "word": STATES[axis.state],
-        "figure": multiple(axis, labels, others, sheet) if axis.fits or others else None,
+        "figure": _curves(axis, labels, others, sheet) if axis.fits or others else None,
         "rows": [_compared_row(axis, letter, labels) for letter in LETTERS if axis.fits],
         "numbers": [_numbers(axis, letter, sheet) for letter in _LETTERS],
         "nees": _nees(axis, comparison.horizon),
     }
+
+
+def _curves(
+    axis: AxisComparison, labels: Sequence[str], out: Sequence[Fit], sheet: Datasheet | None
+) -> str:
+    """Allan deviations with their intervals, and below them their ratios to the common curve.
+
+    out: Of recordings that are not compared.
+    """
+    import matplotlib.pyplot as plt
+
+    margins = {"left": 0.16, "right": 0.98, "bottom": 0.12, "top": 0.98, "hspace": 0.08}
+    figure, (top, bottom) = plt.subplots(
+        2, figsize=_SIZE, sharex=True, height_ratios=(5, 2), gridspec_kw=margins
+    )
+    wvs = [fit.wv for fit in (*axis.fits.values(), *out)]
+    first = wvs[0]
+    unit, scale = shown_unit(first.quantity, first.unit, "field")
+    for wv in wvs[len(axis.fits) :]:
+        top.plot(wv.tau, scale * wv.allan_deviation, ":", color=DATA_COLOUR, linewidth=1.0)
+    stated = None
+    if sheet is not None:
+        stated = sheet.deviation(axis.name, first.quantity, first.tau, first.dt)
+    if stated is not None:
+        top.plot(first.tau, scale * stated, "--", color=_SHEET, linewidth=1.3)
+    shifts = 10.0 ** (_DODGE * np.linspace(-0.5, 0.5, max(len(axis.fits), 2)))
+    style: dict[str, Any] = {"markersize": 3.0, "linewidth": 0.8, "elinewidth": 1.2}
+    for i, (label, wv) in enumerate(zip(axis.fits, wvs, strict=False)):
+        style["color"] = _COLOURS[labels.index(label) % len(_COLOURS)]
+        variances = np.maximum([wv.lower, wv.variance, wv.upper], 0.0)
+        low, value, high = scale * np.sqrt(2.0 * variances)
+        bars = np.maximum([value - low, high - value], 0.0)
+        top.errorbar(shifts[i] * wv.tau, value, bars, fmt="o-", **style)
+        if axis.equality is not None:
+            away = 100.0 * (axis.equality.ratios[i] - 1.0)
+            at, bars = shifts[i] * axis.equality.tau, 196.0 * axis.equality.errors[i]
+            bottom.errorbar(at, away, bars, fmt="o", **style)
+    seen = scale * np.concatenate([wv.allan_deviation for wv in wvs])
+    top.set(xscale="log", yscale="log", ylabel=f"Allan deviation [{unit}]")
+    top.set_ylim(np.min(seen[seen > 0.0]) / 1.8, 1.4 * np.max(seen))
+    if axis.equality is None:
+        bottom.annotate("nothing to compare", (0.5, 0.5), xycoords="axes fraction", ha="center")
+    else:
+        sure = axis.equality.ratios[axis.equality.errors < _SURE]
+        reach = 120.0 * np.max(np.abs(sure - 1.0), initial=0.0) or 100.0
+        bottom.set_ylim(-reach, reach)
+        bottom.axhline(0.0, color=DATA_COLOUR, linewidth=0.8)
+    bottom.set(xlabel="averaging time [s]", ylabel="ratio - 1 [%]")
+    bottom.xaxis.minorticks_off()  # which take most of the time
+    for ax in (top, bottom):
+        ax.grid(True, color="#dddddd", linewidth=0.6)
+    return svg(figure)
 
 
 def _compared_row(axis: AxisComparison, letter: str, labels: tuple[str, ...]) -> dict[str, Any]:

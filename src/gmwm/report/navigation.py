@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import io
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import cycle
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -21,11 +20,7 @@ from gmwm.issues import worst_first
 from gmwm.motion import USES, InMotion
 from gmwm.plotting import COMPONENT_COLOURS, DATA_COLOUR
 from gmwm.process import Model
-from gmwm.report.page import origin, write_page
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
+from gmwm.report.page import origin, svg, write_page
 
 _CONTRADICTED = 0.01  # probability below which a filter is reported to misjudge itself
 _WIDEST_BAND = 2.0  # width of a band of NEES beyond which it decides nothing
@@ -71,19 +66,6 @@ def _models(models: Mapping[str, Model]) -> list[tuple[str, str]]:
         labels = model.term_labels()
         found.append((axis, "; ".join(f"{labels[i]} {', '.join(t)}" for i, t in terms.items())))
     return found
-
-
-def svg(figure: Figure) -> str:
-    """A figure as SVG text for a page; the figure is closed."""
-    import matplotlib.pyplot as plt
-
-    stream = io.StringIO()
-    # Without a date and with a salt of its own, the same study gives the same file.
-    with plt.rc_context({"svg.hashsalt": "gmwm", "svg.fonttype": "none"}):
-        figure.savefig(stream, format="svg", metadata={"Date": None}, transparent=True)
-    plt.close(figure)
-    text = stream.getvalue()
-    return text[text.index("<svg") :]
 
 
 def _outage(validation: Validation, index: int) -> dict[str, Any]:

@@ -30,8 +30,7 @@ from gmwm.filter_numbers import (
     usable,
 )
 from gmwm.report.figure import growth_figure
-from gmwm.report.navigation import svg
-from gmwm.report.page import origin, write_page
+from gmwm.report.page import origin, svg, write_page
 
 SHOWN = HORIZON
 """s: length of outages of all filter numbers on a page."""
