@@ -46,7 +46,7 @@ DT, ROUNDS, SHORT = 0.01, 3, 3_000
 
 
 def medians(cases):
-    """Seconds of the processor of each case, done in turns; the first turn is not counted."""
+    """Processor time of each case, in rounds; the first round is not counted."""
     times = {name: [] for name in cases}
     for turn in range(ROUNDS + 1):
         for name, work in cases.items():
@@ -85,12 +85,12 @@ def of_fits(x, short):
     with_five = gmwm.wavelet_variance(FIVE.simulate(x.size, DT, seed=4), DT)
     model, five = TRUTH.opened(), FIVE.opened()
     rows = table(
-        f"after the variances of {x.size:,} samples",
+        f"from the variances of {x.size:,} samples",
         {
             # A copy each time: what one fit finds of the series serves the next.
             "gmwm.fit of two terms": lambda: gmwm.fit(model, replace(wv)),
             "gmwm.fit of five terms": lambda: gmwm.fit(five, replace(with_five)),
-            "gmwm.fit of five terms, three of them too many": lambda: gmwm.fit(five, replace(wv)),
+            "gmwm.fit of five terms, three too many": lambda: gmwm.fit(five, replace(wv)),
             "gmwm.select": lambda: gmwm.select(replace(wv)),
         },
         "gmwm.fit of two terms",
@@ -201,8 +201,8 @@ def main():
     packages = ", ".join(f"{p} {version(p)}" for p in ("numpy", "numba", "allantools",
                                                        "statsmodels", "python-ins"))  # fmt: skip
     lines += [
-        f"Seconds of the processor, medians of {ROUNDS} turns, one thread. At most {memory:.0f} MB "
-        f"were in memory, with what is compared. gmwm {gmwm.__version__}, {packages}, Python "
+        f"Processor time, medians of {ROUNDS} rounds, one thread. Peak memory {memory:.0f} MB, "
+        f"including the compared packages. gmwm {gmwm.__version__}, {packages}, Python "
         f"{platform.python_version()}, {platform.machine()}, {os.cpu_count()} cores, "
         f"{datetime.now(UTC):%Y-%m-%d}."
     ]

@@ -171,8 +171,8 @@ class Rotation:
             blocks.append([*wrapped(title), plain_table(("filter", *heads), rows)])
 
         add(
-            "All turns, at the ends of outages before the first fix: errors over those of "
-            f"{FIRST}; NEES per degree of freedom",
+            "All calibrated recordings, at the ends of outages, before the first fix: errors "
+            f"relative to {FIRST}; NEES per degree of freedom",
             [*(f"{each} RMS" for each in both), *(f"NEES {each}" for each in both)],
             ratios_and_nees,
         )
@@ -182,9 +182,9 @@ class Rotation:
             [*both, "NEES position"],
             covered,
         )
-        title = f"Horizontal RMS over that of {FIRST}, turn by turn"
+        title = f"Horizontal RMS relative to {FIRST}, by calibrated recording"
         add(title, by_turn, lambda name: [self.ratio(name, "horizontal", i) for i in turns])
-        title = "NEES of the position, turn by turn"
+        title = "NEES of the position, by calibrated recording"
         add(title, by_turn, lambda name: [self.nees(name, "position", i) for i in turns])
         return "\n\n".join(map("\n".join, blocks))
 
@@ -194,8 +194,8 @@ class Rotation:
         n, runs = len(self.sources), sum(each.study[FIRST].runs for each in self.turns)
         text = (
             f"{turn.experiment.title}: {truth.duration:g} s at {1.0 / truth.dt:g} Hz, outages that "
-            f"end at {', '.join(ends)} s; each of {n} recordings calibrated in turn, the others "
-            f"navigated with: {runs} runs, seed {turn.experiment.seed}"
+            f"end at {', '.join(ends)} s; each of {n} recordings calibrated in turn, errors from "
+            f"the others: {runs} runs, seed {turn.experiment.seed}"
         )
         lines = wrapped(text, indent=2)
         for i, (source, size) in enumerate(zip(self.sources, self.stretches, strict=True)):
@@ -203,7 +203,7 @@ class Rotation:
         return lines + bullets(self.notices)
 
     def markdown(self) -> str:
-        """All turns together, as a table for a page."""
+        """All calibrated recordings together, as a table for a page."""
         groups = ("horizontal", "vertical", "position")
         head = ["filter", "horizontal error against GMWM", *(f"NEES {each}" for each in groups)]
         rows = []

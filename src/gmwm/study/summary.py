@@ -91,7 +91,7 @@ class Summary:
                 ratio = f"{bound / self.bounds[name]:.2f}"
                 rows.append([name, label, f"{absolute:.3g}", f"{bound:.3g}", ratio, *[""] * 4])
         columns = ["RMSE", "relative", "/ bound", "bias", "covers", "paper", "without"]
-        legend = "; without: runs\nthat have no estimate"
+        legend = "; without: runs that have\nno estimate"
         if not any(row[-1] for row in rows):
             columns, rows, legend = columns[:-1], [row[:-1] for row in rows], ""
         heads, counts = ["not valid"], [self.invalid]
@@ -106,8 +106,9 @@ class Summary:
             f"seed {self.seed}",
             plain_table(("quantity", "method", *columns), rows),
             plain_table(("method", *heads, "median time"), times),
-            "relative, bias: over the true value; bound: Cramer-Rao; moments: the same for\n"
-            f"estimates by Haar wavelet variances only; covers: 95 % intervals{legend}",
+            "relative, bias: over the true value; bound: Cramer-Rao; moments: Cramer-Rao for\n"
+            "estimates from Haar wavelet variances only; covers: share of the 95 % intervals\n"
+            f"that hold the true value{legend}",
         ]
         return "\n".join(["\n\n".join(parts), *bullets(s.notes)])
 
@@ -328,7 +329,7 @@ def convergence_table(rows: list[Convergence]) -> str:
     """The table, 80 columns wide."""
     parts = [
         "Appendix A: least squares on the Allan variance of white noise + random walk\n"
-        "lines over 1-8 s and 16-128 s, all levels alike (OLS) or reweighted (IRLS)\n"
+        "lines over 1-8 s and 16-128 s, equal weights (OLS) or reweighted (IRLS)\n"
         f"means of {len(rows[0].estimates)} runs with standard errors",
     ]
     for k, name in enumerate(NAMES):
@@ -343,7 +344,7 @@ def convergence_table(rows: list[Convergence]) -> str:
             for row in rows
         ]
         table = plain_table(("n", *(f"{method}, mean" for method in METHODS)), cells)
-        parts.append(f"{name}, truth {_TRUE[k]:g}, expected of OLS {expectation()[k]:.5g}\n{table}")
+        parts.append(f"{name}, truth {_TRUE[k]:g}, OLS expectation {expectation()[k]:.5g}\n{table}")
     ratios = [(k, *(expectation(k) / _TRUE)) for k in range(1, _SCALES.size)]
     table = plain_table(("k", *NAMES), [[f"{value:.4g}" for value in row] for row in ratios])
     parts.append(f"Expected over true value; white noise from the first k scales\n{table}")

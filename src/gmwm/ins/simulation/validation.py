@@ -146,7 +146,8 @@ class Validation:
         blocks.append(head + plain_table(["filter", ""], rows))
         if self.study.outages and len(self.names) > 1:
             blocks.append(
-                f"Horizontal error against {self.names[0]}, over all outages\n{self._differences()}"
+                f"Horizontal error against {self.names[0]}, over all outages (=: not significant)\n"
+                + self._differences()
             )
         return "\n\n".join(blocks)
 
@@ -174,7 +175,7 @@ class Validation:
             mark = "" if d.significant else " ="
             means = f"{d.value:+.3g} ({d.lower:+.3g} .. {d.upper:+.3g}){mark}"
             rows.append([name, ratio, means])
-        return plain_table(["filter", "ratio of RMS", "difference of means [m], = if none"], rows)
+        return plain_table(["filter", "ratio of RMS", "difference of means [m]"], rows)
 
     def report(self, path: str | os.PathLike[str]) -> Path:
         """Write the page."""
