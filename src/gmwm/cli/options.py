@@ -87,9 +87,7 @@ def with_hint(error: InputError) -> str:
     if not hint:
         return str(error)
     if error.code == "clock":  # to ignore the stamps is right only if nothing else is
-        sensor = "the sampling rate of the sensor, --rate HZ --time none"
-        hint = hint if "rate" in error.values else sensor
-        return f"{error.problem}: {re.sub('give [^;]*time=False', f'give {hint}', error.hint)}"
+        return str(error).replace("rate=HZ and time=False", hint)
     if error.hint:
         return f"{error.problem}: {'give e.g. ' if hint.startswith('-') else ''}{hint}"
     return f"{error} (on the command line: {hint})"

@@ -18,7 +18,7 @@ from gmwm.readers.table import more_such
 UNITS = {86400.0: "days", 3600.0: "hours", 60.0: "minutes", 1.0: "seconds"}
 UNITS |= {1e-3: "milliseconds", 1e-6: "microseconds", 1e-9: "nanoseconds"}
 _SHORT = dict(zip(UNITS, ("days", "h", "min", "s", "ms", "us", "ns"), strict=True))
-_WAY_OUT = "if the samples are evenly spaced all the same, give {} and time=False"
+_WAY_OUT = "if the samples are evenly spaced all the same, give the sensor's rate=HZ and time=False"
 _CUT = f"cut the file at this row and use one part, or, {_WAY_OUT}"
 _SHORTEST_SHOWN = 1e-3  # s; less is given in microseconds
 _SHORTEST_STEP = 1e-100  # in any unit; shorter ones only leave the range of floating point
@@ -42,9 +42,11 @@ class Clock:
         place = "" if row is None else f", {self.where(row)}"
         rate = mean_rate(self.stamps, self.seconds)
         values: dict[str, float | str] = {} if rate is None else {"rate": rate}
-        given = "the sampling rate of the sensor, rate=HZ," if rate is None else f"rate={rate:.6g}"
+        # Not an advice: the sensor's rate is higher by the share of the rows that are lost.
+        if rate is not None and hint.endswith(_WAY_OUT):
+            hint += f" (rows come at {rate:.6g} Hz on average)"
         text = f"{self.source}, {self.column}{place}: {text}"
-        return InputError(text, "clock", hint.replace("{}", given), values)
+        return InputError(text, "clock", hint, values)
 
 
 @dataclass(frozen=True)

@@ -277,12 +277,13 @@ def channel_units(
     found, from_header, overruled = dict[str, str](), dict[str, str](), dict[str, str]()
     missing: dict[str, str] = {}  # one channel of each sensor stands for the others
     for channel, column in roles.channels.items():
-        in_header, role = table.meanings[column].unit, table.meanings[column].role or ""
-        sensor = _sensor(channel) or _sensor(role)
+        header = table.meanings[column]
+        sensor = _sensor(channel) or _sensor(header.role or "")
         given = units.get(channel, units.get(sensor))
-        unit = given if given is not None else in_header
+        unit = given if given is not None else header.unit
         if unit is None:
-            missing.setdefault(sensor or channel, channel)
+            other = f" ({header.stated!r} is no unit of it)" if header.stated else ""
+            missing.setdefault(sensor or channel, channel + other)
             continue
         try:
             factor(unit, SI_UNIT[sensor]) if sensor else quantity_of(unit)
@@ -291,8 +292,8 @@ def channel_units(
         found[channel] = unit
         if given is None:
             from_header[channel] = unit
-        elif in_header is not None and not _same(in_header, given):
-            overruled[channel] = f"{in_header}, not {given}"
+        elif not _same(stated := header.unit or header.stated, given) and _same(stated, stated):
+            overruled[channel] = f"{stated}, not {given}"
     # Time stamps are looked at after the units, unless these are to be asked for anyway.
     rate = unknown_rate() if missing or roles.time is None else None
     if missing or rate is not None:

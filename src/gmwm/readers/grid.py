@@ -331,15 +331,11 @@ def place_uneven(stamps: FloatArray) -> Uneven | int | None:
     width = max(min(-(-tuning.ROWS_OF_ROUGH // rows), last.size // 2), 1)
     if last.size <= width:
         return None
-    # For a start over few rows, most of which have no loss: those alike to a fraction of a row.
-    slopes = (time[width:] - time[:-width]) / (last[width:] - last[:-width])
-    interval = median(slopes)
-    for _ in range(tuning.ROUNDS_OF_GRID):
-        alike = np.abs(slopes / interval - 1.0) * width * rows <= 0.9
-        if not np.any(alike):
-            return None
-        interval = float(np.mean(slopes[alike]))
-    finest = float(np.spacing(np.max(np.abs(stamps))))
+    # To start: the narrowest range of a third of the slopes over few rows, those without a loss.
+    slopes = np.sort((time[width:] - time[:-width]) / (last[width:] - last[:-width]))
+    third = slopes.size // 3
+    first = int(np.argmin(slopes[third:] - slopes[: slopes.size - third]))
+    interval = float(np.mean(slopes[first : first + third + 1]))
     lost, line = np.zeros(last.size, dtype=np.int64), interval_of(time, last)
     # The last row of a rounded stamp is within an interval of an even clock that loses none. The
     # last stamp may be cut off. Bursts have one size but for losses, which add up.
@@ -348,7 +344,7 @@ def place_uneven(stamps: FloatArray) -> Uneven | int | None:
     is_coarse = bool(is_mixed and np.ptp((time / line - last)[:-1]) < tuning.ROUNDED)
     interval, number = (line, last) if is_coarse else (interval, last)
     for _ in range(0 if is_coarse else tuning.ROUNDS_OF_GRID):
-        if not 10.0 * finest < interval < np.inf:
+        if not 10.0 * np.spacing(np.max(np.abs(stamps))) < interval < np.inf:
             return None
         lost, set_back = _losses(time / interval - last)
         if set_back is not None:

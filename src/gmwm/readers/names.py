@@ -57,7 +57,7 @@ class Meaning:
     role: str | None
     unit: str | None = None  # its unit, if the name has one that is understood
     seconds: float | None = None  # for a time column, its unit in seconds
-    stated: str = ""  # for a time column, what stands in brackets after its name, understood or not
+    stated: str = ""  # of a time column or a channel, what stands in brackets after its name
 
 
 def stated_seconds(source: str, name: str) -> float | None:
@@ -134,7 +134,8 @@ def _as_channel(words: Sequence[str], bracket: str) -> Meaning | None:
         before, inner_unit = _split_unit(sensor_words)
         sensor = _sensor(sensor_words) or _sensor(before)
         if sensor:
-            return Meaning(f"{sensor}_{axis}", _unit(bracket) or unit or inner_unit)
+            known = _unit(bracket) or unit or inner_unit
+            return Meaning(f"{sensor}_{axis}", known, stated=bracket)
     return None
 
 

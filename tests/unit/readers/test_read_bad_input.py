@@ -184,9 +184,9 @@ def test_too_few_samples(write, samples):
 def test_unit_missing(write, samples, option, quantity):
     units = {key: unit for key, unit in SI.items() if key != quantity}
     with pytest.raises(InputError) as caught:
-        read(write(samples, HEADER), rate=1, units=units)
+        read(write(samples, HEADER.replace("x", "x [m]")), rate=1, units=units)
     message = str(caught.value)
-    assert f"static.csv does not give the unit of {quantity}_x" in message
+    assert f"does not give the unit of {quantity}_x ('m' is no unit of it):" in message
     assert f'units={{"{quantity}": "{option}"}}' in message
     assert caught.value.code == f"{quantity}-unit-missing"
 

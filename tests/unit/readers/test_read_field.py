@@ -117,6 +117,8 @@ def test_a_refusal_names_the_rate_of_the_file(tmp_path):
     times = np.arange(N) / 248.28
     times[N // 2 :] -= times[N // 2]
     lines = [f"time [s],{SENSORS}", *rows([f"{t:.7f}" for t in times])]
-    with pytest.raises(InputError, match=r"give rate=248\.28 and time=False") as caught:
+    with pytest.raises(InputError, match="rate=HZ and time=False") as caught:
         gmwm.read(write(tmp_path, lines))
-    assert with_hint(caught.value).endswith("give --rate 248.28 --time none")
+    assert with_hint(caught.value).endswith(
+        "--rate HZ --time none (rows come at 248.28 Hz on average)"
+    )

@@ -79,7 +79,8 @@ NO_UNITS = ("ax", "ax [counts]", "ax [LSB]", "ax [m]", "ax []", "ax [9**9**9]", 
         ("gyro_x (rad s-1)", "rad s^-1"), ("gyro_x_dps", "deg/s"), ("gyro_dps_x", "deg/s"),
         ("gyro_x_dps [rad/s]", "rad/s"), ("omega_x_deg_per_s", "deg/s"), ("gx [°/s]", "deg/s"),
         ("ax [G]", "g"), ("ax [µg]", "ug"), ("ax [m/s²]", "m/s^2"), ("ax [m/s/s]", "m/s/s"),
-        ("ax [m·s^-2]", "m·s^-2"), ("level [mg]", "mg"), *((name, None) for name in NO_UNITS),
+        ("ax [m·s^-2]", "m·s^-2"), ("level [mg]", "mg"), ("ax [ft/s^2]", "ft/s^2"),
+        ("gx [rpm]", "rpm"), *((name, None) for name in NO_UNITS),
     ],
 )  # fmt: skip
 def test_unit(name, unit):

@@ -107,11 +107,12 @@ def test_units_in_the_header(write, samples, names, gyro_unit, accel_unit):
     assert any("units from the names" in note for note in texts(recording))
 
 
-def test_units_given_overrule_the_header_with_a_note(write, samples):
-    path = write(samples[:, :1], "gyro_x [rad/s]")
+@pytest.mark.parametrize("stated", ["rad/s", "deg"])
+def test_units_given_overrule_the_header_with_a_note(write, samples, stated):
+    path = write(samples[:, :1], f"gyro_x [{stated}]")
     recording = read(path, rate=100, units={"gyro": "deg/s"})
     np.testing.assert_allclose(recording["gyro_x"].values, np.deg2rad(samples[:, 0]))
-    assert "gyro_x in rad/s, not deg/s" in " ".join(texts(recording))
+    assert f"gyro_x in {stated}, not deg/s" in " ".join(texts(recording))
 
 
 def test_blanks_keep_units_with_their_names(write, samples):
