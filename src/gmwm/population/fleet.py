@@ -204,7 +204,7 @@ class Fleet(ByName[Calibration | Notice], Printed):
             lines += ["", *plain_table(heads, rows).splitlines(), ""]
             lines += wrapped(
                 "Limit: 95 % of units are below this (95 % confidence, log-normal). Spread: "
-                "1 sigma, estimation errors included. 5 % of lots of equal units have a false finding."
+                "1 sigma with estimation errors. 5 % of lots of equal units have a false finding."
             )
         for model in dict.fromkeys(each.model for each in self.structures if each.model):
             axes = ", ".join(each.channel for each in self.structures if each.model == model)
