@@ -15,8 +15,8 @@ import numpy as np
 
 from gmwm import WhiteNoise
 from gmwm.variance.covariance.haar import dyadic_levels, haar_covariance
-from gmwm.variance.kernels import cumulative, haar_coefficients
-from gmwm.variance.levels import haar_moments
+from gmwm.variance.kernels import cumulative
+from gmwm.variance.levels import haar_coefficients, haar_moments
 from gmwm.variance.robust import EFFICIENCY, robust_covariance, robust_variance
 
 SAMPLES = 1_000_000
@@ -42,7 +42,7 @@ def main() -> None:
 
     def classical() -> list[float]:
         integral = cumulative(x, 0.0)
-        return haar_moments(x, integral, runs, np.array(levels, dtype=float))[:, 1].tolist()
+        return haar_moments(integral, runs, np.array(levels, dtype=float))[:, 1].tolist()
 
     def robust() -> list[float]:
         integral = cumulative(x, 0.0)

@@ -5,8 +5,7 @@ of ``--rounds``; then processor time per sample of the stream for 1e6, 1e7 and 1
 generator, how far memory grows from 2e6 to 2e7 samples, and how far levels of 1e6 samples are from
 those of all windows.
 
-Wall-clock times of a busy machine say little: processor time stands beside them. That of the exact
-variance is of all its threads.
+Wall-clock times of a busy machine say little: processor time stands beside them.
 """
 
 from __future__ import annotations

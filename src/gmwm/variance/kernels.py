@@ -5,13 +5,6 @@ import numpy as np
 from gmwm._core.compiled import compiled
 from gmwm._core.typing import FloatArray, IntArray
 
-CHUNK = 1 << 14
-FINE = 12  # levels of averaging times 1 ... 2048 samples, of one chunk at a time
-_TILE = 1 << 16  # samples of the other levels that stay in the cache
-_LEAST_COLUMNS = 8
-ROW = 1 << FINE  # shortest averaging time of the other levels
-_PIECE = 256
-
 ANY_ORDER = {"reassoc", "contract", "nsz"}
 """Sums in any order, so that they run on vector registers."""
 
@@ -38,115 +31,23 @@ def summed(out: FloatArray, first: FloatArray, second: FloatArray) -> None:
 
 
 @compiled(fastmath=ANY_ORDER)
-def _second_differences(
-    first: FloatArray, second: FloatArray, third: FloatArray
-) -> tuple[float, float]:
-    total, square = 0.0, 0.0
-    for i in range(first.size):
-        w = first[i] - 2.0 * second[i] + third[i]
-        total += w
-        square += w * w
-    return total, square
-
-
-@compiled()
-def fine_moments(
-    values: FloatArray, start: int, stop: int, end: int, levels: int, found: FloatArray
-) -> None:
-    """Sums over the windows of a run that begin at certain places, for levels from 1 sample on.
-
-    Sums of 2 m samples are those of m samples, m apart: all levels use a chunk that stays in the
-    cache, and nothing cancels.
-
-    values: (n,), about their mean.
-    start, stop: First window, and the one after the last.
-    levels: At most `FINE`.
-    found: (levels, 3), to which number, sum and sum of squares of the coefficients are added.
-    """
-    reach = 2 << (levels - 1)
-    scratch = np.empty((2, CHUNK + reach))
-    for begin in range(start, min(stop, end), CHUNK):
-        own = min(CHUNK, stop - begin)
-        now = values[begin : min(begin + own + reach - 1, end)]
-        number = now.size
-        m = 1
-        for level in range(levels):
-            count = number - 2 * m + 1
-            if count <= 0:
-                break
-            following = scratch[level % 2, :count]
-            used = min(own, count)
-            total, square = summed_with_moments(following[:used], now[:used], now[m : m + used])
-            summed(following[used:], now[used:count], now[m + used : m + count])
-            scale = 0.5 / m
-            found[level, 0] += used
-            found[level, 1] += total * scale
-            found[level, 2] += square * scale * scale
-            now = following
-            m *= 2
-
-
-@compiled()
-def coarse_moments(
-    integral: FloatArray,
-    start: int,
-    end: int,
-    columns: tuple[int, int],
-    averaging: IntArray,
-    found: FloatArray,
-) -> None:
-    """The same for longer averaging times, for some columns of the run in rows of `ROW` samples.
-
-    All levels use a tile of some columns that stays in the cache: one read of the data.
+def haar_sums(integral: FloatArray, runs: IntArray, m: int) -> tuple[int, float, float]:
+    """Number of the Haar MODWT coefficients within runs, their sum, and that of their squares.
 
     integral: (n + 1,), cumulative sum of the series, starting with 0.
-    columns: The first, and the one after the last, of `ROW`.
-    averaging: (L,), multiples of `ROW`, in samples.
-    found: (L, 3), to which number, sum and sum of squares of the coefficients are added.
+    runs: (P, 2), first sample of each run, and the one after its last.
+    m: Averaging time in samples.
     """
-    length = end - start + 1
-    most = (length - 1) // ROW + 1
-    width = max(_TILE // most, _LEAST_COLUMNS)
-    tile = np.empty(most * width)
-    longer = (length - 1) % ROW + 1  # columns that have one row more than the others
-    for part in range(2):
-        low = max(columns[0], longer if part else 0)
-        high = min(columns[1], ROW if part else longer)
-        rows = most - part
-        for first in range(low, high, width):
-            own = min(width, high - first)
-            for r in range(rows):
-                place = start + r * ROW + first
-                for i in range(own):
-                    tile[r * own + i] = integral[place + i]
-            for level in range(averaging.size):
-                m = averaging[level]
-                shift = m // ROW * own
-                count = rows * own - 2 * shift
-                if count <= 0:
-                    break
-                total, square = _second_differences(
-                    tile[:count], tile[shift : shift + count], tile[2 * shift : 2 * shift + count]
-                )
-                scale = 0.5 / m
-                found[level, 0] += count
-                found[level, 1] += total * scale
-                found[level, 2] += square * scale * scale
-
-
-@compiled()
-def haar_coefficients(integral: FloatArray, start: int, stop: int, m: int) -> FloatArray:
-    """Haar MODWT coefficients of the samples from ``start`` to ``stop``, free of end effects.
-
-    integral: (n + 1,), cumulative sum of the series, starting with 0.
-    """
-    count = max(stop - start - 2 * m + 1, 0)
-    result = np.empty(count)
-    scale = 0.5 / m
-    for i in range(count):
-        t = start + i
-        result[i] = scale * (integral[t + 2 * m] - 2.0 * integral[t + m] + integral[t])
-    return result
+    count, total, square = 0, 0.0, 0.0
+    for run in range(runs.shape[0]):
+        first = integral[runs[run, 0] : runs[run, 1] + 1]
+        middle, last = first[m:], first[2 * m :]
+        count += last.size
+        for i in range(last.size):
+            w = first[i] - 2.0 * middle[i] + last[i]
+            total += w
+            square += w * w
+    return count, total * (0.5 / m), square * (0.5 / m) ** 2
 
 
 @compiled()
@@ -181,37 +82,10 @@ def cumulative(values: FloatArray, mean: float) -> FloatArray:
 
 @compiled()
 def accumulate(values: FloatArray, mean: float, result: FloatArray) -> None:
-    """Cumulative sum with compensation between pieces of 256 samples.
-
-    Within a piece the sum begins anew, in four of them at a time, since each addition waits for the
-    one before.
-    """
-    n = values.size
-    result[0] = 0.0
+    """Cumulative sum with what earlier additions lost (Kahan 1965)."""
     total, lost = 0.0, 0.0
-    whole = n // (4 * _PIECE) * (4 * _PIECE)
-    sums = np.zeros(4)
-    for begin in range(0, whole, 4 * _PIECE):
-        a, b, c, d = 0.0, 0.0, 0.0, 0.0
-        for i in range(begin, begin + _PIECE):
-            p, q = values[i] - mean, values[i + _PIECE] - mean
-            r, s = values[i + 2 * _PIECE] - mean, values[i + 3 * _PIECE] - mean
-            a += 0.0 if np.isnan(p) else p
-            b += 0.0 if np.isnan(q) else q
-            c += 0.0 if np.isnan(r) else r
-            d += 0.0 if np.isnan(s) else s
-            result[i + 1], result[i + _PIECE + 1] = a, b
-            result[i + 2 * _PIECE + 1], result[i + 3 * _PIECE + 1] = c, d
-        sums[0], sums[1], sums[2], sums[3] = a, b, c, d
-        for piece in range(4):
-            first = begin + piece * _PIECE + 1
-            for i in range(first, first + _PIECE):
-                result[i] = total + (result[i] - lost)
-            y = sums[piece] - lost
-            following = total + y
-            lost = (following - total) - y
-            total = following
-    for i in range(whole, n):
+    result[0] = total
+    for i in range(values.size):
         y = values[i] - mean
         y = (0.0 if np.isnan(y) else y) - lost
         following = total + y

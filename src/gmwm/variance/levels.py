@@ -1,8 +1,6 @@
 """The levels of a series, their coefficients, and the spectrum that they imply."""
 
-import os
 from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import Self
@@ -90,45 +88,24 @@ class _Places:
         return np.asarray(inside + np.clip(slope, -2.0, 0.0) * self._below)
 
 
-def haar_moments(
-    values: FloatArray, integral: FloatArray, runs: IntArray, averaging: FloatArray
-) -> FloatArray:
+def haar_moments(integral: FloatArray, runs: IntArray, averaging: FloatArray) -> FloatArray:
     """Mean and mean square of the Haar MODWT coefficients that lie within runs, (L, 2).
 
-    values: (n,), about their mean.
-    integral: (n + 1,), their kernels.cumulative sum, starting with 0.
+    integral: (n + 1,), cumulative sum of the series about its mean, starting with 0.
     runs: (P, 2), first sample of each run, and the one after its last.
-    averaging: (L,), averaging times in samples: powers of two in a row, each with a coefficient.
+    averaging: (L,), averaging times in samples, each with a coefficient.
     """
-    m = averaging.astype(np.int64)
-    first = int(m[0]).bit_length() - 1
-    fine = m[m < kernels.ROW]
-    coarse = m[m >= kernels.ROW]
-    long = runs[runs[:, 1] - runs[:, 0] >= 2 * m[0]]
-    levels = first + fine.size
-
-    def of_part(part: int, parts: int) -> FloatArray:
-        found = np.zeros((first + m.size, 3))
-        for start, stop in long.tolist():
-            edges = [start + (stop - start) * i // parts for i in (part, part + 1)]
-            if fine.size:
-                kernels.fine_moments(values, edges[0], edges[1], stop, levels, found[:levels])
-            if coarse.size and stop - start >= 2 * coarse[0]:
-                columns = (kernels.ROW * part // parts, kernels.ROW * (part + 1) // parts)
-                kernels.coarse_moments(
-                    integral, start, stop, columns, coarse, found[first + fine.size :]
-                )
-        return found[first:]
-
-    has_affinity = hasattr(os, "sched_getaffinity")  # not on Windows
-    processors = len(os.sched_getaffinity(0)) if has_affinity else os.cpu_count() or 1
-    parts = min(processors, values.size // tuning.SAMPLES_PER_THREAD)
-    if parts < 2:
-        found = of_part(0, 1)
-    else:
-        with ThreadPoolExecutor(parts) as pool:
-            found = np.sum(list(pool.map(of_part, range(parts), [parts] * parts)), axis=0)
+    found = np.array([kernels.haar_sums(integral, runs, int(m)) for m in averaging])
     return found[:, 1:] / found[:, :1]
+
+
+def haar_coefficients(integral: FloatArray, start: int, stop: int, m: int) -> FloatArray:
+    """Haar MODWT coefficients of the samples from ``start`` to ``stop``, free of end effects.
+
+    integral: (n + 1,), cumulative sum of the series, starting with 0.
+    """
+    own = integral[start : stop + 1]
+    return (0.5 / m) * (own[2 * m :] - 2.0 * own[m:-m] + own[: -2 * m])
 
 
 def wavelet_coefficients(
@@ -176,7 +153,7 @@ def level_changes(values: FloatArray, runs: Runs) -> BoolArray:
     counts = np.array([window_count(runs.edges, 2.0 * each) for each in m])
     m = m[: max(int(np.sum(np.cumprod(counts >= 2.0 * tuning.PILOT_WINDOWS * m))), 1)]
     sums = kernels.cumulative(values, 0.0)
-    mean, square = haar_moments(values, sums, runs.edges, m).T
+    mean, square = haar_moments(sums, runs.edges, m).T
     drift = kernels.slope(values, runs.edges[:, 0])
     noise = np.pad(square - drift * m * mean + (0.5 * drift * m) ** 2, 1, mode="edge")
     noise = np.maximum(np.maximum(noise[:-2], noise[2:]), noise[1:-1])
@@ -310,7 +287,7 @@ class Levels:
         whole = self.plain == self.averaging.size
         integral = self._integral if whole else kernels.cumulative(self.values, 0.0)
         plain = self.averaging[: self.plain]
-        moments[: plain.size] = haar_moments(self.values, integral, self.runs.edges, plain)
+        moments[: plain.size] = haar_moments(integral, self.runs.edges, plain)
         for j in range(self.plain, self.averaging.size):
             w, scarcity[j] = self._masked(j)
             step = self._step[j]
@@ -333,9 +310,7 @@ class Levels:
         own = kernels.cumulative(self.values - line, 0.0)
         for j, m in enumerate(self.averaging.astype(int).tolist()):
             if j < self.plain:
-                yield np.concatenate(
-                    [kernels.haar_coefficients(own, a, b, m) for a, b in self.edges[j]]
-                )
+                yield np.concatenate([haar_coefficients(own, a, b, m) for a, b in self.edges[j]])
             else:
                 yield self._masked(j)[0] + (0.0 if level else self._step[j])
 

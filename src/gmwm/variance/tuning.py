@@ -110,9 +110,7 @@ averaging times: 2 (1/4 + 1/12)."""
 
 LEAST_OF_BLOCK = 0.5  # share of a block of samples that its mean needs to count
 
-# -- threads and files ----------------------------------------------------------------------------
-
-SAMPLES_PER_THREAD = 1 << 20  # fewer take less time than threads need to begin
+# -- files ----------------------------------------------------------------------------------------
 
 LARGEST_VARIANCE = 1e120
 """In a saved result, u^2: a channel whose spread is beyond 1e60 is not analysed."""

@@ -5,17 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from gmwm.variance import tuning
-from gmwm.variance.kernels import (
-    CHUNK,
-    cumulative,
-    difference_powers,
-    fine_moments,
-    haar_coefficients,
-    slope,
-    survey,
-)
-from gmwm.variance.levels import haar_moments
+from gmwm.variance.kernels import cumulative, difference_powers, slope, survey
+from gmwm.variance.levels import haar_coefficients, haar_moments
 
 SIZES = [1, 2, 3, 255, 1023, 1024, 1025, 2600]
 
@@ -66,47 +57,19 @@ def test_one_slope_through_parts_of_levels_of_their_own(parts):
 
 
 @pytest.mark.parametrize(
-    "ends",
-    [[(0, 2 * CHUNK + 5)], [(3, 40), (47, CHUNK + 46), (CHUNK + 50, 4 * CHUNK)], [(7, 8), (9, 73)]],
+    "ends", [[(0, 5000)], [(3, 40), (47, 2046), (2050, 9000)], [(7, 8), (9, 73)]]
 )
 def test_moments_are_those_of_the_coefficients_of_each_run(ends):
     runs = np.array(ends)
-    values = series(runs[-1, 1] + 9, gaps=False) - 3.0
-    integral = cumulative(values, 0.0)
+    integral = cumulative(series(runs[-1, 1] + 9, gaps=False), 3.0)
     longest = int(np.max(runs[:, 1] - runs[:, 0]))
     averaging = 2 ** np.arange(longest.bit_length() - 1)
     expected = []
     for m in averaging.tolist():
         w = np.concatenate([haar_coefficients(integral, a, b, m) for a, b in ends])
         expected.append((np.mean(w), np.mean(w**2)))
-    found = haar_moments(values, integral, runs, averaging.astype(float))
+    found = haar_moments(integral, runs, averaging.astype(float))
     np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-14)
-    np.testing.assert_allclose(
-        haar_moments(values, integral, runs, averaging[1:].astype(float)), expected[1:],
-        rtol=1e-9, atol=1e-14,
-    )  # fmt: skip
-
-
-def test_moments_of_parts_add_up():
-    values, levels = series(3 * CHUNK, gaps=False), 9
-    whole, parts = np.zeros((2, levels, 3))
-    fine_moments(values, 0, values.size, values.size, levels, whole)
-    for start, stop in ((0, 1), (1, CHUNK + 3), (CHUNK + 3, values.size)):
-        fine_moments(values, start, stop, values.size, levels, parts)
-    np.testing.assert_allclose(parts, whole, rtol=1e-12)
-    assert whole[:, 0].tolist() == [values.size - 2 * 2**j + 1 for j in range(levels)]
-
-
-@pytest.mark.parametrize("processors", [2, 3])
-def test_moments_do_not_depend_on_the_number_of_threads(processors, monkeypatch):
-    values = series(9 * 4096 + 17, gaps=False) - 3.0
-    integral, averaging = cumulative(values, 0.0), 2.0 ** np.arange(14)
-    runs = np.array([(0, values.size - 5000), (values.size - 4999, values.size)])
-    alone = haar_moments(values, integral, runs, averaging)
-    monkeypatch.setattr(tuning, "SAMPLES_PER_THREAD", 1000)
-    monkeypatch.setattr("os.sched_getaffinity", lambda _: range(processors), raising=False)
-    shared = haar_moments(values, integral, runs, averaging)
-    np.testing.assert_allclose(shared, alone, rtol=1e-9, atol=1e-14)
 
 
 def test_a_cumulative_sum_is_right_to_the_last_digit():

@@ -11,7 +11,8 @@ from scipy.stats import binom, chi2, norm
 
 import gmwm
 from gmwm.variance.covariance.haar import dyadic_levels, haar_counts, haar_covariance
-from gmwm.variance.kernels import cumulative, haar_coefficients
+from gmwm.variance.kernels import cumulative
+from gmwm.variance.levels import haar_coefficients
 from gmwm.variance.robust import (
     consistency,
     excess_series,
