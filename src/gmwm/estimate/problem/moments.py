@@ -276,22 +276,22 @@ class FittedMoments:
         model: Model,
         wv: WaveletVariance,
         keys: Collection[str],
-        slope_error: float,
         discrepancy: float,
     ) -> FittedMoments:
-        """Moments of the data at a model with values.
-
-        slope_error: Standard error of the slope of a rate ramp, u/s; 0 if it was not estimated.
-        """
+        """Moments of the data at a model with values."""
         drift = drift_key(model)
         noise = tuple(term for term in model.terms if not term.is_drift)
         scales = Scales.of(wv)
         moments = Moments(wv, None, False, scales)
-        if drift is not None:
-            slope = Slope(model.drift_rate(), slope_error**2)
-            moments = Moments(wv, slope, drift in keys, scales)
-        elif wv.regressors is not None:
+        if wv.regressors is not None:
             moments = Moments.of(wv, model, scales).under(model)
+        elif drift is not None:
+            slope = Slope(model.drift_rate(), 0.0)
+            moments = Moments(wv, slope, drift in keys, scales)
+            if noise and (under := moments.under(Model(noise)).found):
+                # Not the printed error, which averages over random walks that are left open.
+                found = Coefficients(slope.values, under.covariance, under.weights)
+                moments = replace(moments, found=found)
         if not noise:  # straight lines of the Allan plot may leave a ramp alone
             nothing = np.zeros_like(wv.tau)
             return cls(scales, moments.target, nothing, wv.covariance, discrepancy, nothing)

@@ -290,8 +290,7 @@ class Fit(Document, Printed):
     @cached_property
     def moments(self) -> FittedMoments:
         """The moments of the data and of the model, whatever the method."""
-        slope_error = self.stderr.get(drift_key(self.model) or "", 0.0)
-        return FittedMoments.of(self.model, self.wv, self.keys, slope_error, self.discrepancy)
+        return FittedMoments.of(self.model, self.wv, self.keys, self.discrepancy)
 
     def deviation_interval(
         self, tau: FloatArray, level: float = 0.95, rivals: Sequence[Model] | None = None

@@ -64,6 +64,17 @@ def test_a_slope_is_less_certain_where_a_walk_may_be_there():
     assert np.mean(held) > 0.5
 
 
+def test_a_walk_of_zero_leaves_the_agreement_of_the_model_without_it():
+    """The error of R includes walks that are left open; the data were judged by a slope as poor."""
+    rng = np.random.default_rng([778, 2])
+    wv = gmwm.wavelet_variance(
+        rng.normal(0.0, N / np.sqrt(DT), SIZE) + R * DT * np.arange(SIZE), DT
+    )
+    fit, without = gmwm.fit(MODEL, wv), gmwm.fit("N + R", wv)
+    assert fit.params["K"] == 0.0 and fit.stderr["R"] > 2.0 * without.stderr["R"]
+    np.testing.assert_allclose(fit.goodness.residual, without.goodness.residual, atol=1e-3)
+
+
 def test_a_poor_fit_of_a_ramp_keeps_its_slope():
     """The weights of the model without the ramp left R open, and the fit ended in an error."""
     rng = np.random.default_rng([91001, 14])
