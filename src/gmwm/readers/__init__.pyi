@@ -20,7 +20,6 @@ from .registry import (
     NAMES as NAMES,
     Wanted as Wanted,
     is_frame as is_frame,
-    is_text as is_text,
     open_tables as open_tables,
 )
 from .rest import (

@@ -57,6 +57,7 @@ class Timing:
     jumps: Jumps  # where rows are missing
     notices: tuple[Notice, ...]  # the rate, its unit, the jitter, jumps, and what else is uneven
     jitter: float  # standard deviation of the steps, as a share of a step
+    start: float  # s, of the first row on the grid
 
 
 def usual_step(stamps: FloatArray) -> float:
@@ -154,7 +155,10 @@ def timing_of(clock: Clock, expected: float | None = None) -> Timing:
         notices.append(notice("rate-unlikely", "", {"rate": rate}, hint=shown_hint))
     if kept is not None:
         jumps = replace(jumps, rows=kept[jumps.rows], repeated=copies)
-    return Timing(rate, jumps, (*notices, *last), found.jitter)
+    # One stamp may come late: the grid is where most of them are.
+    steps = (clock.stamps - clock.stamps[0]) / jumps.interval
+    start = (float(clock.stamps[0]) + jumps.interval * median(steps - np.rint(steps))) * seconds
+    return Timing(rate, jumps, (*notices, *last), found.jitter, start)
 
 
 def _copies(clock: Clock) -> IntArray:

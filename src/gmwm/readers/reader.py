@@ -307,13 +307,12 @@ def recording_of(table: Table, given: Given) -> Recording:
         table, roles, given.units, lambda: _unknown_rate(table, roles.time, stated)
     )
     arrays, auxiliary, unreadable = _load(table, roles)
-    start, odd = 0.0, list[Notice]()
+    odd = list[Notice]()
     if roles.time is not None:
         seconds = table.meanings[roles.time].seconds
         if seconds in (None, 1.0) and clocks.is_time_of_day(arrays[roles.time]):
             arrays[roles.time] = clocks.seconds_of_day(arrays[roles.time])
             odd.append(notice("time-of-day"))
-        start = float(arrays[roles.time][0]) * (seconds or 1.0)
     for name, index in roles.channels.items():
         largest = tuning.BEYOND_SENSORS / factor(unit_of[name], SI_UNIT[quantity_of(unit_of[name])])
         arrays[index], found = without_sentinels(name, arrays[index], largest, table.where)
@@ -346,7 +345,7 @@ def recording_of(table: Table, given: Given) -> Recording:
         recording, unit_of, given.units, are_columns_given=is_given, has_layout=has_layout
     )
     channels, notices = (*recording.channels, *further), (*at_rest, *recording.notices)
-    jitter = timing.jitter if timing else None
+    jitter, start = (timing.jitter, timing.start) if timing else (None, 0.0)
     return replace(recording, channels=channels, notices=notices, jitter=jitter, start=start)
 
 

@@ -103,11 +103,6 @@ def is_frame(data: object) -> bool:
     )
 
 
-def is_text(path: Path) -> bool:
-    """Whether a file is read as delimited text."""
-    return _format_of(path) is _TEXT
-
-
 def _format_of(path: Path, name: str | None = None) -> Format:
     from gmwm._core.files import existing_file, opened
 

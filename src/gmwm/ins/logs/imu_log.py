@@ -5,13 +5,11 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from gmwm._core.distributions import binom
-from gmwm._core.files import existing_file
 from gmwm._core.spool import alike, release, windows
 from gmwm._core.typing import FloatArray
 from gmwm._core.units import SI_UNIT
@@ -21,11 +19,8 @@ from gmwm.ins import tuning
 from gmwm.ins.geometry import STANDARD_GRAVITY
 from gmwm.ins.increments import Imu
 from gmwm.ins.sensors import AXES, require_axes
-from gmwm.ins.trajectory.trajectory import is_time
 from gmwm.issues import Notice, Severity, notice
-from gmwm.readers import CsvTable, Recording, bare, is_text, load_columns, read
-
-_UNITS_OF_CLOCKS = (1.0, 1e-3, 1e-6, 1e-9)  # s
+from gmwm.readers import Recording, read
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,7 +94,14 @@ def read_imu_log(
     dt, source = recording.dt, recording.source
     rotation = _joined(recording, AXES[:3], reversed_axes)
     velocity = _joined(recording, AXES[3:], reversed_axes)
-    first, notices = _first_stamp(Path(path), recording, time, start, reading)
+    notices = list[Notice]()
+    if recording.jitter is None:  # no time stamps
+        first = dt if start is None else start
+        notices += [notice("no-time-stamps")] * (start is None)
+    elif start is not None:
+        raise InputError(f"{source} has time stamps: leave out its start")
+    else:
+        first = recording.start
     notices += _fill(source, dt, rotation, velocity)
     mean = np.sum([np.sum(velocity[part], axis=0) for part in windows(len(velocity))], axis=0)
     mean /= len(velocity)
@@ -222,36 +224,3 @@ def _cut_off(samples: FloatArray) -> dict[float, int]:
     is_cut = (chance < tuning.GATE) & (at >= tuning.FEWEST_CUT_OFF)
     # A dead band is no end.
     return {float(ends[i]): int(at[i]) for i in np.flatnonzero(is_cut) if ends[i] != 0.0}
-
-
-def _first_stamp(
-    path: Path,
-    recording: Recording,
-    time: str | int | bool | None,
-    start: float | None,
-    reading: Mapping[str, Any],
-) -> tuple[float, list[Notice]]:
-    """Time of the first sample on the clock of the time stamps, or ``start`` without any, s."""
-    given = reading.get("format")
-    is_log = reading.get("layout") is None and (given == "text" if given else is_text(path))
-    table, found = None, list[int]()
-    if is_log and time is not False:
-        table = CsvTable.open(existing_file(path))
-        found = [i for i, name in enumerate(table.names) if is_time(name)]
-        if isinstance(time, int):
-            found = [time]
-        elif time is not None:
-            found = [i for i, name in enumerate(table.names) if time in (name, bare(name))]
-    if table is None or not found:
-        return (start, []) if start is not None else (recording.dt, [notice("no-time-stamps")])
-    if start is not None:
-        raise InputError(f"{recording.source} has time stamps: leave out its start")
-    stamps, dt = load_columns(table, found[:1])[found[0]], recording.dt
-    # Half of the record: single stamps may be wrong.
-    half = max(float(np.subtract(*np.quantile(stamps, [0.75, 0.25]))), np.finfo(float).tiny)
-    ratios = np.array(_UNITS_OF_CLOCKS) * half / (0.5 * (recording.n - 1) * dt)
-    unit = _UNITS_OF_CLOCKS[int(np.argmin(np.abs(np.log(ratios))))]
-    elapsed = unit * (stamps - stamps[0])
-    # One stamp may come late: the grid is where most of them are.
-    late = float(np.median(elapsed - dt * np.rint(elapsed / dt)))
-    return float(stamps[0]) * unit + late, []

@@ -54,6 +54,13 @@ def test_the_unit_of_a_clock_does_not_depend_on_its_last_stamp(tmp_path):
     assert log.start == pytest.approx(5.0 - DT)
 
 
+def test_stamps_of_every_format_are_the_clock(tmp_path):
+    rows, names = imu_rows(), HEAD.split(",")
+    path = tmp_path / "imu.npz"
+    np.savez(path, **{name: rows[:, i] for i, name in enumerate(names)})
+    assert read_imu_log(path).start == pytest.approx(5.0 - DT)
+
+
 def test_a_minus_before_a_column_reverses_it(tmp_path):
     path = write_imu(tmp_path, imu_rows(), "time,a,b,c,d,e,f")
     names = ("gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z")
