@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from scipy.optimize import linprog, minimize_scalar
+from scipy.optimize import minimize_scalar
 
 from gmwm._core.typing import BoolArray, FloatArray
 from gmwm.errors import InputError
@@ -188,10 +188,12 @@ def solved(problem: Problem, columns: FloatArray, is_walking: bool = True) -> Fl
     Columns are those of one set, (n, m), or of several, (b, n, m).
     """
     least = limits(problem, columns.shape[-1], is_walking)
-    sets = columns.reshape(-1, *columns.shape[-2:])
-    shares = least_sum(sets, least)
-    for i in np.flatnonzero(np.any(np.isnan(shares), axis=1)):
-        shares[i] = _with_care(sets[i], least)
+    shares = least_sum(columns.reshape(-1, *columns.shape[-2:]), least)
+    if np.any(np.isnan(shares)):
+        raise InputError(
+            "no numbers of this form cover the model within the computer's precision: its "
+            "parameters are too far apart"
+        )
     return shares
 
 
@@ -203,25 +205,6 @@ def limits(problem: Problem, m: int, is_walking: bool) -> FloatArray:
     if walk > 0.0 and is_walking:
         least[1] = problem.cost(RandomWalk(1.0)) * walk
     return least
-
-
-def _with_care(columns: FloatArray, least: FloatArray) -> FloatArray:
-    """The same of one set whose numbers lie too far apart for bases of a few of them."""
-    largest = np.max(columns, axis=1)
-    found = linprog(
-        np.ones(columns.shape[1]),
-        A_ub=-columns / largest[:, None],
-        b_ub=-1.0 / largest,
-        bounds=[(value, None) for value in least],
-        method="highs",
-    )
-    if found.x is None:
-        raise InputError(
-            "no numbers of this form cover the model within the computer's precision: its "
-            "parameters are too far apart"
-        )
-    # Limits may lie below the tolerance of the program.
-    return np.maximum(found.x, least)
 
 
 def _scaled(problem: Problem, processes: Sequence[Process], shares: FloatArray) -> Model:
