@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+from dataclasses import dataclass, replace
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from annotated_types import MaxLen, MinLen
 
 from gmwm._core import checks
 from gmwm._core.documents import Document, NoneIs, NotNegative, Text
-from gmwm._core.text import bullets, cell, frame, plain_table, wrapped
+from gmwm._core.text import bullets, cell, plain_table, wrapped
 from gmwm._core.units import SI_UNIT, factor
 from gmwm.errors import InputError
 from gmwm.filter_numbers import tuning
@@ -27,9 +27,6 @@ from gmwm.issues import Notice, notice
 from gmwm.motion import HORIZON, INTERVAL, InMotion, between
 from gmwm.process import Model, Process, RandomWalk, WhiteNoise, as_model
 from gmwm.readers import Recording
-
-if TYPE_CHECKING:
-    import pandas
 
 Given = AxisFilterNumbers | FilterNumbers | Mapping[str, Any]
 """Numbers of all axes, or by axis or kind (gyro, accel) numbers, a model, or N and K."""
@@ -259,10 +256,6 @@ class Certificate(Document, InUnits):
         else:
             text = "keep the numbers"
         return wrapped(text, first="- ", indent=2)
-
-    def to_frame(self) -> pandas.DataFrame:
-        """A table of the checks; needs pandas."""
-        return frame((asdict(check) for check in self.checks), tuple(Check.__annotations__))
 
 
 def certify(

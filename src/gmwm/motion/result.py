@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from gmwm import plotting
-from gmwm._core import checks, pages
+from gmwm._core import pages
 from gmwm._core.documents import Array, Document, Positive, Text
 from gmwm._core.frozen import freeze
-from gmwm._core.text import Printed, brief, bullets, frame, per_cent, plain_table
+from gmwm._core.text import Printed, brief, bullets, per_cent, plain_table
 from gmwm._core.typing import FloatArray
 from gmwm._core.units import SI_UNIT, factor
 from gmwm.errors import InputError, MissingNameError
@@ -26,24 +26,14 @@ from gmwm.motion.mapping import Mounting
 from gmwm.process import Model
 
 if TYPE_CHECKING:
-    import pandas
     from matplotlib.axes import Axes
 
-_COLUMNS = (
-    *("imu", "channel", "tau", "deviation", "lower", "upper", "coherence", "static", "factor"),
-    "unit",
-)
 _UNITS = {"gyro": "deg/s", "accel": "mg"}
 
 
-def _shown(sensor: str, units: str = "field") -> tuple[str, float]:
+def _shown(sensor: str) -> tuple[str, float]:
     """Unit in which deviations in motion are shown, and how many of it one SI unit is."""
-    unit = (
-        _UNITS[sensor]
-        if checks.choice("units", units, ("field", "si")) == "field"
-        else (SI_UNIT[sensor])
-    )
-    return unit, 1.0 / factor(unit, SI_UNIT[sensor])
+    return _UNITS[sensor], 1.0 / factor(_UNITS[sensor], SI_UNIT[sensor])
 
 
 @dataclass(frozen=True)
@@ -305,30 +295,6 @@ class InMotion(Document, Printed):
     def sensors(self) -> tuple[str, ...]:
         """Gyro, and accel where all IMUs have one."""
         return tuple(dict.fromkeys(each.quantity for each in self.curves))
-
-    def to_frame(self, *, units: str = "field") -> pandas.DataFrame:
-        """A row per IMU, channel and averaging time; needs pandas.
-
-        Parameters
-        ----------
-        units : {"field", "si"}, optional
-        """
-        return frame(self._rows(units), _COLUMNS)
-
-    def _rows(self, units: str) -> Iterator[dict[str, Any]]:
-        for each in self.curves:
-            unit, scale = _shown(each.quantity, units)
-            ends = (scale * np.sqrt(np.maximum(end, 0.0)) for end in (each.lower, each.upper))
-            values = (
-                each.tau,
-                scale * each.deviation,
-                *ends,
-                each.coherence,
-                scale * np.sqrt(each.static),
-                each.factor,
-            )
-            for row in zip(*values, strict=True):
-                yield dict(zip(_COLUMNS, (each.imu, each.channel, *row, unit), strict=True))
 
     def plot(self, channel: str = "gyro_x", *, ax: Axes | None = None) -> Axes:
         """Allan deviations of a channel of each IMU, in motion and at rest.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from gmwm._core import checks
 from gmwm._core.distributions import chi2, norm
 from gmwm._core.documents import Array, Document, Positive, Probability, Text
 from gmwm._core.frozen import freeze
-from gmwm._core.text import Printed, brief, bullets, frame, plain_table
+from gmwm._core.text import Printed, brief, bullets, plain_table
 from gmwm._core.typing import FloatArray, Progress
 from gmwm._core.units import factor
 from gmwm.calibration import departure_notices, departures, screened
@@ -27,23 +27,8 @@ from gmwm.process import GaussMarkov, Process, RandomWalk, WhiteNoise
 from gmwm.readers import Channel, Recording, require_recording
 from gmwm.variance import wavelet_covariance, wavelet_variance
 
-if TYPE_CHECKING:
-    import pandas
-
 _UNITS = {"gyro": ("rad", "deg"), "accel": ("m/s", "m/s")}
 _Z = norm.ppf(0.975)
-_COLUMNS = (
-    "channel",
-    "imu",
-    "weight",
-    "lower",
-    "upper",
-    "alone",
-    "mean",
-    "inverse",
-    "best",
-    "unit",
-)
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,17 +121,6 @@ class SensorArray(Document, Printed):
         ]
         notes = bullets(self.notices)
         return "\n".join([*lines, *([""] if notes else []), *notes])
-
-    def to_frame(self) -> pandas.DataFrame:
-        """A row per channel and IMU, in SI units; needs pandas."""
-        rows = [
-            dict(zip(_COLUMNS, (each.channel, imu, *values, each.mean, each.inverse, each.best,
-                                _UNITS[each.quantity][0]), strict=True))
-            for each in self.axes
-            for imu, *values in zip(
-                self.imus, each.weights, each.lower, each.upper, each.alone, strict=True)
-        ]  # fmt: skip
-        return frame(rows, _COLUMNS)
 
 
 def array(

@@ -381,8 +381,6 @@ def test_several_flights_are_joined_and_the_result_is_stored(tmp_path):
     lines = str(found).splitlines()
     assert len(lines) <= 30
     assert max(map(len, lines)) <= 80
-    table = found.to_frame(units="si")
-    assert len(table) == sum(len(each.tau) for each in found.curves)
     assert found.plot("accel_x").get_title() == "accel_x"
     with pytest.raises(gmwm.MissingNameError):
         found.curve("unit 9", "gyro_x")
