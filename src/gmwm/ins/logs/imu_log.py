@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -114,21 +114,7 @@ def read_imu_log(
         )
     for axis, name in enumerate(AXES):
         samples = (rotation if axis < 3 else velocity)[:, axis % 3]
-        if cut := _cut_off(samples):
-            share = sum(cut.values()) / len(samples)
-            unit = SI_UNIT[name.partition("_")[0]]
-            values = {"samples": sum(cut.values()), "share": share}
-            ends = f"{' and '.join(f'{end:.5g}' for end in cut)} {unit}"
-            severity: Severity = "bad" if share > tuning.MOST_CUT_OFF else "warning"
-            hint = "record with a wider range, or use a part of the log without them"
-            found = notice("saturation", name, values, severity=severity, hint=hint, ends=ends)
-            notices.append(found)
-            continue
-        at, count = longest_run(samples)
-        if count > 1 and count * dt > tuning.LONGEST_HELD:
-            values = {"start": first + at * dt, "length": count * dt}
-            hint = "leave out that part of the log, or check the column"
-            notices.append(notice("stuck", name, values, variant="log", hint=hint))
+        notices += _wrong_samples(name, samples, dt, first)
     if mean[2] > 0.0:
         notices.append(notice("axis-up", "accel_z"))
     for each in (rotation, velocity):
@@ -189,6 +175,23 @@ def _fill(source: str, dt: float, *triads: FloatArray) -> list[Notice]:
     if not filled:
         return []
     return [notice("samples-filled", values={"count": len(filled), "longest": longest})]
+
+
+def _wrong_samples(name: str, samples: FloatArray, dt: float, first: float) -> Iterator[Notice]:
+    """Samples that are cut off at the end of the range, or else held for long."""
+    if cut := _cut_off(samples):
+        share = sum(cut.values()) / len(samples)
+        values = {"samples": sum(cut.values()), "share": share}
+        ends = f"{' and '.join(f'{end:.5g}' for end in cut)} {SI_UNIT[name.partition('_')[0]]}"
+        severity: Severity = "bad" if share > tuning.MOST_CUT_OFF else "warning"
+        hint = "record with a wider range, or use a part of the log without them"
+        yield notice("saturation", name, values, severity=severity, hint=hint, ends=ends)
+        return
+    at, count = longest_run(samples)
+    if count > 1 and count * dt > tuning.LONGEST_HELD:
+        values = {"start": first + at * dt, "length": count * dt}
+        hint = "leave out that part of the log, or check the column"
+        yield notice("stuck", name, values, variant="log", hint=hint)
 
 
 def longest_run(samples: FloatArray) -> tuple[int, int]:
