@@ -402,7 +402,7 @@ def read_numbers(
     Returns: "gyro" and "accel", or each of the axes ("gyro_x" to "accel_z") where they differ -> N
         (u/sqrt(Hz)) and K (u/s/sqrt(Hz)), or a model with a Gauss-Markov process.
     """
-    values = entries(content_of(path).decode("utf-8-sig", errors="replace"))
+    values, ambiguous = entries(content_of(path).decode("utf-8-sig", errors="replace"))
     layouts = {each.keys: None for each in TARGETS.values() if each.keys}
     keys = next((each for each in layouts if any(name in values for name in each.names)), None)
     if keys is None:
@@ -411,6 +411,8 @@ def read_numbers(
     for name in keys.names:
         if name not in values:
             raise InputError(f"{path}: {name} is missing: add it")
+        if name in ambiguous:
+            raise InputError(f"{path}: {name} has several values: keep those of one IMU")
         if not np.all(values[name] > 0.0):
             raise InputError(f"{path}: {name} = {values[name][0]:g}: give a positive number")
     own_rate = next((float(values[key][0]) for key in _RATES if key in values), 0.0)

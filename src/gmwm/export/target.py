@@ -119,12 +119,12 @@ _ALONE = re.compile(r"\s*([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*(?:,|\t\d+)?\s*")
 _NUMBER = re.compile(r"(?<![\w.])[-+]?\d+(?:\.\d*)?(?:[eE][-+]?\d+)?(?![\w.])")
 
 
-def entries(text: str) -> dict[str, FloatArray]:
-    """Values of a file by their keys: one number, or three.
+def entries(text: str) -> tuple[dict[str, FloatArray], set[str]]:
+    """Values of a file by their keys, one number or three, and the keys that have several values.
 
     Of YAML, JSON, Python, C++ and parameter files, without knowing which it is.
     """
-    values: dict[str, FloatArray] = {}
+    values, ambiguous = dict[str, FloatArray](), set[str]()
     # A list of JSON may have a line for each number.
     with contextlib.suppress(ValueError, RecursionError):
         text = "\n".join(_json_lines(json.loads(text)))
@@ -135,8 +135,10 @@ def entries(text: str) -> dict[str, FloatArray]:
             # A setter is named after what it sets.
             key = name[3].lower() + name[4:] if re.match(r"set[A-Z]", name) else name
             with contextlib.suppress(ValueError):
-                values[key] = np.array([float(each) for each in found])
-    return values
+                value = np.array([float(each) for each in found])
+                if not np.array_equal(values.setdefault(key, value), value):
+                    ambiguous.add(key)
+    return values, ambiguous
 
 
 def _json_lines(content: object) -> Iterator[str]:

@@ -23,6 +23,7 @@ def test_numbers_that_depend_on_the_rate_need_one(tmp_path, text):
         ("imu: none\n", "no noise parameters of a known name"),
         ("gyroscope_noise_density: 1e-4\n", "gyroscope_random_walk is missing"),
         ("gyr_n: 0.1\ngyr_w: 0.1\nacc_n: 0.0\nacc_w: 0.1\n", "acc_n = 0"),
+        (VINS + VINS.replace("0.03", "0.3"), "acc_n has several values: keep those of one IMU"),
     ],
 )
 def test_files_that_cannot_be_used(tmp_path, content, message):
