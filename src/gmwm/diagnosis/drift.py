@@ -1,7 +1,7 @@
 """Slow changes of the level, by themselves or with the temperature, and of the noise."""
 
 from collections.abc import Iterator
-from itertools import pairwise
+from itertools import pairwise, product
 
 import numpy as np
 
@@ -219,28 +219,30 @@ def _means(values: FloatArray, length: int) -> FloatArray:
 def temperature_notices(recording: Recording) -> list[Notice]:
     """Find channels that follow a temperature channel, each with the one it follows most closely.
 
-    Changes from one of 64 parts of the record to the next are correlated: mere drift is not.
+    Changes from one part of the record to the next are correlated, because drift alone is not a
+    dependence. Few parts show slow changes above the noise, many parts show fast ones.
     """
     thermometers = [c for c in recording.values() if c.quantity == "temperature"]
     if recording.n < tuning.PARTS * tuning.SHORTEST_PART or not thermometers:
         return []
-    pairs = len(thermometers) * len(recording.inertial)
-    # Thermometers are often slower than the other sensors.
-    warmer = {c.name: np.diff(part_means(c.values, least=0.0)) for c in thermometers}
+    tests = len(thermometers) * len(recording.inertial) * len(tuning.PARTS_OF_TEMPERATURE)
     notices = []
     for channel in recording.inertial:
-        change, found = np.diff(part_means(channel.values)), []
-        for thermometer in thermometers:
-            known = ~np.isnan(warmer[thermometer.name] + change)
-            x, y, n = warmer[thermometer.name][known], change[known], int(np.count_nonzero(known))
+        found = []
+        for thermometer, parts in product(thermometers, tuning.PARTS_OF_TEMPERATURE):
+            # Thermometers are often slower than the other sensors.
+            x = np.diff(part_means(thermometer.values, parts, least=0.0))
+            y = np.diff(part_means(channel.values, parts))
+            known = ~np.isnan(x + y)
+            x, y, n = x[known], y[known], int(np.count_nonzero(known))
             if n < tuning.FEWEST_PARTS or np.std(x) == 0.0 or np.std(y) == 0.0:
                 continue
             r = float(np.corrcoef(x, y)[0, 1])
-            t = abs(r) * np.sqrt((n - 2) / max(1.0 - r**2, 1e-12))
-            if t > student.isf(0.5 * tuning.FALSE_ALARM / pairs, n - 2):
-                found.append((float(t), r, float(np.polyfit(x, y, 1)[0]), thermometer))
+            p = 2.0 * student.sf(abs(r) * np.sqrt((n - 2) / max(1.0 - r**2, 1e-12)), n - 2)
+            if p < tuning.FALSE_ALARM / tests:
+                found.append((float(p), r, float(np.polyfit(x, y, 1)[0]), thermometer))
         if found:
-            _, r, slope, thermometer = max(found, key=lambda one: one[0])
+            _, r, slope, thermometer = min(found, key=lambda one: one[0])
             values = {"correlation": r, "slope": slope}
             per = f"{readable(slope, channel.unit)} per {thermometer.unit or 'unit'}"
             name = thermometer.name

@@ -104,7 +104,8 @@ UNSTEADY = 0.1  # deviation of all above the quiet quarter; at rest it is 0.04 (
 # -- two channels ---------------------------------------------------------------------------------
 
 CORRELATED, STRONGLY_CORRELATED = 0.05, 0.3  # a filter with independent channels is as wrong
-FEWEST_PARTS = 16  # changes from part to part for a correlation with the temperature ...
+PARTS_OF_TEMPERATURE = (16, 32, 64)  # parts of the record whose changes are correlated ...
+FEWEST_PARTS = 12  # ... changes from part to part ...
 SHORTEST_PART = 32  # ... and samples of each part
 
 # -- the step of the samples ----------------------------------------------------------------------

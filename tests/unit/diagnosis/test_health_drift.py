@@ -118,3 +118,17 @@ def test_temperature_that_a_channel_follows():
     (notice,) = found.of(code="temperature")
     assert notice.where == "gyro_x"
     assert notice.values["slope"] == pytest.approx(0.5, rel=0.1)
+
+
+def test_a_slow_temperature_that_a_channel_follows():
+    """From one of 64 parts to the next it changes by less than the noise of their means."""
+    n = 40_000
+    rng = np.random.default_rng(12)
+    warm = np.sin(8.0 * np.pi * np.arange(n) / n)
+    channels = (
+        Channel("gyro_x", rng.normal(size=n) + 0.06 * warm, DT, "gyro", "rad/s"),
+        Channel("gyro_y", rng.normal(size=n), DT, "gyro", "rad/s"),
+        Channel("temp", warm, DT, "temperature", "degC"),
+    )
+    found = gmwm.health(Recording(channels)).of(code="temperature")
+    assert [each.where for each in found] == ["gyro_x"]
