@@ -220,19 +220,21 @@ def temperature_notices(recording: Recording) -> list[Notice]:
     """Find channels that follow a temperature channel, each with the one it follows most closely.
 
     Changes from one part of the record to the next are correlated, because drift alone is not a
-    dependence. Few parts show slow changes above the noise, many parts show fast ones.
+    dependence. Few parts show slow changes above the noise, many parts show fast ones. Either may
+    lag behind the other by a part.
     """
     thermometers = [c for c in recording.values() if c.quantity == "temperature"]
     if recording.n < tuning.PARTS * tuning.SHORTEST_PART or not thermometers:
         return []
-    tests = len(thermometers) * len(recording.inertial) * len(tuning.PARTS_OF_TEMPERATURE)
-    notices = []
+    ways = [*product(thermometers, tuning.PARTS_OF_TEMPERATURE, (-1, 0, 1))]
+    tests, notices = len(ways) * len(recording.inertial), []
     for channel in recording.inertial:
         found = []
-        for thermometer, parts in product(thermometers, tuning.PARTS_OF_TEMPERATURE):
+        for thermometer, parts, lag in ways:
             # Thermometers are often slower than the other sensors.
             x = np.diff(part_means(thermometer.values, parts, least=0.0))
             y = np.diff(part_means(channel.values, parts))
+            x, y = x[max(-lag, 0) : x.size - max(lag, 0)], y[max(lag, 0) : y.size - max(-lag, 0)]
             known = ~np.isnan(x + y)
             x, y, n = x[known], y[known], int(np.count_nonzero(known))
             if n < tuning.FEWEST_PARTS or np.std(x) == 0.0 or np.std(y) == 0.0:
