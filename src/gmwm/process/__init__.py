@@ -3,12 +3,7 @@
 from gmwm.process.base import Process as Process, Shape as Shape
 from gmwm.process.kinds import *  # noqa: F403 - the table of built-in processes
 from gmwm.process.kinds import CATALOGUE as CATALOGUE
-from gmwm.process.kinds.low_pass import (
-    BUTTERWORTH as BUTTERWORTH,
-    compiled_levels as compiled_levels,
-    shaped_curve as shaped_curve,
-    shaped_slope as shaped_slope,
-)
+from gmwm.process.kinds.low_pass import BUTTERWORTH as BUTTERWORTH
 from gmwm.process.model import Model as Model, as_model as as_model, simulate as simulate
 from gmwm.process.parameter import Parameter as Parameter, parameter as parameter
 from gmwm.process.spectral import (

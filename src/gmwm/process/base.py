@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from itertools import product
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
@@ -53,6 +53,9 @@ class Process:
     parameters: tuple[Parameter, ...] = ()
     """The declared parameters, in order; at most one of them linear, see `Parameter.role`."""
 
+    shape_parameters: tuple[Parameter, ...] = ()
+    """Those that enter the wavelet variance non-linearly."""
+
     label: ClassVar[str] = ""
     """Name in tables and legends; the class name where empty."""
 
@@ -99,9 +102,6 @@ class Process:
     has_finite_state_space: ClassVar[bool] = True
     """Whether `state_space`, where there is one, is exact."""
 
-    compiled_kind: ClassVar[int] = 0
-    """Number of its curve in `gmwm.process.shaped_curve`, of this very class; 0 if it has none."""
-
     _examples: ClassVar[tuple[tuple[Any, ...], ...]] = ()  # arguments of those of `examples`
     _constructor: ClassVar[inspect.Signature] = inspect.Signature()
     _accepted: ClassVar[tuple[str, ...]] = ()  # names of its arguments
@@ -115,14 +115,13 @@ class Process:
             if isinstance(value, Parameter)
         }
         cls.parameters = tuple(declared.values())
+        cls.shape_parameters = tuple(p for p in cls.parameters if p.role == "shape")
         cls._constructor = inspect.signature(cls.__init__)
         if cls.__init__ is Process.__init__:
             kind = inspect.Parameter.POSITIONAL_OR_KEYWORD
             names = [inspect.Parameter(name, kind) for name in ("self", *declared)]
             cls._constructor = inspect.Signature(names)
         cls._accepted = tuple(cls._constructor.parameters)[1:]
-        # Neither is inherited: a subclass has another curve, and another name.
-        cls.compiled_kind = vars(cls).get("compiled_kind", 0)
         cls.short_name = vars(cls).get("short_name", cls.__name__)
 
     def __new__(cls, *args: Any, **kwargs: Any) -> Self:
@@ -168,11 +167,6 @@ class Process:
     def linear_parameter(self) -> Parameter | None:
         """The parameter whose power is a factor of the wavelet variance, if there is one."""
         return next((parameter for parameter in self.parameters if parameter.linear), None)
-
-    @property
-    def shape_parameters(self) -> tuple[Parameter, ...]:
-        """The parameters that enter the wavelet variance non-linearly."""
-        return tuple([parameter for parameter in self.parameters if parameter.role == "shape"])
 
     def at_unit(self, shape: Shape) -> Self:
         """A copy at another shape and unit amplitude."""
@@ -302,10 +296,6 @@ class Process:
     def unit_haar_variance(self, shape: Shape, tau: FloatArray, dt: float) -> FloatArray:
         """`haar_variance` at another shape and unit amplitude: the estimator's inner loop."""
         return np.asarray(self.at_unit(shape).haar_variance(tau, dt), dtype=float)
-
-    def unit_haar_curves(self, tau: FloatArray, dt: float) -> Callable[[Shape], FloatArray]:
-        """`unit_haar_variance` as a function of the shape alone."""
-        return lambda shape: self.unit_haar_variance(shape, tau, dt)
 
     def autocovariance(self, lag: FloatArray, dt: float) -> FloatArray:
         """Autocovariance in u^2 at lags in samples (non-negative integers).

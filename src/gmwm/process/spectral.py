@@ -186,14 +186,8 @@ PANEL, _POINTS = 0.125, 12
 through them is as near as rho^-12, rho that of the Bernstein ellipse through the next pole of the
 spectrum (Trefethen 2013, *Approximation Theory and Approximation Practice*, ch. 8)."""
 
-PANEL_POLE, HALF_PANEL = 2.21, 0.5 * PANEL
-"""Distance of that pole in half panels from which the polynomial is good to 1e-8."""
-
-WIDER = 4
-"""Panels that are one panel of a spectrum whose poles are as many times as far."""
-
-TOGETHER = 16
-"""Averaging times whose weights at all nodes are in memory at once: 2 MB."""
+POLE_OF_PANEL = 2.21
+"""Distance of that pole, in half panels, from which the polynomial is good to 1e-8."""
 
 _ANGLES = np.pi * (np.arange(_POINTS) + 0.5) / _POINTS
 _TAIL = 2.0 / _POINTS * np.cos(np.outer(_ANGLES, np.arange(_POINTS - 3, _POINTS)))
@@ -242,27 +236,20 @@ class Panels:
         return np.asarray(tail <= 1e-10 * np.max(np.abs(values), axis=1))
 
 
-@lru_cache(maxsize=8)
-def panel_weights(averaging: tuple[float, ...], times: int = 1) -> tuple[FloatArray, FloatArray]:
-    """Log tan(pi f) at the points of panels, and the weights of each averaging time.
+@lru_cache(maxsize=16)
+def log_tangent_weights(
+    averaging: tuple[float, ...], panel: float = 0.0
+) -> tuple[FloatArray, FloatArray]:
+    """Log tan(pi f) at all nodes of the quadrature, and the weights of each averaging time.
 
-    What `Quadrature.haar_variance` is for a spectrum that is smooth on panels, with a tenth of the
-    points; with fewer still on panels so many times as wide. The gains at all nodes are in memory
-    for some averaging times at a time.
+    panel: Width of panels on which a spectrum is smooth: their points are far fewer.
     """
-    if times > 1:
-        log_tangent, weight = panel_weights(averaging)
-        panels = Panels.of(log_tangent, times * PANEL)
-        gathered = panels.gathered(weight)
-    else:
-        frequency, weight = _nodes(max(averaging))
-        panels = Panels.of(np.log(np.tan(np.pi * frequency)))
-        parts = [
-            panels.gathered(2.0 * weight * _gains(averaging[i : i + TOGETHER], frequency))
-            for i in range(0, len(averaging), TOGETHER)
-        ]
-        gathered = np.concatenate(parts)
-    return panels.points.ravel(), gathered.reshape(len(averaging), -1)
+    frequency, weight = node_weights(rounded(averaging))
+    nodes = np.log(np.tan(np.pi * frequency))
+    if panel == 0.0:
+        return nodes, weight
+    panels = Panels.of(nodes, panel)
+    return panels.points.ravel(), panels.gathered(weight).reshape(len(averaging), -1)
 
 
 def haar_variance(psd: PSD, tau: FloatArray, dt: float) -> FloatArray:

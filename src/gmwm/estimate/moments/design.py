@@ -17,12 +17,10 @@ import numpy as np
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.estimate import tuning
-from gmwm.estimate.moments.kernels import Shaped
 from gmwm.estimate.problem.moments import Scales, is_plain
 from gmwm.estimate.problem.parameters import Coordinates, difference, shape_of
-from gmwm.process import Model, Process, Shape, compiled_levels
+from gmwm.process import Model, Process, Shape
 
-MOST_SHAPES = 3  # parameters of the processes whose curves are known in compiled form
 _STEP = 1e-5  # of central differences in z, whose natural scale is 1
 _SIMULATED_STEP = 0.05  # where a simulation may move in jumps
 
@@ -174,29 +172,6 @@ class Design:
         if key not in self._parts:
             self._parts[key] = Design(Model(tuple(self.terms[i].process for i in key)), self.scales)
         return self._parts[key]
-
-    @cached_property
-    def compiled(self) -> Shaped | None:
-        """What compiled code needs to know; ``None`` if some curve is not known there."""
-        shaped = [self.terms[i] for i in self.shaped]
-        if self.scales.wavelet != "haar" or not all(
-            term.free_scale and term.process.compiled_kind and not self.scales.simulate_all
-            for term in shaped
-        ):
-            return None
-        kinds = np.array([term.process.compiled_kind for term in shaped])
-        counts = [term.n_shapes for term in shaped]
-        free = np.zeros((len(shaped), MOST_SHAPES), dtype=np.bool_)
-        lower, upper = np.zeros(free.shape), np.full(free.shape, np.inf)
-        for s, term in enumerate(shaped):
-            size = term.free_shape.size
-            free[s, :size] = term.free_shape
-            lower[s, :size] = [p.lower for p in term.process.shape_parameters]
-            upper[s, :size] = [p.upper for p in term.process.shape_parameters]
-        first = np.cumsum([0, *counts])[:-1]
-        levels = compiled_levels(self.scales.tau, self.scales.dt, frozenset(kinds.tolist()))
-        owners = np.array([self.linear.index(i) for i in self.owners])
-        return Shaped(kinds, np.array(self.shaped), first, free, lower, upper, owners, levels)
 
     # -- curves -----------------------------------------------------------------------------------
 

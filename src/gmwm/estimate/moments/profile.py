@@ -7,7 +7,7 @@ Kaufman's form (Golub & Pereyra 2003, *Inverse Problems* 19, R1-R26).
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any, cast
+from typing import cast
 
 import numpy as np
 from scipy.optimize import leastsq
@@ -15,8 +15,8 @@ from scipy.optimize import leastsq
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.estimate import tuning
-from gmwm.estimate.moments.design import MOST_SHAPES, Design
-from gmwm.estimate.moments.kernels import Weighted, linearized, profiled, projected
+from gmwm.estimate.moments.design import Design
+from gmwm.estimate.moments.kernels import Weighted, profiled, projected
 from gmwm.estimate.problem.moments import Scales
 from gmwm.estimate.problem.nonnegative import objectives_with, solve_nonnegative
 from gmwm.estimate.problem.parameters import shape_of
@@ -87,37 +87,27 @@ class Profile:
             return self.at(shapes)
         low, high = design.bounds
         bounds = np.maximum(low, z0 - reach), np.minimum(high, z0 + reach)
-        compiled = design.compiled if self._lost is None else None
-        own, fixed = self._start_of_compiled(shapes)
-        visited: dict[bytes, list[Any]] = {}  # the last point, of which MINPACK asks repeatedly
+        visited: dict[bytes, tuple[FloatArray, FloatArray, FloatArray]] = {}
 
-        def at(z: FloatArray) -> list[Any]:
-            """Amplitudes, residuals, their Jacobian if it came with them, and weighted columns."""
+        def at(z: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+            """Weighted columns, amplitudes and residuals; MINPACK asks for a point repeatedly."""
             if z.tobytes() not in visited:
                 visited.clear()
-                is_known = False
-                if compiled is not None:
-                    is_known, *found = linearized(z, bounds, self._problem, compiled, own, fixed)
-                if not is_known:
-                    curves = self._curves(design.unpack(np.clip(z, *bounds), shapes))
-                    columns, x, residual = profiled(self._problem, curves)
-                    found = [x, residual, None, columns]
-                visited[z.tobytes()] = found
+                curves = self._curves(design.unpack(np.clip(z, *bounds), shapes))
+                visited[z.tobytes()] = profiled(self._problem, curves)
             return visited[z.tobytes()]
 
         def jacobian(z: FloatArray) -> FloatArray:
-            found = at(z)
-            if found[2] is None:
-                factor = design.amplitudes(found[0][: len(design.linear)])[design.owners]
-                slopes = design.shape_derivatives(design.unpack(np.clip(z, *bounds), shapes))
-                found[2] = projected(self.root, found[3], found[0], slopes, factor)
-            return np.asarray(found[2])
+            columns, x, _ = at(z)
+            factor = design.amplitudes(x[: len(design.linear)])[design.owners]
+            slopes = design.shape_derivatives(design.unpack(np.clip(z, *bounds), shapes))
+            return np.asarray(projected(self.root, columns, x, slopes, factor))
 
         tolerances = {"xtol": _XTOL, "ftol": _FTOL, "gtol": _GTOL}
         z = leastsq(
-            lambda z: -at(z)[1], z0, Dfun=jacobian, maxfev=_MOST, full_output=True, **tolerances
+            lambda z: -at(z)[2], z0, Dfun=jacobian, maxfev=_MOST, full_output=True, **tolerances
         )[0]
-        x, residual = at(z)[:2]
+        _, x, residual = at(z)
         moved = design.unpack(np.clip(z, *bounds), shapes)
         point = Point(moved, x, float(residual @ residual))
         return point if point.objective <= start.objective else start
@@ -146,20 +136,6 @@ class Profile:
             return self.at(own)
         z = leastsq(residuals, z0, maxfev=_MOST * z0.size, full_output=True)[0]
         return self.refine(self.at(shapes(z)))
-
-    def _start_of_compiled(self, shapes: Sequence[Shape]) -> tuple[FloatArray, FloatArray]:
-        """Shapes of the shaped terms, and the curves of the others, as `linearized` takes them."""
-        design = self.design
-        own = np.zeros((len(design.shaped), MOST_SHAPES))
-        fixed = np.zeros((self.target.size, len(design.terms) + self._beside.shape[1]))
-        fixed[:, len(design.terms) :] = self._beside
-        if design.compiled is not None:
-            for row, i in zip(own, design.shaped, strict=True):
-                row[: len(shapes[i])] = shapes[i]
-            for i, term in enumerate(design.terms):
-                if not term.n_shapes:
-                    fixed[:, i] = design.curve(i, shapes[i])
-        return own, fixed
 
 
 def compile_search() -> None:

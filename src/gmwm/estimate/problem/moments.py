@@ -119,8 +119,6 @@ class Scales:
         if self.is_simulated(process):
             return lambda shape: self.curve(process.at_unit(shape))
         if process.shape_parameters:
-            if self.wavelet == "haar":
-                return process.unit_haar_curves(self.tau, self.dt)
             return lambda shape: process.unit_wavelet_variance(
                 shape, self.tau, self.dt, self.wavelet
             )

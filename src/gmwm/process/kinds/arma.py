@@ -70,8 +70,8 @@ class ARIMA(Process):
         names = [f"ar_{i + 1}" for i in range(len(ar_values))]
         names += [f"ma_{i + 1}" for i in range(len(ma_values))]
         shapes = tuple(Parameter(name, "-", lower=-np.inf, meaning="coefficient") for name in names)
-        object.__setattr__(self, "parameters", (*shapes, *type(self).parameters))
         self.__dict__.update(d=d, orders=(len(ar_values), len(ma_values)))
+        self.__dict__.update(parameters=(*shapes, *type(self).parameters), shape_parameters=shapes)
         super().__init__(*ar_values, *ma_values, sigma2)
         for values, sign, what in ((self.ar, 1, "stationary"), (self.ma, -1, "invertible")):
             if None not in values and not _stable([sign * value for value in values]):

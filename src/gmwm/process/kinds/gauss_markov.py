@@ -51,7 +51,6 @@ class GaussMarkov(Process):
     label: ClassVar[str] = "Gauss-Markov"
     short_name: ClassVar[str] = "GM"
     is_candidate: ClassVar[bool] = True
-    compiled_kind: ClassVar[int] = 1
     ordered_by: ClassVar[str] = "tau"
     is_exponential: ClassVar[bool] = True
     _examples = (
@@ -76,7 +75,8 @@ class GaussMarkov(Process):
         return self.sigma**2 * _exponential_psd(dt / self.tau, f, dt)
 
     def unit_haar_variance(self, shape: Shape, tau: FloatArray, dt: float) -> FloatArray:
-        return real_haar(dt / shape[0], np.ravel(tau) / dt).reshape(np.shape(tau))
+        m = np.asarray(tau) / dt
+        return real_haar(dt / shape[0], m.ravel()).reshape(m.shape)
 
     def autocovariance(self, lag: FloatArray, dt: float) -> FloatArray:
         return self.sigma**2 * np.exp(-np.asarray(lag) * dt / self.tau)
@@ -122,7 +122,6 @@ class Resonance(Process):
     frequency: float = parameter("Hz", meaning="resonance frequency")
     damping: float = parameter("-", upper=1.0, meaning="resonance damping ratio")
     label: ClassVar[str] = "resonance"
-    compiled_kind: ClassVar[int] = 2
     prefix: ClassVar[str] = "resonance_"
     _examples = ((0.4, 0.2, 0.05), (2e-3, 0.01, 0.5), (1.0, 1e-4, 0.3), (1.0, 0.45, 0.9))
 
@@ -139,7 +138,8 @@ class Resonance(Process):
         return self.sigma**2 * np.real(weight * _exponential_psd(rate, f, dt))
 
     def unit_haar_variance(self, shape: Shape, tau: FloatArray, dt: float) -> FloatArray:
-        return resonance_haar(*shape, dt, np.ravel(tau) / dt).reshape(np.shape(tau))
+        m = np.asarray(tau) / dt
+        return resonance_haar(*shape, dt, m.ravel()).reshape(m.shape)
 
     def autocovariance(self, lag: FloatArray, dt: float) -> FloatArray:
         rate, weight = _exponential(self.frequency, self.damping, dt)
@@ -225,22 +225,6 @@ def real_haar(rate: float, m: FloatArray) -> FloatArray:
     excess, scale = _sinh_excess(rate), 8.0 * math.sinh(0.5 * rate) ** 2
     for i in range(m.size):
         result[i] = (2.0 * m[i] * excess + _h(m[i] * rate)) / (m[i] * m[i] * scale)
-    return result
-
-
-@compiled()
-def real_slope(rate: float, m: FloatArray) -> FloatArray:
-    """Derivative of `real_haar` by the logarithm of the correlation time, (J, 1)."""
-    result = np.zeros((m.size, 1))
-    if rate > _WHITE_ABOVE:
-        return result
-    curve = real_haar(rate, m)
-    square = math.sinh(0.5 * rate) ** 2
-    for i in range(m.size):
-        bend = math.expm1(-m[i] * rate) ** 2  # half of h'
-        numerator = 4.0 * m[i] * square + 2.0 * m[i] * bend
-        slope = numerator / (8.0 * m[i] * m[i] * square) - curve[i] / math.tanh(0.5 * rate)
-        result[i, 0] = -rate * slope
     return result
 
 

@@ -6,9 +6,8 @@ state-space form is that white noise, without a state.
 """
 
 import math
-from collections.abc import Collection
 from functools import lru_cache
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 from scipy import fft
@@ -18,23 +17,12 @@ from gmwm._core.frozen import frozen
 from gmwm._core.typing import FloatArray
 from gmwm.process.base import Process, Shape
 from gmwm.process.kinds.arma import haar_sum
-from gmwm.process.kinds.gauss_markov import (
-    GaussMarkov,
-    Resonance,
-    real_haar,
-    real_slope,
-    resonance_haar,
-)
 from gmwm.process.parameter import parameter
 from gmwm.process.spectral import (
-    HALF_PANEL,
-    PANEL_POLE,
-    TOGETHER,
-    WIDER,
+    PANEL,
+    POLE_OF_PANEL,
     log_tangent,
-    node_weights,
-    panel_weights,
-    rounded,
+    log_tangent_weights,
 )
 from gmwm.process.state_space import StateSpace
 
@@ -42,6 +30,7 @@ _GRID_PER_DECADE = 6
 _LOWEST, _HIGHEST = 0.004, 0.45  # of the grid of bandwidths, in cycles per sample
 _LARGEST_LOG = 600.0
 _LAGS = 1 << 17
+_PANELS = (4.0 * PANEL, PANEL)  # widths that are tried
 
 BUTTERWORTH = float(np.sqrt(0.5))
 """Damping ratio at which the pass band is as flat as it can be."""
@@ -90,7 +79,6 @@ class LowPassNoise(_Filtered):
     order: float = parameter("-", lower=0.9, upper=16.0, meaning="order of the sensor's low-pass")
     damping: float = parameter("-", lower=0.2, upper=2.0, meaning="damping ratio of that low-pass")
     label: ClassVar[str] = "low-pass noise"
-    compiled_kind: ClassVar[int] = 3
     prefix: ClassVar[str] = "lowpass_"
     _examples = ((0.3, 0.1, 2.0, BUTTERWORTH), (1.0, 0.31, 1.0, 0.6), (2e-3, 0.02, 3.3, 1.0))
 
@@ -109,8 +97,8 @@ class LowPassNoise(_Filtered):
         return self.N**2 * found.reshape(x.shape)
 
     def unit_haar_variance(self, shape: Shape, tau: FloatArray, dt: float) -> FloatArray:
-        averaging = tuple((np.ravel(tau) / dt).tolist())
-        return _unit_curve(tuple(map(float, shape)), averaging, dt).reshape(np.shape(tau))
+        m = np.asarray(tau) / dt
+        return _unit_curve(shape, tuple(m.ravel().tolist()), dt).reshape(m.shape)
 
     def autocovariance(self, lag: FloatArray, dt: float) -> FloatArray:
         lag = np.asarray(lag, dtype=int)
@@ -198,49 +186,16 @@ def _gain(
     return result
 
 
-@compiled()
-def low_pass_haar(
-    bandwidth: float, order: float, damping: float, dt: float, wide: Any, narrow: Any
-) -> FloatArray:
-    """Haar wavelet variance at unit N, (J,); empty where panels are too wide for the spectrum.
-
-    wide, narrow: (points, weights), of panels, see `on_panels`.
-    """
-    # Distance of the next pole of the spectrum from the real axis of log tan(pi f dt).
-    pole = math.acos(max(1.0 - 2.0 * damping**2, -1.0)) / order
-    if pole > WIDER * PANEL_POLE * HALF_PANEL:
-        return wide[1] @ _gain(bandwidth, order, damping, wide[0], dt) / dt
-    if pole > PANEL_POLE * HALF_PANEL:
-        return narrow[1] @ _gain(bandwidth, order, damping, narrow[0], dt) / dt
-    return np.zeros(0)
-
-
 @lru_cache(maxsize=1024)
 def _unit_curve(shape: Shape, averaging: tuple[float, ...], dt: float) -> FloatArray:
     """Wavelet variance at unit N; kept, as a fit asks for its grid and given shapes often."""
-    found = low_pass_haar(*shape, dt, *on_panels(averaging))
-    if not found.size:
-        parts = (averaging[i : i + TOGETHER] for i in range(0, len(averaging), TOGETHER))
-        nodes = [_nodes(part) for part in parts]
-        found = np.concatenate([weight @ _gain(*shape, x, dt) / dt for x, weight in nodes])
-    curve: FloatArray = frozen(found)
+    _, order, damping = shape
+    # Distance of the next pole of the spectrum from the real axis of log tan(pi f dt).
+    pole = math.acos(max(1.0 - 2.0 * damping**2, -1.0)) / order
+    wide_enough = (each for each in _PANELS if pole > 0.5 * each * POLE_OF_PANEL)
+    x, weight = log_tangent_weights(averaging, next(wide_enough, 0.0))
+    curve: FloatArray = frozen(weight @ _gain(*shape, x, dt) / dt)
     return curve
-
-
-Weights = tuple[FloatArray, FloatArray]
-
-
-@lru_cache(maxsize=16)
-def _nodes(averaging: tuple[float, ...]) -> Weights:
-    """Log tan(pi f) at all nodes of the quadrature, and the weights of each averaging time."""
-    frequency, weight = node_weights(rounded(averaging))
-    return np.log(np.tan(np.pi * frequency)), weight
-
-
-def on_panels(averaging: tuple[float, ...]) -> tuple[Weights, Weights]:
-    """Points and weights of wide and of narrow panels: far fewer than all nodes."""
-    whole = rounded(averaging)
-    return panel_weights(whole, WIDER), panel_weights(whole)
 
 
 def _window(length: float) -> FloatArray:
@@ -263,39 +218,3 @@ def _window_curve(length: float, averaging: tuple[float, ...]) -> FloatArray:
     """Wavelet variance of white noise of unit variance behind a window."""
     covariance = _window_covariance(length)
     return np.array([haar_sum(covariance, m) for m in averaging])
-
-
-_GAUSS_MARKOV, _RESONANCE, _LOW_PASS = (
-    kind.compiled_kind for kind in (GaussMarkov, Resonance, LowPassNoise)
-)
-"""The kinds that the estimator's compiled loops know."""
-
-
-def compiled_levels(tau: FloatArray, dt: float, kinds: Collection[int]) -> tuple[Any, ...]:
-    """The averaging times (s) as `shaped_curve` of some kinds takes them."""
-    nothing = np.zeros(0), np.zeros((tau.size, 0))
-    m = np.ascontiguousarray(tau) / dt
-    panels = on_panels(tuple(m.tolist())) if _LOW_PASS in kinds else (nothing, nothing)
-    return (m, dt, *panels)
-
-
-@compiled()
-def shaped_curve(kind: int, shape: FloatArray, levels: Any) -> FloatArray:
-    """`Process.unit_haar_variance` of a compiled kind, (J,), for inner loops; empty where unknown.
-
-    kind: `Process.compiled_kind`.
-    """
-    m, dt, wide, narrow = levels
-    if kind == _GAUSS_MARKOV:
-        return real_haar(dt / shape[0], m)
-    if kind == _RESONANCE:
-        return resonance_haar(shape[0], shape[1], dt, m)
-    return low_pass_haar(shape[0], shape[1], shape[2], dt, wide, narrow)
-
-
-@compiled()
-def shaped_slope(kind: int, shape: FloatArray, levels: Any) -> FloatArray:
-    """Derivative of `shaped_curve` by its only shape coordinate; empty without a closed form."""
-    if kind == _GAUSS_MARKOV:
-        return real_slope(levels[1] / shape[0], levels[0])[:, 0].copy()
-    return np.zeros(0)
