@@ -66,8 +66,8 @@ def require(needed: float, what: str) -> None:
         raise InputError(
             f"{what} needs about {size} of memory, and {most} may be used",
             "memory",
-            f"read fewer columns with channels=, cut it into parts, or set {VARIABLE} (GB) if "
-            "there is more",
+            "read fewer columns with channels=, cut the file into parts, or set "
+            f"{VARIABLE} (GB) if the machine has more memory",
         )
 
 

@@ -50,7 +50,7 @@ def _check_room(size: int) -> None:
     if shutil.disk_usage(folder).free < size + _LEFT_FREE:
         raise InputError(
             f"there is no room for the samples of a long file in {folder}: set TMPDIR to a folder "
-            "with more, or read fewer channels",
+            "with more space, or read fewer channels",
             "disk-full",
         )
 

@@ -117,8 +117,8 @@ def calibrate(
     beside = wanted(covariates)
     if beside and remove_departures:
         raise InputError(
-            "departures cannot be removed beside covariates, whose curve they would take with them:"
-            " leave one of the two out, or calibrate a part without departures"
+            "steps and drifts cannot be removed together with covariates, as part of the curve "
+            "would be removed too: leave out one of the two, or calibrate a part without steps"
         )
     _check_together(given)
     size = sum(each.n * len(each.inertial) for each in given)

@@ -411,7 +411,7 @@ def _check_separable(chosen: Sequence[Regressor], rows: FloatArray, *, is_chosen
             if together > limit:
                 way = ", or give the degree and all time constants" if is_chosen else ""
                 raise InputError(
-                    f"{one.title} changes as the other terms of the curve do (correlation "
-                    f"{together:.4f}), so that they cannot be separated: leave it out, record "
+                    f"{one.title} changes together with other terms of the curve (correlation "
+                    f"{together:.4f}), so they cannot be separated: leave it out, record "
                     f"cycles of temperature{way}"
                 )

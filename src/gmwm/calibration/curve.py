@@ -193,7 +193,7 @@ class BiasCurve(Document, Printed):
         known: dict[str, FloatArray] = {}
         for one in self.covariates:
             if one.name not in covariates:
-                raise InputError(f"the curve of {self.name} depends on {one.name}: give its values")
+                raise InputError(f"the curve of {self.name} needs values of {one.name}: give them")
             known[one.name] = self._inside(np.asarray(covariates[one.name], dtype=float), one)
         n = len(next(iter(known.values()), next(iter(covariates.values()), np.zeros(0))))
         time = np.asarray(start + dt * np.arange(n), dtype=float)

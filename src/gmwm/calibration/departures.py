@@ -430,7 +430,7 @@ def without_departures(recording: Recording, fits: Mapping[str, Fit]) -> Recordi
         if name in recording and fit.wv.n * fit.wv.dt > recording.duration + recording.dt:
             raise InputError(
                 f"{recording.source or 'the recording'} is not the one that was calibrated: it has "
-                f"{recording.duration:g} s, the fit of {name} {fit.wv.n * fit.wv.dt:g} s"
+                f"{recording.duration:g} s, but the fit of {name} {fit.wv.n * fit.wv.dt:g} s"
             )
     channels = []
     for channel in recording.channels:

@@ -47,7 +47,7 @@ if TYPE_CHECKING:
 def compare(
     files: Sequence[Path], output: Path | None, as_json: bool, quiet: bool, **given: Any
 ) -> None:
-    """Compare recordings of a sensor, or units of a kind.
+    """Compare recordings of a sensor, or units of one type.
 
     FILE is a calibration.json, or a recording, which is calibrated first as by gmwm calibrate. For
     each axis: whether the curves are equal, level by level; one structure for all recordings, with

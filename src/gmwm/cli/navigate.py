@@ -148,9 +148,9 @@ def navigate(
 
     A study simulates INS/GNSS filters with outages (Monte Carlo). Sensor errors are drawn from the
     true models or taken from real static recordings, and added to the error-free signals of a
-    trajectory; every filter navigates on the same errors. The command prints the errors at the end
-    of the outages and whether each filter is consistent. A YAML file can hold more settings than
-    the options, which override it; see docs/navigation.md and docs/own-log.md.
+    trajectory; every filter navigates with the same errors. The command prints the errors at the
+    end of the outages and whether each filter is consistent. A YAML file can hold more settings;
+    options override it. See docs/navigation.md and docs/own-log.md.
 
     With --imu, --gnss and --sensors it filters real data and writes solution.csv and report.html.
     It prints whether the innovations agree with the sensor models, and if not, which fault of the

@@ -233,9 +233,9 @@ def certify(
 ) -> None:
     """Predict how consistent a filter is with the numbers in use.
 
-    FILE is a calibration.json, which counts as the truth. The command prints true errors beside
-    those that the filter predicts: for one axis without aiding, an aided INS in outages, and
-    relative poses between keyframes. Then it prints what N and K have to cover, cause by cause.
+    FILE is a calibration.json, which counts as the truth. The command prints the true errors and
+    the errors that the filter predicts: for one axis without aiding, an aided INS in outages, and
+    relative poses between keyframes. Then it lists the causes that N and K have to cover.
 
     \b
     Examples:

@@ -166,7 +166,7 @@ class Health(Document, Printed):
         if names != tuple(self.channels) or recording.n != self.n:
             raise InputError(
                 f"{recording.source or 'the recording'} is not the one that was examined "
-                f"({self.source or 'without a name'}): give the one that was, or examine this one"
+                f"({self.source or 'without a name'}): give that recording, or examine this one"
             )
         channels, notices = [], list(recording.notices)
         for name, channel in recording.items():

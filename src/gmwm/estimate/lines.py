@@ -193,9 +193,9 @@ def _wanted(model: Model) -> dict[str, _Line]:
     for term in model.terms:
         if type(term) not in _LINES:
             raise InputError(
-                f"{term!r} has no straight line in the Allan plot, from which method='allan' reads "
-                "quantization noise, white noise, bias instability, random walk and rate ramp: "
-                "leave it out or use method='gmwm'"
+                f"{term!r} has no straight line in the Allan plot: leave it out, or use "
+                "method='gmwm' (method='allan' reads quantization noise, white noise, bias "
+                "instability, random walk and rate ramp)"
             )
     wanted = [_LINES[type(term)] for term in model.terms if term.is_open]
     return {line.key: line for line in wanted}

@@ -179,7 +179,8 @@ def given_times(name: str, times: Sequence[float]) -> tuple[float, ...]:
 
 def _axis(name: str, item: object, dt: float, bias_sd: Sd) -> AxisModel:
     if not isinstance(item, One):
-        raise InputError(f"{name}: {checks.shown(item)} is not an error model")
+        hint = "give a fit, or a model such as gmwm.WhiteNoise(1e-4)"
+        raise InputError(f"{name}: {checks.shown(item)} is not an error model: {hint}")
     model = item.model if isinstance(item, Fit) else as_model(item)
     model.require_given(name or "the model")
     fit = item if isinstance(item, Fit) else None

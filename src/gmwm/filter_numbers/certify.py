@@ -357,7 +357,7 @@ def certify(
     notices += [each for each in measured.notices if each.severity == "warning"] if measured else []
     if measured is not None and not any(each.consumer == "motion" for each in found):
         seen = ", ".join(measured.numbers())
-        raise InputError(f"the motion shows {seen}: give models and numbers of some of these axes")
+        raise InputError(f"the motion has only {seen}: give numbers for one of these axes or more")
     return Certificate(own, safe, (*found, *in_flight), tuple(causes), tuple(notices))
 
 

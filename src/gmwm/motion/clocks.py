@@ -132,7 +132,7 @@ def _check_steady(
     delays = along / np.maximum(power, np.finfo(float).tiny)
     if delays**2 @ power > tuning.WANDER * float(np.sum(residual**2)):
         raise InputError(
-            f"flight {flight}: the clock of {imu} wanders against the first one by "
-            f"{1e3 * np.std(delays):.2g} ms around a steady drift: give recordings with stamps of "
-            "the sensors, or shorter ones"
+            f"flight {flight}: the clock of {imu} wanders against that of the first IMU by "
+            f"{1e3 * np.std(delays):.2g} ms around a steady drift: give shorter recordings, or "
+            "recordings with time stamps of the sensors"
         )

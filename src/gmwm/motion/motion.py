@@ -216,7 +216,7 @@ def _flights(sources: Any) -> tuple[list[list[_Imu]], int]:
         for flight in given
     ]
     if any([*flight] != [*named[0]] for flight in named):
-        raise InputError("flights have different IMUs: give the same ones, in one order, for each")
+        raise InputError("flights have different IMUs: give the same IMUs, in the same order")
     if len(named[0]) < 2:
         raise InputError("motion needs two IMUs on one body, better three: give more recordings")
     filled = 0

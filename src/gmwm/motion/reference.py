@@ -115,7 +115,7 @@ def without_reference(curves: Curves, dt: float, where: str) -> tuple[Curves, fl
         raise InputError(
             f"{where}: the noise of the reference's angle, {1e3 * max(angles):.2g} mrad, dominates "
             f"up to {tau[-1]:.2g} s: record longer, or use a better reference (Fisher information "
-            f"against that of a perfect one: {by_octave})"
+            f"relative to a perfect reference: {by_octave})"
         )
     ends = {"lower": lower, "upper": upper}
     return replace(curves, variance=variance, pairs=pairs[None], **ends), max(angles)

@@ -211,8 +211,8 @@ def _named(recordings: Sequence[Recording] | Mapping[str, Recording]) -> dict[st
         require_recording(each)
         if rest_of(each) is not None:
             raise InputError(
-                f"{each.source or 'a recording'} is not static: cut all of them to one stretch at "
-                "rest, with part(start, stop)"
+                f"{each.source or 'a recording'} is not static: cut all recordings to the same "
+                "stretch at rest, with part(start, stop)"
             )
     if len(given) < 2:
         raise InputError(f"an array has two IMUs or more ({len(given)} given): give each recording")
@@ -227,8 +227,8 @@ def _together(named: Mapping[str, Recording]) -> dict[str, Recording]:
     stop = min(each.start + each.duration for each in named.values())
     if stop <= start:
         raise InputError(
-            "the time stamps of the recordings have no time in common: give files of one time; if "
-            "they began together, read them by their rate, without stamps (--rate, --time none)"
+            "the recordings do not overlap in time: give simultaneous recordings; if they began "
+            "together, read them by their rate, without time stamps (--rate, --time none)"
         )
     return {imu: each.part(start - each.start, stop - each.start) for imu, each in named.items()}
 

@@ -144,7 +144,7 @@ def find_column(table: Table, reference: Reference, what: str) -> int:
                 if found:
                     raise InputError(
                         f"{table.source} has {len(found)} columns {reference!r}: give the index of "
-                        f"the one for {what}, counted from 0: {', '.join(map(str, found))}"
+                        f"the column for {what}, counted from 0: {', '.join(map(str, found))}"
                     )
         if not (reference.isascii() and reference.isdigit()):
             text = f"{table.source} has no column {reference!r} for {what}"
@@ -196,7 +196,7 @@ def _by_number(
     if len(sensors) != 1:
         raise InputError(
             f"{table.source}: column names do not show whether this is a gyro or an "
-            f'accelerometer: say it, e.g. channels={{"gyro_x": {rest[0]}}}, or give the unit of '
+            f'accelerometer: name it, e.g. channels={{"gyro_x": {rest[0]}}}, or give the unit of '
             "only one of them",
             "channel-unknown",
         )

@@ -314,7 +314,7 @@ class Recording(Mapping[str, Channel], Printed):
         lengths = {channel.name: channel.n for channel in channels}
         if len(set(lengths.values())) != 1:
             listed = ", ".join(f"{name}: {n}" for name, n in lengths.items()) or "none given"
-            raise InputError(f"a recording needs channels of one length ({listed}): cut them alike")
+            raise InputError(f"channels have different lengths ({listed}): cut them to one length")
         return cls(tuple(channels), source, (*notices, *notices_of_gaps(channels)))
 
     @property

@@ -151,8 +151,8 @@ def wavelet_covariance(channels: Sequence[Channel], *, block: int = 1) -> Wavele
     """
     if len(channels) < 2 or len({(each.dt, each.n) for each in channels}) > 1:
         raise InputError(
-            "wavelet covariances need two channels or more of one rate and length: take those of "
-            "one recording, or cut them alike"
+            "wavelet covariances need two channels or more of the same rate and length: give "
+            "channels of one recording, or cut all to the same length"
         )
     block = checks.whole("block", block, 1, "give a number of samples")
     alike = [replace(c, values=_means(c.values, block), dt=block * c.dt) for c in channels]

@@ -261,7 +261,7 @@ def test_a_curve_along_the_record_is_what_was_added(result):
     np.testing.assert_allclose(along, curve(at) - curve(curve.main.centre), atol=1e-12)
     with pytest.raises(gmwm.InputError, match="known from"):
         curve.along({"temperature": warm_up() + 10.0}, DT)
-    with pytest.raises(gmwm.InputError, match="depends on temperature: give its values"):
+    with pytest.raises(gmwm.InputError, match="needs values of temperature: give them"):
         curve.along({"voltage": at}, DT)
 
 
@@ -391,5 +391,5 @@ def test_departures_are_not_removed_beside_a_curve():
     departed = [each for each in found if each.issue.topic == "departure"]
     assert departed
     assert not any("remove_departures" in each.hint for each in departed)
-    with pytest.raises(gmwm.InputError, match="cannot be removed beside covariates"):
+    with pytest.raises(gmwm.InputError, match="cannot be removed together with covariates"):
         calibrated(rec, remove_departures=True)

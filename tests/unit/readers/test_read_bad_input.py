@@ -213,7 +213,7 @@ def test_unit_missing(write, samples, option, quantity):
         ("gx,gyro_x,gy,gz,ax,ay", {}, "columns 'gx' and 'gyro_x' may both be gyro_x"),
         ("gx,gyro_x,gy,gz,ax,ay", {}, 'channels={"gyro_x": 0}'),
         ("gx,gx,gy,gz,ax,ay", {"channels": {"gyro_x": "gx"}},
-         "2 columns 'gx': give the index of the one for gyro_x"),
+         "2 columns 'gx': give the index of the column for gyro_x"),
         *(("a,b,c,d,e,f", option, "static.csv has no column")
           for column in ("gz", "", "-1", "6", 6, -1)
           for option in ({"channels": {"gyro_x": column}}, {"time": column})),

@@ -92,5 +92,5 @@ def test_levels_of_block_means_are_those_of_the_samples_at_their_averaging_times
     ],
 )
 def test_channels_that_do_not_belong_together_are_rejected(own):
-    with pytest.raises(InputError, match="one rate and length"):
+    with pytest.raises(InputError, match="the same rate and length"):
         wavelet_covariance(own)

@@ -256,7 +256,7 @@ def _is_ros1(path: Path) -> bool:
     if head.startswith(b"#ROSBAG"):
         return True
     what = "is not a ROS bag" if head else "is empty"
-    raise InputError(f"{path.name} {what}: check that it is the right file, and a whole one")
+    raise InputError(f"{path.name} {what}: check that it is the right file, and complete")
 
 
 def _messages(reader: Any, topic: str, start: int | None = None) -> Iterator[_Record]:

@@ -211,6 +211,6 @@ def _check_not_thinned(source: str, topic: Topic, data: Mapping[str, AnyArray]) 
     if not 0.0 < step * 1e-6 * tuning.THINNED < 1.0:
         rate = 1e6 / step if step > 0.0 else 0.0
         raise InputError(
-            f"{source}: {topic.name} is logged at {rate:.3g} Hz, thinned from hundreds, so that "
-            f"its noise is not that of the sensor: {_HINT}"
+            f"{source}: {topic.name} is logged at {rate:.3g} Hz, thinned from hundreds, which "
+            f"does not show the sensor's noise: {_HINT}"
         )
