@@ -1,5 +1,6 @@
 """A term is needed where the model without it misses an averaging time, and only there."""
 
+import numpy as np
 import pytest
 
 import gmwm
@@ -43,3 +44,12 @@ def test_a_walk_that_the_truth_does_not_have_stays_bounded():
     for seed in range(4):
         fit = fitted(WhiteNoise() + RandomWalk(), WhiteNoise(1.0), seed)
         assert "K" in fit.upper_bounds and not fit.valid
+
+
+def test_a_walk_that_is_needed_but_has_no_interval_is_limited():
+    """White noise by chance 37 % above its curve at 819 s; the K of 0.3 +-0.3 had no upper end."""
+    tau = 0.1 * 2.0 ** np.arange(17)
+    values = [31.43, 22.30, 15.84, 11.21, 7.867, 5.545, 3.933, 2.754, 1.973, 1.348, 0.934, 0.609]
+    values += [0.448, 0.476, 0.351, 0.182, 0.146]
+    curve = gmwm.curve(tau, 1e-4 * np.array(values), rate=10.0, duration=14_400.0)
+    assert gmwm.fit("N + K", curve).interval()["K"][1] < 1e-5

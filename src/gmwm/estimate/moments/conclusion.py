@@ -257,7 +257,9 @@ def _with_doubtful_terms(
     the model without it, by its own errors, misses an averaging time (`Goodness.loses_to`). Several
     similar terms can stand in for each other: one of them is too many, not all.
     """
-    present = [key for key in fit.upper_bounds if fit.params[key] > 0.0]
+    # One without a finite interval is only limited, whether it is needed or not.
+    largest = {key: tuning.UNDETERMINED * fit.params[key] for key in fit.upper_bounds}
+    present = [key for key, error in fit.stderr.items() if 0.0 < error <= largest.get(key, 0.0)]
     if not redundant and not present:
         return fit
 
