@@ -360,7 +360,7 @@ def test_a_walk_that_dominates_has_numbers_with_an_n_above_zero():
         ([recording(np.ones((200, 6))), "imu.csv"], "read it first"),
         ([recording(np.ones((200, 6))), recording(np.zeros((200, 6)), 60.0)], "50 to 60 Hz"),
         ([recording(np.ones((200, 6)))] * 2, "flight 1: imu 2 is a copy: give each IMU once"),
-        ([[recording(np.ones((200, 6)))] * 2, [recording(np.ones((200, 6)))] * 3], "one order"),
+        ([[recording(np.ones((200, 6)))] * 2, [recording(np.ones((200, 6)))] * 3], "same order"),
     ],
 )
 def test_what_cannot_be_used_is_rejected(sources, message):
