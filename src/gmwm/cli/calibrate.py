@@ -65,7 +65,7 @@ def folder_of_results(default: str) -> dict[str, Any]:
     --part
     --estimating
     --remove-departures  Subtract steps, transients at the start and slow periods that are found,
-        and calibrate what is left. Not with covariates.
+        and calibrate the rest. Not with covariates.
     --temperature  Estimate the curve of each channel against the temperature channel, together
         with its noise.
     --temperature-file FILE  The temperature by time, in seconds from the first sample, if it is not

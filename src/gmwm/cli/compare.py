@@ -108,10 +108,10 @@ def array(
 ) -> None:
     """Find the weighted sum of IMUs on one board that has the least error.
 
-    IMU is the static recording of one IMU; all begin together, with aligned axes. The weights are
-    for outages of one length: over seconds white noise matters, over minutes slow errors do, and
-    errors that IMUs share do not average out. The second table compares them with the best IMU
-    alone, the mean of all, and weights 1/N^2.
+    Give a static recording of each IMU; all begin together, with aligned axes. The weights are for
+    outages of one length: over seconds white noise matters, over minutes slow errors. Errors that
+    IMUs share do not average out. The second table compares these weights with the best IMU alone,
+    the mean of all, and weights 1/N^2.
 
     \b
     Examples:
@@ -196,18 +196,18 @@ def fleet(
 @click.argument("files", metavar="FILE...", nargs=-1, required=True, type=PATH)
 @options(
     """
-    --static FILE  Calibration of a recording at rest, of one of the IMUs or of their kind.
-    --imus N  Number of IMUs: the files are those of one flight, then those of the next, each in one
-        order. By default all files are of one flight.
+    --static FILE  Calibration of a recording at rest, of one of the IMUs or of their type.
+    --imus N  Number of IMUs. Give the files flight by flight, with the IMUs in the same order. By
+        default all files are of one flight.
     --reference FILE  Attitude of the body, one for each FILE of one IMU: columns time, qw, qx, qy,
         qz (body to a fixed frame), or files of EuRoC or TUM; repeat for flights.
     --limits A,B  Vibration in m/s^2 (rms, 20 to 60 Hz) between the classes low, middle and high,
         such as idle, hover and manoeuvres; by default each has a third of the time.
     --at CLASS  Result at low, middle or high vibration, or at rest.
-    --logs  Each file is a log of one flight with all IMUs; a single file is one anyway.
+    --logs  Each file is a log of one flight with all IMUs, as a single file always is.
     -o --output JSON  File to save the result in.
     --report HTML  Page of the curves, the factors over rest, vibration and numbers.
-    --plot PNG  Picture of the Allan deviations, a panel a channel.
+    --plot PNG  Picture of the Allan deviations, a panel for each channel.
     --reading
     --part
     --json
@@ -236,12 +236,11 @@ def motion(
 ) -> None:
     """Measure the noise of IMUs in motion, from three or more on one rigid body.
 
-    FILE is the recording of an IMU, all of the same motion, or one log with several instances: a
-    bag, or a log of PX4 (vehicle_imu) or ArduPilot; clocks need not agree. Clocks, mounting
-    and lever arms are estimated; what the IMUs do not have in common is their noise. The first
-    table relates each IMU to the first one; the second has the Allan deviation of each in motion,
-    with --static also at rest and the factor between both. Two IMUs give only the sum of
-    their errors.
+    Give a recording of each IMU, all of the same motion, or one log with all IMUs: a bag, or a log
+    of PX4 (vehicle_imu) or ArduPilot. Clocks need not agree. Clocks, mounting and lever arms are
+    estimated; the rest that the IMUs do not share is their noise. The first table relates each IMU
+    to the first one. The second has the Allan deviation of each in motion, with --static also at
+    rest and the factor between both. Two IMUs give only the sum of their errors.
 
     \b
     Examples:

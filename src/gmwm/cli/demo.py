@@ -164,7 +164,7 @@ Found = tuple[str, Sequence[Path]]
 def reproduce(
     experiment: str, output: Path, recording: Sequence[Path], rotate: bool, **options: Any
 ) -> None:
-    """Repeat an experiment of the paper, or our own harder one.
+    """Repeat an experiment of the paper, or a harder one.
 
     The paper is Stebler and others (2012).
 

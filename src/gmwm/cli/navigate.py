@@ -107,7 +107,7 @@ def _sensors(flag: str, texts: Sequence[str]) -> str | dict[str, str]:
     --outages auto|SECONDS  Length of the outages that are cut into the log to compare sensors; auto
         is 30 s.  [default: auto]
     --lever-arm X,Y,Z  From the IMU to the antenna, metres: forward, right, down.
-    --heading NUMBER  Heading at the first fix in degrees; by default from GNSS once it moves.
+    --heading NUMBER  Heading at the first fix in degrees; by default from GNSS in motion.
     --attitude ROLL,PITCH,YAW  Attitude at the first fix in degrees, if the record begins in motion;
         by default from the data.
     --imu-start S  Time of the first IMU sample on the clock of the fixes, if it has no time stamps.
@@ -154,8 +154,8 @@ def navigate(
 
     With --imu, --gnss and --sensors it filters real data and writes solution.csv and report.html.
     It prints whether the innovations agree with the sensor models, and if not, which fault of the
-    log explains them. Several --sensors are compared: outages are cut into the log, and the errors
-    after them, against a smoother of all fixes, show which model to use.
+    log explains them. Several --sensors are compared: the command cuts outages into the log and
+    compares the positions after them with a smoother of all fixes, to show which model to use.
 
     \b
     Examples:

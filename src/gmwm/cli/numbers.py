@@ -68,7 +68,7 @@ _number_options = options(
 def bound(file: Path, temperature: float | None, **options: Any) -> None:
     """Find the smallest numbers that are never overconfident.
 
-    FILE is a calibration.json. K covers a random walk that was not found up to its 95 % limit.
+    FILE is a calibration.json. If a model has no random walk, K covers its 95 % upper limit.
 
     \b
     Example:
@@ -415,7 +415,7 @@ def sheet(
     as_json: bool,
     **how: float,
 ) -> None:
-    """Find numbers for a filter from a data sheet, where there is no recording.
+    """Find numbers for a filter from a data sheet, without a recording.
 
     SHEET is a YAML file such as 'gyro: {N: 0.15 deg/sqrt(h), B: 7 deg/h}', or a sensor of --list.
     Many sheets call the lowest point of the Allan plot bias instability: then write

@@ -157,7 +157,7 @@ def bootstrap_test(
 def _check(fit: Fit, runs: int) -> int:
     if fit.method != "gmwm":
         raise InputError(
-            f"a fit by {fit.method!r} has no weights to simulate: take one by method='gmwm'"
+            f"a fit by {fit.method!r} has no weights to simulate: fit by method='gmwm'"
         )
     return checks.whole("runs", runs, 2)
 
