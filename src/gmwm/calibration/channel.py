@@ -192,6 +192,8 @@ def advise_cut(
         parts.append((start - free, free, start))
         free = max(free, stop)
     kept, start, stop = max(parts)
+    if kept <= 0.0:
+        return dict(found), []
     removable = all(each.values["removable"] for each in departed)
     values = {"start": start, "stop": stop, "of": length, "removable": removable}
     advice = notice(LONGEST_PART, "", values, count=len(departed), kept=kept)

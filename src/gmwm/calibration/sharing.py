@@ -112,7 +112,7 @@ def sharing_notices(one: Screened, models: Mapping[str, Model]) -> list[Notice]:
     pairs.sort(key=lambda each: -abs(each.correlation))
     largest = pairs[0]
     listed = ", ".join(
-        f"{each.first} and {each.second} ({each.correlation:.2f})"
+        f"{each.first} and {each.second} ({np.clip(each.correlation, -1.0, 1.0):.2f})"
         for each in pairs[: tuning.SHARED_LISTED]
     )
     more = len(pairs) - tuning.SHARED_LISTED

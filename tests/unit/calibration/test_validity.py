@@ -66,6 +66,7 @@ def test_the_longest_part_without_any(notices, part):
         ((STEP, DRIFT), 0.0),
         ((STEP, departed("step", 10.0, 20.0, severity="note")), 100.0),
         ((STEP, departed("slow-period", 10.0, 20.0)), 100.0),
+        ((STEP, departed("transient", 0.0, 40.0)), 50.0),
     ],
 )
 def test_one_that_is_evident_has_its_own_remedy(notices, length):
