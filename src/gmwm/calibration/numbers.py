@@ -180,12 +180,14 @@ def axis_numbers(fit: Fit, rivals: Sequence[Model] = ()) -> AxisNumbers:
     """The sensor numbers of a fitted model.
 
     rivals: Models that fit equally well; the intervals of B and K cover them. If one has no random
-        walk, K is an upper limit: the data do not tell it from other slow noise, such as flicker.
+        walk, K is an upper limit: the data do not tell it from other slow noise, such as flicker,
+        or from a rate ramp.
     """
     n, k = (random_walk(fit, letter) for letter in "NK")
     bias, tau = _bias_instability(fit, rivals, k)
-    if k.kind == "estimated" and rivals:
-        others = [float(each.params.get("K") or 0.0) for each in rivals]
+    others = [float(each.params.get("K") or 0.0) for each in rivals]
+    others += [0.0 for each in fit.notices if each.code == "ramp-or-walk"]
+    if k.kind == "estimated" and others:
         low, high, walk = min(k.lower, *others), max(k.upper, *others), PROCESSES["K"]
         if min(others) > 0.0:
             k = Estimate.of(walk, "estimated", k.value, k.stderr, (low, high), fit.wv)

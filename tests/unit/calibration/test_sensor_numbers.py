@@ -1,6 +1,6 @@
 """Sensor numbers: N, B and K of known models, their intervals, and how they are shown."""
 
-import dataclasses
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,6 +8,7 @@ import pytest
 import gmwm
 from gmwm import GaussMarkov, Model, Process, QuantizationNoise, RandomWalk, WhiteNoise
 from gmwm.calibration import PLATEAU, axis_numbers, fast_density, upper_limit
+from gmwm.issues import notice
 from gmwm.readers import Channel
 
 DT, N = 0.01, 200_000
@@ -94,6 +95,9 @@ def test_K_is_a_limit_where_a_model_that_fits_equally_well_has_no_walk():
     found = axis_numbers(fit, [larger]).K
     assert (found.kind, found.value) == ("estimated", alone.value)
     assert (found.lower, found.upper) == (alone.lower, 2.0 * alone.upper)
+    slope = replace(fit, notices=(notice("ramp-or-walk", "", {}, ramp="R", slow="K"),))
+    found = axis_numbers(slope).K
+    assert (found.kind, found.upper) == ("bound", alone.upper)
 
 
 def test_what_the_model_lacks_has_an_upper_limit():
@@ -165,7 +169,7 @@ def test_no_B_lies_below_the_data():
     x = (WhiteNoise(1e-3) + RandomWalk(1e-4)).simulate(50_000, 0.1, 1)
     fit = gmwm.fit(WhiteNoise() + RandomWalk(), Channel("gyro_x", x, 0.1, "gyro", "rad/s"))
     white = Model((WhiteNoise(1e-3),))
-    blind = dataclasses.replace(fit, model=white, keys=(), covariance=np.zeros((0, 0)))
+    blind = replace(fit, model=white, keys=(), covariance=np.zeros((0, 0)))
     numbers = axis_numbers(blind)
     at = int(np.searchsorted(fit.wv.tau, numbers.tau))
     lowest = numbers.B.upper * PLATEAU
