@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -99,25 +100,28 @@ def write_files_to_try(output: Path, hours: float, seed: int) -> None:
 
 
 def show_truth(fitted: Calibration, truth: dict[str, Model]) -> None:
-    """One table of truth beside estimate."""
+    """One table of truth beside estimate, in the units of the field."""
     from gmwm._core.text import plain_table, wrapped
-    from gmwm.study import compare
+    from gmwm._core.units import customary_unit
 
-    table, shown = [], [row for name, fit in fitted.items() for row in compare(fit, truth[name])]
-    for row in shown:
-        cells = [f"{row.estimate:.4g}", f"{row.lower:.4g} .. {row.upper:.4g}"]
-        if not row.determined:
+    rows, held = [], []
+    for name, fit in fitted.items():
+        intervals = fit.interval()
+        for item in truth[name].parameters:
+            key, wv = item.key, fit.wv
+            unit, scale = customary_unit(item.parameter.unit, wv.quantity, wv.unit)
+            lower, upper = (scale * end for end in intervals.get(key, (0.0, math.inf)))
+            true, estimate = scale * (item.value or 0.0), scale * fit.params[key]
             cells = ["-", "too short to tell"]
-        elif row.lower == 0.0:
-            cells[1] = f"<= {row.upper:.4g}"
-        cells[1] += "" if row.covered else " *"
-        table.append((row.channel, row.what, f"{row.truth:.4g}", *cells, row.unit))
-    click.echo(
-        plain_table(("channel", "parameter", "truth", "estimate", "95 % interval", "unit"), table)
-    )
-    determined = [row.covered for row in shown if row.determined]
-    text = f"{len(determined)} of {len(shown)} parameters are determined by this record; "
-    text += f"{sum(determined)} of these {len(determined)} intervals hold the truth (* does not)."
+            if upper < math.inf:
+                held.append(lower <= true <= upper)
+                shown = f"{lower:.4g} .. {upper:.4g}" if lower else f"<= {upper:.4g}"
+                cells = [f"{estimate:.4g}", shown + ("" if held[-1] else " *")]
+            rows.append((name, key, f"{true:.4g}", *cells, unit))
+    heads = ("channel", "parameter", "truth", "estimate", "95 % interval", "unit")
+    click.echo(plain_table(heads, rows))
+    text = f"{len(held)} of {len(rows)} parameters are determined by this record; "
+    text += f"{sum(held)} of these {len(held)} intervals hold the truth (* does not)."
     click.echo("\n".join(wrapped(text)))
 
 

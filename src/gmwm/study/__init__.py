@@ -1,10 +1,6 @@
 """The simulation study of Stebler et al. (2012), and a harder case, over the public API."""
 
-from gmwm.study.demo import (
-    compare as compare,
-    simulated_imu as simulated_imu,
-    write_demo_files as write_demo_files,
-)
+from gmwm.study.demo import simulated_imu as simulated_imu, write_demo_files as write_demo_files
 from gmwm.study.navigation import reproduce_figure as reproduce_figure
 from gmwm.study.rotation import reproduce_rotation as reproduce_rotation
 from gmwm.study.sensor import reproduce_sensor as reproduce_sensor

@@ -1,6 +1,5 @@
 """Simulated recordings and a log with a known truth."""
 
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -8,8 +7,7 @@ import pyarrow as pa
 from pyarrow import csv
 
 from gmwm._core.typing import FloatArray
-from gmwm._core.units import SI_UNIT, customary_unit
-from gmwm.estimate.result import Fit
+from gmwm._core.units import SI_UNIT
 from gmwm.ins import SensorModels, car_drive, emulate, gnss
 from gmwm.ins.fields import sensor_models
 from gmwm.ins.sensors import AXES
@@ -64,45 +62,6 @@ def simulated_imu(
     columns = {name: model.simulate(n, 1.0 / RATE, rng) for name, model in truth.items()}
     source = f"simulated IMU, seed {seed}"
     return Recording.from_arrays(columns, RATE, SI_UNIT, source=source), truth
-
-
-@dataclass(frozen=True)
-class Comparison:
-    """A true value beside its estimate, in the units of the field.
-
-    lower, upper: Of the 95 % interval.
-    """
-
-    channel: str
-    what: str
-    truth: float
-    estimate: float
-    lower: float
-    upper: float
-    unit: str
-
-    @property
-    def determined(self) -> bool:
-        """Whether the record determines it."""
-        return bool(np.isfinite(self.upper))
-
-    @property
-    def covered(self) -> bool:
-        """Whether the interval holds the truth."""
-        return self.lower <= self.truth <= self.upper
-
-
-def compare(fitted: Fit, truth: Model) -> list[Comparison]:
-    """True parameters beside those estimated for a model of the same form."""
-    intervals = fitted.interval()
-    rows = []
-    for item in truth.parameters:
-        key = item.key
-        unit, scale = customary_unit(item.parameter.unit, fitted.wv.quantity, fitted.wv.unit)
-        values = (item.value or 0.0, fitted.params[key], *intervals.get(key, (0.0, np.inf)))
-        true, estimate, low, high = (scale * each for each in values)
-        rows.append(Comparison(fitted.wv.name, key, true, estimate, low, high, unit))
-    return rows
 
 
 FILES_RATE, DRIVE = 25.0, 600.0
