@@ -36,6 +36,7 @@ class Clock:
     own_unit: str  # the unit as the header states it
     where: Callable[[int], str]  # row -> its place in the file
     same: Callable[[IntArray], BoolArray]  # rows -> whether each has the samples of the one before
+    origin: float = 0.0  # of the stamps, in their unit
 
     def error(self, row: int | None, text: str, hint: str = _WAY_OUT) -> InputError:
         """An error about the stamps, with the file, the column and the place."""
@@ -157,7 +158,8 @@ def timing_of(clock: Clock, expected: float | None = None) -> Timing:
         jumps = replace(jumps, rows=kept[jumps.rows], repeated=copies)
     # One stamp may come late: the grid is where most of them are.
     steps = (clock.stamps - clock.stamps[0]) / jumps.interval
-    start = (float(clock.stamps[0]) + jumps.interval * median(steps - np.rint(steps))) * seconds
+    first = float(clock.stamps[0]) + jumps.interval * median(steps - np.rint(steps))
+    start = (clock.origin + first) * seconds
     return Timing(rate, jumps, (*notices, *last), found.jitter, start)
 
 

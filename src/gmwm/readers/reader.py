@@ -121,7 +121,7 @@ def _cut(recording: Recording, start: float, stop: float) -> list[Channel]:
     return [replace(channel, values=channel.values[rows]) for channel in recording.channels]
 
 
-def with_temperature(recording: Recording, table: Table) -> Recording:
+def with_temperature(recording: Recording, table: Table, *, is_one_clock: bool = True) -> Recording:
     """A thermometer beside the sensors, interpolated at their rate between its stamps."""
     roles = [each.role for each in table.meanings]
     if TIME not in roles or "temperature" not in roles:
@@ -132,7 +132,8 @@ def with_temperature(recording: Recording, table: Table) -> Recording:
     except InputError as error:
         outcome = notice("columns-unreadable", what=f"temperature ({error})")
     else:
-        stamps = arrays.pop(time) * (table.meanings[time].seconds or 1.0)
+        origin = table.origins.get(time, 0.0) * is_one_clock
+        stamps = (arrays.pop(time) + origin) * (table.meanings[time].seconds or 1.0)
         order = np.argsort(stamps, kind="stable")
         grid = recording.start + recording.dt * np.arange(recording.n)
         for column, own in arrays.items():
@@ -149,7 +150,7 @@ def with_temperature(recording: Recording, table: Table) -> Recording:
 
 def with_thermometer(recording: Recording, table: Table) -> Recording:
     """A recording with the temperatures of another file, whose times count from its first one."""
-    found = with_temperature(replace(recording, start=0.0), table)
+    found = with_temperature(replace(recording, start=0.0), table, is_one_clock=False)
     added = found.channels[len(recording.channels) :]
     if not added or all(channel.missing == channel.n for channel in added):
         raise InputError(
@@ -455,9 +456,9 @@ def _timing(
 
     found, column = table.meanings[time], table.column(time)
     unit = (found.seconds, found.stated)
-    timing = clocks.timing_of(
-        Clock(table.source, column, arrays[time], *unit, table.where, same), stated
-    )
+    origin = table.origins.get(time, 0.0)
+    clock = Clock(table.source, column, arrays[time], *unit, table.where, same, origin)
+    timing = clocks.timing_of(clock, stated)
     if stated is None:
         return timing
     return replace(timing, notices=(*timing.notices, notice("rate-stated", "", {"rate": stated})))

@@ -45,20 +45,6 @@ class Missing:
         return cls(gone.size, int(np.sum(lengths)), lengths.size, longest)
 
 
-def missing_notices(found: Mapping[str, Missing]) -> list[Notice]:
-    """One for all channels that miss equally many samples in equally many gaps."""
-    notices = []
-    for each in dict.fromkeys(each for each in found.values() if each.samples):
-        names = [name for name, other in found.items() if other == each]
-        variant = "all" if each.samples == each.n else "many" if each.gaps > 1 else "one"
-        values = {"missing": each.samples, "gaps": each.gaps, "longest": each.longest}
-        where, them = ", ".join(names), "each " if len(names) > 1 else ""
-        notices.append(
-            notice("missing-samples", where, values, variant=variant, n=each.n, each=them)
-        )
-    return notices
-
-
 def without_sentinels(
     name: str, values: FloatArray, largest: float, where: Callable[[int], str]
 ) -> tuple[FloatArray, list[Notice]]:
@@ -456,8 +442,17 @@ def _series(name: str, values: FloatArray) -> FloatArray:
 
 
 def notices_of_gaps(channels: Iterable[Channel]) -> list[Notice]:
-    """What is missing in channels that are whole."""
-    return missing_notices({channel.name: Missing.of(channel.values) for channel in channels})
+    """One for all channels that miss equally many samples in equally many gaps."""
+    found, notices = {channel.name: Missing.of(channel.values) for channel in channels}, []
+    for each in dict.fromkeys(each for each in found.values() if each.samples):
+        names = [name for name, other in found.items() if other == each]
+        variant = "all" if each.samples == each.n else "many" if each.gaps > 1 else "one"
+        values = {"missing": each.samples, "gaps": each.gaps, "longest": each.longest}
+        where, them = ", ".join(names), "each " if len(names) > 1 else ""
+        notices.append(
+            notice("missing-samples", where, values, variant=variant, n=each.n, each=them)
+        )
+    return notices
 
 
 def require_recording(given: Any) -> None:

@@ -35,6 +35,8 @@ class Table(ABC):
     tentative: bool = False  # whether the names come from a comment and may be something else
     # What was noticed while opening and reading the file.
     notices: list[Notice] = field(default_factory=list)
+    # Column of time stamps -> what was subtracted from them, so that they keep their digits.
+    origins: dict[int, int] = field(default_factory=dict)
     stamps: str = ""  # what messages call the time stamps, where they are no column of the file
     imu: str = ""  # of a log of several IMUs, the one whose sensors these are
     origin: str = "the names of the columns"  # what says the units, for messages

@@ -3,7 +3,7 @@
 import numpy as np
 from hypothesis import given, strategies as st
 
-from gmwm.readers.recording import Missing, missing_notices
+from gmwm.readers.recording import Channel, Missing, notices_of_gaps
 
 
 @given(st.lists(st.booleans(), min_size=1, max_size=60))
@@ -15,12 +15,13 @@ def test_samples_and_gaps_are_counted(gone):
 
 
 def test_channels_that_miss_the_same_have_one_notice():
-    gaps = Missing.of(np.array([1.0, np.nan, np.nan, 1.0, np.nan]))
-    one = Missing.of(np.array([1.0, np.nan, np.nan]))
-    found = missing_notices({"a": gaps, "b": one, "c": gaps, "d": Missing(5)})
+    gone = np.nan
+    series = {"a": [1, gone, gone, 1, gone], "b": [1, gone, gone], "d": [1, 1, 1, 1, 1]}
+    series["c"] = series["a"]
+    found = notices_of_gaps(Channel(name, np.array(series[name]), 1.0) for name in "abcd")
     assert [(each.where, each.text) for each in found] == [
         ("a, c", "each 3 of 5 samples missing, in 2 gaps, the longest 2 samples"),
         ("b", "2 of 3 samples missing, in one gap"),
     ]
-    (all_gone,) = missing_notices({"a": Missing.of(np.full(3, np.nan))})
+    (all_gone,) = notices_of_gaps([Channel("a", np.full(3, gone), 1.0)])
     assert all_gone.text == "all 3 samples missing"

@@ -270,17 +270,17 @@ class FrameTable(Table):
             if not any(each(kind) for each in are_numbers):
                 text = f"{self.source}, column {label(self.names, column)} holds {kind}"
                 raise InputError(f"{text}: give numbers, a column for each axis")
-        first, row = dict[int, int](), 0
+        row = 0
         with damage_named(self.source):
             for part in self.parts(columns, rows):
                 found = {}
                 for column, values in zip(columns, part, strict=True):
-                    found[column] = self._floats(column, values, first)
+                    found[column] = self._floats(column, values)
                     self.check_usable(column, found[column], row)
                 row += len(part[0]) if part else 0
                 yield found
 
-    def _floats(self, column: int, values: Any, first: dict[int, int]) -> FloatArray:
+    def _floats(self, column: int, values: Any) -> FloatArray:
         """Values of a column; stamps less the first one, so that nanoseconds keep their digits."""
         import pyarrow as pa
 
@@ -292,8 +292,10 @@ class FrameTable(Table):
             return numbers
         missing = values.is_null().to_numpy()
         ticks = values.cast(pa.int64(), safe=False).fill_null(0).to_numpy()
-        start = first.setdefault(column, int(ticks[np.argmin(missing)]) if ticks.size else 0)
-        return np.where(missing, np.nan, (ticks - start).astype(float))
+        origin = self.origins.setdefault(
+            column, int(ticks[np.argmin(missing)]) if ticks.size else 0
+        )
+        return np.where(missing, np.nan, (ticks - origin).astype(float))
 
 
 def _is_time(kind: Any) -> bool:

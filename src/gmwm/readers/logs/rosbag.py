@@ -155,7 +155,6 @@ class BagTable(MessageTable):
     bag: _Bag
     message: Message
     is_log: bool  # whether the stamps are the times at which the messages were recorded
-    start: int  # stamp that is written as zero, ns
 
     def parts(self, columns: Sequence[int]) -> Iterator[Columns]:
         wanted = [column for column in columns if column > 0]
@@ -178,7 +177,7 @@ class BagTable(MessageTable):
                 changes = changes or bool(np.any(stamps != first))
                 row += len(block)
                 part = dict(zip(wanted, found, strict=True))
-                yield {0: (stamps - self.start).astype(float)} | part if 0 in columns else part
+                yield {0: (stamps - self.origins[0]).astype(float)} | part if 0 in columns else part
         if 0 in columns and row > 1 and not changes:
             text = f"{self.source}, topic {self.topic.name}: every header has the same stamp"
             raise InputError(text, "no-stamps", 'use the time of recording, clock="log"')
@@ -227,7 +226,7 @@ def open_bag(path: Path, wanted: Wanted) -> tuple[BagTable, ...]:
             bag=bag,
             message=message,
             is_log=is_log,
-            start=start,
+            origins={0: start},
         )
 
     tables = []

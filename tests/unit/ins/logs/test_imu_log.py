@@ -3,7 +3,9 @@
 from pathlib import Path
 
 import numpy as np
+import pyarrow as pa
 import pytest
+from pyarrow import parquet
 
 from gmwm._core.spool import is_spooled
 from gmwm.calibration import BiasCurve, Covariate
@@ -54,11 +56,13 @@ def test_the_unit_of_a_clock_does_not_depend_on_its_last_stamp(tmp_path):
     assert log.start == pytest.approx(5.0 - DT)
 
 
-def test_stamps_of_every_format_are_the_clock(tmp_path):
+@pytest.mark.parametrize("unit", ["s", "ns"])
+def test_stamps_of_every_format_are_the_clock(tmp_path, unit):
     rows, names = imu_rows(), HEAD.split(",")
-    path = tmp_path / "imu.npz"
-    np.savez(path, **{name: rows[:, i] for i, name in enumerate(names)})
-    assert read_imu_log(path).start == pytest.approx(5.0 - DT)
+    stamps = rows[:, 0] if unit == "s" else np.rint(1e9 * rows[:, 0]).astype(np.int64)
+    columns = {f"time [{unit}]": stamps, **dict(zip(names[1:], rows[:, 1:].T, strict=True))}
+    parquet.write_table(pa.table(columns), tmp_path / "imu.parquet")
+    assert read_imu_log(tmp_path / "imu.parquet").start == pytest.approx(5.0 - DT)
 
 
 def test_a_minus_before_a_column_reverses_it(tmp_path):
