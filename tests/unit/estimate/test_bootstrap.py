@@ -89,5 +89,5 @@ def test_bad_input(fit):
     with pytest.raises(gmwm.InputError, match="give a model with more terms"):
         gmwm.bootstrap_test(fit, WhiteNoise())
     exact = gmwm.fit(WhiteNoise(), WhiteNoise(1.0).simulate(100, 1.0, 1), dt=1.0, method="mle")
-    with pytest.raises(gmwm.InputError, match="take one by method='gmwm'"):
+    with pytest.raises(gmwm.InputError, match="fit by method='gmwm'"):
         gmwm.bootstrap(exact)
