@@ -16,9 +16,12 @@ from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.estimate import tuning
 from gmwm.estimate.moments.design import Design
-from gmwm.estimate.moments.kernels import Weighted, profiled, projected
 from gmwm.estimate.problem.moments import Scales
-from gmwm.estimate.problem.nonnegative import objectives_with, solve_nonnegative
+from gmwm.estimate.problem.nonnegative import (
+    objectives_with,
+    orthogonal_to,
+    solve_nonnegative,
+)
 from gmwm.estimate.problem.parameters import shape_of
 from gmwm.process import GaussMarkov, Model, Process, Shape, WhiteNoise
 
@@ -57,27 +60,28 @@ class Profile:
         beside: FloatArray | None = None,
         lost: FloatArray | None = None,
     ) -> None:
-        self.design, self._lost = design, lost
-        self._beside = np.zeros((target.size, 0)) if beside is None else np.array(beside, order="C")
-        linear = np.ones(len(design.terms) + self._beside.shape[1], dtype=bool)
-        linear[: len(design.terms)] = False
-        linear[list(design.linear)] = True
-        self.target, self.root = (np.array(each, order="C") for each in (target, root))
-        self._problem = Weighted(
-            self.root, np.flatnonzero(linear), np.flatnonzero(~linear), self.target
-        )
+        self.design, self.target, self.root, self._lost = design, target, root, lost
+        self._beside = None if beside is None else root @ beside
+        self._free = list(design.linear)
+        self._given = [i for i, term in enumerate(design.terms) if not term.free_scale]
 
     def at(self, shapes: Sequence[Shape]) -> Point:
         """The best point with these shapes."""
-        _, x, residual = profiled(self._problem, self._curves(shapes))
+        _, x, residual = self._profiled(shapes)
         return Point(shapes, x, float(residual @ residual))
 
-    def _curves(self, shapes: Sequence[Shape]) -> FloatArray:
-        """Curves of the terms, and those beside them, (J, terms + k)."""
+    def _profiled(self, shapes: Sequence[Shape]) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Weighted columns of free amplitude, the best amplitudes, and the weighted residuals."""
         curves = self.design.curves(shapes)
         if self._lost is not None:
             curves -= self._lost
-        return np.hstack([curves, self._beside]) if self._beside.size else curves
+        weighted = self.root @ curves
+        columns, y = weighted[:, self._free], self.root @ self.target
+        if self._beside is not None:
+            columns = np.hstack([columns, self._beside])
+        if self._given:
+            y -= np.sum(weighted[:, self._given], axis=1)
+        return columns, *solve_nonnegative(columns, y)
 
     def refine(self, start: Point, reach: float = np.inf) -> Point:
         """Local minimum reached from ``start``, at most so far from it; never worse than it."""
@@ -87,28 +91,27 @@ class Profile:
             return self.at(shapes)
         low, high = design.bounds
         bounds = np.maximum(low, z0 - reach), np.minimum(high, z0 + reach)
-        visited: dict[bytes, tuple[FloatArray, FloatArray, FloatArray]] = {}
+        visited: dict[bytes, tuple[Sequence[Shape], FloatArray, FloatArray, FloatArray]] = {}
 
-        def at(z: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-            """Weighted columns, amplitudes and residuals; MINPACK asks for a point repeatedly."""
+        def at(z: FloatArray) -> tuple[Sequence[Shape], FloatArray, FloatArray, FloatArray]:
+            """Shapes, and what is `_profiled` there; MINPACK asks for a point repeatedly."""
             if z.tobytes() not in visited:
                 visited.clear()
-                curves = self._curves(design.unpack(np.clip(z, *bounds), shapes))
-                visited[z.tobytes()] = profiled(self._problem, curves)
+                moved = design.unpack(np.clip(z, *bounds), shapes)
+                visited[z.tobytes()] = moved, *self._profiled(moved)
             return visited[z.tobytes()]
 
         def jacobian(z: FloatArray) -> FloatArray:
-            columns, x, _ = at(z)
+            moved, columns, x, _ = at(z)
             factor = design.amplitudes(x[: len(design.linear)])[design.owners]
-            slopes = design.shape_derivatives(design.unpack(np.clip(z, *bounds), shapes))
-            return np.asarray(projected(self.root, columns, x, slopes, factor))
+            slopes = self.root @ (design.shape_derivatives(moved) * factor)
+            return orthogonal_to(slopes, columns[:, x > 0.0])
 
         tolerances = {"xtol": _XTOL, "ftol": _FTOL, "gtol": _GTOL}
         z = leastsq(
-            lambda z: -at(z)[2], z0, Dfun=jacobian, maxfev=_MOST, full_output=True, **tolerances
+            lambda z: -at(z)[-1], z0, Dfun=jacobian, maxfev=_MOST, full_output=True, **tolerances
         )[0]
-        _, x, residual = at(z)
-        moved = design.unpack(np.clip(z, *bounds), shapes)
+        moved, _, x, residual = at(z)
         point = Point(moved, x, float(residual @ residual))
         return point if point.objective <= start.objective else start
 
