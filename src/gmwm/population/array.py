@@ -18,7 +18,7 @@ from gmwm._core.units import factor
 from gmwm.calibration import departure_notices, departures, screened
 from gmwm.diagnosis import rest_of
 from gmwm.errors import InputError, MissingNameError
-from gmwm.estimate import fit, fit_shared
+from gmwm.estimate import estimate, fit_shared
 from gmwm.filter_numbers import integral_rms
 from gmwm.issues import Notice, notice
 from gmwm.population import tuning
@@ -245,7 +245,7 @@ def _without_shocks(imu: str, recording: Recording, names: Collection[str]) -> R
 def _steps(channel: Channel, name: str) -> list[Notice]:
     """Departures that pass for slow noise of a channel whose name is that of its IMU."""
     data = wavelet_variance(channel)
-    fitted = fit("N + K", data)
+    fitted = estimate("N + K", data)
     found = departure_notices(fitted, departures(fitted), (), data, data, removing=True)
     where = f"{channel.name}, {name}"
     return [replace(each, where=where) for each in found if each.severity == "bad"]

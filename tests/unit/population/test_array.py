@@ -43,6 +43,7 @@ def test_shared_slow_errors_turn_the_weights_where_they_dominate():
     assert short.best <= short.inverse <= short.mean
 
 
+@pytest.mark.filterwarnings("error::gmwm.errors.FitWarning")
 def test_equal_sensors_are_left_to_the_mean():
     found = gmwm.array([imu(x) for x in white(np.random.default_rng(3), *[1e-4] * 3)])
     assert [notice.code for notice in found.notices] == ["array-mean"]
