@@ -98,6 +98,19 @@ def test_help_of_each_command_has_units_and_an_example(command):
     assert max(map(len, shown.output.splitlines())) <= WIDTH
 
 
+def test_temperatures_of_a_file_stay_in_step_with_a_part(run, tmp_path, no_pages):
+    time = np.arange(4000.0)
+    warm = 10.0 * np.sin(2.0 * np.pi * time / 1500.0)
+    noise = np.random.default_rng(5).normal(size=time.size)
+    write_csv(tmp_path / "n.csv", {"time [s]": time, "gyro_x [rad/s]": noise + 0.5 * warm})
+    write_csv(tmp_path / "oven.csv", {"time [s]": time, "temperature [degC]": 25.0 + warm})
+    given = ["n.csv", "--temperature-file", "oven.csv", "--degree", "1", "--start", "400"]
+    assert run("calibrate", *given, "--model", "N", "-q", "-o", "out")[0] == 0
+    (curve,) = gmwm.load(tmp_path / "out" / "calibration.json").curves.values()
+    low, high = curve(np.array([20.0, 30.0]))
+    assert high - low == pytest.approx(5.0, rel=0.05)
+
+
 def test_example_of_calibrate_works(run, tmp_path, no_pages):
     # The very line that the help shows, on a file of that name.
     rng = np.random.default_rng(0)

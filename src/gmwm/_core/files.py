@@ -43,7 +43,7 @@ def _remove_left_over(folder: Path, _: int) -> None:
 @contextmanager
 def moved_into_place(path: str | os.PathLike[str]) -> Iterator[Path]:
     """A temporary file to be filled; it takes its own name when all went well."""
-    target = Path(path)
+    target = replaceable(Path(os.path.realpath(path)))  # a link stays, and its file is replaced
     try:
         handle, name = tempfile.mkstemp(prefix=_own_prefix(target.parent), dir=target.parent)
         os.close(handle)
@@ -190,10 +190,11 @@ def writable_folder(path: Path, names: Iterable[str] = ()) -> Path:
 def replaceable(path: Path) -> Path:
     """The path, if a file can take its place.
 
-    Raises InputError if a folder stands there.
+    Raises InputError if a folder, a pipe or a device stands there.
     """
-    if os.path.isdir(path):
-        problem, hint = f"{path}: a folder of that name is in the way", "move it, or "
+    if os.path.exists(path) and not os.path.isfile(path):
+        what, hint = ("folder", "move it, or ") if os.path.isdir(path) else ("pipe or device", "")
+        problem = f"{path}: a {what} of that name is in the way"
         raise InputError(problem, "output", f"{hint}choose another place", {"first": hint})
     return path
 

@@ -32,7 +32,7 @@ from gmwm.variance import RegressorPart, Regressors, WaveletVariance
 
 _DEGREES = {"linear": 1, "quadratic": 2, "cubic": 3, "quartic": 4}
 _FORM = 'covariates={"temperature": "cubic, lag", "settling": "auto"}'
-_TIME = re.compile(r"(\d+\.?\d*) *s")
+_TIME = re.compile(r"(?:lag +)?(\d+\.?\d*) *s")
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ class Wanted:
         degrees: tuple[int, ...] | None = None
         constants: tuple[float, ...] | None = () if name != "settling" else None
         for word in words:
-            time = _TIME.search(word)
+            time = _TIME.fullmatch(word)
             if name != "settling" and word in _DEGREES:
                 degrees = (_DEGREES[word],)
             elif name != "settling" and word.isdigit() and 1 <= int(word) <= MOST_POWER:

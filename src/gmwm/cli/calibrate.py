@@ -167,13 +167,14 @@ def _recordings(
     files: Sequence[Path], temperature: Path | None, reading: dict[str, Any]
 ) -> list[Recording]:
     """Recordings, with the temperatures of another file where one is given."""
-    found = [read_recording(file, **reading) for file in files]
     if temperature is None:
-        return found
+        return [read_recording(file, **reading) for file in files]
     from gmwm.readers import Wanted, open_tables, with_thermometer
 
     table = open_tables(temperature, Wanted())[0]
-    return [with_thermometer(each, table) for each in found]
+    span = {name: reading.pop(name) for name in ("start", "stop")}  # the file's times are not cut
+    whole = [with_thermometer(read_recording(file, **reading), table) for file in files]
+    return [each.part(**span) for each in whole]
 
 
 def _covariates(

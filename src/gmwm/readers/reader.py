@@ -149,13 +149,14 @@ def with_temperature(recording: Recording, table: Table, *, is_one_clock: bool =
 
 
 def with_thermometer(recording: Recording, table: Table) -> Recording:
-    """A recording with the temperatures of another file, whose times count from its first one."""
-    found = with_temperature(replace(recording, start=0.0), table, is_one_clock=False)
-    added = found.channels[len(recording.channels) :]
-    if not added or all(channel.missing == channel.n for channel in added):
+    """A recording with the temperatures of another file alone, by time from its first sample."""
+    own = tuple(each for each in recording.channels if each.quantity != "temperature")
+    found = with_temperature(replace(recording, start=0.0, channels=own), table, is_one_clock=False)
+    added = found.channels[len(own) :]
+    if not added or any(2 * channel.missing > channel.n for channel in added):
         raise InputError(
-            f"{table.source}: no temperature falls within the recording: give columns such as "
-            "'time [s]' and 'temperature [degC]', with times from its first sample"
+            f"{table.source}: its temperatures do not cover half of the recording: give columns "
+            "such as 'time [s]' and 'temperature [degC]', with times from its first sample"
         )
     return replace(found, start=recording.start)
 

@@ -226,6 +226,7 @@ def test_soaks_have_one_curve():
         ({"temperature": "round"}, "write auto, linear"),
         ({"pressure": "linear"}, "no channel 'pressure' as a covariate: it has temperature"),
         ({"settling": "cubic"}, "write auto, linear"),
+        ({"temperature": "cubic, lag -5 s"}, "write auto, linear"),
     ],
 )
 def test_what_cannot_be_a_covariate_is_said(covariates, said):

@@ -170,12 +170,13 @@ def test_no_model_and_no_diagnosis_of_its_own():
 
 def test_temperatures_of_another_file(tmp_path):
     rng = np.random.default_rng(4)
-    arrays = {"gyro_x": rng.normal(size=1000)}
-    recording = Recording.from_arrays(arrays, 10.0, {"gyro": "rad/s"})
+    arrays = {"gyro_x": rng.normal(size=1000), "temp": np.full(1000, 20.0)}
+    recording = Recording.from_arrays(arrays, 10.0, {"gyro": "rad/s", "temp": "degC"})
     path = tmp_path / "oven.csv"
     path.write_text("time [min],fan,temperature [K]\n0,1,300\n1,2,310\n2,2,320\n")
     found = with_thermometer(recording, open_tables(path, Wanted())[0])
     np.testing.assert_allclose(found["temperature"].values, 26.85 + np.arange(1000) / 60.0)
+    assert found.names == ("gyro_x", "temperature")  # not the recording's own
     path.write_text("time [min],temperature [K]\n100,300\n101,310\n102,320\n")
-    with pytest.raises(InputError, match="no temperature falls within the recording"):
+    with pytest.raises(InputError, match="do not cover half of the recording"):
         with_thermometer(recording, open_tables(path, Wanted())[0])
