@@ -377,7 +377,7 @@ def export(
     click.echo(f"wrote {output}" if output else text, nl=output is not None)
 
 
-_CAUTIOUS = 0.5  # NEES below which predicted errors are 1.4 times the true ones
+_CONSERVATIVE = 0.5  # NEES below which predicted errors are 1.4 times the true ones
 
 
 @click.command()
@@ -421,7 +421,7 @@ def sheet(
     Many sheets call the lowest point of the Allan plot bias instability: then write
     lowest_deviation in place of B. All keys: docs/data-sheets.md.
     Many error models agree with two numbers. The command finds N and K for every kind of them, and
-    prints first the N and K that cover them all. An hour of recording tells more.
+    prints first the N and K that cover them all. For your own unit record an hour.
 
     \b
     Examples:
@@ -501,8 +501,8 @@ def _for_filter(name: str, numbers: FilterNumbers, unit_spread: float) -> str:
     worst = [f"{k} {max(n.nees.values()):.2g}" for k, n in numbers.items()]
     warnings = [n for each in numbers.values() for n in each.notices if n.severity == "warning"]
     lines += bullets(dict.fromkeys(map(str, warnings)))
-    lines += wrapped(f"NEES at most {', '.join(worst)} (1: consistent, below: cautious)")
-    return "\n".join([*lines, *wrapped("An hour of recording tells more: gmwm calibrate")])
+    lines += wrapped(f"NEES at most {', '.join(worst)} (1: consistent, below: conservative)")
+    return "\n".join([*lines, *wrapped("For your unit, record an hour: gmwm calibrate")])
 
 
 def _in_use(imu: Path, rate: float) -> Any:
@@ -518,7 +518,7 @@ def _judged(nees: dict[str, tuple[float, float]], imu: Path) -> str:
     """NEES of a filter with numbers in use in typical and in noisy units, by sensor."""
     lines = wrapped(f"{imu}: NEES of a filter with these numbers, over the models (1: consistent)")
     for sensor, (least, largest) in nees.items():
-        verdict = "cautious" if largest < _CAUTIOUS else "consistent"
+        verdict = "conservative" if largest < _CONSERVATIVE else "consistent"
         if largest > 1.0:
             verdict = "overconfident" + " where the sensor is noisier" * (least <= 1.0)
         lines += bullets([f"{sensor}: {least:.2g} to {largest:.2g}, {verdict}"])

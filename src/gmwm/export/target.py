@@ -271,7 +271,7 @@ def _consistency(imu: ImuNumbers) -> str:
             ends = dict.fromkeys(f"{end(values):.3g}" for end in (min, max))
             parts.append(f"{triad.quantity} {' to '.join(ends)}")
     if not parts and imu.method == "motion":
-        return "NEES at most 1 in these flights; judge others: gmwm certify --motion"
+        return "NEES at most 1 in these flights; for other flights: gmwm certify --motion"
     if not parts:
         return "NEES unknown: the file holds other numbers; export the calibration"
     return f"NEES at {imu.horizon:g} s: {', '.join(parts)}; 1: consistent"
