@@ -5,7 +5,6 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import fft
 
-from gmwm._core.compiled import compiled
 from gmwm._core.distributions import fisher
 from gmwm._core.text import brief, readable
 from gmwm._core.typing import BoolArray, FloatArray, IntArray, inner
@@ -212,36 +211,22 @@ def _scores(
     stop: int,
 ) -> tuple[FloatArray, IntArray]:
     """Largest ratio to the limit over all widths, and the width that has it, of some bins."""
-    last, widths = ratio.size - 1, np.array(list(limits))
-    low, high = max(start - int(widths[-1]), 0), min(stop + int(widths[-1]), last)
+    widest = max(limits)
+    low, high = max(start - widest, 0), min(stop + widest, ratio.size - 1)
     total = np.concatenate([[0.0], np.cumsum(ratio[low:high])])
-    slowest = np.where(widths > tuning.UNRESOLVED, widths / tuning.NARROW, 0).astype(np.int64)
-    slowest = np.maximum(slowest, np.maximum(tuning.FIRST_BIN, low + widths // 2))
-    table = np.stack([limits[width] for width in limits])
-    place = np.interp(freedom[start:stop], grid, np.arange(grid.size))
-    found: tuple[FloatArray, IntArray] = _largest(total, low, start, place, widths, slowest, table)
-    return found
-
-
-@compiled()
-def _largest(
-    total: FloatArray, low: int, start: int, place: FloatArray,
-    widths: IntArray, slowest: IntArray, table: FloatArray,
-) -> tuple[FloatArray, IntArray]:  # fmt: skip
-    """Hot loop of `_scores`."""
-    score, best = np.zeros(place.size), np.ones(place.size, dtype=np.int64)
-    for i in range(place.size):
-        k = start + i
-        cell = min(int(place[i]), table.shape[1] - 2)
-        part = place[i] - cell
-        for w in range(widths.size):
-            begin = k - widths[w] // 2 - low
-            if k < slowest[w] or begin + widths[w] >= total.size:
-                continue
-            limit = table[w, cell] + part * (table[w, cell + 1] - table[w, cell])
-            value = (total[begin + widths[w]] - total[begin]) / widths[w] / limit
-            if value > score[i]:
-                score[i], best[i] = value, widths[w]
+    score, best = np.zeros(stop - start), np.ones(stop - start, dtype=np.int64)
+    for width, limit in limits.items():
+        slowest = int(width / tuning.NARROW) if width > tuning.UNRESOLVED else 0
+        first = max(start, slowest, tuning.FIRST_BIN, low + width // 2)
+        end = min(stop, high + 1 - width + width // 2)
+        count, begin = end - first, first - width // 2 - low
+        if count <= 0:
+            continue
+        sums = total[begin + width :][:count] - total[begin:][:count]
+        value = sums / width / np.interp(freedom[first:end], grid, limit)
+        own = slice(first - start, end - start)
+        best[own][value > score[own]] = width
+        score[own] = np.maximum(score[own], value)
     return score, best
 
 

@@ -191,23 +191,6 @@ def biweight_means(coefficients: FloatArray, factor: float) -> tuple[float, floa
     return value / coefficients.size, slope / coefficients.size
 
 
-@compiled(fastmath=ANY_ORDER)
-def weighted_series(correlation: FloatArray, weight: FloatArray, series: FloatArray) -> float:
-    """Sum over lags of weight times sum_p series[p] correlation^(2 p + 4).
-
-    correlation, weight: (L,).
-    series: (P,).
-    """
-    total = 0.0
-    for i in range(correlation.size):
-        z = correlation[i] * correlation[i]
-        value = 0.0
-        for p in range(series.size - 1, -1, -1):
-            value = value * z + series[p]
-        total += weight[i] * value * z * z
-    return total
-
-
 @compiled()
 def pairs_at_lag(first: IntArray, second: IntArray, lag: int) -> int:
     """Number of places t within the first intervals such that t + lag is within the second.

@@ -36,11 +36,10 @@ def pilot_psd(variance: FloatArray, averaging: FloatArray, dt: float) -> PSD:
     """
     x, weight = _points(tuple(averaging.tolist()))
     knots = np.log(tuning.HAAR_PEAK / averaging)[::-1]  # rising frequency
-    places = _Places(x, knots)
     level = np.log(2.0 * variance * averaging)
     largest = (tuning.PILOT_STEEPEST * np.diff(np.log(averaging))).tolist()
     for _ in range(tuning.PILOT_ITERATIONS):
-        implied = weight @ np.exp(places.interpolated(level[::-1]))
+        implied = weight @ np.exp(_interpolated(x, knots, level[::-1]))
         level = level + np.clip(tuning.PILOT_STEP * np.log(variance / implied), -1.0, 1.0)
         limited = level.tolist()  # within f^-2.5 .. f^2.5 from one level to the next
         for j, step in enumerate(largest, 1):
@@ -48,7 +47,7 @@ def pilot_psd(variance: FloatArray, averaging: FloatArray, dt: float) -> PSD:
         level = np.array(limited)
 
     def psd(f: FloatArray, sampling: float) -> FloatArray:
-        return sampling * np.exp(_Places(np.log(f * sampling), knots).interpolated(level[::-1]))
+        return sampling * np.exp(_interpolated(np.log(f * sampling), knots, level[::-1]))
 
     return psd
 
@@ -65,27 +64,13 @@ def _points(averaging: tuple[float, ...]) -> tuple[FloatArray, FloatArray]:
     return points, weights
 
 
-class _Places:
-    """Places (n,) between knots (K,), for repeated linear interpolation of values in long runs."""
-
-    def __init__(self, x: FloatArray, knots: FloatArray) -> None:
-        self._knots = knots
-        self._below = np.minimum(x - knots[0], 0.0)
-        piece = np.clip(np.searchsorted(knots, x, side="right") - 1, 0, max(knots.size - 2, 0))
-        self._beyond = np.clip(x, knots[0], knots[-1]) - knots[piece]
-        start = np.flatnonzero(np.diff(piece, prepend=-1))
-        self._piece, self._repeats = piece[start], np.diff(start, append=piece.size)
-
-    def interpolated(self, level: FloatArray) -> FloatArray:
-        """Between levels at the knots; below the lowest with the mean slope of the lowest three."""
-        reach = min(3, level.size - 1)
-        if reach == 0:
-            return np.full(self._below.shape, level[0])
-        slopes = np.diff(level) / np.diff(self._knots)
-        inside = np.repeat(slopes[self._piece], self._repeats) * self._beyond
-        inside += np.repeat(level[self._piece], self._repeats)
-        slope = (level[reach] - level[0]) / (self._knots[reach] - self._knots[0])
-        return np.asarray(inside + np.clip(slope, -2.0, 0.0) * self._below)
+def _interpolated(x: FloatArray, knots: FloatArray, level: FloatArray) -> FloatArray:
+    """Between levels at the knots; below the lowest with the mean slope of the lowest three."""
+    found = np.interp(x, knots, level)
+    if reach := min(3, level.size - 1):
+        slope = (level[reach] - level[0]) / (knots[reach] - knots[0])
+        found += np.clip(slope, -2.0, 0.0) * np.minimum(x - knots[0], 0.0)
+    return found
 
 
 def haar_moments(integral: FloatArray, runs: IntArray, averaging: FloatArray) -> FloatArray:

@@ -8,7 +8,6 @@ from typing import Self
 import numpy as np
 from scipy import fft
 
-from gmwm._core.compiled import compiled
 from gmwm._core.documents import Array
 from gmwm._core.typing import FloatArray, IntArray
 from gmwm.process import PANEL
@@ -176,7 +175,6 @@ def _panel(f: FloatArray) -> FloatArray:
     return np.floor(np.log(np.abs(np.tan(np.pi * f))) / PANEL)
 
 
-@compiled()
 def _fitted(
     seen: FloatArray, count: FloatArray, laws: FloatArray, steps: int, largest: float
 ) -> FloatArray:
@@ -189,25 +187,14 @@ def _fitted(
     laws: (L, B), what a power of one gives.
     steps, largest: Of each kind, and that factor.
     """
-    number = laws.shape[0]
-    powers = np.zeros(number)
-    for k in range(number):
-        powers[k] = np.sum(seen) / np.sum(laws[k]) / number
+    powers = np.sum(seen) / np.sum(laws, axis=1) / len(laws)
     for step in range(2 * steps):
-        pull, share = np.zeros(number), np.zeros(number)
-        for b in range(seen.size):
-            implied = 0.0
-            for k in range(number):
-                implied += powers[k] * laws[k, b]
-            ratio = seen[b] / implied
-            if step >= steps:
-                ratio = min(max(ratio, 1.0 / largest), largest)
-            for k in range(number):
-                part = laws[k, b] * count[b] / implied
-                share[k] += part
-                pull[k] += part * ratio
-        for k in range(number):
-            powers[k] *= np.sqrt(pull[k] / share[k])
+        implied = powers @ laws
+        ratio = seen / implied
+        if step >= steps:
+            ratio = np.clip(ratio, 1.0 / largest, largest)
+        pull = laws * (count / implied)
+        powers *= np.sqrt(pull @ ratio / np.sum(pull, axis=1))
     return powers
 
 

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
+from numpy.polynomial.polynomial import polyval
 from scipy import fft
 from scipy.optimize import brentq
 
@@ -22,7 +23,7 @@ from gmwm.process import PSD, legendre, quadrature
 from gmwm.variance import tuning
 from gmwm.variance.covariance.haar import centred_pairs, dyadic_levels, haar_counts
 from gmwm.variance.covariance.lags import block_density
-from gmwm.variance.kernels import biweight_means, weighted_series
+from gmwm.variance.kernels import biweight_means
 
 EFFICIENCY = 0.6  # at Gaussian data, by default
 _TAIL = 13.0  # the normal density beyond is below double precision
@@ -237,7 +238,8 @@ def _excess(psd: PSD, n: int, dt: float, series: FloatArray, levels: int) -> Flo
             product = scaled[j] * density * scaled[j : j + tuning.ROBUST_REACH + 1]
             for d, correlation in enumerate(fft.dct(product, type=2, axis=-1)):
                 row, column = grid.first + j, grid.first + j + d
-                excess = weighted_series(correlation, grid.weight[j, d], series)
+                square = correlation**2
+                excess = grid.weight[j, d] @ (square**2 * polyval(square, series))
                 result[row, column] = result[column, row] = excess
     return result
 
