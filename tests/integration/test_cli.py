@@ -621,7 +621,7 @@ def test_reproduce_prints_the_table_and_keeps_the_runs(run, tmp_path):
     assert lines[1] == "3 runs of 6,000 samples at 1 Hz, seed 0"
     assert max(map(len, lines)) <= WIDTH
     names = sorted(path.name for path in (tmp_path / "s").iterdir())
-    assert names == ["table2-runs", "table2.md", "table2.parquet", "table2.txt"]
+    assert names == ["table2-runs", "table2.parquet", "table2.txt"]
     assert (tmp_path / "s" / "table2.txt").read_text() in printed
     # The figure is drawn from the same runs, which are not touched without being asked.
     before = (tmp_path / "s" / "table2.parquet").read_bytes()

@@ -236,10 +236,8 @@ def _simulated(
     raw = _raw(table, folder / f"{experiment}.parquet")
     if experiment in FIGURES:
         return "", [raw, *boxplots(study, table, folder / experiment)]
-    summary = summarise(study, table, seed)
-    texts = {"txt": str(summary), "md": summary.markdown()}
-    pages = [write_text(folder / f"{study.name}.{end}", text) for end, text in texts.items()]
-    return texts["txt"], [raw, *pages]
+    text = str(summarise(study, table, seed))
+    return text, [raw, write_text(folder / f"{study.name}.txt", text)]
 
 
 def _raw(table: pyarrow.Table, path: Path) -> Path:

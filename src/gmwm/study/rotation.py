@@ -39,7 +39,7 @@ from gmwm.study.navigation import (
     scenario_of,
     times,
 )
-from gmwm.study.summary import markdown_table, saved
+from gmwm.study.summary import saved
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -212,7 +212,9 @@ class Rotation:
             judged = [self.nees(name, each).text(" to ") for each in groups]
             shares = [self.coverage(name, each).value for each in groups[:2]]
             rows.append([name, ratio, *judged, *(f"{100.0 * each:.0f} %" for each in shares)])
-        return markdown_table([*head, "within 95 %: horizontal", "vertical"], rows)
+        heads = [*head, "within 95 %: horizontal", "vertical"]
+        lines = [heads, ["---"] * len(heads), *rows]
+        return "\n".join("| " + " | ".join(line) + " |" for line in lines)
 
     def plot(self) -> Figure:
         """Ratio of horizontal errors and NEES of each filter: every turn, and all together."""

@@ -9,7 +9,7 @@ every length of record: more data do not bring the estimates closer to the truth
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -112,19 +112,6 @@ class Summary:
         ]
         return "\n".join(["\n\n".join(parts), *bullets(s.notes)])
 
-    def markdown(self) -> str:
-        """The table in the layout of the paper: RMSE (relative RMSE), methods side by side."""
-        rows = []
-        for quantity in self.study.quantities:
-            name, truth = quantity.name, abs(self.study.true_value(quantity))
-            scores = [self.scores[name, method] for method in self.methods]
-            bound = _cell(truth, self.bounds[name])
-            rows.append([name, *(_cell(truth, x.relative) for x in scores), bound])
-            if quantity.published:
-                paper = [_cell(truth, x.published) for x in scores]
-                rows.append([f"{name}, paper", *paper, ""])
-        return markdown_table(["", *self.methods, "Cramer-Rao bound"], rows)
-
 
 def summarise(study: Study, table: pa.Table, seed: int) -> Summary:
     """Scores of all methods in ``table``, as `run_study` gives it."""
@@ -180,16 +167,6 @@ def _cells(name: str, method: str, x: Score) -> list[str]:
     errors = [f"{x.rmse:.3g}", f"{x.relative:.3g}", f"{x.ratio:.2f}"]
     shares = [f"{bias:.1%}", "" if np.isnan(x.coverage) else f"{x.coverage:.1%}"]
     return [name, method, *errors, *shares, paper, str(x.missing or "")]
-
-
-def _cell(truth: float, relative: float) -> str:
-    return "-" if np.isnan(relative) else f"{relative * truth:.3g} ({relative:.3g})"
-
-
-def markdown_table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """A table for a page in Markdown."""
-    lines = [head, ["---"] * len(head), *rows]
-    return "\n".join("| " + " | ".join(line) + " |" for line in lines)
 
 
 def boxplots(study: Study, table: pa.Table, stem: Path) -> list[Path]:

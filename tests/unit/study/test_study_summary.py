@@ -61,15 +61,6 @@ def test_scores(table):
     assert summary.bounds == {"sigma2_WN": pytest.approx(bound)}
 
 
-def test_table_in_the_layout_of_the_paper(table):
-    assert summarise(WHITE, table, 0).markdown() == (
-        "|  | A | B | Cramer-Rao bound |\n"
-        "| --- | --- | --- | --- |\n"
-        "| sigma2_WN | 0.004 (0.1) | 0.008 (0.2) | 0.00179 (0.0447) |\n"
-        "| sigma2_WN, paper | - | 0.002 (0.05) |  |"
-    )
-
-
 def test_scenarios_are_those_of_the_paper():
     values = {s.name: {q.name: s.true_value(q) for q in s.quantities} for s in FIGURES.values()}
     assert values["table2"] == pytest.approx({"sigma2_WN": 0.04, "sigma2_RW": 4e-4, "omega": 3e-3})
