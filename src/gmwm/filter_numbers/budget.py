@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -236,21 +236,6 @@ class ErrorBudget:
             parts.setdefault(label, []).append(row.curve)
         scale = per_si(quantity)
         return {label: scale * root_sum(part) for label, part in parts.items() if np.any(part)}
-
-    def to_dict(self) -> dict[str, Any]:
-        """Everything in JSON types and SI units, with the totals."""
-        rows = [asdict(row) for row in self.rows]
-        return {
-            "times_s": list(self.times),
-            "calibrated": self.calibrated,
-            "rows": [r | {"values": list(r["values"]), "curve": list(r["curve"])} for r in rows],
-            "totals": {
-                of: {quantity: values.tolist() for quantity, values in self.total(of).items()}
-                for of in self.groups
-            },
-            "grid_s": list(self.grid),
-            "notes": list(self.notes),
-        }
 
 
 def axis(channel: str) -> str:

@@ -1,6 +1,5 @@
 """The error budget: field numbers, sums, tables, curves, refusals and the command."""
 
-import json
 import re
 
 import matplotlib
@@ -163,23 +162,6 @@ def test_a_tilt_that_is_no_small_angle():
     # A heading is none.
     heading = {"gyro_z": GaussMarkov(0.1 * DEG, 1e6)}
     assert error_budget(heading, dt=DT, calibrated=False).notes == ()
-
-
-# -- looks ----------------------------------------------------------------------------------------
-
-
-def test_to_dict_is_json_and_complete(budget):
-    content = json.loads(json.dumps(budget.to_dict(), allow_nan=False))
-    assert content["times_s"] == [1.0, 10.0, 60.0, 600.0]
-    assert content["calibrated"] is True
-    assert len(content["rows"]) == len(budget.rows)
-    assert content["totals"]["horizontal"]["position"] == budget.total()["position"].tolist()
-    for row in content["rows"]:
-        assert (
-            row["unit"] == {"attitude": "rad", "velocity": "m/s", "position": "m"}[row["quantity"]]
-        )
-        assert len(row["values"]) == 4
-        assert len(row["curve"]) == len(content["grid_s"])
 
 
 # -- bad input ------------------------------------------------------------------------------------
