@@ -22,7 +22,7 @@ NEEDED = {
 DEFAULT = {
     "bound": lambda **at: gmwm.bound(MODEL, **at).K,
     "reduce": lambda **at: gmwm.reduce(MODEL, **at).K,
-    "error_budget": lambda **at: gmwm.error_budget({"gyro_x": MODEL}, (10.0,), **at).to_dict(),
+    "error_budget": lambda **at: gmwm.error_budget({"gyro_x": MODEL}, (10.0,), **at).rows,
     "certify": lambda **at: gmwm.certify({"gyro_x": MODEL}, {"gyro": (1e-3, 1e-5)}, **at).to_dict(),
 }
 

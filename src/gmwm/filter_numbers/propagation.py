@@ -24,10 +24,8 @@ from gmwm.ins.covariance import CovarianceErrors
 from gmwm.ins.joint_kernels import LinearStep, aid_jointly
 from gmwm.process import (
     BiasInstability,
-    ComplexArray,
     Model,
     Process,
-    RateRamp,
     StateSpace,
     block_diagonal,
     evaluated,
@@ -252,10 +250,10 @@ ORDERS = 3
 _WHOLE = 1e-6  # of a step: a time that close to a multiple of dt is one
 _CANCELS = 3e-3  # 2 pi f t below which the difference of the two parts of a gain is all rounding
 _DIVERGES = 2.0  # rise of a spectrum over the lowest octaves that makes a simulation start at zero
-_RESOLVED_LOBES = 64
-_PANELS_PER_OCTAVE = 32
-_NODES_PER_PANEL = 8
+_RESOLVED = 400.0  # 2 pi f t up to which lobes are resolved
+_PANELS, _NODES_PER_PANEL = 16, 8  # an octave
 _OCTAVES_BELOW = 26
+_SLOWEST = 1e-60  # Hz, of a line that is aliased to a constant
 _STEEP_OCTAVES = 20  # below 1/t, the band that must not matter ...
 _STEEP_SHARE = 0.01  # ... to more than this share of the variance
 
@@ -274,8 +272,9 @@ def integral_rms(
 
     With flicker noise S(f) = B^2/(2 pi f) of known past, the integral of order m is the
     Riemann-Liouville process of index m + 1/2 (Mandelbrot & Van Ness 1968, *SIAM Review* 10,
-    422-437): its variance is B^2 t^(2m) / (2m Gamma(m + 1/2)^2). A spectrum is looked at in steps
-    of some 1/(16 t): a narrower peak needs a ``state_space``, or a line in ``lines``.
+    422-437): its variance is B^2 t^(2m) / (2m Gamma(m + 1/2)^2). A spectrum is
+    integrated over 128 frequencies an octave, right from some tens of samples on: a narrower peak
+    needs a ``state_space``, or a line in ``lines``.
     """
     t = np.asarray(times, dtype=float)
     if isinstance(process, BiasInstability):
@@ -302,7 +301,9 @@ def _from_states(form: StateSpace, t: FloatArray, dt: float, *, known: bool) -> 
     if not known:
         covariance[ORDERS:, ORDERS:] = form.initial_covariance
     result = np.empty((ORDERS, t.size))
-    for i, (count, rest) in enumerate(zip(*_steps(t, dt), strict=True)):
+    for i, time in enumerate(t.tolist()):
+        count = int(time / dt + _WHOLE)
+        rest = time - count * dt if time / dt - count > _WHOLE else 0.0
         m, P = mean, covariance
         for h, times in ((dt, count), (rest, int(rest > 0.0))):
             step, noise = power(*integrated(form, h, ORDERS), times)
@@ -311,104 +312,51 @@ def _from_states(form: StateSpace, t: FloatArray, dt: float, *, known: bool) -> 
     return result
 
 
-def _steps(t: FloatArray, dt: float) -> tuple[list[int], FloatArray]:
-    """Whole steps in each time, and what is left, s."""
-    ratio = t / dt
-    whole = np.where(np.abs(ratio - np.rint(ratio)) < _WHOLE, np.rint(ratio), np.floor(ratio))
-    rest = np.where(ratio - whole > _WHOLE, (ratio - whole) * dt, 0.0)
-    return [int(n) for n in whole], rest
-
-
 def _from_spectrum(process: Process, t: FloatArray, dt: float) -> FloatArray:
     """2 int S(f) |G(f)|^2 df with the gain G of each integral, less G(0) for a start at zero."""
     # The rule by which a simulation decides whether it starts at zero.
     ends = evaluated(process.psd, np.array([2.5e-5, 0.25]) / np.max(t), dt)
     at_zero = bool(ends[0] > _DIVERGES * ends[1])
-    lines = [(abs(f * dt - np.rint(f * dt)), a) for f, a in process.lines()]
-    counts, rests = _steps(t, dt)
     result = np.empty((ORDERS, t.size))
-    moment = _from_states(RateRamp(1.0).state_space(dt), t, dt, known=True)
-    for i, (count, rest) in enumerate(zip(counts, rests, strict=True)):
-        if at_zero and count == 1 and rest == 0.0:
-            result[:, i] = 0.0  # the first sample alone; the sum below would be its rounding
-            continue
-        frequency, weight, resolved = _nodes(t[i] / dt)
-        density = evaluated(process.psd, frequency / dt, dt) / dt
-        gain = _squared_gain(frequency, resolved, count, rest, dt, at_zero, moment[:, i])
-        share = gain * (weight * density)
+    # Samples that are held lag by half of one, which what starts at zero shows.
+    for i, (time, held_time) in enumerate(zip(t.tolist(), (t - 0.5 * dt).tolist(), strict=True)):
+        octaves = _OCTAVES_BELOW + np.log2(time / dt)
+        edge = np.geomspace(2.0**-_OCTAVES_BELOW / time, 0.5 / dt, int(octaves * _PANELS) + 1)
+        x, w = legendre(_NODES_PER_PANEL)
+        half = 0.5 * np.diff(edge, prepend=0.0)[:, None]
+        f, weight = (edge[:, None] - half + half * x).ravel(), (half * w).ravel()
+        gain = _squared_gain(f, held_time if at_zero else time, dt, at_zero)
+        share = gain * weight * evaluated(process.psd, f, dt)
         variance = 2.0 * np.sum(share, axis=1)
-        low = frequency < 2.0**-_STEEP_OCTAVES * dt / t[i]
+        low = f < 2.0**-_STEEP_OCTAVES / time
         if np.any(2.0 * np.sum(share[:, low], axis=1) > _STEEP_SHARE * variance):
             raise InputError(
                 f"the spectrum of {process!r} rises too fast towards zero frequency for an error "
                 "budget: give the process a state_space"
             )
-        for place, amplitude in lines:
-            about = (count, rest, dt, False, moment[:, i])
-            line = _squared_gain(np.array([place]), np.ones(1), *about)
-            variance += 0.5 * amplitude**2 * line[:, 0]
-        result[:, i] = np.sqrt(variance + (process.drift_rate() * moment[:, i]) ** 2)
+        for frequency, amplitude in process.lines():
+            place = np.array([max(abs(frequency - np.rint(frequency * dt) / dt), _SLOWEST)])
+            # In continuous time, whose phase is exact.
+            gain = _squared_gain(place, time, 1e-6 * dt, False, np.inf)
+            variance += 0.5 * amplitude**2 * gain[:, 0]
+        drift = [process.drift_rate() * held_time**k / factorial(k) for k in (2, 3, 4)]
+        result[:, i] = np.hypot(np.sqrt(variance), drift)
     return result
 
 
-def _nodes(n: float) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Frequencies (cycles per sample), their weights, and whether lobes are resolved there.
-
-    Octaves below half a lobe of width 1/n, then half lobe by half lobe, then parts of octaves,
-    where the lobes are averaged over. The cut is at the end of a lobe: what is left out cancels.
-    """
-    x, w = legendre(_NODES_PER_PANEL)
-    cut = min(_RESOLVED_LOBES / n, 0.5)
-    octaves = np.geomspace(2.0**-_OCTAVES_BELOW, 0.5, _OCTAVES_BELOW * _PANELS_PER_OCTAVE // 4)
-    lobes = np.linspace(0.5 / n, cut, max(int(np.ceil(2.0 * (cut * n - 0.5))), 1) + 1)
-    edges = [np.zeros(1), octaves / n, lobes[1:]]
-    if cut < 0.5:
-        panels = int(np.ceil(np.log2(0.5 / cut) * _PANELS_PER_OCTAVE))
-        edges.append(np.geomspace(cut, 0.5, panels + 1)[1:])
-    edge = np.concatenate(edges)
-    half = 0.5 * np.diff(edge)[:, None]
-    frequency = (0.5 * (edge[1:] + edge[:-1])[:, None] + half * x).ravel()
-    return frequency, (half * w).ravel(), np.where(frequency < cut, 1.0, 0.0)
-
-
 def _squared_gain(
-    frequency: FloatArray,
-    resolved: FloatArray,
-    count: int,
-    rest: float,
-    dt: float,
-    at_zero: bool,
-    moment: FloatArray,
+    f: FloatArray, time: float, dt: float, at_zero: bool, resolved: float = _RESOLVED
 ) -> FloatArray:
     """|G|^2 of the three integrals, or |G - G(0)|^2 for a start at zero, shape (3, K).
 
-    The input q^k with q = exp(2 pi i f dt) gives the integrals q^n a - b: a moves with the input,
-    b is left of the start. Where the lobes are not resolved, their mean |a|^2 + |b|^2 is taken.
-    ``moment`` is what the input k dt gives: the gain's first derivative at zero frequency.
+    With w = 2 sin(pi f dt)/dt, that of held samples, the integral of order m of exp(i w t) is what
+    the first m terms of its series leave, over (i w)^m; G(0) is one more of them. Beyond an
+    angle, lobes are not resolved, and their mean is taken.
     """
-    turn = 2j * np.pi * frequency
-    ratio = np.expm1(turn)
-    ratio[ratio == 0.0] = 1.0  # zero frequency itself is taken from the expansion below
-    chain, gain = held(dt, ORDERS)
-    moving = np.zeros((ORDERS, frequency.size), dtype=complex)
-    for row in range(ORDERS):
-        moving[row] = (gain[row] + _times(chain[row : row + 1, :row], moving[:row])[0]) / ratio
-    left = _times(held(count * dt + rest, ORDERS)[0], moving)
-    last_chain, last_gain = held(rest, ORDERS)
-    moving = _times(last_chain, moving) + last_gain[:, None]
-    total = count * dt + rest
-    constant = np.array([total, total**2 / 2.0, total**3 / 6.0])[:, None]
-    if at_zero:
-        left = left + constant
-    exact = np.abs(moving * np.exp(turn * count) - left) ** 2
-    mean = np.abs(moving) ** 2 + np.abs(left) ** 2
-    squared = resolved * exact + (1.0 - resolved) * mean
-    angle = 2.0 * np.pi * frequency * (total / dt)
-    slow = angle < _CANCELS
-    expansion = (moment[:, None] * 2.0 * np.pi * frequency / dt) ** 2 if at_zero else constant**2
-    return np.asarray(np.where(slow, expansion, squared))
-
-
-def _times(matrix: FloatArray, columns: ComplexArray) -> ComplexArray:
-    """Product of a small matrix and long rows, without the threads of a matrix library."""
-    return np.asarray(np.einsum("ij,jk->ik", matrix, columns))
+    w, m = 2.0 * np.sin(np.pi * f * dt) / dt, np.arange(1, ORDERS + 1)[:, None]
+    x, last = w * time, m + at_zero
+    terms = np.array([(1j * x) ** k / factorial(k) for k in range(ORDERS + 2)])
+    series = np.cumsum(terms, axis=0)[last[:, 0] - 1]
+    lobes = np.where(x < resolved, np.abs(np.exp(1j * x) - series), np.hypot(1.0, np.abs(series)))
+    left = np.where(x < _CANCELS, np.abs(terms[last[:, 0]]), lobes)
+    return np.asarray((left / w**m) ** 2)
