@@ -73,7 +73,7 @@ def _named(flag: str, texts: Sequence[str]) -> dict[str, str]:
         if not (name and path):
             raise InputError(f"{flag} {text}: write NAME=FILE, e.g. GMWM=out/calibration.json")
         if name in found:
-            raise InputError(f"{flag} {name}=... is given twice: give each a name of its own")
+            raise InputError(f"{flag} {name}=... is given twice: give different names")
         found[name] = path if path == "truth" and flag == "--filter" else _absolute(flag, path)
     return found
 

@@ -83,7 +83,7 @@ def agreeing(where: str, values: Mapping[str, float], N: float) -> dict[str, Mod
         if "K" in values:
             return {"N+K": Model(tuple(known))}
         raise InputError(
-            f"{where}: no slow noise is stated, which leaves K open: add B, lowest_deviation or "
+            f"{where}: no slow noise is stated, so K is unknown: add B, lowest_deviation or "
             "K, or record an hour at rest"
         )
     crossing = (N / lowest) ** 2  # s, where white noise alone has this deviation

@@ -117,7 +117,7 @@ def _named(given: Any) -> dict[str, Any]:
                 "printable characters"
             )
         if name in found:
-            raise ValueError(f"{name!r} appears twice: give each a name of its own")
+            raise ValueError(f"{name!r} appears twice: give different names")
         found[name] = each
     return found
 

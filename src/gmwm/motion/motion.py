@@ -349,7 +349,7 @@ def _of_target(
         if max(tilts) > tuning.MOST_TILT:
             raise InputError(
                 f"flight {flight}: the IMUs turn about one axis only, which leaves their rotation "
-                "about it open: give a motion about two"
+                "about it unknown: give a motion about two axes"
             )
         if np.any(away := far_out(mapped, target.dt)):
             good = good & ~away

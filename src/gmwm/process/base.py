@@ -358,7 +358,7 @@ class Process:
                 f"{where} returns an array of shape {series.shape}: let it return {n:,} samples"
             )
         if not np.all(np.isfinite(series)):
-            raise InputError(f"{where} returns samples that are not finite: repair it")
+            raise InputError(f"{where} returns samples that are not finite: correct it")
         return series
 
     def draw(self, n: int, dt: float, rng: np.random.Generator) -> FloatArray:

@@ -63,7 +63,7 @@ class Curve(WaveletVariance):
     def detrended(self, slope: float) -> FloatArray:
         """Raise InputError: a curve does not show the sign of a drift."""
         raise InputError(
-            "a curve does not show a drift apart from noise: fit a model without RateRamp, or the "
+            "a curve cannot tell a drift from noise: fit a model without RateRamp, or fit the "
             "samples"
         )
 
@@ -305,7 +305,7 @@ def _of_table(path: Path) -> Columns:
     values = load_columns(table, range(len(table.names)))
     columns = {name or str(i): values[i] for i, name in enumerate(table.names)}
     if len(columns) < len(table.names):
-        raise InputError(f"{path.name} has two columns of one name: leave one out")
+        raise InputError(f"{path.name} has two columns of the same name: leave one out")
     return columns
 
 

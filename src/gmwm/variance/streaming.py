@@ -173,7 +173,7 @@ class StreamingVariance:
         self._single = channels is None
         names = ("",) if channels is None else tuple(channels)
         if not all(isinstance(name, str) for name in names) or len(set(names)) < len(names):
-            raise InputError(f"channels = {checks.shown(names)}: give each a name of its own")
+            raise InputError(f"channels = {checks.shown(names)}: give different names")
         if not names:
             raise InputError("channels = (): name at least one, or leave it out for one series")
         units = channels if isinstance(channels, Mapping) else dict.fromkeys(names, "")

@@ -265,7 +265,7 @@ def test_averaging_times_are_read_in_their_unit(tmp_path, head, scale):
     ("head", "message"),
     [
         ("tau,gyro_x [deg/h],tau_y,gyro_y [deg/h]", "has 2 columns of averaging times"),
-        ("tau,gyro_x [deg/h],gyro_x [deg/h]", "two columns of one name"),
+        ("tau,gyro_x [deg/h],gyro_x [deg/h]", "two columns of the same name"),
         ("tau [furlong],gyro_x [deg/h]", "not a known unit of time"),
         ("tau,gyro_x [ug]", "'ug' is not a unit of gyro_x"),
     ],

@@ -260,7 +260,7 @@ def test_infinite_blocks_change_nothing():
     ("make", "message"),
     [
         (lambda: gmwm.StreamingVariance(0.0), "dt"),
-        (lambda: gmwm.StreamingVariance(0.1, ("a", "a")), "name of its own"),
+        (lambda: gmwm.StreamingVariance(0.1, ("a", "a")), "give different names"),
         (lambda: gmwm.StreamingVariance(0.1, ()), "at least one"),
         (lambda: gmwm.StreamingVariance(0.1, {"a": "deg/s"}), "rad/s"),
         (lambda: gmwm.StreamingVariance(0.1).update(np.zeros((3, 2))), "shape"),

@@ -70,7 +70,7 @@ class ParameterRegion:
             if not np.isfinite(end):
                 raise InputError(
                     f"channel {fit.wv.name!r}: the record does not bound {key}, so no numbers "
-                    "dominate its confidence region: record longer, or leave out the level"
+                    "cover its confidence region: record longer, or leave out the level"
                 )
         errors = np.sqrt(np.diag(free.covariance))
         correlation = free.covariance / np.outer(errors, errors)

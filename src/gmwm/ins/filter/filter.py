@@ -143,7 +143,7 @@ class Solution:
         if index.size and index[-1] > truth.n:
             raise InputError(
                 f"the trajectory ends at {truth.duration:g} s, before the solution at "
-                f"{self.time[-1]:g} s: give all of it"
+                f"{self.time[-1]:g} s: give a longer one"
             )
         return self.less(truth.lla[index], truth.velocity[index], truth.rpy[index])
 

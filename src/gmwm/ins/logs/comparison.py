@@ -395,7 +395,7 @@ def compare(
     smoothed = {name: smooth(replay, ends) for name, replay in replays.items()}
     for name, track in smoothed.items():
         if not np.all(np.isfinite(track.lla)):
-            raise InputError(f"{name}: the filter diverges with all fixes: compare without it")
+            raise InputError(f"{name}: the filter diverges with all fixes: leave this model out")
     # One reference for all models, so that none is its own.
     lla = np.mean([track.lla for track in smoothed.values()], axis=0)
     outcomes = {
@@ -419,7 +419,7 @@ def _outcome(
         ends = tuple(each.end for each in every[part])
         solution = cut.solution(cut.imu.n * cut.imu.dt, ends)
         if solution.diverged_at is not None:
-            raise InputError(f"{name}: the filter diverges in an outage: compare without it")
+            raise InputError(f"{name}: the filter diverges in an outage: leave this model out")
         estimate[part] = solution.lla[solution.before]
         covariance[part] = solution.covariance[solution.before, :3, :3]
     error = ned_difference(estimate, lla)
