@@ -1,6 +1,7 @@
 """Error models of tests: what bounds and reductions are held to."""
 
 from gmwm import AR, BiasInstability, GaussMarkov, Model, RandomWalk, WhiteNoise
+from gmwm.ins import SensorModels
 
 TRUTHS = {
     "one": WhiteNoise(8e-5) + GaussMarkov(4e-5, 60.0),
@@ -19,3 +20,8 @@ TRUTHS = {
 """By name; sampled at DT."""
 
 DT = 0.01
+
+
+def triads(gyro, accel):
+    """Sensors whose three axes have one model."""
+    return SensorModels.of({"gyro": gyro, "accel": accel})

@@ -10,22 +10,18 @@ import pytest
 from scipy.stats import binom
 
 import gmwm
+from error_models import triads
 from gmwm import GaussMarkov, WhiteNoise
-from gmwm.ins import Outage, SensorModels, innovation_test, monte_carlo, over_time, spread
+from gmwm.ins import Outage, innovation_test, monte_carlo, over_time, spread
 from gmwm.ins.simulation import GROUPS
 from gmwm.ins.simulation.consistency import sizes
 
-TRUE = SensorModels.of(
-    {
-        "gyro": WhiteNoise(5e-5) + GaussMarkov(2e-4, 30.0) + GaussMarkov(1e-4, 500.0),
-        "accel": WhiteNoise(1e-3) + GaussMarkov(2e-3, 10.0) + GaussMarkov(2e-3, 300.0),
-    }
+TRUE = triads(
+    WhiteNoise(5e-5) + GaussMarkov(2e-4, 30.0) + GaussMarkov(1e-4, 500.0),
+    WhiteNoise(1e-3) + GaussMarkov(2e-3, 10.0) + GaussMarkov(2e-3, 300.0),
 )
-SLOW_ONLY = SensorModels.of(
-    {
-        "gyro": WhiteNoise(5e-5) + GaussMarkov(1e-4, 500.0),
-        "accel": WhiteNoise(1e-3) + GaussMarkov(2e-3, 300.0),
-    }
+SLOW_ONLY = triads(
+    WhiteNoise(5e-5) + GaussMarkov(1e-4, 500.0), WhiteNoise(1e-3) + GaussMarkov(2e-3, 300.0)
 )
 NAMES = {*GROUPS, "sensors"}
 

@@ -180,10 +180,7 @@ def test_the_full_navigation_filter_is_not_too_optimistic_either():
     flight = fixed_wing_loiter(duration=250.0, dt=0.1)
     outages = (Outage(120.0, 60.0), Outage(240.0, 10.0))
     scenario = Scenario(flight, gnss(flight), outages, interval=10.0, step=0.5, second_order=False)
-    believed = SensorModels.of(
-        {name: each.model for name, each in numbers.items()},
-        {name: each.initial_sd for name, each in numbers.items()},
-    )
+    believed = SensorModels.of(numbers)
     analysis = covariance_analysis(scenario, SensorModels.of(truth), believed)
     ratio = np.linalg.solve(analysis.predicted, analysis.actual)
     assert np.max(np.linalg.eigvals(ratio).real) < WORST

@@ -55,10 +55,7 @@ def test_numbers_of_a_heading_that_are_too_small_are_not_hidden_by_its_start():
 
 def test_its_errors_are_those_of_a_covariance_analysis(sheet):
     scenario = loiter_with_outages((10.0, 60.0), 0.1)
-    believed = SensorModels.of(
-        {name: each.model for name, each in sheet.numbers.items()},
-        {name: each.initial_sd for name, each in sheet.numbers.items()},
-    )
+    believed = SensorModels.of(sheet.numbers)
     analysis = covariance_analysis(scenario, SensorModels.of(SENSOR), believed)
     for check, outage in zip(sheet.of("outage"), scenario.outages, strict=True):
         at = analysis.index(outage.end)
@@ -292,10 +289,7 @@ def test_a_reference_trajectory_takes_the_place_of_the_loiter():
     (own,) = gmwm.certify(SENSOR, SHEET, outages=(10.0,), reference=drive, dt=0.1).of("outage")
     scenario = loiter_with_outages((10.0,), 0.1, drive)
     believed = gmwm.certify(SENSOR, SHEET, outages=(10.0,), dt=0.1).numbers
-    models = SensorModels.of(
-        {name: each.model for name, each in believed.items()},
-        {name: each.initial_sd for name, each in believed.items()},
-    )
+    models = SensorModels.of(believed)
     analysis = covariance_analysis(scenario, SensorModels.of(SENSOR), models)
     assert own.nees == pytest.approx(analysis.nees()[analysis.index(scenario.outages[0].end)])
     short = drive.segment(0.0, 100.0)

@@ -154,10 +154,7 @@ def test_the_navigation_filter_is_consistent_with_them():
     flight = fixed_wing_loiter(duration=590.0, dt=0.1)
     outages = (Outage(120.0, 10.0), Outage(250.0, 30.0), Outage(400.0, 60.0))
     scenario = Scenario(flight, gnss(flight), outages, interval=100.0, step=0.5)
-    believed = SensorModels.of(
-        {name: each.model for name, each in numbers.items()},
-        {name: each.initial_sd for name, each in numbers.items()},
-    )
+    believed = SensorModels.of(numbers)
     analysis = covariance_analysis(scenario, SensorModels.of(TABLE_6), believed)
     for outage in outages:
         assert 0.9 < analysis.nees()[analysis.index(outage.end)] < 1.1

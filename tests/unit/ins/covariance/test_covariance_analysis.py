@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import chi2, t
 
+from error_models import triads
 from gmwm import AR, GaussMarkov, QuantizationNoise, RandomWalk, RateRamp, Resonance, WhiteNoise
 from gmwm.errors import InputError
 from gmwm.ins.covariance import covariance_analysis
@@ -38,17 +39,12 @@ EVERYTHING = SensorModels.of(
     },
     {"gyro": 1e-5, "accel": 1e-3},
 )
-FULL = SensorModels.of(
-    {
-        "gyro": WhiteNoise(1e-4) + GaussMarkov(4e-4, 10.0) + GaussMarkov(1e-4, 300.0),
-        "accel": WhiteNoise(1e-3) + GaussMarkov(3e-3, 10.0) + GaussMarkov(3e-3, 200.0),
-    }
+FULL = triads(
+    WhiteNoise(1e-4) + GaussMarkov(4e-4, 10.0) + GaussMarkov(1e-4, 300.0),
+    WhiteNoise(1e-3) + GaussMarkov(3e-3, 10.0) + GaussMarkov(3e-3, 200.0),
 )
-SLOW_ONLY = SensorModels.of(
-    {
-        "gyro": WhiteNoise(1e-4) + GaussMarkov(1e-4, 300.0),
-        "accel": WhiteNoise(1e-3) + GaussMarkov(3e-3, 200.0),
-    }
+SLOW_ONLY = triads(
+    WhiteNoise(1e-4) + GaussMarkov(1e-4, 300.0), WhiteNoise(1e-3) + GaussMarkov(3e-3, 200.0)
 )
 STATELESS = SensorModels.of({"gyro": WhiteNoise(2e-4), "accel": WhiteNoise(2e-3)})
 

@@ -7,6 +7,7 @@ import pytest
 from scipy import stats
 
 import gmwm
+from error_models import triads
 from free_inertial import integrate
 from gmwm import GaussMarkov, RandomWalk, RateRamp, Resonance, Sinusoid, WhiteNoise
 from gmwm.errors import InputError
@@ -14,11 +15,9 @@ from gmwm.ins import Aiding, Fixes, SensorModels, emulate, gnss, helicopter_mapp
 from gmwm.ins.geometry import matrix_from_rotation_vector, matrix_from_rpy, rpy_from_matrix
 from marks import every, slow
 
-SENSORS = SensorModels.of(
-    {
-        "gyro": WhiteNoise(5e-5) + GaussMarkov(1e-4, 5.0) + GaussMarkov(5e-5, 200.0),
-        "accel": WhiteNoise(1e-3) + GaussMarkov(2e-3, 2.0) + GaussMarkov(1e-3, 100.0),
-    }
+SENSORS = triads(
+    WhiteNoise(5e-5) + GaussMarkov(1e-4, 5.0) + GaussMarkov(5e-5, 200.0),
+    WhiteNoise(1e-3) + GaussMarkov(2e-3, 2.0) + GaussMarkov(1e-3, 100.0),
 )
 INITIAL = gmwm.ins.InitialSd(
     position=1.0, velocity=0.1, tilt=np.radians(0.1), heading=np.radians(0.3)

@@ -6,19 +6,17 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from error_models import triads
 from gmwm import GaussMarkov, WhiteNoise
-from gmwm.ins import Imu, SensorModels, car_drive, emulate, gnss, navigate
+from gmwm.ins import Imu, car_drive, emulate, gnss, navigate
 from gmwm.ins.geometry import ned_difference
 
 FINE, EVERY = 0.005, 4
 COARSE = FINE * EVERY
 INTERVAL = 0.505  # s: 0, 5, 10 and 15 ms after an epoch of the coarse grid in turn
 ARM = (0.8, -0.3, -1.1)
-SENSORS = SensorModels.of(
-    {
-        "gyro": WhiteNoise(5e-5) + GaussMarkov(1e-4, 50.0),
-        "accel": WhiteNoise(1e-3) + GaussMarkov(2e-3, 50.0),
-    }
+SENSORS = triads(
+    WhiteNoise(5e-5) + GaussMarkov(1e-4, 50.0), WhiteNoise(1e-3) + GaussMarkov(2e-3, 50.0)
 )
 
 

@@ -7,16 +7,14 @@ import pytest
 from scipy.stats import chi2
 
 import gmwm
+from error_models import triads
 from gmwm import GaussMarkov, WhiteNoise
-from gmwm.ins import Outage, SensorModels, barometer, car_drive, emulate, gnss, navigate, tuning
+from gmwm.ins import Outage, barometer, car_drive, emulate, gnss, navigate, tuning
 from gmwm.ins.filter import KINDS, filter_kernels
 
 DT = 0.05
-SENSORS = SensorModels.of(
-    {
-        "gyro": WhiteNoise(1e-4) + GaussMarkov(1e-4, 50.0),
-        "accel": WhiteNoise(2e-3) + GaussMarkov(5e-3, 50.0),
-    }
+SENSORS = triads(
+    WhiteNoise(1e-4) + GaussMarkov(1e-4, 50.0), WhiteNoise(2e-3) + GaussMarkov(5e-3, 50.0)
 )
 
 

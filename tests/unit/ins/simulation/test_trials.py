@@ -7,6 +7,7 @@ import pytest
 from scipy.stats import chi2, kstest
 
 import gmwm
+from error_models import triads
 from gmwm import GaussMarkov, RandomWalk, WhiteNoise
 from gmwm.errors import InputError
 from gmwm.ins import FilterErrors, InitialSd, Outage, Scenario, SensorModels, Simulated, gnss
@@ -18,11 +19,8 @@ from gmwm.readers.recording import Recording
 
 DT = 0.05
 TRUTH = gmwm.ins.helicopter_mapping(duration=130.0, dt=DT).segment(70.0, 130.0)
-GOOD = SensorModels.of(
-    {
-        "gyro": WhiteNoise(1e-4) + GaussMarkov(2e-4, 20.0),
-        "accel": WhiteNoise(1e-3) + GaussMarkov(3e-3, 50.0),
-    }
+GOOD = triads(
+    WhiteNoise(1e-4) + GaussMarkov(2e-4, 20.0), WhiteNoise(1e-3) + GaussMarkov(3e-3, 50.0)
 )
 POOR = SensorModels.of({"gyro": WhiteNoise(1e-4), "accel": WhiteNoise(1e-3)})
 SCENARIO = Scenario(TRUTH, gnss(TRUTH), (Outage(30.0, 20.0),), interval=5.0)
@@ -249,12 +247,7 @@ def test_sensor_errors_are_those_of_the_sample_after_an_epoch():
 
 
 def test_a_random_walk_that_starts_at_zero_counts_from_its_first_step():
-    walk = SensorModels.of(
-        {
-            "gyro": WhiteNoise(1e-4) + GaussMarkov(2e-4, 20.0),
-            "accel": WhiteNoise(1e-3) + RandomWalk(1e-4),
-        }
-    )
+    walk = triads(WhiteNoise(1e-4) + GaussMarkov(2e-4, 20.0), WhiteNoise(1e-3) + RandomWalk(1e-4))
     runs = study(60, filters={"walk": walk}, source=Simulated(walk))["walk"]
     assert np.all(np.isnan(runs.sensor_nees[:, 0]))
     assert np.all(np.isfinite(runs.sensor_nees[:, 1:-1]))
