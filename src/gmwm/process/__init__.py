@@ -21,7 +21,7 @@ from gmwm.process.spectral import (
 from gmwm.process.state_space import StateSpace as StateSpace, block_diagonal as block_diagonal
 from gmwm.process.wavelets import (
     ComplexArray as ComplexArray,
-    pair_weights as pair_weights,
+    gain_weights as gain_weights,
     unit_legendre as unit_legendre,
     wavelet as wavelet,
 )

@@ -10,11 +10,10 @@ from gmwm.process.wavelets import (
     NAMES,
     gain_weights,
     lagrange,
-    pair_weights,
     unit_legendre,
     wavelet,
 )
-from marks import EXAMPLES, FIRST, slow
+from marks import EXAMPLES, FIRST
 
 SOME = ("haar", "db2", "db4", "db10", "sym6", "coif1", "coif5")
 LEVELS = 9
@@ -187,20 +186,6 @@ def test_a_spectrum_that_is_none_is_refused():
     for bad in (lambda f, dt: -f, lambda f, dt: f * np.nan, lambda f, dt: 1.0):
         with pytest.raises(gmwm.InputError, match="psd gives"):
             wavelet_variance(bad, (), np.array([1.0, 2.0]), 1.0, "db2")
-
-
-@pytest.mark.parametrize("name", [*SOME[:-1], slow(SOME[-1])])
-def test_pairs_of_gains_equal_a_rule_that_is_exact_for_their_products(name):
-    levels = 9
-    pairs = pair_weights(name, levels)
-    # Midpoints of the band integrate cosines exactly below their number.
-    size = 4 * wavelet(name).width(levels)
-    f = (np.arange(size) + 0.5) / (2 * size)
-    gains = wavelet(name).gains(levels, f)
-    for weight in (np.sin, np.cos):
-        exact = (gains * weight(np.pi * f) ** 2) @ gains.T / (2 * size)
-        found = pairs.weight @ weight(np.pi * pairs.frequency) ** 2
-        np.testing.assert_allclose(found, exact[pairs.first, pairs.second], rtol=1e-10)
 
 
 def test_weights_hold_the_energy_of_every_level_at_thirty_levels():

@@ -18,7 +18,7 @@ from functools import lru_cache
 import numpy as np
 
 from gmwm._core.typing import FloatArray
-from gmwm.process import PSD, ComplexArray, evaluated, pair_weights, unit_legendre, wavelet
+from gmwm.process import PSD, ComplexArray, evaluated, gain_weights, unit_legendre, wavelet
 from gmwm.variance import tuning
 from gmwm.variance.covariance.haar import centred_pairs
 from gmwm.variance.covariance.lags import LagGrid, block_of
@@ -104,6 +104,12 @@ def _at_zero(
     return np.asarray(np.maximum(12.0 * mean - neighbour, 0.0) / 11.0 / zero ** (2 * moments))
 
 
+@lru_cache(maxsize=4)
+def _gains(name: str, levels: int) -> FloatArray:
+    """Gains at the nodes of `gmwm.process.gain_weights`, (levels, K)."""
+    return wavelet(name).gains(levels, gain_weights(name, levels).frequency)
+
+
 def wavelet_covariance(psd: PSD, n: int, dt: float, name: str, levels: int) -> FloatArray:
     """Covariance of the wavelet variance estimates of a Gaussian series.
 
@@ -116,12 +122,12 @@ def wavelet_covariance(psd: PSD, n: int, dt: float, name: str, levels: int) -> F
     Raises InputError for an unknown wavelet, or a spectrum that is not finite and non-negative.
     """
     filters = wavelet(name)
-    weights = pair_weights(filters.name, levels)
+    weights = gain_weights(filters.name, levels)
     density = evaluated(psd, weights.frequency / dt, dt) / dt
-    integral = 4.0 * (weights.weight @ density**2)
-    result = np.empty((levels, levels))
-    result[weights.first, weights.second] = integral
-    result[weights.second, weights.first] = integral
+    # The lobes of the coarser level are in its weights; where those of the finer one are too many
+    # for the nodes as well, the product is negligible.
+    products = 4.0 * (weights.weight * density**2) @ _gains(filters.name, levels).T
+    result = np.tril(products) + np.tril(products, -1).T
     sums = _lag_sums(filters.name, n, levels)
     if sums.transfer.size:
         coarse = slice(sums.first, None)
