@@ -208,7 +208,8 @@ def _not_even(clock: Clock, found: NoGrid) -> InputError:
         back = f"the clock goes back: {early}, or the rows are not in order"
         return clock.error(found.row, back, _CUT)
     stamp = f"time stamp {clock.stamps[found.row]:.15g} {found.stamp}{more_such(found.count)}"
-    hint = f"sort the rows or use a part with an even clock, or, {_WAY_OUT}"
+    is_restart = found.count * tuning.FEWEST_SAMPLES < clock.stamps.size
+    hint = _CUT if is_restart else f"sort the rows or use a part with an even clock, or, {_WAY_OUT}"
     return clock.error(found.row, f"{stamp}, so that no even clock fits most of them", hint)
 
 
@@ -277,16 +278,6 @@ def _check_jumps(clock: Clock, found: Grid, seconds: float) -> None:
         usual = f"the usual one of {jumps.interval:.6g}, so that the sampling rate is not known"
         text = f"{off_grid:,} of {n:,} steps are not near a whole number of {usual}"
         raise clock.error(None, text)
-    early = 0
-    if found.uneven is not None:
-        early = int(np.count_nonzero(found.uneven.late < -tuning.ASTRAY - found.uneven.burst))
-    if early > max(
-        tuning.MOST_OFF_GRID * n, tuning.FEWEST_BESIDE
-    ):  # a host that stalls makes stamps late, never early
-        text = (
-            f"{early:,} of {n:,} stamps are earlier than an even clock allows: the number of lost"
-        )
-        raise clock.error(None, f"{text} rows is unknown")
     if found.uneven is None and found.change is None and jumps.strays(clock.stamps):
         text = f"its steps differ at random from the usual one of {jumps.interval:.6g}, and the"
         text += " differences add up as if rows were lost"

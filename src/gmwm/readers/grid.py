@@ -352,6 +352,9 @@ def place_uneven(stamps: FloatArray) -> Uneven | int | None:
         number = last + np.cumsum(lost)
         interval = interval_of(time, number)
     late = time / interval - number
+    away = np.abs(late[tuning.STAMPS_OF_STRAYING :] - late[: -tuning.STAMPS_OF_STRAYING])
+    if away.size and median(away) > tuning.MOST_STRAYING:  # rows were lost, how many is not known
+        return int(last[tuning.STAMPS_OF_STRAYING + np.argmax(away > tuning.MOST_STRAYING)])
     # Slow wander of the clock: the median drops what a stall delays, the mean its own noise.
     size = tuning.STAMPS_OF_WANDER
     calm = ndimage.median_filter(late, min(size, late.size) | 1, mode="nearest")

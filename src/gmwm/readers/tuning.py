@@ -108,9 +108,9 @@ SHARE_OF_SHORTEST, MOST_LOST, MANY_LOST = 0.005, 25.0, 0.01
 # above their median: of rows lost at random, simulated, 26 was the highest in 240 parts.
 PARTS_OF_RHYTHM, PLACES_OF_RHYTHM, BINS_OF_RHYTHM, RHYTHM = 8, 1 << 16, 101, 50.0
 
-# Rows after which, and intervals by which in the median, a clock without a grid strays from an even
-# one: jitter of 12 % does if each step adds its own to those before.
-ROWS_OF_STRAYING, MOST_STRAYING = 64, 0.75
+# Rows (of uneven ones, stamps) after which, and intervals by which in the median, a clock without a
+# grid strays from an even one: jitter of 12 % does if each step adds its own to those before.
+ROWS_OF_STRAYING, STAMPS_OF_STRAYING, MOST_STRAYING = 64, 512, 0.75
 
 ROUNDS_OF_LINE, LINE_SETTLED = 20, 1e-9  # of the robust line; relative change that ends them
 

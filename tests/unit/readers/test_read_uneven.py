@@ -169,7 +169,10 @@ def test_stamps_coarser_than_the_interval_give_the_mean_rate(recorded, rate, rou
     assert "stamps-coarse" in {each.code for each in found.notices}
 
 
-@pytest.mark.parametrize(("rate", "loss"), [(1600.0, 0.001), (1800.0, 0.01), (1990.0, 0.01)])
+@pytest.mark.parametrize(
+    ("rate", "loss"),
+    [(1600.0, 0.001), (1800.0, 0.01), (1990.0, 0.01), (1250.0, 0.03), (2000.0, 0.03)],
+)
 def test_stamps_coarser_than_the_interval_hide_no_rhythm(recorded, rate, loss):
     clock = Simulated(0, rate, 20_000)
     clock.lose(loss)
@@ -260,6 +263,13 @@ def test_a_counter_that_runs_over_in_bursts_is_continued(tmp_path):
     assert found.rate == pytest.approx(200.0, rel=1e-5)
     codes = {each.code for each in found.notices}
     assert "clock-wraps" in codes
+
+
+def test_a_clock_that_restarts_twice_is_to_be_cut(recorded):
+    clock = Simulated(0, 200.0)
+    clock.stamps = np.mod(clock.stamps, N / 600.0)
+    with pytest.raises(InputError, match=r"goes back, and \d more .*: cut the file"):
+        recorded(clock)
 
 
 @pytest.mark.parametrize("seed", range(3))
