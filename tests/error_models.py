@@ -25,3 +25,9 @@ DT = 0.01
 def triads(gyro, accel):
     """Sensors whose three axes have one model."""
     return SensorModels.of({"gyro": gyro, "accel": accel})
+
+
+def noisy(imu, models, rng):
+    """An IMU with errors drawn of its models."""
+    errors = models.simulate(imu.n, imu.dt, rng).total
+    return imu.with_errors(errors[:, :3], errors[:, 3:])

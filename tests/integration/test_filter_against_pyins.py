@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 import gmwm
+from error_models import noisy
 from gmwm import GaussMarkov, RandomWalk, WhiteNoise
 from gmwm.ins import Outage, SensorModels, Trajectory, emulate, gnss, helicopter_mapping, navigate
 from gmwm.ins.geometry import ned_difference
@@ -107,8 +108,7 @@ def flight(duration, seed, *, velocity, outages=(), start=0.0):
     truth = whole.segment(start, start + duration)
     rng = np.random.default_rng(seed)
     sensors = models()
-    errors = sensors.simulate(truth.n, DT, rng).total
-    imu = emulate(truth).with_errors(errors[:, :3], errors[:, 3:])
+    imu = noisy(emulate(truth), sensors, rng)
     aiding = gnss(truth, position_sd=POSITION_SD, velocity_sd=VELOCITY_SD if velocity else None)
     return Flight(truth, imu, aiding.noisy(rng).without(outages))
 
@@ -191,9 +191,8 @@ def test_the_same_solution_with_fixes_between_samples():
     fine = helicopter_mapping(duration=94.0, dt=DT / parts, start=place).segment(80.0, 94.0)
     truth = Trajectory(DT, *(each[::parts] for each in (fine.lla, fine.velocity, fine.rpy)))
     rng = np.random.default_rng(4)
-    errors = models().simulate(truth.n, DT, rng).total
     aiding = gnss(fine, 1.0 + DT / parts, position_sd=POSITION_SD, velocity_sd=VELOCITY_SD)
-    imu = emulate(truth).with_errors(errors[:, :3], errors[:, 3:])
+    imu = noisy(emulate(truth), models(), rng)
     data = Flight(truth, imu, aiding.noisy(rng))
     assert np.any(data.aiding.events(DT, truth.n).offset)
     apart, wider, ours = compared(data)

@@ -82,16 +82,6 @@ def test_textbook_formulas(process, forms, known):
         np.testing.assert_allclose(rms(process, t, FINE * t, known), forms(t), rtol=1e-6)
 
 
-@pytest.mark.parametrize("ratio", [1e-3, 0.1, 1.0, 30.0, 1e4])
-def test_angle_under_stationary_gauss_markov(ratio):
-    # Papoulis 1991, sec. 11.1; the expansion for short times, where the formula cancels.
-    tau = 5.0
-    t = ratio * tau
-    bracket = ratio - 1.0 + np.exp(-ratio) if ratio > 0.01 else ratio**2 / 2 - ratio**3 / 6
-    expected = 2.0 * tau * np.sqrt(2.0 * bracket)
-    assert rms(gmwm.GaussMarkov(2.0, tau), t, FINE * t)[0] == pytest.approx(expected, rel=1e-6)
-
-
 def continuous(a, q, h, p0, t):
     """Van Loan's method on the continuous-time system with three integrals appended."""
     p = len(h)

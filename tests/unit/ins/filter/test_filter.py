@@ -7,7 +7,7 @@ import pytest
 from scipy import stats
 
 import gmwm
-from error_models import triads
+from error_models import noisy, triads
 from free_inertial import integrate
 from gmwm import GaussMarkov, RandomWalk, RateRamp, Resonance, Sinusoid, WhiteNoise
 from gmwm.errors import InputError
@@ -76,9 +76,9 @@ def ensemble(truth, aiding, runs, *, before, sensors=SENSORS, step=0.1, seed=1):
     records = []
     for _ in range(runs):
         drawn = sensors.simulate(imu.n, imu.dt, rng)
-        noisy = imu.with_errors(drawn.total[:, :3], drawn.total[:, 3:])
+        with_noise = imu.with_errors(drawn.total[:, :3], drawn.total[:, 3:])
         solution = navigate(
-            noisy, started(truth, rng), sensors, aiding.noisy(rng), initial_sd=INITIAL,
+            with_noise, started(truth, rng), sensors, aiding.noisy(rng), initial_sd=INITIAL,
             step=step, interval=50.0, before=before,
         )  # fmt: skip
         assert solution.diverged_at is None
@@ -135,11 +135,9 @@ def test_errors_have_the_covariance_of_the_filter(kind, duration, dt, outage, ru
 def flown(truth, aiding, *, sensors=SENSORS, seed=3, step=0.1, interval=1.0, before=()):
     """One run with noise; the solution and its errors over their standard deviations."""
     rng = np.random.default_rng(seed)
-    imu = emulate(truth)
-    drawn = sensors.simulate(imu.n, imu.dt, rng)
-    noisy = imu.with_errors(drawn.total[:, :3], drawn.total[:, 3:])
+    imu = noisy(emulate(truth), sensors, rng)
     solution = navigate(
-        noisy, started(truth, rng), sensors, aiding.noisy(rng), initial_sd=INITIAL,
+        imu, started(truth, rng), sensors, aiding.noisy(rng), initial_sd=INITIAL,
         step=step, interval=interval, before=before,
     )  # fmt: skip
     return solution, solution.errors(truth) / solution.sd

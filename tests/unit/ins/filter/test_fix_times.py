@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from error_models import triads
+from error_models import noisy, triads
 from gmwm import GaussMarkov, WhiteNoise
 from gmwm.ins import Imu, car_drive, emulate, gnss, navigate
 from gmwm.ins.geometry import ned_difference
@@ -26,8 +26,13 @@ def drive():
     whole = car_drive(duration=110.0, dt=FINE)
     truth = whole.segment(70.0, 110.0)
     fine = emulate(truth)
-    sums = [each.reshape(-1, EVERY, 3).sum(axis=1) for each in (fine.rotation, fine.velocity)]
-    return truth, fine, Imu(COARSE, *sums)
+    return truth, fine, every(fine)
+
+
+def every(fine):
+    """The same increments on the coarse grid."""
+    sums = (each.reshape(-1, EVERY, 3).sum(axis=1) for each in (fine.rotation, fine.velocity))
+    return Imu(COARSE, *sums)
 
 
 def test_error_free_fixes_agree_at_any_time(drive):
@@ -48,24 +53,21 @@ def test_precise_fixes_off_the_grid_have_innovations_of_the_expected_size(drive)
     """At 15 m/s, 5 ms are 75 mm: a filter that used the nearest epoch had a NIS of about 3."""
     truth, _, coarse = drive
     rng = np.random.default_rng(3)
-    errors = SENSORS.simulate(coarse.n, COARSE, rng).total
-    noisy = coarse.with_errors(errors[:, :3], errors[:, 3:])
+    imu = noisy(coarse, SENSORS, rng)
     aiding = gnss(truth, INTERVAL, position_sd=0.05).noisy(rng)
-    squares = navigate(noisy, truth.state(0), SENSORS, aiding).innovations.standard.ravel() ** 2
+    squares = navigate(imu, truth.state(0), SENSORS, aiding).innovations.standard.ravel() ** 2
     low, high = stats.chi2.ppf([1e-4, 1.0 - 1e-4], squares.size) / squares.size
     assert low < squares.mean() < high
 
 
 def test_the_same_solution_as_with_a_grid_that_has_the_fixes(drive):
-    truth, fine, coarse = drive
+    truth, fine, _ = drive
     rng = np.random.default_rng(5)
-    errors = SENSORS.simulate(fine.n, FINE, rng).total
-    noisy = fine.with_errors(errors[:, :3], errors[:, 3:])
-    sums = [each.reshape(-1, EVERY, 3).sum(axis=1) for each in (noisy.rotation, noisy.velocity)]
+    imu = noisy(fine, SENSORS, rng)
     aiding = gnss(truth, INTERVAL, position_sd=0.1, velocity_sd=0.05, lever_arm=ARM,
                   imu=fine).noisy(rng)  # fmt: skip
-    on_grid = navigate(noisy, truth.state(0), SENSORS, aiding)
-    off_grid = navigate(Imu(coarse.dt, *sums), truth.state(0), SENSORS, aiding)
+    on_grid = navigate(imu, truth.state(0), SENSORS, aiding)
+    off_grid = navigate(every(imu), truth.state(0), SENSORS, aiding)
     ours, theirs = off_grid.innovations, on_grid.innovations
     np.testing.assert_allclose(ours.time, theirs.time, atol=1e-6)
     # With the lever arm, velocities need the rate, which the coarse grid has as a mean.

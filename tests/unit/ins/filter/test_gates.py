@@ -7,7 +7,7 @@ import pytest
 from scipy.stats import chi2
 
 import gmwm
-from error_models import triads
+from error_models import noisy, triads
 from gmwm import GaussMarkov, WhiteNoise
 from gmwm.ins import Outage, barometer, car_drive, emulate, gnss, navigate, tuning
 from gmwm.ins.filter import KINDS, filter_kernels
@@ -21,9 +21,7 @@ SENSORS = triads(
 @pytest.fixture(scope="module")
 def drive():
     truth = car_drive(duration=150.0, dt=DT)
-    errors = SENSORS.simulate(truth.n, DT, np.random.default_rng(1)).total
-    noisy = emulate(truth).with_errors(errors[:, :3], errors[:, 3:])
-    return truth, noisy
+    return truth, noisy(emulate(truth), SENSORS, np.random.default_rng(1))
 
 
 @pytest.fixture(scope="module")

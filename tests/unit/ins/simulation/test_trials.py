@@ -216,27 +216,22 @@ def test_the_first_nees_is_right_and_stays_so_without_aiding():
 
 
 @dataclass(frozen=True)
-class Steady:
-    """Constant errors of the sensors."""
+class Given:
+    """The errors of each run as they are told."""
 
-    values: tuple[float, ...]
-
-    @property
-    def available(self):
-        return None
+    errors: tuple[np.ndarray, ...]
+    available = None
 
     def draw(self, run, n, dt, rng):
-        slow = np.tile(self.values, (n, 1)) + 1e-9 * np.arange(n)[:, None]
-        return gmwm.ins.SensorErrors(slow, slow)
+        return gmwm.ins.SensorErrors(self.errors[run], self.errors[run])
 
 
 def test_sensor_errors_are_those_of_the_sample_after_an_epoch():
-    source = Steady((1e-4,) * 3 + (1e-3,) * 3)
-    found = study(1, source=source)
+    slow = np.repeat([1e-4, 1e-3], 3) + 1e-9 * np.arange(TRUTH.n)[:, None]
+    found = study(1, source=Given((slow,)))
     runs, solution = found["good"], found.example["good"]
     k = runs.index(50.0)
     j = int(np.flatnonzero(solution.before & (solution.time == 50.0))[0])
-    slow = source.draw(0, TRUTH.n, DT, None).slow
     np.testing.assert_allclose(
         runs.sensor_error[0, k], solution.sensor_errors[j] - slow[1000], atol=1e-14
     )
@@ -259,25 +254,10 @@ def test_a_random_walk_that_starts_at_zero_counts_from_its_first_step():
 # ---- Divergence ----
 
 
-@dataclass(frozen=True)
-class Wild:
-    """Errors that no filter survives, in some runs."""
-
-    runs: tuple[int, ...]
-
-    @property
-    def available(self):
-        return None
-
-    def draw(self, run, n, dt, rng):
-        total = np.zeros((n, 6))
-        if run in self.runs:
-            total[n // 2 :, 3:] = 1e9
-        return gmwm.ins.SensorErrors(total)
-
-
 def test_a_filter_that_diverges_is_counted():
-    found = study(5, source=Wild((1, 3)), filters={"good": GOOD})["good"]
+    wild = np.zeros((5, TRUTH.n, 6))
+    wild[[1, 3], TRUTH.n // 2 :, 3:] = 1e9
+    found = study(5, source=Given(tuple(wild)))["good"]
     assert found.diverged == 2
     lost = np.isnan(found.error[:, :, 0])
     assert not np.any(lost[[0, 2, 4]])
