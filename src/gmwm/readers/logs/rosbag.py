@@ -27,6 +27,7 @@ from gmwm._core.typing import FloatArray
 from gmwm._core.units import SI_UNIT
 from gmwm.errors import InputError
 from gmwm.issues import notice
+from gmwm.readers import tuning
 from gmwm.readers.logs.topics import MessageTable, Topic, choose
 from gmwm.readers.registry import Wanted
 from gmwm.readers.table import Columns, damage_named, library
@@ -73,6 +74,7 @@ def decode(
     for i, each in enumerate(raw):  # a topic has one encoding and one frame_id, almost always
         alike[len(each), each[: 2 * is_cdr], each[_FRAME - 4 : _FRAME]].append(i)
     stamps, numbers = np.empty(len(raw), np.int64), np.empty((len(wanted), len(raw)))
+    frames = Counter[bytes]()
     for (size, code, frame), group in alike.items():
         order = _ORDERS.get(code) if is_cdr else "<"
         if order is None and size >= _FRAME:
@@ -80,6 +82,7 @@ def decode(
             hint = "record with a usual RMW, or convert the bag with ros2 bag convert"
             raise InputError(f"{text}: {hint}")
         offset = _FRAME + int.from_bytes(frame, "little" if order == "<" else "big")
+        frames.update(raw[i][_FRAME:offset] for i in group)
         offset = 4 + -(-(offset - 4) // 8) * 8 if is_cdr else offset
         if size < _FRAME or offset + 8 * message.count > size:
             hint = "record the bag again, or cut it before that message"
@@ -94,6 +97,9 @@ def decode(
         stamps[rows] = seconds * 10**9 + field(f"{order}u4", offset=_STAMP + 4)
         for values, index in zip(numbers, wanted, strict=True):
             values[rows] = field(f"{order}f8", offset=offset + 8 * index)
+    if frames.total() - max(frames.values()) > tuning.IN_TURNS * len(raw):
+        text = f"{where(0)}: from here on the topic has messages of {len(frames)} frame_id in turns"
+        raise InputError(f"{text}: keep those of one sensor", "several-sensors")
     return stamps, numbers
 
 
