@@ -285,14 +285,6 @@ class Process:
             return self.haar_variance(tau, dt)
         return spectral.wavelet_variance(self.psd, self.lines(), tau, dt, wavelet)
 
-    def unit_wavelet_variance(
-        self, shape: Shape, tau: FloatArray, dt: float, wavelet: str = "haar"
-    ) -> FloatArray:
-        """`wavelet_variance` at another shape and unit amplitude."""
-        if wavelet == "haar":
-            return self.unit_haar_variance(shape, tau, dt)
-        return self.at_unit(shape).wavelet_variance(tau, dt, wavelet)
-
     def unit_haar_variance(self, shape: Shape, tau: FloatArray, dt: float) -> FloatArray:
         """`haar_variance` at another shape and unit amplitude: the estimator's inner loop."""
         return np.asarray(self.at_unit(shape).haar_variance(tau, dt), dtype=float)

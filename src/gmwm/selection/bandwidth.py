@@ -132,8 +132,8 @@ class _Beside:
         middle, dt = int(np.rint(start[0] / self.scales.dt)), self.scales.dt
         reach = max(middle // 8, 1) + 1
         lengths = range(max(middle - reach, 2), middle + reach + 1)
-        curve = self.scales.unit_curves(free)
-        squares = self.squares(np.stack([curve((m * dt,)) for m in lengths], axis=1))
+        curves = [self.scales.unit_curve(free, (m * dt,)) for m in lengths]
+        squares = self.squares(np.stack(curves, axis=1))
         best = int(np.argmin(squares))
         given = free.with_values(window=lengths[best] * dt)
         return Bandwidth(given, given, 1), float(squares[best])

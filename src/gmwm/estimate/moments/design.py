@@ -43,10 +43,6 @@ class Design:
                 )
         self.linear = tuple(i for i, term in enumerate(self.terms) if term.free_scale)
         self.shaped = tuple(i for i, term in enumerate(self.terms) if term.n_shapes)
-        # Functions without the lookups that each step would repeat.
-        self._unit_curves = [
-            scales.unit_curves(term.process) if term.free_scale else None for term in self.terms
-        ]
         self.owners = [i for i, is_amplitude in self.coordinates.owners if not is_amplitude]
         self._own: dict[Any, Any] = {}
         self._last: dict[int, tuple[Shape, FloatArray]] = {}
@@ -79,9 +75,12 @@ class Design:
 
     def curve(self, i: int, shape: Shape) -> FloatArray:
         """Wavelet variance of `at_shape`, (J,)."""
-        known, unit_curve = self._last.get(i), self._unit_curves[i]
+        known = self._last.get(i)
         if known is None or known[0] != shape:
-            found = unit_curve(shape) if unit_curve else self.scales.curve(self.at_shape(i, shape))
+            if self.terms[i].free_scale:
+                found = self.scales.unit_curve(self.terms[i].process, shape)
+            else:
+                found = self.scales.curve(self.at_shape(i, shape))
             known = self._last[i] = shape, found
         return known[1]
 

@@ -12,7 +12,7 @@ Applied Econometrics* 8, S85-S118; eq. (13) ff. of Stebler et al. 2012).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, Any
@@ -114,16 +114,11 @@ class Scales:
             return self.simulation.curve(model, self.tau, self.n, self.dt, self.wavelet)
         return np.asarray(model.wavelet_variance(self.tau, self.dt, self.wavelet), dtype=float)
 
-    def unit_curves(self, process: Process) -> Callable[[Shape], FloatArray]:
-        """Wavelet variance of a process at unit amplitude as a function of its shape, u^2, (J,)."""
-        if self.is_simulated(process):
-            return lambda shape: self.curve(process.at_unit(shape))
-        if process.shape_parameters:
-            return lambda shape: process.unit_wavelet_variance(
-                shape, self.tau, self.dt, self.wavelet
-            )
-        found = frozen(process.unit_wavelet_variance((), self.tau, self.dt, self.wavelet))
-        return lambda _: found
+    def unit_curve(self, process: Process, shape: Shape) -> FloatArray:
+        """Wavelet variance of a process at another shape and unit amplitude, u^2, (J,)."""
+        if self.wavelet == "haar" and not self.is_simulated(process):
+            return process.unit_haar_variance(shape, self.tau, self.dt)
+        return self.curve(process.at_unit(shape))
 
     def is_simulated(self, process: Process) -> bool:
         """Whether the curve of a process is simulated."""
