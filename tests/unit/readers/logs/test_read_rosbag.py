@@ -92,17 +92,17 @@ def test_alignment_behind_frames_of_every_length(tmp_path, big):
 
 
 def test_frames_that_change_within_a_topic(tmp_path):
-    def bag(frame):
+    def bag(name, frame):
         kind, messages = imu_topic(ROS1, X)
         messages = [
             (time, imu(ROS1, stamp, six, frame(i)))
             for i, ((time, _), stamp, six) in enumerate(zip(messages, stamps(200), X, strict=True))
         ]
-        return write1(tmp_path / "a.bag", {"/imu": (kind, messages)})
+        return write1(tmp_path / name, {"/imu": (kind, messages)})
 
-    assert exact(gmwm.read(bag(lambda i: "f" * max(i - 190, 0))))
+    assert exact(gmwm.read(bag("once.bag", lambda i: "f" * max(i - 190, 0))))
     with pytest.raises(gmwm.InputError, match="messages of 2 frame_id in turns"):
-        gmwm.read(bag(lambda i: f"imu{i % 2}"))
+        gmwm.read(bag("turns.bag", lambda i: f"imu{i % 2}"))
 
 
 # -- topics ---------------------------------------------------------------------------------------
