@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import combinations
 from typing import Any
 
@@ -126,24 +126,10 @@ def calibrate(
     on_disk = any(is_spooled(c.values) for each in given for c in each.inertial)
     is_worth = size > tuning.WORTH_PROCESSES and not on_disk  # memory for one channel at a time
     with workers.worker_pool(others if is_worth else 0, "gmwm.estimate:compile_search"):
-        work = _Work(screening, still, tuning.REMOVALS if remove_departures else 0, beside)
-        return _calibrated(given, model, work, progress)
-
-
-@dataclass(frozen=True)
-class _Work:
-    """What is done to recordings before and after a fit, see `calibrate`."""
-
-    screening: Collection[str]
-    still: bool
-    removals: int
-    covariates: tuple[Wanted, ...]
-
-    def split(self, given: Sequence[Recording]) -> list[Recording]:
-        """The stretches at rest, where they are looked for."""
-        if not (self.still and self.screening):
-            return list(given)
-        return [part for each in given for part in stretches_at_rest(each)]
+        if still and screening:
+            given = [part for each in given for part in stretches_at_rest(each)]
+        removals = tuning.REMOVALS if remove_departures else 0
+        return _calibrated(given, model, screening, removals, beside, progress, still=still)
 
 
 def _without_curves(
@@ -177,13 +163,19 @@ def _picked(recording: Recording) -> list[Notice]:
 
 
 def _calibrated(
-    given: list[Recording], model: GivenModels, work: _Work, progress: Progress | None
+    given: Sequence[Recording],
+    model: GivenModels,
+    screening: Collection[str],
+    removals: int,
+    covariates: tuple[Wanted, ...],
+    progress: Progress | None,
+    *,
+    still: bool,
 ) -> Calibration:
-    given = work.split(given)
     parts = [part for each in given for part in each.by_rate()]
-    parts, designs = _without_curves(parts, work.covariates)
-    treated = [screened(part, work.screening) for part in parts]
-    tasks, skipped = _tasks(treated, model, work.removals, designs)
+    parts, designs = _without_curves(parts, covariates)
+    treated = [screened(part, screening) for part in parts]
+    tasks, skipped = _tasks(treated, model, removals, designs)
     found = _models_found(tasks, progress)
     done = {name: each for name, each in found.items() if isinstance(each, ChannelModel)}
     skipped |= {name: each for name, each in found.items() if isinstance(each, Notice)}
@@ -194,7 +186,7 @@ def _calibrated(
     issues = _issues(treated, designs, done, several=len(given) > 1)
     done, advice = advise_cut(done, given[0].n * given[0].dt if len(given) == 1 else 0.0)
     issues += advice
-    done = with_validity(done, issues, still=work.still)
+    done = with_validity(done, issues, still=still)
     chosen = {name: each.fit.model for name, each in done.items()}
     offered = {} if model is not None else {task.name: task.extra for task in tasks}
     rivals = {name: each.rivals for name, each in done.items() if each.rivals}
@@ -209,7 +201,7 @@ def _calibrated(
         if each.largest is not None
     ]
     shared: list[Notice] = []
-    for one in treated if work.screening else ():
+    for one in treated if screening else ():
         about = one.recording.source if len(treated) > 1 else ""
         shared += [replace(n, source=about) for n in sharing_notices(one, chosen)]
     return Calibration(
