@@ -15,7 +15,6 @@ from importlib import import_module
 from multiprocessing import current_process
 from operator import call
 from pickle import PicklingError
-from pkgutil import resolve_name
 from queue import SimpleQueue
 from threading import Lock, Thread, enumerate as threads
 from time import sleep
@@ -90,7 +89,7 @@ _has_pool = Lock()
 def worker_pool(others: int, first: str) -> Iterator[None]:
     """Processes for `shared` that end with the block, unless there are some already.
 
-    first: "module:function", what they import and call while this process does something else.
+    first: Module that they import while this process does something else.
     """
     # One pool for a process: of threads side by side, the others work alone.
     if not others or _pool.get()[0] is not None or not _has_pool.acquire(blocking=False):
@@ -111,7 +110,7 @@ def _new_pool(others: int, first: str) -> Iterator[None]:
     try:
         # None: they do not end while they wait for work, only with this block or this process.
         pool = ProcessPoolExecutor(max_workers=others, timeout=None)
-        begun = [pool.submit(_in_worker, _called, first, os.getpid()) for _ in range(others)]
+        begun = [pool.submit(_in_worker, _imported, first, os.getpid()) for _ in range(others)]
     except (ImportError, OSError):  # a machine without semaphores, or one that lets none be started
         yield
         return
@@ -219,8 +218,8 @@ def _in_processes(work: Work[T, R], items: Sequence[T], jobs: int) -> Done[T, R]
             found.close()
 
 
-def _called(name: str) -> None:
-    resolve_name(name)()
+def _imported(name: str) -> None:
+    import_module(name)
 
 
 def _in_worker(work: Work[T, R], item: T, parent: int) -> tuple[T, R]:

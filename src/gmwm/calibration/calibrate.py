@@ -125,7 +125,7 @@ def calibrate(
     others = workers.extra_workers(jobs, max(len(each.inertial) for each in given))
     on_disk = any(is_spooled(c.values) for each in given for c in each.inertial)
     is_worth = size > tuning.WORTH_PROCESSES and not on_disk  # memory for one channel at a time
-    with workers.worker_pool(others if is_worth else 0, "gmwm.estimate:compile_search"):
+    with workers.worker_pool(others if is_worth else 0, "gmwm.calibration"):
         if still and screening:
             given = [part for each in given for part in stretches_at_rest(each)]
         removals = tuning.REMOVALS if remove_departures else 0

@@ -206,7 +206,7 @@ def _start_workers(files: Sequence[Path], jobs: int, memory: float | None) -> No
     if any(file.is_file() and _LARGE < file.stat().st_size < on_disk for file in files):
         from gmwm._core.jobs import extra_workers, worker_pool
 
-        others = worker_pool(extra_workers(jobs, _CHANNELS), "gmwm.estimate:compile_search")
+        others = worker_pool(extra_workers(jobs, _CHANNELS), "gmwm.calibration")
         click.get_current_context().with_resource(others)
 
 

@@ -23,7 +23,6 @@ from gmwm.estimate.lines import AllanLines as AllanLines
 from gmwm.estimate.moments import (
     GMWM as GMWM,
     SimulatedMoments as SimulatedMoments,
-    compile_search as compile_search,
 )
 from gmwm.estimate.result import (
     Estimate as Estimate,

@@ -163,7 +163,7 @@ def test_threads_side_by_side_have_one_pool():
 
     def work():
         before.wait()
-        with jobs.worker_pool(1, "os:getpid"):
+        with jobs.worker_pool(1, "os"):
             before.wait()
             pools.append(jobs._pool.get()[0])
 

@@ -54,12 +54,12 @@ def test_this_process_shares_the_work_and_does_what_another_could_not(tmp_path):
             drawn.append(number)
             yield number
 
-    with worker_pool(1, "time:time"), worker_pool(1, "time:time"):
+    with worker_pool(1, "time"), worker_pool(1, "time"):
         until_ready()
         found = shared(work, items())
         assert next(found)[0] == 2 and drawn[:2] == [1, 2]  # the first one was sent
         assert dict(found) == {n: n**2 for n in (1, *range(3, 9))}
-    with worker_pool(1, "time:time"):
+    with worker_pool(1, "time"):
         until_ready()
         unsent = dict(shared(Unsendable(), (3, 4)))
     assert unsent == {3: os.getpid(), 4: os.getpid()}
@@ -71,11 +71,13 @@ def until_ready():
         each.result(60.0)
 
 
-def test_nothing_waits_for_a_process_that_is_not_ready(tmp_path):
-    with worker_pool(1, "signal:pause"):
+def test_nothing_waits_for_a_process_that_is_not_ready(tmp_path, monkeypatch):
+    (tmp_path / "pausing.py").write_text("import signal\nsignal.pause()\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    with worker_pool(1, "pausing"):
         found = dict(shared(Square(tmp_path), range(1, 9)))
     assert found == {n: n**2 for n in range(1, 9)}
-    assert {path.name.partition("-")[2] for path in tmp_path.iterdir()} == {str(os.getpid())}
+    assert {path.name.partition("-")[2] for path in tmp_path.glob("*-*")} == {str(os.getpid())}
 
 
 class Unsendable:
@@ -92,7 +94,7 @@ def test_processes_end_with_an_interrupt(tmp_path):
     def pids():
         return {path.name.partition("-")[2] for path in tmp_path.iterdir()} - {str(os.getpid())}
 
-    with pytest.raises(KeyboardInterrupt), worker_pool(1, "time:time"):
+    with pytest.raises(KeyboardInterrupt), worker_pool(1, "time"):
         until_ready()
         dict(shared(Square(tmp_path), range(50)))
         other = int(min(pids()))
@@ -105,6 +107,6 @@ def test_processes_end_with_an_interrupt(tmp_path):
 def test_no_thread_that_gives_semaphores_back_is_left_for_the_end_of_this_process():
     before = set(threading.enumerate())
     for _ in range(12):
-        with worker_pool(1, "os:getpid"):
+        with worker_pool(1, "os"):
             assert dict(shared(abs, [-1, 2])) == {-1: 1, 2: 2}
         assert set(threading.enumerate()) <= before

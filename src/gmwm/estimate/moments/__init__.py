@@ -5,7 +5,6 @@ from gmwm.estimate.moments.gmwm import GMWM as GMWM, SimulatedMoments as Simulat
 from gmwm.estimate.moments.profile import (
     Point as Point,
     Profile as Profile,
-    compile_search as compile_search,
     search as search,
 )
 from gmwm.estimate.moments.weights import (

@@ -16,14 +16,13 @@ from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.estimate import tuning
 from gmwm.estimate.moments.design import Design
-from gmwm.estimate.problem.moments import Scales
 from gmwm.estimate.problem.nonnegative import (
     objectives_with,
     orthogonal_to,
     solve_nonnegative,
 )
 from gmwm.estimate.problem.parameters import shape_of
-from gmwm.process import GaussMarkov, Model, Process, Shape, WhiteNoise
+from gmwm.process import Model, Process, Shape
 
 _MOST = 200  # evaluations of a search
 _LARGEST = 300.0  # logarithm of an amplitude, beyond which its square overflows
@@ -139,17 +138,6 @@ class Profile:
             return self.at(own)
         z = leastsq(residuals, z0, maxfev=_MOST * z0.size, full_output=True)[0]
         return self.refine(self.at(shapes(z)))
-
-
-def compile_search() -> None:
-    """Have the loops of a search ready: where none is kept on disk, compiling them takes seconds.
-
-    Another process does it while this one reads and examines a recording.
-    """
-    model, tau = WhiteNoise() + GaussMarkov(), np.array([1.0, 2.0, 4.0, 8.0])
-    design = Design(model, Scales(tau, 1.0, 32))
-    profile = Profile(design, np.ones(4), np.eye(4))
-    profile.refine(profile.at([(), (1.0,)]))
 
 
 def search(profile: Profile, known: Sequence[Shape | None] | None = None) -> Point:
