@@ -112,6 +112,14 @@ def interpreted_pyins(monkeypatch):
 
 
 @pytest.fixture
+def closed_figures():
+    yield
+    import matplotlib.pyplot as plt
+
+    plt.close("all")
+
+
+@pytest.fixture
 def no_pages(monkeypatch):
     """Pages take most of the time of a command: tests that do not look at one go without."""
     from gmwm.calibration.calibration import Calibration

@@ -6,7 +6,6 @@ import matplotlib
 
 matplotlib.use("Agg")
 
-import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
@@ -14,6 +13,8 @@ from hypothesis import given, settings, strategies as st
 import gmwm
 from gmwm import GaussMarkov, RandomWalk, RateRamp, WhiteNoise, error_budget
 from gmwm.process import CATALOGUE
+
+pytestmark = pytest.mark.usefixtures("closed_figures")
 
 G = 9.80665
 DEG = np.pi / 180.0
@@ -26,12 +27,6 @@ ACCEL = (
     + GaussMarkov(1e-4, 300.0)
 )
 IMU = {f"{kind}_{axis}": m for kind, m in (("gyro", GYRO), ("accel", ACCEL)) for axis in "xyz"}
-
-
-@pytest.fixture(autouse=True)
-def closed():
-    yield
-    plt.close("all")
 
 
 @pytest.fixture(scope="module")

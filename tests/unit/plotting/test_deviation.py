@@ -11,11 +11,7 @@ import pytest
 import gmwm
 from gmwm import RandomWalk, WhiteNoise, plotting as plot
 
-
-@pytest.fixture(autouse=True)
-def closed():
-    yield
-    plt.close("all")
+pytestmark = pytest.mark.usefixtures("closed_figures")
 
 
 @pytest.fixture(scope="module")

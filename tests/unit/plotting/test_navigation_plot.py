@@ -1,16 +1,11 @@
-import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
 from gmwm.plotting import navigation as navigation_plot
 
+pytestmark = pytest.mark.usefixtures("closed_figures")
+
 RNG = np.random.default_rng(3)
-
-
-@pytest.fixture(autouse=True)
-def _closed():
-    yield
-    plt.close("all")
 
 
 def panel(scale=1.0, n=50):

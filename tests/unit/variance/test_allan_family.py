@@ -8,7 +8,6 @@ import matplotlib
 
 matplotlib.use("Agg")
 
-import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 from scipy.stats import binom, chi2
@@ -18,13 +17,9 @@ from gmwm import Channel, InputError, QuantizationNoise, RandomWalk, RateRamp, R
 from marks import slow
 from places import SHARED
 
+pytestmark = pytest.mark.usefixtures("closed_figures")
+
 KINDS = ("overlapping", "modified", "hadamard", "total")
-
-
-@pytest.fixture(autouse=True)
-def closed():
-    yield
-    plt.close("all")
 
 
 def noise(n, seed=0):
