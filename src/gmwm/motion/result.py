@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
+from itertools import cycle
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -306,21 +307,19 @@ class InMotion(Document, Printed):
         """
         own = [self.curve(imu, channel) for imu in self.imus]
         unit, scale = _shown(own[0].quantity)
-        kinds = {}
-        for each in own:
-            seen = each.variance > 0.0
-            value, low, high = (
-                scale * np.sqrt(np.maximum(part[seen], 0.0))
-                for part in (each.variance, each.lower, each.upper)
+        ax = plotting.allan_axes(unit, channel, ax)
+        for each, colour in zip(own, cycle(plotting.COMPONENT_COLOURS), strict=False):
+            seen = (each.variance > 0.0) & (each.lower > 0.0)
+            low, mid, high = (
+                scale * np.sqrt(part[seen]) for part in (each.lower, each.variance, each.upper)
             )
-            kinds[f"{each.imu}, in motion"] = (each.tau[seen], value, low, high)
-        for each in own:
-            known = np.isfinite(each.static)
-            if np.any(known):
-                rest = scale * np.sqrt(each.static[known])
-                kinds[f"{each.imu}, at rest"] = (each.tau[known], rest, rest, rest)
-        places = [k % len(own) for k in range(len(kinds))]
-        return plotting.deviations(kinds, unit=unit, places=places, title=channel, ax=ax)
+            ax.fill_between(each.tau[seen], low, high, color=colour, alpha=0.25, linewidth=0.0)
+            ax.plot(each.tau[seen], mid, "o-", color=colour, markersize=3.0, label=each.imu)
+            if np.any(np.isfinite(each.static)):
+                rest, label = scale * np.sqrt(each.static), "at rest" if each is own[0] else None
+                ax.plot(each.tau, rest, "--", color=plotting.DATA_COLOUR, label=label)
+        ax.legend(fontsize="small", framealpha=0.9)
+        return ax
 
     def report(self, path: str | os.PathLike[str]) -> Path:
         """Write a page of curves, factors, vibration and numbers; HTML that needs no network.

@@ -4,6 +4,7 @@ from gmwm.plotting.deviation import (
     COMPONENT_COLOURS as COMPONENT_COLOURS,
     DATA_COLOUR as DATA_COLOUR,
     SUM_COLOUR as SUM_COLOUR,
+    allan_axes as allan_axes,
     boxes as boxes,
     curves as curves,
     deviation as deviation,

@@ -64,11 +64,10 @@ def deviation(
     value, lower, upper: (J,), deviations and the ends of their intervals, in ``unit``.
     interval: Level of the intervals, for the legend.
     """
-    ax = ax or _new_axes(4.6)
+    ax = allan_axes(unit, title, ax)
     bars = np.stack([np.maximum(value - lower, 0.0), np.maximum(upper - value, 0.0)])
     style: dict[str, Any] = {"color": DATA_COLOUR, "capsize": 2.5, "elinewidth": 1.0, "zorder": 4}
     ax.errorbar(tau, value, bars, fmt="o", ms=4.5, label=f"data, {interval} interval", **style)
-    _label(ax, f"Allan deviation [{unit}]", title)
     return ax
 
 
@@ -108,6 +107,13 @@ def deviations(
     ax.set_ylim(np.min(every[every > 0.0]) / _MARGIN, np.max(every) * _MARGIN)
     _label(ax, f"deviation [{unit}]", title)
     ax.legend(fontsize="small", framealpha=0.9, title=f"bars: {interval} intervals")
+    return ax
+
+
+def allan_axes(unit: str, title: str = "", ax: Axes | None = None) -> Axes:
+    """Given axes or new ones, for Allan deviations."""
+    ax = ax or _new_axes(4.6)
+    _label(ax, f"Allan deviation [{unit}]", title)
     return ax
 
 
@@ -187,7 +193,7 @@ def model_set(
     lines: Label -> deviations, (J,).
     lowest: Deviation at which all of them are flat.
     """
-    ax = ax or _new_axes(4.6)
+    ax = allan_axes(unit, title, ax)
     ax.fill_between(tau, models.min(0), models.max(0), color="#808080", alpha=0.3, lw=0,
                     label="models that agree")  # fmt: skip
     ax.plot(tau, models.T, color="#808080", linewidth=0.5)
@@ -195,7 +201,6 @@ def model_set(
         ax.plot(tau, value, _DASHES[turn % len(_DASHES)], color=colour, linewidth=1.8, label=label)
     ax.axhline(lowest, color=DATA_COLOUR, linewidth=1.0, linestyle=":", label="lowest deviation")
     ax.set_ylim(lowest / 3.0, 1.5 * float(models.max(0)[0]))
-    _label(ax, f"Allan deviation [{unit}]", title)
     ax.legend(fontsize="small", framealpha=0.9)
     return ax
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator, Mapping, Sequence
-from itertools import cycle
 from pathlib import Path
 from typing import Any
 
@@ -183,35 +182,18 @@ def write_motion_report(found: InMotion, path: str | os.PathLike[str]) -> Path:
     )
 
 
-def _axes(value: str, title: str) -> tuple[Any, Any]:
+def _curves(found: InMotion, channel: str) -> str:
     import matplotlib.pyplot as plt
 
     figure, ax = plt.subplots(figsize=_SIZE, layout="constrained")
-    ax.set(xlabel="averaging time [s]", ylabel=value, title=title, xscale="log", yscale="log")
-    ax.grid(True, which="major", color="#dddddd", linewidth=0.6)
-    return figure, ax
-
-
-def _curves(found: InMotion, channel: str) -> str:
-    """Deviations of a channel of each IMU with their 95 % bands, and the one at rest."""
-    quantity = channel.partition("_")[0]
-    unit, scale = customary_unit("u", quantity, "u")
-    figure, ax = _axes(f"Allan deviation [{unit}]", channel)
-    own = [found.curve(imu, channel) for imu in found.imus]
-    for each, colour in zip(own, cycle(COMPONENT_COLOURS), strict=False):
-        seen = (each.variance > 0.0) & (each.lower > 0.0)
-        low, mid, high = (scale * np.sqrt(v[seen]) for v in (each.lower, each.variance, each.upper))
-        ax.fill_between(each.tau[seen], low, high, color=colour, alpha=0.25, linewidth=0.0)
-        ax.plot(each.tau[seen], mid, color=colour, marker="o", markersize=3.0, label=each.imu)
-    if np.any(np.isfinite(own[0].static)):
-        rest = scale * np.sqrt(own[0].static)
-        ax.plot(own[0].tau, rest, color=DATA_COLOUR, linestyle="--", label="at rest")
-    ax.legend(fontsize="small", framealpha=0.9)
+    found.plot(channel, ax=ax)
     return svg(figure)
 
 
 def _ranges(found: InMotion, name: str, value: str, level: float, text: str) -> dict[str, str]:
     """By sensor, the median and range over IMUs and axes of what curves have, and a level."""
+    import matplotlib.pyplot as plt
+
     tau, pictures = found.curves[0].tau, {}
     for sensor in found.sensors:
         rows = np.array([getattr(c, name) for c in found.curves if c.quantity == sensor])
@@ -219,7 +201,9 @@ def _ranges(found: InMotion, name: str, value: str, level: float, text: str) -> 
         if not np.any(known):
             continue
         low, mid, high = (np.nanquantile(rows[:, known], q, axis=0) for q in (0.0, 0.5, 1.0))
-        figure, ax = _axes(value, sensor)
+        figure, ax = plt.subplots(figsize=_SIZE, layout="constrained")
+        ax.set(xlabel="averaging time [s]", ylabel=value, title=sensor, xscale="log", yscale="log")
+        ax.grid(True, which="major", color="#dddddd", linewidth=0.6)
         ax.fill_between(tau[known], low, high, color=COMPONENT_COLOURS[0], alpha=0.25, linewidth=0)
         ax.plot(tau[known], mid, color=COMPONENT_COLOURS[0], marker="o", markersize=3.0)
         ax.axhline(level, color=DATA_COLOUR, linestyle="--", linewidth=1.0)
