@@ -73,8 +73,6 @@ SHARED_TAU_WITHIN = 0.1  # Of its logarithm: the score of six axes is flat to 0.
 
 REGION_DRAWS = 300  # Models drawn from a region, starts of the searches for the largest densities
 REGION_POINTS = 8  # Frequencies a decade at which the largest density is searched
-# Such frequencies within the width of the narrowest resonance of a region:
-REGION_POINTS_OF_PEAK = 16
 REGION_STEP = 1e-6  # Of the way to the end of a parameter, for the slope of a density
 REGION_SEED = 1  # Of those draws: the same region has the same numbers
 ENVELOPE = 1.02  # Times the largest density found, for the gaps between the points of the search

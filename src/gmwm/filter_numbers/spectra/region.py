@@ -96,18 +96,6 @@ class ParameterRegion:
         ways = enumerate((self.root @ point).tolist())
         return self.model.with_params({self.keys[i]: self.value(i, along) for i, along in ways})
 
-    @property
-    def points_of_peak(self) -> int:
-        """Frequencies near a resonance that see the peaks of all models; the usual number at most.
-
-        The peak of damping ratio d at f is 2 d f wide, and is sought from 0.9 f to 1.1 f.
-        """
-        ratios = {p.key for p in self.model.parameters if p.parameter.name == "damping"}
-        low = [end for key, end in zip(self.keys, self.lower, strict=True) if key in ratios]
-        width = 2.0 * min(low, default=1.0)
-        points = 0.2 * tuning.REGION_POINTS_OF_PEAK / max(width, np.finfo(float).tiny)
-        return int(np.ceil(min(points, tuning.PEAK_POINTS - 1.0))) + 1
-
     def draws(self, number: int, rng: np.random.Generator) -> FloatArray:
         """Points of the ball, (number, p): half of them on its surface."""
         points = rng.standard_normal((number, len(self.keys)))
@@ -187,7 +175,7 @@ def region_spectra(
         return (RequiredSpectrum.of(region.model, dt, target.horizon), *others)
     spectrum = _Spectrum.of(region, dt)
     # Slower processes than the estimate change at lower frequencies.
-    f = target.frequencies(tuning.REGION_POINTS, region.points_of_peak)
+    f = target.frequencies(tuning.REGION_POINTS)
     f = np.append(f[0] * np.array([0.01, 0.1]), f)
     points = list(region.draws(tuning.REGION_DRAWS, np.random.default_rng(tuning.REGION_SEED)))
     densities = [spectrum.density(point, f) for point in points]

@@ -70,7 +70,7 @@ class RequiredSpectrum:
                     _line(label, f, amplitude, f < passing, unit) for f, amplitude in term.lines()
                 ]
             else:
-                band = _frequencies([term], floor, nyquist, tuning.PEAK_DECADE, tuning.PEAK_POINTS)
+                band = _frequencies([term], floor, nyquist, tuning.PEAK_DECADE)
                 density = evaluated(term.psd, band, dt)
                 high, low = float(np.max(density)), float(np.max(density[band <= fast]))
                 weight, own = _weight(band, density, low, passing)
@@ -132,11 +132,11 @@ class RequiredSpectrum:
             return 0.0
         return float((2.0 * np.pi * self.lowest) ** 2 * self.psd(np.array([self.lowest]))[0])
 
-    def frequencies(self, points: int, of_peak: int = tuning.PEAK_POINTS) -> FloatArray:
+    def frequencies(self, points: int) -> FloatArray:
         """Frequencies up to 1/(2 dt), some a decade, and more around resonances; Hz."""
         # Below the lowest there are only limits, which are as good as reached.
         below = self.lowest * np.array([1e-3, 1e-2, 1e-1])
-        f = _frequencies(self.terms, self.lowest, 0.5 / self.dt, points, of_peak)
+        f = _frequencies(self.terms, self.lowest, 0.5 / self.dt, points)
         return np.unique(np.append(below, f))
 
     def slow_variance(self, stationary: Model) -> float:
@@ -172,12 +172,10 @@ def _weight(
     return float(np.clip(within, min(near, 1.0), 1.0)), own
 
 
-def _frequencies(
-    terms: Sequence[Process], low: float, high: float, points: int, of_peak: int
-) -> FloatArray:
+def _frequencies(terms: Sequence[Process], low: float, high: float, points: int) -> FloatArray:
     """Some frequencies a decade, and more around resonances."""
     own = [
-        np.linspace(0.9, 1.1, of_peak) * (term.values[p.name] or 0.0)
+        np.linspace(0.9, 1.1, tuning.PEAK_POINTS) * (term.values[p.name] or 0.0)
         for term in terms
         for p in term.shape_parameters
         if p.unit == "Hz"
