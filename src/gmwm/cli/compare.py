@@ -257,14 +257,11 @@ def motion(
         raise InputError(f"{text}: give a file of each IMU for every flight")
     levels = None if limits is None else numbers("--limits", limits, "two levels, e.g. 1,4", 2)
     at_rest = None if static is None else Calibration.load(static)
-    flights: list[Any]
-    if reference:
-        flights = [read_recording(file, **reading) for file in files]
-    elif logs or len(files) == 1:
-        flights = [_of_log(file, **reading) for file in files]
-    else:
-        recordings = [read_recording(file, **reading) for file in files]
-        flights = [recordings[k : k + count] for k in range(0, len(files), count)]
+    is_log = not reference and (logs or len(files) == 1)
+    read_one = _of_log if is_log else read_recording
+    flights: list[Any] = [read_one(file, **reading) for file in files]
+    if not (reference or is_log):
+        flights = [flights[k : k + count] for k in range(0, len(files), count)]
     with progress_bar("motion", "flights", quiet=quiet) as bar:
         found = run(
             flights, static=at_rest, limits=levels, reference=reference or None, progress=bar

@@ -175,11 +175,6 @@ def experiment(
     return Experiment(scenario, Simulated(TABLE_6), filters, TABLE_6, runs, seed, title)
 
 
-def vehicle_of(figure: str) -> str:
-    """The vehicle of the paper's Figures 7 to 9."""
-    return "paper-car" if figure == "fig9" else "helicopter"
-
-
 def scenario_of(vehicle: str) -> Scenario:
     """The mission of a vehicle, with its outages.
 
@@ -258,7 +253,7 @@ def reproduce_figure(
         raise InputError("give two recordings or more: one to calibrate, others to navigate with")
     first = recordings[0] if recordings else static_recording(seed)
     check_channels(figure, [first], AXES)
-    vehicle = vehicle_of(figure)
+    vehicle = "paper-car" if figure == "fig9" else "helicopter"
     planned = experiment(vehicle, Calibrated.of(first), runs or _RUNS, seed, recordings)
     validation = Validation.of(
         planned,
