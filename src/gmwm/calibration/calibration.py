@@ -243,6 +243,9 @@ class Calibration(ByName[Fit], Document):
         for name, fit in self.fits.items():
             if fit.wv.name != name:
                 raise ValueError(f"the fit of {name} is of channel {fit.wv.name!r}")
+        fastest = max((1.0 / fit.wv.dt for fit in self.fits.values()), default=self.rate)
+        if not self.skipped and abs(fastest / self.rate - 1.0) > 1e-3:
+            raise ValueError(f"rate_hz is {self.rate:g}, but its channels have {fastest:g} Hz")
 
     def beside(self, path: Path) -> Calibration:
         files = ", ".join(of_other_runs(path, COMPANIONS))

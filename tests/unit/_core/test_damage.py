@@ -175,17 +175,19 @@ def test_threads_side_by_side_have_one_pool():
     assert sum(pool is not None for pool in pools) == 1
 
 
-@pytest.mark.parametrize(("edit", "message"), [
-    ("swapped", "the fit of gyro_x is of channel 'accel_x'"), ("covariance", "stderr of N"),
+@pytest.mark.parametrize(("keys", "value", "message"), [
+    (("channels", "gyro_x", "wavelet_variance", "name"), "accel_x", "is of channel 'accel_x'"),
+    (("channels", "gyro_x", "covariance"), [[4.0]], "stderr does not follow"),
+    (("channels", "gyro_x", "valid"), False, "valid does not follow"),
+    (("channels", "gyro_x", "upper_bounds"), {"R": 1e-3}, "upper_bounds are not those"),
+    (("rate_hz",), 1.0, "rate_hz is 1, but its channels have"),
 ])  # fmt: skip
-def test_an_edited_calibration_is_rejected(calibration, tmp_path, edit, message):
-    content = calibration.to_dict()
-    (fits,) = (each for each in content.values() if isinstance(each, dict) and "gyro_x" in each
-               and "covariance" in each["gyro_x"])  # fmt: skip
-    if edit == "swapped":
-        fits["gyro_x"] = fits["accel_x"]
-    else:
-        fits["gyro_x"]["covariance"] = [[4.0 * fits["gyro_x"]["covariance"][0][0]]]
+def test_an_edited_calibration_is_rejected(calibration, tmp_path, keys, value, message):
+    content = edited = calibration.to_dict()
+    for key in keys[:-1]:
+        edited = edited[key]
+    assert edited[keys[-1]] != value
+    edited[keys[-1]] = value
     path = tmp_path / "edited.json"
     path.write_text(json.dumps(content))
     with pytest.raises(InputError, match=message):

@@ -467,19 +467,27 @@ class Fit(Document, Printed):
     def check_content(self) -> None:
         if self.model.is_open or len({*self.keys}) != len(self.keys):
             raise ValueError("its model has open parameters, or a key stands twice")
-        if not {*self.keys} <= {*self.params}:
-            raise ValueError("keys are not those of parameters")
+        if not {*self.keys, *self.upper_bounds} <= {*self.params}:
+            raise ValueError("keys or upper_bounds are not those of parameters")
         check_covariance(self.covariance.tolist(), len(self.keys))
 
     @classmethod
     def from_content(cls, content: Mapping[str, Any]) -> Self:
         found = super().from_content(content)
-        if content["params"] != found.params:
-            raise InputError(f"its parameters are not those of its model {found.model!r}")
-        for key, error in content.get("stderr", {}).items():
-            if not np.isclose(error, found.stderr[key], rtol=1e-6, atol=0.0, equal_nan=True):
-                raise InputError(f"stderr of {key} = {error} is not that of its covariance")
+        for name, value in found.derived().items():
+            if not _is_alike(content.get(name, value), value):
+                raise InputError(f"{name} does not follow from the other entries: change those")
         return found
+
+
+def _is_alike(given: Any, value: Any) -> bool:
+    """Whether JSON is equal but for the last digits of numbers."""
+    if isinstance(value, dict):
+        same_keys = isinstance(given, dict) and given.keys() == value.keys()
+        return same_keys and all(_is_alike(given[key], each) for key, each in value.items())
+    if isinstance(value, float):
+        return checks.is_number(given) and bool(np.isclose(given, value, 1e-6, 0.0, equal_nan=True))
+    return bool(given == value)
 
 
 def _p_value(statistic: float, dof: int) -> float:
