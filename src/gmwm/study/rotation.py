@@ -57,9 +57,9 @@ class Interval:
     lower: float
     upper: float
 
-    def text(self, dash: str) -> str:
+    def __str__(self) -> str:
         """Value and ends in three digits, without an exponent."""
-        return f"{_short(self.value)} ({_short(self.lower)}{dash}{_short(self.upper)})"
+        return f"{_short(self.value)} ({_short(self.lower)}-{_short(self.upper)})"
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,7 +167,7 @@ class Rotation:
         blocks = [self._head()]
 
         def add(title: str, heads: list[str], row: Callable[[str], list[Interval]]) -> None:
-            rows = [[name, *(each.text("-") for each in row(name))] for name in self.names]
+            rows = [[name, *(str(each) for each in row(name))] for name in self.names]
             blocks.append([*wrapped(title), plain_table(("filter", *heads), rows)])
 
         add(
@@ -201,20 +201,6 @@ class Rotation:
         for i, (source, size) in enumerate(zip(self.sources, self.stretches, strict=True)):
             lines += wrapped(f"{source}, {size} stretches", f"{i + 1} ", 2)
         return lines + bullets(self.notices)
-
-    def markdown(self) -> str:
-        """All calibrated recordings together, as a table for a page."""
-        groups = ("horizontal", "vertical", "position")
-        head = ["filter", "horizontal error against GMWM", *(f"NEES {each}" for each in groups)]
-        rows = []
-        for name in self.names:
-            ratio = "1" if name == FIRST else self.ratio(name, "horizontal").text(" to ")
-            judged = [self.nees(name, each).text(" to ") for each in groups]
-            shares = [self.coverage(name, each).value for each in groups[:2]]
-            rows.append([name, ratio, *judged, *(f"{100.0 * each:.0f} %" for each in shares)])
-        heads = [*head, "within 95 %: horizontal", "vertical"]
-        lines = [heads, ["---"] * len(heads), *rows]
-        return "\n".join("| " + " | ".join(line) + " |" for line in lines)
 
     def plot(self) -> Figure:
         """Ratio of horizontal errors and NEES of each filter: every turn, and all together."""
@@ -350,9 +336,7 @@ def reproduce_rotation(
     vehicle = "car" if figure == "fig9" else "helicopter"
     rotation = rotate(vehicle, recordings, folder, earlier=earlier, **options)
     text, stem = str(rotation), folder / f"{figure}-rotated"
-    contents = {".txt": text, ".md": rotation.markdown()}
-    paths = [write_text(stem.with_suffix(end), each) for end, each in contents.items()]
-    return text, [*paths, *saved(rotation.plot(), stem)]
+    return text, [write_text(stem.with_suffix(".txt"), text), *saved(rotation.plot(), stem)]
 
 
 def _filters(
