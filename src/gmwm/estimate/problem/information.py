@@ -67,21 +67,14 @@ def _relative(slopes: FloatArray, density: FloatArray) -> FloatArray:
     return np.divide(slopes, density, out=np.zeros_like(slopes), where=density > 0.0)
 
 
-def _log_slopes(
-    coordinates: Coordinates, processes: Sequence[Process], f: FloatArray, dt: float
-) -> FloatArray:
-    """Slopes d log S / d z at ``f`` (Hz), (len(f), d)."""
-    own, rows = _slopes(coordinates, processes, f, dt)
-    return _relative(rows, np.sum(own, axis=0)).T
-
-
 def spectral_information(
     coordinates: Coordinates, processes: Sequence[Process], n: int, dt: float
 ) -> FloatArray:
     """Expected information of z, (d, d)."""
     f, weight = frequency_nodes(n, dt)
-    scaled = _log_slopes(coordinates, processes, f, dt)
-    return np.asarray(scaled.T @ (weight[:, None] * scaled))
+    own, rows = _slopes(coordinates, processes, f, dt)
+    scaled = _relative(rows, np.sum(own, axis=0))
+    return np.asarray((weight * scaled) @ scaled.T)
 
 
 def information_with(
