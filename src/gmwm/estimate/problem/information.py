@@ -99,6 +99,7 @@ def information_with(
     return information
 
 
+@np.errstate(divide="ignore", invalid="ignore")  # no noise, or a value beyond its own steps
 def error_growth(model: Model, keys: Sequence[str], n: int, dt: float) -> dict[str, float]:
     """Exponents with which the relative standard errors of positive parameters grow, by key.
 
@@ -110,8 +111,7 @@ def error_growth(model: Model, keys: Sequence[str], n: int, dt: float) -> dict[s
     if not names or not all(process.has_spectrum() for process in processes):
         return {}
     positive = {i.key for i in model.parameters if i.parameter.lower == 0.0}
-    with np.errstate(divide="ignore", invalid="ignore"):  # where there is no noise at all
-        covariance = _covariance(coordinates, processes, n, dt)
+    covariance = _covariance(coordinates, processes, n, dt)
     if covariance is None:
         return {}
     z = coordinates.pack(processes)
