@@ -118,6 +118,7 @@ def _groups(fleet: Fleet) -> list[dict[str, Any]]:
 def _strip(spreads: Sequence[Spread]) -> str:
     """A row an axis, a point a unit; those that stand apart farthest have their names."""
     import matplotlib.pyplot as plt
+    from matplotlib.ticker import LogLocator, NullLocator
 
     size = (_SIZE[0], 0.5 + 0.35 * len(spreads))
     figure, ax = plt.subplots(figsize=size, layout="constrained")
@@ -139,7 +140,12 @@ def _strip(spreads: Sequence[Spread]) -> str:
         ax.vlines(scale * each.median, *ends, color=SUM_COLOUR)
         if scale * each.normal_limit < _FARTHEST * high:
             ax.vlines(scale * each.normal_limit, *ends, color=COMPONENT_COLOURS[1], linestyle="--")
-    ax.set_xscale("log" if high > 10.0 * low else "linear")
+    if high > 10.0 * low:
+        subs = (1.0,) if high > 100.0 * low else (1.0, 2.0, 5.0)
+        ax.set_xscale("log")
+        ax.xaxis.set_major_locator(LogLocator(subs=subs))
+        ax.xaxis.set_major_formatter("{x:g}")
+        ax.xaxis.set_minor_locator(NullLocator())
     ax.set_yticks(range(len(spreads)), [literal(each.channel) for each in spreads])
     ax.set_ylim(len(spreads) - 0.5, -0.5)
     ax.grid(True, axis="x", color="#dddddd", linewidth=0.6)
@@ -293,7 +299,7 @@ def _curves(
     """
     import matplotlib.pyplot as plt
 
-    margins = {"left": 0.16, "right": 0.98, "bottom": 0.12, "top": 0.98, "hspace": 0.08}
+    margins = {"left": 0.16, "right": 0.98, "bottom": 0.15, "top": 0.98, "hspace": 0.08}
     figure, (top, bottom) = plt.subplots(
         2, figsize=_SIZE, sharex=True, height_ratios=(5, 2), gridspec_kw=margins
     )
