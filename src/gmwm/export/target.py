@@ -22,7 +22,7 @@ from gmwm._core.typing import FloatArray
 from gmwm._core.units import SI_UNIT
 from gmwm.calibration import Calibration
 from gmwm.errors import InputError
-from gmwm.export.imu import ImuNumbers, imu_of, numbers_for
+from gmwm.export.imu import ImuNumbers, Triad, imu_of, numbers_for
 from gmwm.filter_numbers import FORMS, usable
 from gmwm.process import GaussMarkov, Model, WhiteNoise
 
@@ -210,6 +210,7 @@ def notes(imu: ImuNumbers, title: str, caution: str) -> list[str]:
     covers = "; ".join(f"{axis.name} {axis.covers}" for axis in slow if axis.covers)
     notices = [n for triad in imu.triads for axis in triad.axes for n in axis.notices]
     is_short = any(n.code == "short-horizon" for n in notices)
+    is_beyond = any(_has(triad, "beyond-record") for triad in imu.triads)
     unlikely = dict.fromkeys(n.where for n in notices if n.code == "unlikely-sheet")
     lines = [
         f"{title}: {' and '.join(imu.sources)}",
@@ -218,6 +219,7 @@ def notes(imu: ImuNumbers, title: str, caution: str) -> list[str]:
         f"with reservation, steps or drifts may recur: {', '.join(imu.reserved)}"
         if imu.reserved
         else "",
+        "record too short: use N alone, not K and the start bias" if is_beyond else "",
         "do not use: below a second N and K describe the sensor's low-pass" if is_short else "",
         f"unlikely, check the units of the sheet: {', '.join(unlikely)}" if unlikely else "",
         caution,
@@ -230,6 +232,10 @@ def notes(imu: ImuNumbers, title: str, caution: str) -> list[str]:
         else "",
     ]
     return [_fitting(line) for line in lines if line][:MOST]
+
+
+def _has(triad: Triad, code: str) -> bool:
+    return any(notice.code == code for axis in triad.axes for notice in axis.notices)
 
 
 def not_valid_line(invalid: Mapping[str, str]) -> str:
@@ -380,6 +386,8 @@ class ImuFile(Target):
             unit = f"({unit})^2" if keys.power == 2 else unit
             if any(axis.name in imu.invalid for axis in triad.axes):
                 unit += ", do not use: not valid"
+            elif letter == "K" and _has(triad, "beyond-record"):
+                unit += ", do not use: record too short"
             lines.append(self.line.format(key=key, value=value, unit=unit))
             if value > self.most.get(key, value):
                 beyond.append(f"{self.mark} {self.title} takes at most {self.most[key]:g} as {key}")

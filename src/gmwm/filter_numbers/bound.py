@@ -360,6 +360,8 @@ def fit_notices(axis: AxisModel, level: float | None, horizon: float) -> list[No
         return found
     if not axis.fit.valid:
         found.append(notice("fit-not-valid"))
+    if (longest := float(axis.fit.wv.tau[-1])) < horizon:
+        found.append(notice("beyond-record", "", {"longest": longest, "horizon": horizon}))
     if axis.bias_sd == 0.0:
         found.append(notice("turn-on-left-out"))
     if level is None:

@@ -98,6 +98,13 @@ class Cause:
     K_factor: _OrNaN
 
 
+_DOUBTS = {
+    "fit-not-valid": "the error model is not valid",
+    "beyond-record": "the record is too short for this horizon",
+}
+"""Codes of notices about the error model -> why the advice may be wrong for the axis."""
+
+
 @dataclass(frozen=True, repr=False)
 class Certificate(Document, InUnits):
     """How consistent a filter will be with given numbers, and why.
@@ -255,6 +262,13 @@ class Certificate(Document, InUnits):
             text = f"{kinds}: {row} is less than half of those in use, and as safe: {values} (SI)"
         else:
             text = "keep the numbers"
+        for code, why in _DOUBTS.items():
+            found = [
+                name
+                for name, axis in self.recommended.items()
+                if any(each.code == code for each in axis.notices)
+            ]
+            text += f". Do not rely on {', '.join(found)}: {why}" if found else ""
         return wrapped(text, first="- ", indent=2)
 
 

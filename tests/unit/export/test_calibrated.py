@@ -414,3 +414,11 @@ def test_the_topic_is_that_of_the_bag_where_it_is_one(calibration, topics, expec
     text = gmwm.export(replace(calibration, notices=(*calibration.notices, *found)), "kalibr")
     assert yaml.safe_load(text)["rostopic"] == expected
     assert ("set to the topic of your bag" in text) is (expected == "/imu0")
+
+
+def test_K_of_a_record_shorter_than_the_outage_is_not_for_use(calibration, text):
+    """Terminal and page said so, the file and the certificate did not."""
+    lines = [line for line in text.splitlines() if line.endswith("do not use: record too short")]
+    assert [line.split(":")[0] for line in lines] == [NUMBERS[1], NUMBERS[3]]
+    certificate = gmwm.certify(calibration, {"gyro": (N_GYRO, K_GYRO), "accel": (N_ACCEL, 1e-6)})
+    assert "record is too short for this horizon" in " ".join(certificate.text().split())
