@@ -29,7 +29,8 @@ def health(calibration: Calibration) -> dict[str, Any]:
     found = findings(calibration)
     _, _, least = _worst(calibration, SHOWN) or ("", 0.0, np.inf)
     words = [
-        f"That part is {size} for {SHOWN:g} s outages." for size in ("too short", "long enough")
+        f"There, a deviation at {SHOWN:g} s is known less well than to +-{100.0 * _AIM:g} %.",
+        f"That part is long enough for {SHOWN:g} s outages.",
     ]
     return {
         "examined": examined,
@@ -177,10 +178,11 @@ def known_at(fit: Fit, tau: float, rivals: Sequence[Model] = ()) -> float:
 
 
 def _worst(calibration: Calibration, horizon: float) -> tuple[str, float, float] | None:
-    """Channel whose curve is known worst at a horizon, its error, and the length (s) for `_AIM`."""
+    """Valid channel that is known worst at a horizon, its error, and the length (s) for `_AIM`."""
     errors = {
         name: known_at(fit, horizon, calibration.rivals.get(name, ()))
         for name, fit in calibration.items()
+        if fit.valid
     }
     known = {name: each for name, each in errors.items() if np.isfinite(each)}
     if not known:
@@ -196,14 +198,15 @@ def length_sentence(calibration: Calibration, horizon: float) -> str:
     if found is None:
         return ""
     worst, error, least = found
-    covered = not is_short(calibration.values(), horizon)
+    if is_short(calibration.values(), horizon):  # what is beyond the curve tells no length
+        return f"too short for {horizon:g} s outages: record an hour or more"
     share, text = per_cent(error), duration_text(least)
-    if least <= calibration.duration and covered:
+    if least <= calibration.duration:
         return (
             f"long enough for {horizon:g} s outages: {worst} is known to +-{share} there; {text} "
             f"would give +-{100.0 * _AIM:g} %"
         )
-    if covered and error > _AIM:
+    if error > _AIM:
         aim = f"for +-{100.0 * _AIM:g} % record {text} in all"
         return f"{worst}'s deviation at {horizon:g} s is known to +-{share}; {aim}"
     return f"too short for {horizon:g} s outages: record {text}"
