@@ -56,6 +56,7 @@ FOUND = [
     ("document", 41, 1335),  # an efficiency of next to nothing
     ("document", 4320, 1668),  # a certificate whose axes have checks at other times
     ("document", 88001, 4693),  # a notice with a count of more digits than a number has
+    ("document", 92001, 42166),  # a bin of next to no ordinates
     ("document", 92001, 5979),  # a parameter that its own steps do not move
     ("document", 41, 4884),  # more degrees of freedom than numbers have digits
 ]

@@ -61,8 +61,8 @@ class Periodogram:
             raise ValueError("the spectrum has a bin that is not positive, or too large")
         if np.any(np.diff(self.centre, append=0.5) <= 0.0):
             raise ValueError("the frequencies of the spectrum do not rise to half the rate")
-        if np.any(self.block != np.rint(self.block)):
-            raise ValueError("the spectrum has blocks of parts of samples")
+        if np.any(self.block != np.rint(self.block)) or np.any(self.count < 1.0):
+            raise ValueError("the spectrum has blocks of parts of samples, or bins of no ordinate")
 
     def psd(self, f: FloatArray, dt: float) -> FloatArray:
         """Two-sided spectrum, u^2/Hz."""
