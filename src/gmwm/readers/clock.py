@@ -75,7 +75,7 @@ def mean_rate(stamps: FloatArray, seconds: float | None) -> float | None:
     """Rate (Hz) of the rows over the time that they cover, in the digits that are sure.
 
     It is that of most parts of the recording: a gap, or a clock that is set, changes that of one.
-    None if fewer than half have the same, or without a unit (s) where it is no rate of a sensor.
+    None if fewer than half have the same, or without a unit (s) where no sensor has such a rate.
     """
     there = np.flatnonzero(~np.isnan(stamps))
     if there.size < 2:

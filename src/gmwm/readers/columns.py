@@ -282,7 +282,7 @@ def channel_units(
         given = units.get(channel, units.get(sensor))
         unit = given if given is not None else header.unit
         if unit is None:
-            other = f" ({header.stated!r} is no unit of it)" if header.stated else ""
+            other = f" ({header.stated!r} does not fit)" if header.stated else ""
             missing.setdefault(sensor or channel, channel + other)
             continue
         try:

@@ -186,7 +186,7 @@ def test_unit_missing(write, samples, option, quantity):
     with pytest.raises(InputError) as caught:
         read(write(samples, HEADER.replace("x", "x [m]")), rate=1, units=units)
     message = str(caught.value)
-    assert f"does not give the unit of {quantity}_x ('m' is no unit of it):" in message
+    assert f"does not give the unit of {quantity}_x ('m' does not fit):" in message
     assert f'units={{"{quantity}": "{option}"}}' in message
     assert caught.value.code == f"{quantity}-unit-missing"
 
