@@ -68,7 +68,7 @@ def main(truths: int, runs: int) -> None:
                 continue
             believed, needed = (m.haar_variance(WITHIN, dt) for m in (numbers, truth))
             below += bool(np.any(believed < needed))
-    print("tau, s  records    alone  with what is open    width, median")
+    print("tau, s  records    alone  with the process     width, median")
     for k, tau in enumerate(TIMES):
         count = len(growth[k])
         alone, open_ = 100.0 * held[:, k] / count
