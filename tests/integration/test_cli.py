@@ -409,7 +409,7 @@ def test_what_is_missing_is_asked_for_at_once(run, tmp_path, no_pages):
         (("--model", "N + N"), "two WhiteNoise"),
         (("--model", "0 N"), "is not a term"),
         (("--model", "gyro=N"), "no model is given for channel 'accel_z': give e.g. --model"),
-        (("--model", "mag=N"), "the channels are gyro_x, gyro_y, accel_z"),
+        (("--model", "mag=N"), "choose a channel from gyro_x, gyro_y, accel_z"),
         (("--model", "N", "--model", "K"), "give one"),
     ],
     ids=str,

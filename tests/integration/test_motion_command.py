@@ -120,7 +120,7 @@ def test_command_gives_numbers_of_a_class(run, files, no_pages):
     assert "largest axis and IMU, SI" in out
     code, out, error = run("export", "low.json", "--to", "kalibr")
     assert (code, error) == (0, "")
-    assert "N+K for outages up to 1 s (motion)" in out
+    assert "N+K for outages up to 1 s, motion" in out
     code, _, error = run("motion", *files, "--at", "rest")
     assert (code, error) == (2, "gmwm: no class 'rest': there are low, middle, high\n")
     code, _, error = run("motion", *files, "--limits", "3,x")

@@ -156,4 +156,4 @@ def real_numbers(values: Any, where: str) -> FloatArray:
     except InputError:
         raise
     except (TypeError, ValueError, OverflowError):
-        raise InputError(f"{where} holds something that is not a number") from None
+        raise InputError(f"{where} holds something that is not a number: correct it") from None

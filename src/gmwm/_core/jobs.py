@@ -284,7 +284,7 @@ def _client(address: str) -> Any:
         get_backend(parse_address(address)[0])
         return Client(address, timeout="10s")
     except (OSError, TypeError, ValueError) as error:  # TypeError: tls:// without certificates
-        raise InputError(f"no Dask scheduler answers at {address!r} ({error})") from None
+        raise InputError(f"no Dask scheduler answers at {address!r} ({error}): start one") from None
 
 
 _lock = Lock()

@@ -429,8 +429,8 @@ def without_departures(recording: Recording, fits: Mapping[str, Fit]) -> Recordi
     for name, fit in fits.items():
         if name in recording and fit.wv.n * fit.wv.dt > recording.duration + recording.dt:
             raise InputError(
-                f"{recording.source or 'the recording'} is not the one that was calibrated: it has "
-                f"{recording.duration:g} s, but the fit of {name} {fit.wv.n * fit.wv.dt:g} s"
+                f"{recording.source or 'the recording'} has {recording.duration:g} s, but the fit "
+                f"of {name} {fit.wv.n * fit.wv.dt:g} s: give the recording that was calibrated"
             )
     channels = []
     for channel in recording.channels:

@@ -95,7 +95,7 @@ def screened(recording: Recording, chosen: Collection[str] = SCREENING) -> Scree
     for name in chosen:
         if name not in SCREENING:
             known = ", ".join(SCREENING)
-            raise InputError(f"screening for {name!r} is unknown: there are {known}")
+            raise InputError(f"screening for {name!r} is unknown: choose from {known}")
     if not chosen:
         return Screened(recording, {}, notices=recording.notices)
     found = health(recording)

@@ -145,7 +145,7 @@ def calibrate(
         for name in models:
             if not any(name in (each, each.partition("_")[0], "") for each in quantities):
                 channels = ", ".join(quantities)
-                raise InputError(f"--model {name}=...: the channels are {channels}")
+                raise InputError(f"--model {name}=...: choose a channel from {channels}")
         if datasheet is not None:  # rejected before the work
             read_datasheet(datasheet, quantities)
         with progress_bar("calibrating", "channels", quiet=quiet) as bar:

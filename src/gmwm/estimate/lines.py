@@ -234,9 +234,8 @@ def _given_runs(
         levels = np.flatnonzero(inside & (wv.variance > 0.0))
         if levels.size == 0:
             raise InputError(
-                f"regions: no averaging time lies between {first:g} and {last:g} s ({key}): there "
-                f"are {wv.tau.size}, from {wv.tau[0]:g} to {wv.tau[-1]:g} s, each twice the one "
-                "before"
+                f"regions: no averaging time lies between {first:g} and {last:g} s ({key}): choose "
+                f"from {wv.tau[0]:g} to {wv.tau[-1]:g} s, at least a factor of two apart"
             )
         runs[key] = _Run(int(levels[0]), int(levels[-1]))
     return runs

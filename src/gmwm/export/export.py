@@ -265,7 +265,7 @@ def _triads(curves: Curves) -> dict[str, tuple[list[BiasCurve], float, float]]:
         for each in own.values():
             if each.main is None or each.main.unit != "degC":
                 raise InputError(
-                    f"the curve of {each.name} is not one against a temperature in degC"
+                    f"the curve of {each.name} is not against degC: calibrate with a temperature"
                 )
             if each.degree > _CUBIC:
                 raise InputError(

@@ -203,7 +203,7 @@ def comment(lines: Sequence[str], mark: str) -> list[str]:
 
 def notes(imu: ImuNumbers, title: str, caution: str) -> list[str]:
     """The lines of comment in a file: what the numbers are, for what, and what to mind."""
-    how = f" ({imu.method})" if imu.method in ("reduce", "motion") else ""
+    how = f", {imu.method}" if imu.method in ("reduce", "motion") else ""
     purpose = f"{imu.form} for outages up to {imu.horizon:g} s{how}"
     upper = [f"{t.quantity} {k}" for t in imu.triads for k in ("N", "K", "sigma") if t.is_upper(k)]
     slow = [triad.slowest for triad in imu.triads]
@@ -214,7 +214,7 @@ def notes(imu: ImuNumbers, title: str, caution: str) -> list[str]:
     unlikely = dict.fromkeys(n.where for n in notices if n.code == "unlikely-sheet")
     lines = [
         f"{title}: {' and '.join(imu.sources)}",
-        f"{purpose}; for details: gmwm export --explain",
+        f"{purpose}; see gmwm export --to NAME --explain",
         not_valid_line(imu.invalid) if imu.invalid else "",
         f"with reservation, steps or drifts may recur: {', '.join(imu.reserved)}"
         if imu.reserved
@@ -390,7 +390,8 @@ class ImuFile(Target):
                 unit += ", do not use: record too short"
             lines.append(self.line.format(key=key, value=value, unit=unit))
             if value > self.most.get(key, value):
-                beyond.append(f"{self.mark} {self.title} takes at most {self.most[key]:g} as {key}")
+                limit = f"{self.title} takes at most {self.most[key]:g} as {key}: enter that"
+                beyond.append(f"{self.mark} {limit}")
         return "\n".join([*lines[2:], *lines[:2], *beyond])
 
     def text(self, imu: ImuNumbers) -> str:
@@ -412,7 +413,7 @@ class ImuFile(Target):
             parts.append("The same for all axes of a sensor, as in the file:")
             own = [each for each in given if isinstance(each, Calibration)]
             parts += [usable(each, self.form, imu.horizon, shared=True).text("si") for each in own]
-            parts.append("Each axis by itself, which the file does not hold:")
+            parts.append("Each axis by itself (not in the file):")
         sources = numbers_for(given, self.form, horizon, self.one_tau)
         return "\n\n".join([*parts, *(each.text("si") for each in sources)]) + "\n"
 

@@ -102,7 +102,7 @@ def bound(
     if level is not None:
         level = checks.share("level", level, 0.95)
         if any(axis.fit is None for axis in axes.axes):
-            raise InputError("level needs a fit: leave it out, a model has no confidence region")
+            raise InputError("level needs a fit, a model has no confidence region: leave level out")
     if isinstance(tau, str):
         tau = _shared_time(axes.sharing(shared), form, horizon, level)
     given = (form, horizon, level, tau)

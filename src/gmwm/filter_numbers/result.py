@@ -32,9 +32,10 @@ UNITS = ("field", "si")
 
 _UNITS = {"N": "u/sqrt(Hz)", "K": "u/s/sqrt(Hz)", "sigma": "u", "tau": "s", "initial_sd": "u"}
 _NAN = float("nan")
+_HALF = 1.96  # standard errors: half of a 95 % interval
 _PREDICTION = (
-    "NEES: predicted, per degree of freedom, after a time without aiding; sd: predicted over true "
-    "standard deviation then."
+    "NEES: predicted, per degree of freedom, after an outage of that length; sd: predicted over "
+    "true standard deviation."
 )
 
 
@@ -164,8 +165,10 @@ class AxisFilterNumbers(Document, InUnits):
         lines = [f"{self.form} for {self.horizon:g} s, {self.method}"]
         for key, value in self._shown().items():
             unit, per_si = shown_unit(key, self.quantity, units)
-            error = f" +- {self.stderr[key] * per_si:.2g}" if key in self.stderr else ""
-            lines.append(f"  {key:<10} {value * per_si:>11.4g}{error} {unit}")
+            shown = f"{value * per_si:>11.4g} {unit}"
+            if key in self.stderr:
+                shown += f", +-{_HALF * self.stderr[key] * per_si:.2g} (95 %)"
+            lines.append(f"  {key:<10} {shown}")
         for each in self.predicted:
             lines.append(
                 f"  after {each.time:g} s without aiding: NEES {each.nees:.3g} per degree of "
@@ -267,7 +270,7 @@ class FilterNumbers(ByName[AxisFilterNumbers], Document, InUnits):
         if first.predicted:
             lines += ["", *wrapped(_PREDICTION)]
         if first.form != "N+GM":
-            lines += wrapped("N and the slow terms belong together: use them as a pair.")
+            lines += wrapped("Use all numbers of an axis together.")
         places: dict[str, list[str]] = {}
         for notice in self.notices:
             places.setdefault(str(replace(notice, where="")), []).append(notice.where)
@@ -307,8 +310,8 @@ def _tables(axes: Mapping[str, AxisFilterNumbers], quantity: str, units: str) ->
         limits = ["<= " * (key in each.upper) for each in axes.values()]
         columns.append(list(map(add, limits, shown)))
         if key in longest.stderr:
-            heads.append("+-")
-            columns.append([cell(each.stderr.get(key), 2, scale) for each in axes.values()])
+            heads.append("+-\n95 %")
+            columns.append([cell(each.stderr.get(key), 2, _HALF * scale) for each in axes.values()])
     lines = _table(heads, columns)
     times = max((list(each.nees) for each in axes.values()), key=len)
     if not times:

@@ -273,7 +273,7 @@ def channel_units(
     for key in units:
         if key not in SI_UNIT and key not in known:
             text = f"units has {key!r}, which is neither gyro nor accel nor a channel"
-            raise InputError(f"{text}: the channels are {', '.join(known)}")
+            raise InputError(f"{text}: choose a channel from {', '.join(known)}")
     found, from_header, overruled = dict[str, str](), dict[str, str](), dict[str, str]()
     missing: dict[str, str] = {}  # one channel of each sensor stands for the others
     for channel, column in roles.channels.items():

@@ -26,8 +26,9 @@ _NAME, _SOURCE, _TEXT = 18, 40, 60  # characters; longer ones are shortened
 _NOTABLE = 1.1  # times the table's N or K
 _NORMAL = 1.96  # standard errors of a 95 % interval
 _LEAST = 0.1  # smallest number without an exponent
-_LEGEND = "95 % intervals; <= x: below x (95 %). B at t: Allan minimum / 0.664, at time t"
-_FILTER = "For your filter, outages up to {:g} s (keys of OpenVINS, Kalibr; GTSAM: N^2, K^2)"
+_LEGEND = "95 % intervals; <=: 95 % upper limit. B at t: Allan minimum / 0.664, at time t"
+_RESERVED = "*: usable with reservation, bias steps or drifts may recur"
+_FILTER = "For your filter, outages up to {:g} s, one value for all axes (GTSAM: N^2, K^2)"
 KEYS = {"N": "noise_density", "K": "random_walk"}
 """Ends of the keys of OpenVINS and Kalibr, which begin with the names of `SENSORS`."""
 _SHORT = (
@@ -177,12 +178,14 @@ def _sensor(calibration: Calibration, most: int) -> list[str]:
     if len(skipped) > 2:
         skipped = [skipped[0], f"{len(calibration.skipped)} channels have no model"]
     names = list(calibration)
+    has_reserved = any(state(fit) == "reserved" for fit in calibration.values())
+    legend = [_LEGEND, *([_RESERVED] if has_reserved else [])]
     while True:  # all axes of one IMU, the first of very many
         lines = _table(calibration, names)
         missing = len(calibration) - len(names)
         lines += [f"and {missing} more channels"] if missing else []
-        if len(lines) + len(skipped) < most or len(names) <= _AXES:
-            return [*lines, *skipped, _LEGEND]
+        if len(lines) + len(skipped) + len(legend) <= most or len(names) <= _AXES:
+            return [*lines, *skipped, *legend]
         names.pop()
 
 
@@ -354,7 +357,9 @@ def actions(calibration: Calibration) -> list[str]:
 
 def _to_do(texts: Sequence[str], most: int) -> list[str]:
     """The title and as many of them as there are lines."""
-    lines, place = ["What to do (error models and all notices: -v)"], 1
+    again = sum("rerun with" in text for text in texts) > 1
+    order = ": 1. first, then see what remains" if again else ""
+    lines, place = [f"What to do{order} (error models and all notices: -v)"], 1
     for text in texts or ["nothing: no defect was found, and the recording is long enough"]:
         whole = text.replace(" h ", "\xa0h\xa0").replace(" min", "\xa0min")
         item = wrapped(whole, first=f"{place}. " if texts else "", indent=3)

@@ -171,7 +171,7 @@ class Selection(Document, Printed):
     def from_content(cls, content: Mapping[str, Any]) -> Self:
         ranking, index = content["ranking"], content["chosen"]
         if not isinstance(index, int) or index not in range(len(ranking)):
-            raise InputError("the chosen model is not in the ranking")
+            raise InputError("the chosen model is not in the ranking: make the selection again")
         found = super().from_content({**content, "chosen": ranking[index]})
         return replace(found, chosen=found.ranking[index])
 

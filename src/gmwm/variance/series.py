@@ -96,8 +96,8 @@ def wavelet_variance(
         found = covariance_of_data(levels.coefficients(), longest, data_covariance)
     if not np.any(variance > 0.0):
         raise InputError(
-            f"{where_of(channel)} changes only where samples are missing: a dead channel has no "
-            "noise model"
+            f"{where_of(channel)} changes only where samples are missing, so the channel is dead: "
+            "leave it out"
         )
     return WaveletVariance(
         tau=levels.averaging * channel.dt,
@@ -191,8 +191,8 @@ def check_varies(channel: Channel) -> None:
     where = where_of(channel)
     if channel.is_constant:
         raise InputError(
-            f"{where} is constant ({np.nanmin(channel.values):g}): a dead channel has no noise "
-            "model"
+            f"{where} is constant ({np.nanmin(channel.values):g}), so the channel is dead: leave "
+            "it out"
         )
     if not channel.is_of_a_sensor:
         raise InputError(

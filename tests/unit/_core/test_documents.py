@@ -66,7 +66,7 @@ CASES = [
     ("joint", "equality_p", 1.5, "equality_p = 1.5"),
     ("health", "channels.gyro_x.events", [[5, 4]], "not an interval of samples"),
     ("health", "channels.gyro_x.lines", [[1.0]], "channels.gyro_x.lines.0"),
-    ("selection", "chosen", 99, "the chosen model is not in the ranking"),
+    ("selection", "chosen", 99, "the chosen model is not in the ranking: make the selection again"),
     ("selection", "ranking.0.n_parameters", 0, "ranking.0.n_parameters = 0"),
     ("selection", "ranking.0.dof", None, "ranking.0.dof = None"),
     ("bootstrap", "draws", [[1.0], [2.0]], "draws are not one value a key"),

@@ -543,7 +543,7 @@ def test_screening_can_be_left_out():
     assert not calibration.is_examined
     assert calibration["gyro_x"].wv.gaps is None
     assert "sinusoid_amplitude" not in calibration["accel_x"].params
-    with pytest.raises(gmwm.InputError, match="there are events, lines, resonances, outliers"):
+    with pytest.raises(gmwm.InputError, match="choose from events, lines, resonances, outliers"):
         gmwm.calibrate(noisy_recording(), screening=["magic"])
 
 

@@ -268,7 +268,7 @@ def test_a_walk_without_a_place_for_it_is_reduced_and_the_file_says_so(calibrati
     fits = {name: fit for name, fit in calibration.items() if name.endswith("x")}
     calibration = replace(calibration, fits=fits)
     text = gmwm.export(calibration, "kfgins", horizon=6.0)
-    assert "# N+GM for outages up to 6 s (reduce)" in text
+    assert "# N+GM for outages up to 6 s, reduce" in text
     joined = " ".join(explained(calibration, "kfgins", 6.0).split())
     assert "consistent on average, since no N+GM covers a random walk" in joined
     found = reduce(calibration, "N+GM", [1.0, 3.0, 6.0], tau="shared")

@@ -442,7 +442,7 @@ def test_standard_errors_of_shared_axes_and_of_none(fitted):
     assert not gmwm.bound(fitted, level=0.95).stderr
     assert not gmwm.bound(fitted, "N+GM").stderr
     assert gmwm.AxisFilterNumbers.from_dict(one.to_dict()) == one
-    assert f"+- {one.stderr['K']:.2g}" in one.text("si")
+    assert f", +-{1.96 * one.stderr['K']:.2g} (95 %)" in one.text("si")
 
 
 def test_the_bias_at_switch_on_is_missed_where_none_is_given(fitted):

@@ -162,7 +162,7 @@ def test_export_writes_the_numbers():
     numbers = found.numbers(0.1, 2.0)
     text = gmwm.export(found, "kalibr", horizon=2.0)
     assert f"gyroscope_noise_density: {numbers['gyro_x'].params['N']:.6e}" in text
-    assert "N+K for outages up to 2 s (motion)" in text
+    assert "N+K for outages up to 2 s, motion" in text
     by_axis = gmwm.export(found, "gtsam")
     # White noise is at most as large as the numbers say, at the horizon it has a NEES below 1.
     assert "NEES at 1 s: gyro 0." in by_axis

@@ -84,7 +84,7 @@ class RequiredSpectrum:
         if slope > tuning.STEEPEST:
             raise InputError(
                 f"the spectrum of {model!r} rises as f^-{slope:.2g} towards zero frequency, more "
-                "than a random walk: no form covers it"
+                "than a random walk, so no form covers it: leave that term out"
             )
         if not kept:
             raise InputError(

@@ -128,7 +128,7 @@ def read_fix_log(path: str | os.PathLike[str]) -> FixLog:
             if there and len(there) < len(group):
                 lacking = next(name for name in group if name not in there)
                 raise InputError(
-                    f"{source} has a column for {there[0]} and none for {lacking}: add it, or "
+                    f"{source} has a column for {there[0]} but none for {lacking}: add it, or "
                     "leave out all three"
                 )
         values = log.load()

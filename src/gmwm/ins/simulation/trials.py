@@ -135,7 +135,7 @@ class MonteCarlo:
 
     def __getitem__(self, name: str) -> FilterErrors:
         if name not in self.filters:
-            raise InputError(f"no filter {name!r}: there are {', '.join(self.filters)}")
+            raise InputError(f"no filter {name!r}: choose from {', '.join(self.filters)}")
         return self.filters[name]
 
 

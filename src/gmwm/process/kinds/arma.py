@@ -135,7 +135,7 @@ class ARIMA(Process):
 
     def autocovariance(self, lag: FloatArray, dt: float) -> FloatArray:
         if self.d:
-            raise InputError(f"{self!r} is not stationary: it has no autocovariance")
+            raise InputError(f"{self!r} is not stationary and has no autocovariance: give d = 0")
         lag = np.asarray(lag, dtype=int)
         return self.sigma2 * _unit_autocovariance(self.ar, self.ma, int(lag.max()) + 1)[lag]
 
