@@ -137,7 +137,7 @@ def test_sizes_pooled_over_outages():
     found = pooled_sizes(study(one=runs_of(error)), "one")
     expected = np.sqrt(0.5 * (error[:, 1, 2] ** 2 + error[:, 3, 2] ** 2))
     np.testing.assert_allclose(found["vertical"], expected)
-    with pytest.raises(InputError, match="no filter 'two': there are one"):
+    with pytest.raises(InputError, match="no filter 'two': choose from one"):
         pooled_sizes(study(one=runs_of(error)), "two")
     none = MonteCarlo({"one": runs_of(error)}, (), {}, SimpleNamespace())
     with pytest.raises(InputError, match="no outage"):
