@@ -1,8 +1,8 @@
 """From the minimum of the method of moments to a fit, without terms that the data do not need."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from itertools import islice
 
 import numpy as np
@@ -13,14 +13,15 @@ from gmwm.estimate import tuning
 from gmwm.estimate.moments.design import Design
 from gmwm.estimate.moments.profile import Point, Profile, search
 from gmwm.estimate.moments.weights import Weights
-from gmwm.estimate.problem.moments import Moments, weight_root
+from gmwm.estimate.problem.moments import FittedMoments, Moments, weight_root
 from gmwm.estimate.problem.parameters import drift_key, in_model_order
 from gmwm.estimate.problem.regressors import Coefficients
 from gmwm.estimate.result.conclusion import Estimates, agreement, conclude, estimate_notices
 from gmwm.estimate.result.estimate import upper_amplitude
 from gmwm.estimate.result.fit import Fit
+from gmwm.estimate.result.goodness import Goodness
 from gmwm.issues import Notice, notice
-from gmwm.process import Model, Process
+from gmwm.process import Process
 from gmwm.variance import WaveletVariance
 
 
@@ -48,29 +49,43 @@ class Converged:
         """The moments that were fitted."""
         return replace(Moments.of(wv, self.design.model, self.design.scales), found=self.found)
 
+    @cached_property
+    def root(self) -> FloatArray:
+        """L with L'L the weights that belong to the minimum, (J, J)."""
+        return weight_root(self.covariance)
 
-def conclude_moments(
-    end: Converged,
-    wv: WaveletVariance,
-    method: str,
-    without: Callable[[int], Fit | None],
-) -> Fit:
-    """Make the `Fit` of a minimum under model weights.
+    @cached_property
+    def processes(self) -> Sequence[Process]:
+        """The noise terms with their values."""
+        return self.design.fitted_processes(self.point.x, self.point.shapes)
 
-    without: The fit without a noise term, which shows whether a doubtful term is needed; None if
-        nothing is left to fit.
-    """
+    @property
+    def implied(self) -> FloatArray:
+        """Wavelet variance of the noise, u^2, (J,)."""
+        return self.design.implied(self.point.x, self.point.shapes)
+
+    def goodness(self, wv: WaveletVariance) -> Goodness:
+        """Agreement of the data with the fitted model."""
+        slope = self.moments(wv).slope
+        value = None if slope is None else slope.value
+        model, _ = self.design.coordinates.fitted(self.processes, value)
+        keys = () if slope is None else (str(drift_key(model)),)
+        at = FittedMoments.of(model, wv, keys, self.discrepancy)
+        return Goodness.of(at, wv, is_tested=True)
+
+
+def conclude_moments(end: Converged, wv: WaveletVariance, method: str) -> Fit:
+    """Make the `Fit` of a minimum under model weights."""
     design, point, moments = end.design, end.point, end.moments(wv)
-    target, implied = moments.target, design.implied(point.x, point.shapes)
-    slope = None if wv.regressors is not None else moments.found
-    own = moments.coefficient_covariances(design.unit_terms(point.shapes))
+    target, slope = moments.target, moments.slope
+    residual = target - end.implied
     absent = [i for i in design.linear if design.amplitudes(point.x)[i] == 0.0]
     jacobian, curves = _jacobian(end, moments)
-    processes = design.fitted_processes(point.x, point.shapes)
+    own = moments.coefficient_covariances(design.unit_terms(point.shapes))
     limits = {}
     for i in absent:
-        estimate = _unrestricted(jacobian, curves[:, i], target - implied, end.covariance)
-        limit = upper_amplitude(design.coordinates, processes, i, (*estimate, 0.0), wv, absent)
+        estimate = _unrestricted(end.root @ jacobian, end.root @ curves[:, i], end.root @ residual)
+        limit = upper_amplitude(design.coordinates, end.processes, i, (*estimate, 0.0), wv, absent)
         limit = float(max(limit, 0.0))
         limits[i] = limit ** (1.0 / design.terms[i].linear.power)
         if own is not None and slope is not None and np.isfinite(limit):
@@ -82,10 +97,10 @@ def conclude_moments(
         notices.append(notice("too-few-levels", "", values))
     found = Estimates(
         coordinates=design.coordinates,
-        processes=processes,
-        covariance=_sandwich(jacobian, end.covariance, weight_root(end.covariance)),
+        processes=end.processes,
+        covariance=_sandwich(jacobian, end.covariance, end.root),
         absent=limits,
-        slope=None if own is None else slope,
+        slope=slope,
         method=method,
         weights="model",
         discrepancy=end.discrepancy,
@@ -93,11 +108,9 @@ def conclude_moments(
     )
     covariance, n_free = end.covariance, jacobian.shape[1]
     agrees = agreement(
-        target, implied, covariance, end.basis, n_free, end.statistical, moments.taken
+        target, end.implied, covariance, end.basis, n_free, end.statistical, moments.taken
     )
-    fit = conclude(found, agrees, wv, misfits=end.discrepancy > 0.0)
-    redundant = _redundant_terms(design, point, fit.objective, target, covariance)
-    return _with_doubtful_terms(fit, redundant, design, processes, without)
+    return conclude(found, agrees, wv, misfits=end.discrepancy > 0.0)
 
 
 def reweighted(fit: Fit, end: Converged, weights: Weights) -> Fit:
@@ -109,11 +122,11 @@ def reweighted(fit: Fit, end: Converged, weights: Weights) -> Fit:
     """
     design, moments, coordinates = end.design, end.moments(fit.wv), end.design.coordinates
     best, target = end.point, moments.target
-    root = weights.root(end.covariance, design.implied(best.x, best.shapes) - target)
+    root = weights.root(end.covariance, end.implied - target)
     point = search(Profile(design, target, root))
     jacobian, _ = _jacobian(end, moments)
     matrix = _sandwich(jacobian, end.covariance, root)
-    before = coordinates.fitted(design.fitted_processes(best.x, best.shapes))[1]
+    before = coordinates.fitted(end.processes)[1]
     rows = {before[k]: row for row, k in enumerate(_present(design, best))}
     drift = next((key for key in fit.keys if key == drift_key(fit.model)), None)
     processes = design.fitted_processes(point.x, point.shapes)
@@ -187,11 +200,12 @@ def _sandwich(jacobian: FloatArray, covariance: FloatArray, root: FloatArray) ->
 
 
 def _unrestricted(
-    jacobian: FloatArray, curve: FloatArray, residual: FloatArray, covariance: FloatArray
+    others: FloatArray, column: FloatArray, residual: FloatArray
 ) -> tuple[float, float]:
-    """Estimate of an amplitude that came out as zero, were it free, and its standard error."""
-    root = weight_root(covariance)
-    column, others = root @ curve, root @ jacobian
+    """Estimate of an amplitude that came out as zero, were it free, and its standard error.
+
+    others, column, residual: Weighted Jacobian of the free parameters, curve and residuals.
+    """
     if others.shape[1]:
         length = np.sqrt(np.sum(others**2, axis=0))
         basis, _ = np.linalg.qr(others / np.where(length > 0.0, length, 1.0))
@@ -199,7 +213,7 @@ def _unrestricted(
     information = float(column @ column)
     if information <= 0.0:
         return 0.0, float("inf")
-    return float(column @ (root @ residual)) / information, 1.0 / float(np.sqrt(information))
+    return float(column @ residual) / information, 1.0 / float(np.sqrt(information))
 
 
 def limit_notices(design: Design, point: Point) -> list[Notice]:
@@ -217,38 +231,8 @@ def limit_notices(design: Design, point: Point) -> list[Notice]:
     return notices
 
 
-def _redundant_terms(
-    design: Design, point: Point, objective: float, target: FloatArray, covariance: FloatArray
-) -> list[tuple[float, int]]:
-    """Gain and place of terms that do not improve the fit significantly, the least useful first.
-
-    Only terms with free shapes are tested. Their amplitude alone does not show it: among all shapes
-    one always fits some accident. The objective without the term does, at one per cent shared among
-    the levels where a term of this kind might have been found.
-
-    objective: Of the point under ``covariance``, whatever the weights of the estimate were.
-    """
-    root, amplitudes = weight_root(covariance), design.amplitudes(point.x)
-    redundant: list[tuple[float, int]] = []
-    for i in design.shaped:
-        others = [k for k in range(len(design.terms)) if k != i]
-        if amplitudes[i] == 0.0 or i not in design.linear or not others:
-            continue
-        model = Model(tuple(design.terms[k].process for k in others))
-        reduced = Profile(Design(model, design.scales), target, root)
-        without = reduced.refine(reduced.at([point.shapes[k] for k in others])).objective
-        gain, freed = without - objective, 1 + design.terms[i].n_shapes
-        if gain < chi2.isf(tuning.REDUNDANT_P / target.size, freed):
-            redundant.append((gain, i))
-    return sorted(redundant)
-
-
-def _with_doubtful_terms(
-    fit: Fit,
-    redundant: Sequence[tuple[float, int]],
-    design: Design,
-    processes: Sequence[Process],
-    without: Callable[[int], Fit | None],
+def with_doubtful_terms(
+    fit: Fit, end: Converged, without: Callable[[int], Converged | None]
 ) -> Fit:
     """A fit with the notice of the term that the data can do without, if there is one.
 
@@ -256,7 +240,10 @@ def _with_doubtful_terms(
     amplitude looks significant under the noise that it is part of. It is needed all the same where
     the model without it, by its own errors, misses an averaging time (`Goodness.loses_to`). Several
     similar terms can stand in for each other: one of them is too many, not all.
+
+    without: The minimum without a noise term; None if nothing is left to fit.
     """
+    redundant = _redundant_terms(end, fit.objective, end.moments(fit.wv).target)
     # One without a finite interval is only limited, whether it is needed or not.
     largest = {key: tuning.UNDETERMINED * fit.params[key] for key in fit.upper_bounds}
     present = [key for key, error in fit.stderr.items() if 0.0 < error <= largest.get(key, 0.0)]
@@ -268,18 +255,43 @@ def _with_doubtful_terms(
         if fit.goodness.is_excluded:
             return False
         reduced = without(i)
-        return reduced is not None and reduced.goodness.loses_to(fit.goodness)
+        return reduced is not None and reduced.goodness(fit.wv).loses_to(fit.goodness)
 
-    keys = design.coordinates.fitted(processes)[1]
-    places: Mapping[str, int] = {
-        key: i for key, (i, _) in zip(keys, design.coordinates.owners, strict=True)
-    }
+    coordinates = end.design.coordinates
+    keys = coordinates.fitted(end.processes)[1]
+    places = {key: i for key, (i, _) in zip(keys, coordinates.owners, strict=True)}
     found = {key for key in present if is_needed(places[key])}
     notices = [n for n in fit.notices if n.code != "amplitude-bound" or n.where not in found]
     for gain, i in islice(((gain, i) for gain, i in redundant if not is_needed(i)), 1):
-        process = processes[i]
+        process = end.processes[i]
         shape = {p.name: process.values[p.name] for p in process.shape_parameters}
         values = {"process": type(process).__name__, "gain": gain, **shape}
         notices.append(notice("redundant-term", "", values, term=process.named()))
     bounds = {key: bound for key, bound in fit.upper_bounds.items() if key not in found}
     return replace(fit, notices=tuple(notices), upper_bounds=bounds)
+
+
+def _redundant_terms(
+    end: Converged, objective: float, target: FloatArray
+) -> list[tuple[float, int]]:
+    """Gain and place of terms that do not improve the fit significantly, the least useful first.
+
+    Only terms with free shapes are tested. Their amplitude alone does not show it: among all shapes
+    one always fits some accident. The objective without the term does, at one per cent shared among
+    the levels where a term of this kind might have been found.
+
+    objective: Of the minimum under its own covariance, of wavelet variances ``target`` (J,).
+    """
+    design, point = end.design, end.point
+    amplitudes = design.amplitudes(point.x)
+    redundant: list[tuple[float, int]] = []
+    for i in design.shaped:
+        others = [k for k in range(len(design.terms)) if k != i]
+        if amplitudes[i] == 0.0 or i not in design.linear or not others:
+            continue
+        reduced = Profile(design.part(others), target, end.root)
+        without = reduced.refine(reduced.at([point.shapes[k] for k in others])).objective
+        gain, freed = without - objective, 1 + design.terms[i].n_shapes
+        if gain < chi2.isf(tuning.REDUNDANT_P / target.size, freed):
+            redundant.append((gain, i))
+    return sorted(redundant)

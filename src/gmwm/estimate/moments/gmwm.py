@@ -19,7 +19,12 @@ from gmwm._core import checks
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.estimate import tuning
-from gmwm.estimate.moments.conclusion import Converged, conclude_moments, reweighted
+from gmwm.estimate.moments.conclusion import (
+    Converged,
+    conclude_moments,
+    reweighted,
+    with_doubtful_terms,
+)
 from gmwm.estimate.moments.design import Design
 from gmwm.estimate.moments.profile import Point, Profile, search
 from gmwm.estimate.moments.weights import (
@@ -118,21 +123,19 @@ class GMWM:
             size = math.copysign(found.params["R"], ols_slope(wv).value)
             return replace(found, model=model.with_params({**found.params, "R": size}))
 
-        def without(i: int) -> Fit | None:
-            noise = [k for k, term in enumerate(model.terms) if not term.is_drift]
-            left = tuple(term for k, term in enumerate(model.terms) if k != noise[i])
+        def without(i: int) -> Converged | None:
+            place = least.design.terms[i].place
+            left = tuple(term for k, term in enumerate(model.terms) if k != place)
             if not any(term.is_open for term in left) or all(t.is_drift or t.is_line for t in left):
                 return None
-            return conclude_moments(
-                efficient._cached(Model(left), wv), wv, self.name, lambda _: None
-            )
+            return efficient._cached(Model(left), wv)
 
         weights = Weights.of(self.weights, wv, self.drift == "moments")
         efficient = replace(self, weights="model", start=None)
         least, missed = efficient._cached(model, wv), []
         if self.start is not None:
             target = least.moments(wv).target
-            excess = least.design.implied(least.point.x, least.point.shapes) - target
+            excess = least.implied - target
             profile = Profile(least.design, target, weights.root(least.covariance, excess))
             grid = profile.refine(profile.at(least.point.shapes))
             reached = profile.descend(_started(self.start, least.design.coordinates))
@@ -141,7 +144,8 @@ class GMWM:
             if reached.objective > grid.objective + tuning.SAME_MINIMUM:
                 values = {"objective": reached.objective, "least": grid.objective}
                 missed.append(notice("start-missed", "", values))
-        fit = conclude_moments(least, wv, self.name, without)
+        fit = conclude_moments(least, wv, self.name)
+        fit = with_doubtful_terms(fit, least, without)
         if self.weights != "model":
             fit = reweighted(fit, least, weights)
         return replace(fit, notices=(*fit.notices, *missed)) if missed else fit

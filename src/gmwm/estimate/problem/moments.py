@@ -181,6 +181,11 @@ class Moments:
         return cls(wv, ols_slope(wv), True, scales)
 
     @property
+    def slope(self) -> Coefficients | None:
+        """Of a ramp, where it is estimated."""
+        return self.found if self.is_free and self.wv.regressors is None else None
+
+    @property
     def regression(self) -> Regression:
         """The regressors beside the noise."""
         curve = self.wv.regressors
