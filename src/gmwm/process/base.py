@@ -262,7 +262,8 @@ class Process:
             return spectral.haar_variance(self.psd, tau, dt)
         shape = tuple(getattr(self, parameter.name) for parameter in self.shape_parameters)
         amplitude: float = getattr(self, linear.name) ** linear.power
-        return amplitude * self.unit_haar_variance(shape, tau, dt)
+        unit = self.unit_haar_variance(shape, np.ascontiguousarray(tau.ravel()), dt)
+        return amplitude * unit.reshape(tau.shape)
 
     def wavelet_variance(self, tau: FloatArray, dt: float, wavelet: str = "haar") -> FloatArray:
         """Wavelet variance by any Daubechies filter.
@@ -286,8 +287,15 @@ class Process:
         return spectral.wavelet_variance(self.psd, self.lines(), tau, dt, wavelet)
 
     def unit_haar_variance(self, shape: Shape, tau: FloatArray, dt: float) -> FloatArray:
-        """`haar_variance` at another shape and unit amplitude: the estimator's inner loop."""
+        """`haar_variance` at another shape and unit amplitude, (J,): the estimator's inner loop."""
         return np.asarray(self.at_unit(shape).haar_variance(tau, dt), dtype=float)
+
+    def unit_haar_slopes(self, shape: Shape, tau: FloatArray, dt: float) -> FloatArray | None:
+        """Derivatives of `unit_haar_variance` by the coordinates of `shape_to_free`, (J, s).
+
+        ``None``: the estimator takes differences.
+        """
+        return None
 
     def autocovariance(self, lag: FloatArray, dt: float) -> FloatArray:
         """Autocovariance in u^2 at lags in samples (non-negative integers).
@@ -388,7 +396,8 @@ class Process:
 
     def shape_from_free(self, free: FloatArray) -> Shape:
         """Inverse of `shape_to_free`."""
-        return tuple(p.from_free(z) for p, z in zip(self.shape_parameters, free, strict=True))
+        pairs = zip(self.shape_parameters, free.tolist(), strict=True)
+        return tuple([parameter.from_free(z) for parameter, z in pairs])
 
     @classmethod
     def examples(cls) -> tuple[Process, ...]:

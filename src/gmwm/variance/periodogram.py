@@ -192,9 +192,9 @@ def _fitted(
         implied = powers @ laws
         ratio = seen / implied
         if step >= steps:
-            ratio = np.clip(ratio, 1.0 / largest, largest)
+            ratio = np.minimum(np.maximum(ratio, 1.0 / largest), largest)
         pull = laws * (count / implied)
-        powers *= np.sqrt(pull @ ratio / np.sum(pull, axis=1))
+        powers *= np.sqrt(pull @ ratio / pull.sum(axis=1))
     return powers
 
 

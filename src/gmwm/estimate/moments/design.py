@@ -9,7 +9,7 @@ are regressors, see `gmwm.estimate.problem.ramp`.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -160,10 +160,13 @@ class Design:
         low, high = [np.zeros(0)], [np.zeros(0)]
         for i in self.shaped:
             term = self.terms[i]
-            free = np.array([term.process.shape_to_free(shape) for shape in self.grid(i)])
+            free = self._cached("free", i, partial(self._free_grid, i))
             low.append((free.min(axis=0) - tuning.SEARCH_REACH)[term.free_shape])
             high.append((free.max(axis=0) + tuning.SEARCH_REACH)[term.free_shape])
         return np.concatenate(low), np.concatenate(high)
+
+    def _free_grid(self, i: int) -> FloatArray:
+        return np.array([self.terms[i].process.shape_to_free(shape) for shape in self.grid(i)])
 
     def part(self, present: Sequence[int]) -> Design:
         """The design of some of the terms."""
@@ -193,20 +196,23 @@ class Design:
 
     def shape_derivatives(self, shapes: Sequence[Shape]) -> FloatArray:
         """Derivative of each term's curve by its own z, at unit free amplitude, (J, z)."""
-        result = np.empty((self.scales.tau.size, len(self.owners)))
-        column = 0
-        for i in self.shaped:
-            term = self.terms[i]
-            z = term.process.shape_to_free(shapes[i])
-            width = _SIMULATED_STEP if self.scales.is_simulated(term.process) else _STEP
+        slopes = [self._slopes(i, shapes[i])[:, self.terms[i].free_shape] for i in self.shaped]
+        return np.hstack([np.zeros((self.scales.tau.size, 0)), *slopes])
 
-            def curve(z: FloatArray, i: int = i) -> FloatArray:
-                return self.curve(i, self.terms[i].process.shape_from_free(z))
+    def _slopes(self, i: int, shape: Shape) -> FloatArray:
+        """Derivative of a curve by all its coordinates, (J, s)."""
+        process, scales = self.terms[i].process, self.scales
+        is_simulated = scales.is_simulated(process)
+        if self.terms[i].free_scale and scales.wavelet == "haar" and not is_simulated:
+            known = process.unit_haar_slopes(shape, scales.tau, scales.dt)
+            if known is not None:
+                return known
+        z, width = process.shape_to_free(shape), _SIMULATED_STEP if is_simulated else _STEP
 
-            for k in np.flatnonzero(term.free_shape):
-                result[:, column] = difference(curve, z, k, width)
-                column += 1
-        return result
+        def curve(z: FloatArray) -> FloatArray:
+            return self.curve(i, process.shape_from_free(z))
+
+        return np.stack([difference(curve, z, k, width) for k in range(z.size)], axis=1)
 
     # -- models -----------------------------------------------------------------------------------
 

@@ -89,14 +89,14 @@ class Profile:
         if z0.size == 0 or z0.size > self.target.size:
             return self.at(shapes)
         low, high = design.bounds
-        bounds = np.maximum(low, z0 - reach), np.minimum(high, z0 + reach)
+        low, high = np.maximum(low, z0 - reach), np.minimum(high, z0 + reach)
         visited: dict[bytes, tuple[Sequence[Shape], FloatArray, FloatArray, FloatArray]] = {}
 
         def at(z: FloatArray) -> tuple[Sequence[Shape], FloatArray, FloatArray, FloatArray]:
             """Shapes, and what is `_profiled` there; MINPACK asks for a point repeatedly."""
             if z.tobytes() not in visited:
                 visited.clear()
-                moved = design.unpack(np.clip(z, *bounds), shapes)
+                moved = design.unpack(np.minimum(np.maximum(z, low), high), shapes)
                 visited[z.tobytes()] = moved, *self._profiled(moved)
             return visited[z.tobytes()]
 

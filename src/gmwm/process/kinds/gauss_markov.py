@@ -31,6 +31,7 @@ _SINH_ARRAY = np.array([1.0 / factorial(2 * k + 1) for k in range(1, 9)])
 _H_ARRAY = np.array([-((-1) ** k) * (2.0**k - 4.0) / factorial(k) for k in range(3, 22)])
 _SLOW_BELOW = 1e-3
 _WHITE_ABOVE = 40.0  # exp(-a) is below rounding: white noise
+_SLOPE_STEP = 1e-5  # of a logarithm, for a central difference
 _GRID_PER_DECADE = 8
 _PEAK, _PEAK_AT = 0.618, 1.89  # of sigma and of tau: the top of the Allan deviation, IEEE Std 952
 
@@ -75,8 +76,10 @@ class GaussMarkov(Process):
         return self.sigma**2 * _exponential_psd(dt / self.tau, f, dt)
 
     def unit_haar_variance(self, shape: Shape, tau: FloatArray, dt: float) -> FloatArray:
-        m = np.asarray(tau) / dt
-        return real_haar(dt / shape[0], m.ravel()).reshape(m.shape)
+        return np.asarray(real_haar(dt / shape[0], tau / dt))
+
+    def unit_haar_slopes(self, shape: Shape, tau: FloatArray, dt: float) -> FloatArray:
+        return np.asarray(_real_slope(dt / shape[0], tau / dt))[:, None]
 
     def autocovariance(self, lag: FloatArray, dt: float) -> FloatArray:
         return self.sigma**2 * np.exp(-np.asarray(lag) * dt / self.tau)
@@ -138,8 +141,7 @@ class Resonance(Process):
         return self.sigma**2 * np.real(weight * _exponential_psd(rate, f, dt))
 
     def unit_haar_variance(self, shape: Shape, tau: FloatArray, dt: float) -> FloatArray:
-        m = np.asarray(tau) / dt
-        return resonance_haar(*shape, dt, m.ravel()).reshape(m.shape)
+        return np.asarray(resonance_haar(*shape, dt, tau / dt))
 
     def autocovariance(self, lag: FloatArray, dt: float) -> FloatArray:
         rate, weight = _exponential(self.frequency, self.damping, dt)
@@ -226,6 +228,16 @@ def real_haar(rate: float, m: FloatArray) -> FloatArray:
     for i in range(m.size):
         result[i] = (2.0 * m[i] * excess + _h(m[i] * rate)) / (m[i] * m[i] * scale)
     return result
+
+
+@compiled()
+def _real_slope(rate: float, m: FloatArray) -> FloatArray:
+    """Derivative of `real_haar` by the logarithm of the correlation time, (J,)."""
+    step = math.exp(_SLOPE_STEP)
+    longer, shorter = real_haar(rate / step, m), real_haar(rate * step, m)
+    for i in range(m.size):
+        longer[i] = (longer[i] - shorter[i]) / (2.0 * _SLOPE_STEP)
+    return longer
 
 
 @compiled()

@@ -97,8 +97,7 @@ class LowPassNoise(_Filtered):
         return self.N**2 * found.reshape(x.shape)
 
     def unit_haar_variance(self, shape: Shape, tau: FloatArray, dt: float) -> FloatArray:
-        m = np.asarray(tau) / dt
-        return _unit_curve(shape, tuple(m.ravel().tolist()), dt).reshape(m.shape)
+        return _unit_curve(shape, tuple((tau / dt).tolist()), dt)
 
     def autocovariance(self, lag: FloatArray, dt: float) -> FloatArray:
         lag = np.asarray(lag, dtype=int)
@@ -156,8 +155,7 @@ class AveragedNoise(_Filtered):
         return self.N**2 / dt * np.where(inside, covariance[np.where(inside, lag, 0)], 0.0)
 
     def unit_haar_variance(self, shape: Shape, tau: FloatArray, dt: float) -> FloatArray:
-        averaging = tuple((np.ravel(tau) / dt).tolist())
-        return _window_curve(shape[0] / dt, averaging).reshape(np.shape(tau)) / dt
+        return _window_curve(shape[0] / dt, tuple((tau / dt).tolist())) / dt
 
     def draw(self, n: int, dt: float, rng: np.random.Generator) -> FloatArray:
         weights = _window(self.window / dt)
