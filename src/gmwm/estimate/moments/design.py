@@ -43,7 +43,8 @@ class Design:
                 )
         self.linear = tuple(i for i, term in enumerate(self.terms) if term.free_scale)
         self.shaped = tuple(i for i, term in enumerate(self.terms) if term.n_shapes)
-        self.owners = [i for i, is_amplitude in self.coordinates.owners if not is_amplitude]
+        shapes = [i for i, is_amplitude in self.coordinates.owners if not is_amplitude]
+        self.owners = np.array(shapes, dtype=int)
         self._own: dict[Any, Any] = {}
         self._last: dict[int, tuple[Shape, FloatArray]] = {}
         self._parts: dict[tuple[int, ...], Design] = {}

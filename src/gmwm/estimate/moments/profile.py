@@ -61,7 +61,7 @@ class Profile:
     ) -> None:
         self.design, self.target, self.root, self._lost = design, target, root, lost
         self._beside = None if beside is None else root @ beside
-        self._free = list(design.linear)
+        self._y = root @ target
         self._given = [i for i, term in enumerate(design.terms) if not term.free_scale]
 
     def at(self, shapes: Sequence[Shape]) -> Point:
@@ -75,11 +75,12 @@ class Profile:
         if self._lost is not None:
             curves -= self._lost
         weighted = self.root @ curves
-        columns, y = weighted[:, self._free], self.root @ self.target
+        columns, y = weighted, self._y
+        if self._given:
+            columns = weighted[:, list(self.design.linear)]
+            y = y - np.sum(weighted[:, self._given], axis=1)
         if self._beside is not None:
             columns = np.hstack([columns, self._beside])
-        if self._given:
-            y -= np.sum(weighted[:, self._given], axis=1)
         return columns, *solve_nonnegative(columns, y)
 
     def refine(self, start: Point, reach: float = np.inf) -> Point:
