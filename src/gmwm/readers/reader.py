@@ -10,7 +10,6 @@ from typing import Any, Literal
 
 import numpy as np
 
-from gmwm._core.files import existing_file
 from gmwm._core.typing import BoolArray, FloatArray, IntArray, known_of
 from gmwm._core.units import SI_UNIT, AuxiliaryUnit, auxiliary_unit, factor, quantity_of
 from gmwm.errors import InputError
@@ -18,7 +17,7 @@ from gmwm.issues import Notice, notice
 from gmwm.readers import clock as clocks, tuning
 from gmwm.readers.clock import Clock, Timing
 from gmwm.readers.columns import AuxiliaryColumn, Given, Reference, Roles, channel_units, roles_of
-from gmwm.readers.formats.binary import BinaryTable, layout_of
+from gmwm.readers.formats.binary import BinaryTable
 from gmwm.readers.names import CANONICAL, NUMBERS_OF_SENSORS, TIME, bare, stated_seconds
 from gmwm.readers.recording import (
     Channel,
@@ -242,15 +241,9 @@ def read(
     --------
     >>> rec = gmwm.read("static.csv", rate=100, units={"gyro": "deg/s"})  # doctest: +SKIP
     """
-    if layout is not None:
-        if format is not None:
-            raise InputError("layout is for a binary file without a header: leave out format")
-        tables: Sequence[Table] = [
-            BinaryTable.open(existing_file(Path(os.fspath(path))), layout_of(layout))
-        ]
-    else:
-        topics = (topic,) if isinstance(topic, str) else tuple(topic)
-        tables = open_tables(path, Wanted(topics, clock, channels is not None, damaged), format)
+    topics = (topic,) if isinstance(topic, str) else tuple(topic)
+    wanted = Wanted(topics, clock, channels is not None, damaged, layout=layout)
+    tables = open_tables(path, wanted, format)
     return _recording(tables, Given(rate, units or {}, channels, time))
 
 

@@ -31,6 +31,7 @@ class Wanted:
     by_channel: bool = False  # whether channels are named, all of which one sensor may have
     damaged: bool = False  # whether the rest of a damaged file is used
     every_imu: bool = False  # whether all IMUs of a log are wanted, each with tables of its own
+    layout: str | None = None  # of a binary file without a header
 
 
 @dataclass(frozen=True)
@@ -52,6 +53,7 @@ class Format:
 
 _TEXT = Format("text", "CSV and other delimited text (plain or .gz)", "csv_table:open_text")
 _FRAME = Format("a table in memory", "tables in memory", "formats.arrays:open_frame")
+_RECORDS = Format("records", "binary files of a layout", "formats.binary:open_records")
 
 FORMATS = (
     _TEXT,
@@ -79,13 +81,15 @@ READABLE = f"gmwm reads {', '.join(each.title for each in FORMATS)}"
 
 def open_tables(data: Any, wanted: Wanted, name: str | None = None) -> Sequence[Table]:
     """Open a file or a table in memory, whatever it is; sensors with own rates are own tables."""
+    if wanted.layout is not None and name is not None:
+        raise InputError("layout is for a binary file without a header: leave out format")
     if wanted.clock not in CLOCKS:
         raise InputError(f"clock = {wanted.clock!r}: give one of {', '.join(CLOCKS)}")
     if name is not None and name not in NAMES:
         raise InputError(f"format = {name!r}: give one of {', '.join(NAMES)}")
     if is_frame(data) and name is not None:
         raise InputError("a table in memory has no format: format is for files, leave it out")
-    found = _FRAME if is_frame(data) else _format_of(Path(data), name)
+    found = _RECORDS if wanted.layout is not None else _format_of(data, name)
     source = found.name if found is _FRAME else Path(data).name
     if wanted.topics and not found.is_log:
         raise InputError(f"{source} has no topics: topic is for bags and flight logs, leave it out")
@@ -103,9 +107,12 @@ def is_frame(data: object) -> bool:
     )
 
 
-def _format_of(path: Path, name: str | None = None) -> Format:
+def _format_of(data: Any, name: str | None) -> Format:
     from gmwm._core.files import existing_file, opened
 
+    if is_frame(data):
+        return _FRAME
+    path = Path(data)
     if name is not None:
         if name != "rosbag2":  # a bag of ROS 2 may be a folder, which its reader checks
             existing_file(path)

@@ -4,21 +4,24 @@ A layout says how one record is laid out. Those with a name are the formats of s
 users write them (increments over the sampling interval, native order), and that of KF-GINS.
 """
 
+from __future__ import annotations
+
 import math
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Self
 
 import numpy as np
 
+from gmwm._core.files import existing_file
 from gmwm._core.typing import FloatArray
 from gmwm._core.units import SI_UNIT
 from gmwm.errors import InputError
 from gmwm.issues import notice
 from gmwm.readers import tuning
 from gmwm.readers.names import CANONICAL
+from gmwm.readers.registry import Wanted
 from gmwm.readers.table import Columns, Table
 
 
@@ -82,45 +85,18 @@ class BinaryTable(Table):
     path: Path
     layout: BinaryLayout
 
-    @classmethod
-    def open(cls, path: Path, layout: BinaryLayout) -> Self:
-        """Look at the size of a file and its first times."""
-        record, size = layout.record.itemsize, path.stat().st_size
-        count, rest = divmod(size, record)
-        if count < tuning.FEWEST_SAMPLES:
-            raise InputError(
-                f"{path.name} has {size:,} bytes, {count} records of {record}, but needs at least "
-                f"{tuning.FEWEST_SAMPLES} records: check the layout, or record longer",
-                "layout",
-            )
-        notices = [notice("partial-record", "", {"bytes": rest}, size=record)] if rest else []
-        names = ("time [s]", *(f"{name} [{SI_UNIT[name.partition('_')[0]]}]" for name in CANONICAL))
-        table = cls(
-            source=path.name, names=names, notices=notices, path=path, layout=layout, rows=count
-        )
-        first = table._raw(0, tuning.FEWEST_SAMPLES)[0]
-        with np.errstate(all="ignore"):
-            steps = np.diff(first)
-            even = np.all(np.isfinite(first)) and np.count_nonzero(steps > 0.0) > steps.size // 2
-            median = float(np.median(steps)) if even else 0.0
-        if not tuning.LEAST_STEP <= median < tuning.LARGEST_OF_BINARY:
-            times = f"{path.name}: its first times, {first[0]:.6g} and {first[1]:.6g}"
-            hint = "give the layout of this file"
-            raise InputError(f"{times}, are not seconds of a clock: {hint}", "layout")
-        return table
-
     def segments(self, columns: Sequence[int], rows: int) -> Iterator[Columns]:
         interval = self._interval(rows) if self.layout.increments else 1.0
         scales = (1.0, *(self.layout.gyro / interval,) * 3, *(self.layout.accel / interval,) * 3)
         for start in range(0, int(self.rows), rows):
-            raw, found = self._raw(start, rows), {}
+            raw, found = self.raw(start, rows), {}
             for column in columns:
                 with np.errstate(all="ignore"):
                     found[column] = raw[column] * scales[column]
                 self.check_usable(column, found[column], start)
             yield found
 
-    def _raw(self, start: int, rows: int) -> list[FloatArray]:
+    def raw(self, start: int, rows: int) -> list[FloatArray]:
         """Time and six numbers of some records as they are."""
         record = self.layout.record
         block = np.fromfile(self.path, record, rows, offset=start * record.itemsize)
@@ -129,7 +105,7 @@ class BinaryTable(Table):
 
     def _interval(self, rows: int) -> float:
         """Seconds between records that follow each other."""
-        times = [self._raw(start, rows)[0] for start in range(0, int(self.rows), rows)]
+        times = [self.raw(start, rows)[0] for start in range(0, int(self.rows), rows)]
         with np.errstate(all="ignore"):
             steps = np.diff(np.concatenate(times))
             usual = float(np.median(steps))
@@ -140,3 +116,31 @@ class BinaryTable(Table):
 
     def where(self, row: int) -> str:
         return f"record {row} (counted from 0)"
+
+
+def open_records(path: Path, wanted: Wanted) -> tuple[BinaryTable]:
+    """Look at the size of a file of the layout that is wanted, and at its first times."""
+    size, layout = existing_file(path).stat().st_size, layout_of(str(wanted.layout))
+    record = layout.record.itemsize
+    count, rest = divmod(size, record)
+    if count < tuning.FEWEST_SAMPLES:
+        raise InputError(
+            f"{path.name} has {size:,} bytes, {count} records of {record}, but needs at least "
+            f"{tuning.FEWEST_SAMPLES} records: check the layout, or record longer",
+            "layout",
+        )
+    notices = [notice("partial-record", "", {"bytes": rest}, size=record)] if rest else []
+    names = ("time [s]", *(f"{name} [{SI_UNIT[name.partition('_')[0]]}]" for name in CANONICAL))
+    table = BinaryTable(
+        source=path.name, names=names, notices=notices, path=path, layout=layout, rows=count
+    )
+    first = table.raw(0, tuning.FEWEST_SAMPLES)[0]
+    with np.errstate(all="ignore"):
+        steps = np.diff(first)
+        even = np.all(np.isfinite(first)) and np.count_nonzero(steps > 0.0) > steps.size // 2
+        median = float(np.median(steps)) if even else 0.0
+    if not tuning.LEAST_STEP <= median < tuning.LARGEST_OF_BINARY:
+        times = f"{path.name}: its first times, {first[0]:.6g} and {first[1]:.6g}"
+        hint = "give the layout of this file"
+        raise InputError(f"{times}, are not seconds of a clock: {hint}", "layout")
+    return (table,)
