@@ -23,6 +23,7 @@ SI_UNIT = {"gyro": "rad/s", "accel": "m/s^2"}
 _TABLE = toml_beside(__file__)
 _USUAL: dict[str, dict[str, float]] = _TABLE["usual"]
 """What pint finds for the units of most recordings."""
+_SAME_UNIT = 1e-6  # relative; the same unit in two spellings differs by rounding
 
 
 @lru_cache(maxsize=1)
@@ -107,26 +108,44 @@ AUXILIARY = ("temperature", "voltage", "vibration", "clock")
 """Quantities of channels that are kept for what they explain; no error model is fitted to them."""
 
 
-class AuxiliaryUnit(NamedTuple):
-    """A unit of a quantity of `AUXILIARY`; times scale, plus offset it is in ``unit``, as kept."""
+class Unit(NamedTuple):
+    """The unit of a channel: values times scale, plus offset, are in the unit as kept."""
 
-    quantity: str
-    unit: str
+    text: str  # as written
+    quantity: str  # "gyro", "accel" or one of `AUXILIARY`
+    kept: str  # of a sensor the SI unit
     scale: float = 1.0
     offset: float = 0.0
 
 
 _AUXILIARY_UNITS = {
-    word: AuxiliaryUnit(*unit)
-    for words, unit in _TABLE["auxiliary"].items()
-    for word in words.split()
+    word: unit for words, unit in _TABLE["auxiliary"].items() for word in words.split()
 }
 
 
-def auxiliary_unit(text: str) -> AuxiliaryUnit | None:
+def auxiliary_unit(text: str) -> Unit | None:
     """The unit of an auxiliary quantity that a text names, ``None`` for any other text."""
     plain = re.sub(r"[°º]", "deg", text).replace("µ", "u")
-    return _AUXILIARY_UNITS.get(re.sub(r"[\s_.]", "", plain).lower())
+    found = _AUXILIARY_UNITS.get(re.sub(r"[\s_.]", "", plain).lower())
+    return found and Unit(text, *found)
+
+
+def sensor_unit(text: str, quantity: str = "") -> Unit:
+    """The unit that a text names of an angular rate or a specific force, of which if it is said."""
+    quantity = quantity or quantity_of(text)
+    return Unit(text, quantity, SI_UNIT[quantity], factor(text, SI_UNIT[quantity]))
+
+
+def is_other_unit(text: str, unit: str) -> bool:
+    """Whether a text is a unit, and not another spelling of this one."""
+    try:
+        factor(text, text)
+    except InputError:
+        return False
+    try:
+        return abs(factor(text, unit) - 1.0) >= _SAME_UNIT
+    except InputError:
+        return True
 
 
 class FieldUnit(NamedTuple):

@@ -1,21 +1,30 @@
 """Which column is which channel, and in what unit."""
 
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
+import numpy as np
+
 from gmwm._core import checks
-from gmwm._core.units import AUXILIARY, SI_UNIT, AuxiliaryUnit, auxiliary_unit, factor, quantity_of
+from gmwm._core.units import AUXILIARY, SI_UNIT, Unit, auxiliary_unit, is_other_unit, sensor_unit
 from gmwm.errors import InputError
 from gmwm.issues import Notice, notice
-from gmwm.readers.names import AXES, CANONICAL, TIME, bare, meaning
+from gmwm.readers import tuning
+from gmwm.readers.names import (
+    AXES,
+    CANONICAL,
+    NUMBERS_OF_SENSORS,
+    TIME,
+    bare,
+    meaning,
+    stated_seconds,
+)
 from gmwm.readers.table import Table, label
 
 Reference = str | int  # a column's name, or its index counted from 0
 
 _EXAMPLE = 'channels={"gyro_x": 0, "accel_x": 3}'
-_EXAMPLES = {"gyro": "deg/s", "accel": "g"}
-_SAME_UNIT = 1e-6  # relative; the same unit in two spellings differs by rounding
 
 
 @dataclass(frozen=True)
@@ -41,7 +50,7 @@ class AuxiliaryColumn:
     name: str  # name of its channel
     index: int
     quantity: str  # one of `AUXILIARY`
-    unit: AuxiliaryUnit | None  # unit in the file; None if unknown
+    unit: Unit | None  # unit in the file; None if unknown
 
     def __str__(self) -> str:
         return f"{self.name!r} ({self.quantity}{'' if self.unit else ', unit unknown'})"
@@ -66,7 +75,8 @@ class Roles:
 def roles_of(table: Table, given: Given) -> Roles:
     """Decide which column is which channel: as the caller says, by their names, by their number.
 
-    The units decide what one or three columns without names are.
+    The units decide what one or three columns without names are. The rate of ``given`` is the
+    file's where the caller gives none.
     """
     names, channels = table.names, given.channels
     time: int | None = None
@@ -91,18 +101,23 @@ def roles_of(table: Table, given: Given) -> Roles:
             chosen, stamp = _by_number(table, rest, bool(known - {None}), given.units)
             stamps = [stamp] if stamp is not None else stamps
         chosen = _only(table, chosen, channels)
-    notices = []
     if given.time is None and stamps:
         time = stamps[0]
-        if len(stamps) > 1:
-            others = ", ".join(label(names, i) for i in stamps[1:])
-            this = label(names, time)
-            notices.append(notice("time-column", "", {"column": time}, used=this, others=others))
     auxiliary = _given_auxiliary(table, chosen, given.units)
     chosen = {name: i for name, i in chosen.items() if name not in {a.name for a in auxiliary}}
     if not isinstance(channels, Mapping):
         left = {*chosen.values(), time, *(() if given.time is not False else stamps)}
         auxiliary += _found_auxiliary(table, left, chosen, given.units)
+    if not chosen:
+        hint = 'name one of a gyro or an accelerometer, e.g. channels={"gyro_x": 1}'
+        raise InputError(f"{table.source}: every channel is auxiliary: {hint}", "channel-unknown")
+    _check_one_sensor(table, {*chosen.values(), time})
+    if time is not None and given.rate is None:  # complain before a long file is read
+        stated_seconds(table.source, names[time])
+    notices = []
+    if given.time is None and len(stamps) > 1:
+        this, others = label(names, stamps[0]), ", ".join(label(names, i) for i in stamps[1:])
+        notices.append(notice("time-column", "", {"column": time}, used=this, others=others))
     if auxiliary:
         values = {column.name: column.quantity for column in auxiliary}
         listed = ", ".join(map(str, auxiliary))
@@ -112,10 +127,24 @@ def roles_of(table: Table, given: Given) -> Roles:
     if ignored:
         count = {"count": len(ignored)}
         notices.append(notice("columns-not-used", "", count, listed=", ".join(ignored)))
-    if not chosen:
-        hint = 'name one of a gyro or an accelerometer, e.g. channels={"gyro_x": 1}'
-        raise InputError(f"{table.source}: every channel is auxiliary: {hint}", "channel-unknown")
     return Roles(chosen, tuple(auxiliary), time, tuple(notices))
+
+
+def _check_one_sensor(table: Table, columns: Collection[int | None]) -> None:
+    """Raise InputError if another column says that the rows are of several sensors in turns."""
+    for index, name in enumerate(table.names):
+        if index in columns or bare(name).lower() not in NUMBERS_OF_SENSORS:
+            continue
+        try:
+            first = next(table.segments([index], tuning.FEWEST_OF_BLOCK), {index: np.zeros(0)})
+        except InputError:  # words
+            continue
+        numbers = first[index][~np.isnan(first[index])]
+        several = np.unique(numbers).size
+        turns = np.count_nonzero(np.diff(numbers))
+        if 1 < several <= tuning.MOST_SENSORS and turns > tuning.IN_TURNS * numbers.size:
+            text = f"{table.source}, {table.column(index)}: rows of {several} sensors come in turns"
+            raise InputError(f"{text}: keep one sensor's rows", "several-sensors")
 
 
 def _each_axis(table: Table, channels: Mapping[str, Reference]) -> Iterator[tuple[str, Reference]]:
@@ -232,8 +261,8 @@ def _given_auxiliary(
         elif (role := meaning(name).role) in AUXILIARY or (
             role is None and column.role in AUXILIARY and name not in units
         ):
-            unit = auxiliary_unit(column.unit or "")
-            found.append(AuxiliaryColumn(name, index, role or str(column.role), unit))
+            own = column.unit if column.unit and column.unit.quantity in AUXILIARY else None
+            found.append(AuxiliaryColumn(name, index, role or str(column.role), own))
     return found
 
 
@@ -249,9 +278,9 @@ def _found_auxiliary(
         name = bare(table.names[index])
         if name in chosen or name in {other.name for other in found}:
             name = f"{name}_{index}"
-        unit = auxiliary_unit(units.get(name, role.unit or ""))
+        unit = auxiliary_unit(units[name]) if name in units else role.unit
         if quantity == "clock" and role.seconds is not None:
-            unit = AuxiliaryUnit("clock", "s", role.seconds)
+            unit = Unit("s", "clock", "s", role.seconds)
         found.append(AuxiliaryColumn(name, index, quantity, unit))
     return found
 
@@ -259,45 +288,42 @@ def _found_auxiliary(
 # -- units ----------------------------------------------------------------------------------------
 
 
-def channel_units(
-    table: Table,
-    roles: Roles,
-    units: Mapping[str, str],
-    unknown_rate: Callable[[], InputError | None],
-) -> tuple[dict[str, str], tuple[Notice, ...]]:
-    """Unit of every channel, as the user gives it (by channel, else by sensor) or the header.
+@dataclass(frozen=True)
+class Units:
+    """In what units the channels are."""
 
-    unknown_rate: Says what is wrong with the sampling rate, which is then asked for at once.
-    """
+    known: dict[str, Unit]  # of each channel
+    missing: dict[str, str]  # sensor, or channel of another name, without a unit -> what lacks it
+    notices: tuple[Notice, ...]
+
+
+def units_of(table: Table, roles: Roles, units: Mapping[str, str]) -> Units:
+    """Unit of every channel, as the user gives it (by channel, else by sensor) or the header."""
     known = (*roles.channels, *(column.name for column in roles.auxiliary))
     for key in units:
         if key not in SI_UNIT and key not in known:
             text = f"units has {key!r}, which is neither gyro nor accel nor a channel"
             raise InputError(f"{text}: choose a channel from {', '.join(known)}")
-    found, from_header, overruled = dict[str, str](), dict[str, str](), dict[str, str]()
+    found, from_header, overruled = dict[str, Unit](), dict[str, str](), dict[str, str]()
     missing: dict[str, str] = {}  # one channel of each sensor stands for the others
     for channel, column in roles.channels.items():
         header = table.meanings[column]
         sensor = _sensor(channel) or _sensor(header.role or "")
-        given = units.get(channel, units.get(sensor))
-        unit = given if given is not None else header.unit
-        if unit is None:
+        given, own = units.get(channel, units.get(sensor)), header.unit
+        if given is None and own is None:
             other = f" ({header.stated!r} does not fit)" if header.stated else ""
             missing.setdefault(sensor or channel, channel + other)
             continue
+        stated = own.text if own else header.stated
+        unit = stated if given is None else given
         try:
-            factor(unit, SI_UNIT[sensor]) if sensor else quantity_of(unit)
+            found[channel] = sensor_unit(unit, sensor)
         except InputError as error:
             raise InputError(f"{table.source}, channel {channel}: {error}") from error
-        found[channel] = unit
         if given is None:
             from_header[channel] = unit
-        elif not _same(stated := header.unit or header.stated, given) and _same(stated, stated):
+        elif is_other_unit(stated, given):
             overruled[channel] = f"{stated}, not {given}"
-    # Time stamps are looked at after the units, unless these are to be asked for anyway.
-    rate = unknown_rate() if missing or roles.time is None else None
-    if missing or rate is not None:
-        raise _incomplete(table.source, missing, rate)
     notices, origin = [], table.origin
     if from_header:
         listed = "; ".join(
@@ -308,35 +334,9 @@ def channel_units(
     if overruled:
         listed = "; ".join(f"{name} in {text}" for name, text in overruled.items())
         notices.append(notice("units-contradicted", "", overruled, origin=origin, listed=listed))
-    return found, tuple(notices)
+    return Units(found, missing, tuple(notices))
 
 
 def _sensor(name: str) -> str:
     """The sensor whose name a channel's name begins with, or nothing."""
     return next((sensor for sensor in SI_UNIT if name.lower().startswith(sensor)), "")
-
-
-def _same(unit: str, other: str) -> bool:
-    try:
-        return abs(factor(unit, other) - 1.0) < _SAME_UNIT
-    except InputError:
-        return False
-
-
-def _incomplete(source: str, missing: Mapping[str, str], rate: InputError | None) -> InputError:
-    """One error that asks for the rate and for the units of ``missing`` sensors or channels."""
-    if rate is not None and not missing:
-        return rate
-    text = f"does not give the unit of {' and '.join(missing.values())}"
-    codes = [f"{key}-unit-missing" if key in SI_UNIT else "unit-missing" for key in missing]
-    examples = [f'"{key}": "{_EXAMPLES.get(key, "deg/s")}"' for key in missing]
-    hint = f"units={{{', '.join(examples)}}}"
-    if rate is None:
-        it = "it" if len(codes) == 1 else "them"
-        code = " ".join(dict.fromkeys(codes))
-        return InputError(f"{source} {text}", code, f"give {it}, e.g. {hint}")
-    # The advice about a time column ends the advice of the command line.
-    codes.insert(len(codes) if rate.code == "time-unit" else 0, rate.code)
-    hint = f"give them, e.g. rate={rate.values['rate']:.6g}, {hint}"
-    code = " ".join(dict.fromkeys(codes))
-    return InputError(f"{rate.problem}, and it {text}", code, hint, rate.values)

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 from gmwm._core.files import toml_beside
-from gmwm._core.units import auxiliary_unit, quantity_of, seconds_in
+from gmwm._core.units import Unit, auxiliary_unit, seconds_in, sensor_unit
 from gmwm.errors import InputError
 
 AXES = ("x", "y", "z")
@@ -55,7 +55,7 @@ class Meaning:
 
     # One of `CANONICAL`, `TIME`, "temperature", "voltage", or ``None`` for anything else.
     role: str | None
-    unit: str | None = None  # its unit, if the name has one that is understood
+    unit: Unit | None = None  # its unit, if the name has one that is understood
     seconds: float | None = None  # for a time column, its unit in seconds
     stated: str = ""  # of a time column or a channel, what stands in brackets after its name
 
@@ -145,25 +145,24 @@ def _as_auxiliary(words: Sequence[str], bracket: str) -> Meaning | None:
         return None  # "T [degC]" is one, "time of temp" is not
     found = auxiliary_unit(bracket)
     if found is not None:
-        return None if found.quantity == "clock" else Meaning(found.quantity, bracket)
+        return None if found.quantity == "clock" else Meaning(found.quantity, found)
     quantities = [_AUXILIARY_WORDS.get(word.rstrip("0123456789")) for word in words]
     quantity = next((quantity for quantity in quantities if quantity), None)
     if quantity is None:
         return None
     for size in (2, 1):  # temp deg c, temp_c
-        unit = " ".join(words[-size:])
-        found = auxiliary_unit(unit)
+        found = auxiliary_unit(" ".join(words[-size:]))
         if len(words) > size and found is not None and found.quantity == quantity:
-            return Meaning(quantity, unit)
+            return Meaning(quantity, found)
     return Meaning(quantity)
 
 
-def _split_unit(words: Sequence[str]) -> tuple[list[str], str | None]:
+def _split_unit(words: Sequence[str]) -> tuple[list[str], Unit | None]:
     """Split a unit of up to three words from the end: ``gyro x rad s``."""
     for size in (3, 2, 1):
         unit = _UNIT_WORDS.get("".join(words[-size:]))
         if unit and len(words) > size:
-            return list(words[:-size]), unit
+            return list(words[:-size]), sensor_unit(unit)
     return list(words), None
 
 
@@ -191,15 +190,13 @@ def _sensor(words: Sequence[str]) -> str | None:
     return None
 
 
-def _unit(text: str) -> str | None:
+def _unit(text: str) -> Unit | None:
     """The unit in a header, if it is one of an angular rate or a specific force."""
     cleaned = re.sub(r"\bsec\b", "s", text.replace("°", "deg"))
     cleaned = "g" if cleaned == "G" else cleaned
     if len(cleaned) > 24 or not _UNIT_IN_HEADER.fullmatch(cleaned):
         return None
-    unit = _POWER.sub(r"^\1", cleaned)
     try:
-        quantity_of(unit)
+        return sensor_unit(_POWER.sub(r"^\1", cleaned))
     except InputError:
         return None
-    return unit

@@ -10,19 +10,18 @@ from typing import Any, Literal
 
 import numpy as np
 
-from gmwm._core.typing import BoolArray, FloatArray, IntArray, known_of
-from gmwm._core.units import SI_UNIT, AuxiliaryUnit, auxiliary_unit, factor, quantity_of
+from gmwm._core.typing import FloatArray
+from gmwm._core.units import Unit
 from gmwm.errors import InputError
 from gmwm.issues import Notice, notice
 from gmwm.readers import clock as clocks, tuning
-from gmwm.readers.clock import Clock, Timing
-from gmwm.readers.columns import AuxiliaryColumn, Given, Reference, Roles, channel_units, roles_of
+from gmwm.readers.columns import AuxiliaryColumn, Given, Reference, Roles, roles_of, units_of
 from gmwm.readers.formats.binary import BinaryTable
-from gmwm.readers.names import CANONICAL, NUMBERS_OF_SENSORS, TIME, bare, stated_seconds
+from gmwm.readers.names import CANONICAL, TIME, bare
 from gmwm.readers.recording import (
     Channel,
     Recording,
-    auxiliary_channel,
+    channel_of,
     notices_of_gaps,
     without_sentinels,
 )
@@ -137,9 +136,9 @@ def with_temperature(recording: Recording, table: Table, *, is_one_clock: bool =
         grid = recording.start + recording.dt * np.arange(recording.n)
         for column, own in arrays.items():
             values = np.interp(grid, stamps[order], own[order], left=np.nan, right=np.nan)
-            name, unit = bare(table.names[column]), table.meanings[column].unit or "degC"
-            unit_of = auxiliary_unit(unit) or AuxiliaryUnit("temperature", "degC")
-            channels.append(auxiliary_channel(name, values, recording.dt, unit_of))
+            unit = table.meanings[column].unit or Unit("", "temperature", "degC")
+            name = bare(table.names[column])
+            channels.append(channel_of(name, values, recording.dt, unit))
         names, first = ", ".join(channel.name for channel in channels), recording.names[0]
         count = {"count": stamps.size}
         outcome = notice("temperature-interpolated", "", count, listed=names, first=first)
@@ -279,11 +278,10 @@ def read_imus(
 
 def _recording(tables: Sequence[Table], given: Given) -> Recording:
     """One recording of the tables of an IMU."""
-    channels = given.channels
     if len(tables) == 1:
         return recording_of(tables[0], given)
     own = [table for table in tables if has_sensors(table)]
-    chosen = [(own[0], channels)] if len(own) == 1 else shares(own, channels)
+    chosen = [(own[0], given.channels)] if len(own) == 1 else shares(own, given.channels)
     parts = [recording_of(table, replace(given, channels=only)) for table, only in chosen]
     for table in tables:
         if table not in own:
@@ -294,27 +292,18 @@ def _recording(tables: Sequence[Table], given: Given) -> Recording:
 def recording_of(table: Table, given: Given) -> Recording:
     """The recording of a table."""
     stated = _stated_rate(table, given.rate)
-    roles = roles_of(table, given)
-    _check_one_sensor(table, roles)
-    if roles.time is not None and stated is None:  # complain before a long file is read
-        stated_seconds(table.source, table.names[roles.time])
-    unit_of, unit_notices = channel_units(
-        table, roles, given.units, lambda: _unknown_rate(table, roles.time, stated)
-    )
+    roles = roles_of(table, replace(given, rate=stated))
+    units = units_of(table, roles, given.units)
+    clocks.ask_for_unknown(table, roles.time, stated, units.missing)
     arrays, auxiliary, unreadable = _load(table, roles)
     odd = list[Notice]()
-    if roles.time is not None:
-        seconds = table.meanings[roles.time].seconds
-        if seconds in (None, 1.0) and clocks.is_time_of_day(arrays[roles.time]):
-            arrays[roles.time] = clocks.seconds_of_day(arrays[roles.time])
-            odd.append(notice("time-of-day"))
     for name, index in roles.channels.items():
-        largest = tuning.BEYOND_SENSORS / factor(unit_of[name], SI_UNIT[quantity_of(unit_of[name])])
+        largest = tuning.BEYOND_SENSORS / units.known[name].scale
         arrays[index], found = without_sentinels(name, arrays[index], largest, table.where)
         odd += found
-    timing = None if roles.time is None else _timing(table, roles.time, arrays, stated)
+    timing = None if roles.time is None else clocks.timing_in(table, roles.time, arrays, stated)
     if given.time is False and stated is not None:
-        odd += _contradicted(table, stated)
+        odd += clocks.contradicted(table, stated)
     rate = stated or (timing.rate if timing else 0.0)  # or it was asked for with the units
     if timing is not None:
         # One column at a time: its short form goes before the next one is made longer.
@@ -322,7 +311,7 @@ def recording_of(table: Table, given: Given) -> Recording:
     further = [
         Channel(column.name, arrays[column.index], 1.0 / rate, column.quantity)
         if column.unit is None
-        else auxiliary_channel(column.name, arrays[column.index], 1.0 / rate, column.unit)
+        else channel_of(column.name, arrays[column.index], 1.0 / rate, column.unit)
         for column in auxiliary
     ]
     series = {name: arrays[index] for name, index in roles.channels.items()}
@@ -331,13 +320,13 @@ def recording_of(table: Table, given: Given) -> Recording:
     recording = Recording.from_arrays(
         ((name, series.pop(name)) for name in list(series)),
         rate=rate,
-        units=unit_of,
+        units={name: unit.text for name, unit in units.known.items()},
         source=table.source,
-        notices=(*table.notices, *roles.notices, *unreadable, *unit_notices, *clock_notices, *odd),
+        notices=(*table.notices, *roles.notices, *unreadable, *units.notices, *clock_notices, *odd),
     )
     is_given, has_layout = isinstance(given.channels, Mapping), isinstance(table, BinaryTable)
     at_rest = rest_notices(
-        recording, unit_of, given.units, are_columns_given=is_given, has_layout=has_layout
+        recording, units.known, given.units, are_columns_given=is_given, has_layout=has_layout
     )
     channels, notices = (*recording.channels, *further), (*at_rest, *recording.notices)
     jitter, start = (timing.jitter, timing.start) if timing else (None, 0.0)
@@ -355,53 +344,6 @@ def _stated_rate(table: Table, rate: float | None) -> float | None:
         text = f"{table.source} states a rate of {table.rate:.6g} Hz, not {rate:.6g} Hz"
         raise InputError(f"{text}: leave out the rate to use the file's")
     return rate
-
-
-def _check_one_sensor(table: Table, roles: Roles) -> None:
-    """Raise InputError if a column says that the rows are of several sensors in turns."""
-    for index, name in enumerate(table.names):
-        if index in roles.columns or bare(name).lower() not in NUMBERS_OF_SENSORS:
-            continue
-        try:
-            first = next(table.segments([index], tuning.FEWEST_OF_BLOCK), {index: np.zeros(0)})
-        except InputError:  # words
-            continue
-        numbers = known_of(first[index])
-        several = np.unique(numbers).size
-        turns = np.count_nonzero(np.diff(numbers))
-        if 1 < several <= tuning.MOST_SENSORS and turns > tuning.IN_TURNS * numbers.size:
-            text = f"{table.source}, {table.column(index)}: rows of {several} sensors come in turns"
-            raise InputError(f"{text}: keep one sensor's rows", "several-sensors")
-
-
-def _unknown_rate(table: Table, time: int | None, stated: float | None) -> InputError | None:
-    """What to ask for if the rate is not known: the rate, or the unit of the time stamps."""
-    if time is None and stated is None:
-        problem = f"{table.source} has no time column and no rate was given"
-        return InputError(problem, "rate", "give it in Hz, e.g. rate=100", {"rate": 100.0})
-    if time is None or stated is not None or table.meanings[time].seconds is not None:
-        return None
-    steps = np.diff(table.load([time])[time])
-    usual = float(np.median(steps)) if steps.size else 0.0  # too few samples are reported later
-    return clocks.without_unit(table.source, table.column(time), usual)
-
-
-def _contradicted(table: Table, rate: float) -> list[Notice]:
-    """Say that stamps which are not used have another rate (Hz) than the given one."""
-    stamped = (i for i, each in enumerate(table.meanings) if each.role == TIME and each.seconds)
-    index = next(stamped, None)
-    if index is not None:
-        with suppress(InputError, ZeroDivisionError, ValueError):  # few stamps, or no step
-            stamps = known_of(load_columns(table, [index])[index])
-            unit = table.meanings[index].seconds or 1.0
-            own = 1.0 / (clocks.usual_step(stamps) * unit)
-            known = clocks.mean_rate(stamps, unit) if np.min(np.diff(stamps)) < 0.0 else None
-            mean = known or (stamps.size - 1) / (float(np.ptp(stamps)) * unit)
-            if not (clocks.agree(rate, own) and clocks.agree(rate, mean)):
-                values = {"rate": rate, "own": own, "mean": mean}
-                column = table.column(index)
-                return [notice("rate-ignores-stamps", "", values, column=column)]
-    return []
 
 
 def _load(
@@ -434,25 +376,3 @@ def _load(
         least = f"needs at least {tuning.FEWEST_SAMPLES}"
         raise InputError(f"{text}, but {least}: record longer")
     return arrays, kept, notices
-
-
-def _timing(
-    table: Table, time: int, arrays: Mapping[int, FloatArray], stated: float | None
-) -> Timing:
-    """What the time stamps say, checked against the stated rate if there is one."""
-
-    def same(order: IntArray) -> BoolArray:
-        found = np.arange(order.size) > 0
-        for values in (arrays[i][order] for i in arrays if i != time):
-            both = np.isnan(values[1:]) & np.isnan(values[:-1])
-            found[1:] &= (values[1:] == values[:-1]) | both
-        return found
-
-    found, column = table.meanings[time], table.column(time)
-    unit = (found.seconds, found.stated)
-    origin = table.origins.get(time, 0.0)
-    clock = Clock(table.source, column, arrays[time], *unit, table.where, same, origin)
-    timing = clocks.timing_of(clock, stated)
-    if stated is None:
-        return timing
-    return replace(timing, notices=(*timing.notices, notice("rate-stated", "", {"rate": stated})))

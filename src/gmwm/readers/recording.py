@@ -11,7 +11,7 @@ from gmwm._core import checks
 from gmwm._core.spool import scaled
 from gmwm._core.text import Printed
 from gmwm._core.typing import BoolArray, FloatArray, IntArray
-from gmwm._core.units import AUXILIARY, SI_UNIT, AuxiliaryUnit, auxiliary_unit, factor, quantity_of
+from gmwm._core.units import AUXILIARY, Unit, auxiliary_unit, sensor_unit
 from gmwm.errors import InputError, MissingNameError, printable
 from gmwm.issues import Notice, Severity, codes, notice
 from gmwm.readers import tuning
@@ -289,14 +289,9 @@ class Recording(Mapping[str, Channel], Printed):
             unit = units.get(name) or units.get(name.partition("_")[0])
             if unit is None:
                 raise InputError(f"channel {name!r} has no unit: give one, e.g. deg/s or g")
-            series, auxiliary = _series(name, values), auxiliary_unit(unit)
-            if auxiliary is not None:
-                channels.append(auxiliary_channel(name, series, 1.0 / rate, auxiliary))
-                continue
-            quantity = quantity_of(unit)
-            si = SI_UNIT[quantity]
-            values = scaled(series, factor(unit, si))
-            channels.append(Channel(name, values, 1.0 / rate, quantity, si))
+            series = _series(name, values)
+            known = auxiliary_unit(unit) or sensor_unit(unit)
+            channels.append(channel_of(name, series, 1.0 / rate, known))
         lengths = {channel.name: channel.n for channel in channels}
         if len(set(lengths.values())) != 1:
             listed = ", ".join(f"{name}: {n}" for name, n in lengths.items()) or "none given"
@@ -422,9 +417,9 @@ class Recording(Mapping[str, Channel], Printed):
         return "\n".join([head, *channels, *map(str, self.notices)])
 
 
-def auxiliary_channel(name: str, values: FloatArray, dt: float, unit: AuxiliaryUnit) -> Channel:
-    """A channel of an auxiliary quantity in its usual unit."""
-    return Channel(name, scaled(values, unit.scale, unit.offset), dt, unit.quantity, unit.unit)
+def channel_of(name: str, values: FloatArray, dt: float, unit: Unit) -> Channel:
+    """A channel of values in any unit."""
+    return Channel(name, scaled(values, unit.scale, unit.offset), dt, unit.quantity, unit.kept)
 
 
 def _series(name: str, values: FloatArray) -> FloatArray:

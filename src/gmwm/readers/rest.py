@@ -8,7 +8,7 @@ from typing import Any, Self
 import numpy as np
 
 from gmwm._core.typing import QUARTILE, FloatArray, known_of, median
-from gmwm._core.units import SI_UNIT, factor
+from gmwm._core.units import SI_UNIT, Unit, factor
 from gmwm.errors import InputError
 from gmwm.issues import Notice, notice
 from gmwm.readers import tuning
@@ -128,16 +128,19 @@ def steady_turn(recording: Recording, size: int) -> float:
     return 0.0
 
 
-_GRAVITY = factor("g", SI_UNIT["accel"])
-_DEGREE = factor("deg/s", SI_UNIT["gyro"])
-_ACCEL_UNITS = ("m/s^2", "g", "mg", "ug", "cm/s^2")
-_GYRO_UNITS = ("deg/s", "rad/s", "deg/h", "mdeg/s", "mrad/s")
+_ACCEL_UNITS = {
+    unit: factor(unit, SI_UNIT["accel"]) for unit in ("m/s^2", "g", "mg", "ug", "cm/s^2")
+}
+_GYRO_UNITS = {
+    unit: factor(unit, SI_UNIT["gyro"]) for unit in ("deg/s", "rad/s", "deg/h", "mdeg/s", "mrad/s")
+}
+_GRAVITY, _DEGREE = _ACCEL_UNITS["g"], _GYRO_UNITS["deg/s"]
 _LEAST_COUNT = {"gyro": _DEGREE, "accel": 1.0}  # no sensor's last bit is larger
 
 
 def rest_notices(
     recording: Recording,
-    unit_of: Mapping[str, str],
+    unit_of: Mapping[str, Unit],
     given: Mapping[str, str],
     *,
     are_columns_given: bool,
@@ -176,7 +179,7 @@ class _Sensor:
         so that neither a filter's band nor a drift counts.
     """
 
-    def __init__(self, unit: str, axes: Sequence[FloatArray], dt: float) -> None:
+    def __init__(self, unit: Unit, axes: Sequence[FloatArray], dt: float) -> None:
         self.unit = unit
         self.size = float(np.linalg.norm([np.nanmean(values) for values in axes]))
         second = max(round(1.0 / dt), 1)
@@ -190,7 +193,7 @@ class _Sensor:
         self.size_error = self.scatter * math.sqrt(len(axes) / axes[0].size)
 
     @classmethod
-    def of(cls, recording: Recording, unit_of: Mapping[str, str], sensor: str) -> Self | None:
+    def of(cls, recording: Recording, unit_of: Mapping[str, Unit], sensor: str) -> Self | None:
         """None if axes are absent, empty (an accelerometer needs all three) or differ in unit."""
         names = [name for axis in AXES if (name := f"{sensor}_{axis}") in recording]
         units = {unit_of[name] for name in names if name in unit_of}
@@ -219,7 +222,7 @@ def _is_gravity(length: float, tolerance: float = tuning.GRAVITY_AGREES) -> bool
 
 def _gravity_units(length: float, tolerance: float = tuning.GRAVITY_AGREES) -> list[str]:
     """Units in which a number of the file is gravity, the nearest first."""
-    sizes = {unit: length * factor(unit, SI_UNIT["accel"]) for unit in _ACCEL_UNITS}
+    sizes = {unit: length * scale for unit, scale in _ACCEL_UNITS.items()}
     likely = [unit for unit, size in sizes.items() if _is_gravity(size, tolerance)]
     return sorted(likely, key=lambda unit: abs(sizes[unit] - _GRAVITY))
 
@@ -230,9 +233,9 @@ def _swapped(
     """Gravity in the gyro's columns, and none in the accelerometer's."""
     if rate is None or force is None:
         return ()
-    in_file = rate.size / factor(rate.unit, SI_UNIT["gyro"])
+    in_file = rate.size / rate.unit.scale
     units = _gravity_units(in_file, tuning.GRAVITY_SURE)
-    other = force.size / factor(force.unit, SI_UNIT["accel"])
+    other = force.size / force.unit.scale
     if not units or _gravity_units(other) or rate.scatter > tuning.GRAVITY_NOISE * rate.size:
         return ()
     text = (
@@ -252,12 +255,12 @@ def _gravity(
     """A mean that is gravity in another unit than the one used, or has a wrong scale."""
     if force is None or _is_gravity(force.size) or _is_gravity(force.usual):  # it may turn over
         return ()
-    in_file = force.size / factor(force.unit, SI_UNIT["accel"])
+    in_file = force.size / force.unit.scale
     likely = _gravity_units(in_file)
     is_given = any(key in given for key in ("accel", *(f"accel_{axis}" for axis in AXES)))
     if not likely:
         return _scale(recording, force, must_show=has_layout and not is_given)
-    values = {"norm": force.size, "unit": force.unit, "likely": likely[0], "alike": likely[0]}
+    values = {"norm": force.size, "unit": force.unit.text, "likely": likely[0], "alike": likely[0]}
     hint = f"check the unit: all accelerometer values are off by {_GRAVITY / force.size:.4g}"
     found = notice("gravity", "accel", values, variant="unit", hint=hint, in_file=in_file)
     if not is_given:
@@ -285,8 +288,7 @@ def _scale(recording: Recording, force: _Sensor, *, must_show: bool) -> tuple[No
 
 def _gyro_unit(rate: _Sensor) -> Notice:
     """Noise or a mean rate that is too large, and the units in which it is not."""
-    used = factor(rate.unit, SI_UNIT["gyro"])
-    ratios = {unit: factor(unit, SI_UNIT["gyro"]) / used for unit in _GYRO_UNITS}
+    ratios = {unit: scale / rate.unit.scale for unit, scale in _GYRO_UNITS.items()}
     likely = [
         unit
         for unit, ratio in ratios.items()
@@ -295,11 +297,11 @@ def _gyro_unit(rate: _Sensor) -> Notice:
     # Units whose ratio is smaller than that between gyros cannot be distinguished.
     first, apart = ratios[likely[0]] if likely else 1.0, math.log(tuning.UNITS_APART)
     near = [unit for unit in likely if abs(math.log(ratios[unit] / first)) < apart]
-    values: dict[str, object] = {"density": rate.density, "mean": rate.size, "unit": rate.unit}
+    values: dict[str, object] = {"density": rate.density, "mean": rate.size, "unit": rate.unit.text}
     explained = ""
     if near:
         values |= {"likely": near[0], "alike": " or ".join(near)}
-        explained = f": {values['alike']}, not {rate.unit}, would explain it"
+        explained = f": {values['alike']}, not {rate.unit.text}, would explain it"
     is_noisy = rate.density > tuning.NOISIEST_GYRO
     size = (rate.density if is_noisy else rate.size) / _DEGREE
     variant = "noise" if is_noisy else "mean"
@@ -311,20 +313,19 @@ def _is_plausible(density: float, mean: float) -> bool:
     return density < tuning.NOISIEST_GYRO and mean < tuning.LARGEST_BIAS
 
 
-def _counts(recording: Recording, unit_of: Mapping[str, str]) -> tuple[Notice, ...]:
+def _counts(recording: Recording, unit_of: Mapping[str, Unit]) -> tuple[Notice, ...]:
     """Whole numbers with noise of several, in a unit in which no sensor's last bit is one."""
     notices = []
     for sensor, largest in _LEAST_COUNT.items():
         units = {name: unit for name, unit in unit_of.items() if name.startswith(sensor)}
         counts = {
-            name: recording[name].values / size
+            name: recording[name].values / unit.scale
             for name, unit in units.items()
-            if (size := factor(unit, SI_UNIT[sensor])) >= largest
-            and _is_counted(recording[name].values, size)
+            if unit.scale >= largest and _is_counted(recording[name].values, unit.scale)
         }
         if counts:
             noise = float(np.max(_noise_of([*counts.values()])))
-            listed, unit = ", ".join(counts), units[next(iter(counts))]
+            listed, unit = ", ".join(counts), units[next(iter(counts))].text
             notices.append(notice("counts", sensor, {"noise": noise}, listed=listed, unit=unit))
     return tuple(notices)
 

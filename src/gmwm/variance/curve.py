@@ -272,8 +272,9 @@ def read_curves(
         raise InputError(f"{path.name} has averaging times only: add a column for each axis")
     found: dict[str, Curve] = {}
     for name, axis in axes.items():
-        own = unit.get((axis or "").partition("_")[0]) if isinstance(unit, Mapping) else unit
-        own = roles[name].unit or own
+        given = unit.get((axis or "").partition("_")[0]) if isinstance(unit, Mapping) else unit
+        stated = roles[name].unit
+        own = stated.text if stated else given
         if own is None:
             raise InputError(
                 f"{path.name} does not give the unit of {name}: write it as in gyro_x [deg/h], or "

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from gmwm import InputError, Recording
+from gmwm._core.units import sensor_unit
 from gmwm.readers.rest import rest_notices
 from reading import SI
 
@@ -20,8 +21,7 @@ def recorded(gyro=(1e-3, 0.0, 0.0), accel=(0.0, 0.0, -G), noise=(1e-4, 1e-2), n=
 
 
 def notices(recording, given=(), columns=False, layout=False):
-    units = {name: SI[name.split("_")[0]] for name in recording}
-    given = dict.fromkeys(given, "")
+    units = {name: sensor_unit(SI[name.split("_")[0]]) for name in recording}
     return rest_notices(recording, units, given, are_columns_given=columns, has_layout=layout)
 
 
