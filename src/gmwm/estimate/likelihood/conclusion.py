@@ -1,7 +1,7 @@
 """From the maximum of a likelihood to a result, and terms that it can do without."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import scipy
@@ -21,7 +21,8 @@ from gmwm.estimate.problem.information import density, frequency_nodes
 from gmwm.estimate.problem.moments import Moments
 from gmwm.estimate.problem.parameters import Coordinates, difference
 from gmwm.estimate.problem.ramp import Slope
-from gmwm.estimate.result.conclusion import Estimates, agreement, conclude
+from gmwm.estimate.result.bound import upper_limits
+from gmwm.estimate.result.conclusion import Compared, Estimates, conclude
 from gmwm.estimate.result.fit import Fit
 from gmwm.issues import Notice, notice
 from gmwm.process import Model, Process
@@ -184,33 +185,37 @@ def conclude_likelihood(
     slope = series.columns.slope(top.processes) if series.columns.drift_is_free else None
     if slope is not None and drift is not None:
         slope = Slope(drift, slope.variance)
+    owners, covariance = series.coordinates.owners, regular_inverse(top.information)
+    processes = [p.with_amplitude(0.0) if i in absent else p for i, p in enumerate(processes)]
+    present = [k for k, (i, _) in enumerate(owners) if i not in absent]
+    limits = upper_limits(series.coordinates, processes, present, covariance, {}, series.wv)
+    limits |= {i: _upper_limit(processes[i], top, series.columns) for i in absent}
     found = Estimates(
         coordinates=series.coordinates,
-        processes=[p.with_amplitude(0.0) if i in absent else p for i, p in enumerate(processes)],
-        covariance=regular_inverse(top.information),
-        absent={i: _upper_limit(processes[i], top, series.columns) for i in absent},
+        processes=processes,
+        present=present,
+        covariance=covariance,
+        limits=limits,
         slope=slope,
         method=method,
-        notices=notices,
+        notices=(*notices, notice("no-test")) if series.is_bridged else notices,
         log_likelihood=trace[-1] if trace else top.maximum.value,
         trace=trace,
     )
     wv = series.wv
-    moments = Moments.of(wv, found.coordinates.model)
+    moments = Moments.of(wv, series.coordinates.model)
     if slope is not None:
         moments = Moments(wv, slope, True, moments.scales)
     noise = Model(top.processes)
-    covariance, target = moments.covariance(noise), moments.target
+    statistical, target, taken = moments.covariance(noise), moments.target, moments.taken
     implied = noise.wavelet_variance(wv.tau, wv.dt, wv.wavelet)
-    n_free, taken = len(found.present), moments.taken
-    agrees = agreement(target, implied, covariance, implied, n_free, taken=taken)
-    if series.is_bridged:
-        agrees |= dict.fromkeys(("chi_square", "chi_square_allowed"), float("nan"))
-        found = replace(found, notices=(*found.notices, notice("no-test")))
-        return conclude(found, agrees, wv, misfits=False)
-    dof = max(agrees["dof"], 1)
-    is_right = suffices(0.0, target - implied, covariance, target, implied, dof, taken)
-    return conclude(found, agrees, wv, misfits=not is_right)
+    is_tested = not series.is_bridged
+    compared = Compared(target, implied, statistical, implied, taken, is_tested=is_tested)
+    dof = max(target.size - len(present), 1)
+    misfits = is_tested and not suffices(
+        0.0, target - implied, statistical, target, implied, dof, taken
+    )
+    return conclude(found, compared, wv, misfits=misfits)
 
 
 def redundant_term(

@@ -14,10 +14,11 @@ from gmwm.estimate.moments.design import Design
 from gmwm.estimate.moments.profile import Point, Profile, search
 from gmwm.estimate.moments.weights import Weights
 from gmwm.estimate.problem.moments import FittedMoments, Moments, weight_root
-from gmwm.estimate.problem.parameters import drift_key, in_model_order
+from gmwm.estimate.problem.parameters import drift_key
+from gmwm.estimate.problem.ramp import Slope
 from gmwm.estimate.problem.regressors import Coefficients
-from gmwm.estimate.result.conclusion import Estimates, agreement, conclude, estimate_notices
-from gmwm.estimate.result.estimate import upper_amplitude
+from gmwm.estimate.result.bound import upper_limits
+from gmwm.estimate.result.conclusion import Compared, Estimates, conclude, estimate_notices
 from gmwm.estimate.result.fit import Fit
 from gmwm.estimate.result.goodness import Goodness
 from gmwm.issues import Notice, notice
@@ -60,6 +61,13 @@ class Converged:
         return self.design.fitted_processes(self.point.x, self.point.shapes)
 
     @property
+    def present(self) -> list[int]:
+        """Coordinates of the terms that have an amplitude."""
+        amplitudes = self.design.amplitudes(self.point.x)
+        owners = self.design.coordinates.owners
+        return [k for k, (i, _) in enumerate(owners) if amplitudes[i] > 0.0]
+
+    @property
     def implied(self) -> FloatArray:
         """Wavelet variance of the noise, u^2, (J,)."""
         return self.design.implied(self.point.x, self.point.shapes)
@@ -76,41 +84,40 @@ class Converged:
 
 def conclude_moments(end: Converged, wv: WaveletVariance, method: str) -> Fit:
     """Make the `Fit` of a minimum under model weights."""
-    design, point, moments = end.design, end.point, end.moments(wv)
+    design, point, moments, root = end.design, end.point, end.moments(wv), end.root
+    coordinates, processes, present = design.coordinates, end.processes, end.present
     target, slope = moments.target, moments.slope
-    residual = target - end.implied
-    absent = [i for i in design.linear if design.amplitudes(point.x)[i] == 0.0]
     jacobian, curves = _jacobian(end, moments)
     own = moments.coefficient_covariances(design.unit_terms(point.shapes))
-    limits = {}
+    covariance = _sandwich(jacobian, end.covariance, root)
+    absent = [i for i in design.linear if design.amplitudes(point.x)[i] == 0.0]
+    weighted, residual = root @ jacobian, root @ (target - end.implied)
+    free = {i: _unrestricted(weighted, root @ curves[:, i], residual) for i in absent}
+    limits = upper_limits(coordinates, processes, present, covariance, free, wv)
     for i in absent:
-        estimate = _unrestricted(end.root @ jacobian, end.root @ curves[:, i], end.root @ residual)
-        limit = upper_amplitude(design.coordinates, end.processes, i, (*estimate, 0.0), wv, absent)
-        limit = float(max(limit, 0.0))
-        limits[i] = limit ** (1.0 / design.terms[i].linear.power)
-        if own is not None and slope is not None and np.isfinite(limit):
-            more = tuning.MEAN_OF_LIMIT * limit * own[i]
+        if own is not None and slope is not None and np.isfinite(limits[i]):
+            more = tuning.MEAN_OF_LIMIT * limits[i] ** design.terms[i].linear.power * own[i]
             slope = Coefficients(slope.values, slope.covariance + more)
-    notices = limit_notices(design, point)
+    notices = limit_notices(end)
     if target.size < design.n_free:
         values = {"levels": target.size, "parameters": design.n_free}
         notices.append(notice("too-few-levels", "", values))
     found = Estimates(
-        coordinates=design.coordinates,
-        processes=end.processes,
-        covariance=_sandwich(jacobian, end.covariance, end.root),
-        absent=limits,
+        coordinates=coordinates,
+        processes=processes,
+        present=present,
+        covariance=covariance,
+        limits=limits,
         slope=slope,
         method=method,
         weights="model",
         discrepancy=end.discrepancy,
         notices=notices,
     )
-    covariance, n_free = end.covariance, jacobian.shape[1]
-    agrees = agreement(
-        target, end.implied, covariance, end.basis, n_free, end.statistical, moments.taken
+    compared = Compared(
+        target, end.implied, end.covariance, end.basis, moments.taken, end.statistical
     )
-    return conclude(found, agrees, wv, misfits=end.discrepancy > 0.0)
+    return conclude(found, compared, wv, misfits=end.discrepancy > 0.0)
 
 
 def reweighted(fit: Fit, end: Converged, weights: Weights) -> Fit:
@@ -121,32 +128,30 @@ def reweighted(fit: Fit, end: Converged, weights: Weights) -> Fit:
     taken there too: at a poor estimate, errors would be as poor as that.
     """
     design, moments, coordinates = end.design, end.moments(fit.wv), end.design.coordinates
-    best, target = end.point, moments.target
-    root = weights.root(end.covariance, end.implied - target)
-    point = search(Profile(design, target, root))
-    jacobian, _ = _jacobian(end, moments)
-    matrix = _sandwich(jacobian, end.covariance, root)
-    before = coordinates.fitted(end.processes)[1]
-    rows = {before[k]: row for row, k in enumerate(_present(design, best))}
-    drift = next((key for key in fit.keys if key == drift_key(fit.model)), None)
-    processes = design.fitted_processes(point.x, point.shapes)
-    model, keys = coordinates.fitted(processes, None if drift is None else fit.params[drift])
-    places = [k for k in _present(design, point) if keys[k] in rows]
-    names = [keys[k] for k in places]
-    order = [rows[name] for name in names]
-    own = coordinates.jacobian(processes)[np.ix_(places, places)]
-    covariance = own @ matrix[np.ix_(order, order)] @ own.T
-    if drift is not None:
-        names.append(drift)
-        covariance = np.pad(covariance, (0, 1))
-        covariance[-1, -1] = fit.stderr[drift] ** 2
-    ordered, covariance = in_model_order(model, names, covariance)
-    vanished = {keys[k] for k, (_, is_amplitude) in enumerate(coordinates.owners) if is_amplitude}
-    vanished -= {*names, *fit.upper_bounds}
-    limits = fit.interval()
-    upper = {**fit.upper_bounds, **{key: limits[key][1] for key in vanished}}
+    root = weights.root(end.covariance, end.implied - moments.target)
+    other = replace(end, point=search(Profile(design, moments.target, root)))
+    matrix = _sandwich(_jacobian(end, moments)[0], end.covariance, root)
+    before, keys = (coordinates.fitted(each.processes)[1] for each in (end, other))
+    rows = {before[k]: row for row, k in enumerate(end.present)}
+    present = [k for k in other.present if keys[k] in rows]
+    order = [rows[keys[k]] for k in present]
+    drift, ends = str(drift_key(fit.model)), fit.interval()
+    found = Estimates(
+        coordinates=coordinates,
+        processes=other.processes,
+        present=present,
+        covariance=matrix[np.ix_(order, order)],
+        limits={
+            i: ends[keys[k]][1]
+            for k, (i, is_amplitude) in enumerate(coordinates.owners)
+            if is_amplitude and k not in present and keys[k] in ends
+        },
+        slope=Slope(fit.params[drift], fit.stderr[drift] ** 2) if drift in fit.keys else None,
+        method=fit.method,
+    )
+    model, ordered, covariance, limits = found.by_key()
+    upper = {**fit.upper_bounds, **limits}
     bad, others = estimate_notices(model, ordered, covariance, upper, fit.wv)
-    found = [*bad, *others, *limit_notices(design, point)]
     kept = [each for each in fit.notices if each.code not in _OF_VALUES]
     return replace(
         fit,
@@ -155,19 +160,13 @@ def reweighted(fit: Fit, end: Converged, weights: Weights) -> Fit:
         covariance=covariance,
         upper_bounds=upper,
         weights=weights.name,
-        notices=(*found, *kept),
+        notices=(*bad, *others, *limit_notices(other), *kept),
     )
 
 
 _OF_VALUES = {"amplitude-bound", "confounded", "indistinct-terms", "search-limit"}
 _OF_VALUES |= {"sensor-bandwidth", "undetermined"}
 """Codes of notices about estimates, which belong to one Omega; the others are about the model."""
-
-
-def _present(design: Design, point: Point) -> list[int]:
-    """Coordinates of the terms that have an amplitude."""
-    amplitudes = design.amplitudes(point.x)
-    return [k for k, (i, _) in enumerate(design.coordinates.owners) if amplitudes[i] > 0.0]
 
 
 def _jacobian(end: Converged, moments: Moments) -> tuple[FloatArray, FloatArray]:
@@ -183,7 +182,7 @@ def _jacobian(end: Converged, moments: Moments) -> tuple[FloatArray, FloatArray]
         for i, is_amplitude in design.coordinates.owners
     ]
     derivative = np.reshape(columns, (len(columns), len(curves)))
-    return derivative[_present(design, point)].T, curves
+    return derivative[end.present].T, curves
 
 
 def _sandwich(jacobian: FloatArray, covariance: FloatArray, root: FloatArray) -> FloatArray:
@@ -216,17 +215,17 @@ def _unrestricted(
     return float(column @ residual) / information, 1.0 / float(np.sqrt(information))
 
 
-def limit_notices(design: Design, point: Point) -> list[Notice]:
+def limit_notices(end: Converged) -> list[Notice]:
     """Shapes at the limit of the search."""
-    z = design.pack(point.shapes)
+    design, shapes = end.design, end.point.shapes
+    amplitudes, z = design.amplitudes(end.point.x), design.pack(shapes)
     low, high = design.bounds
-    amplitudes = design.amplitudes(point.x)
     at_limit = (z <= low + tuning.SEARCH_MARGIN) | (z >= high - tuning.SEARCH_MARGIN)
     notices = []
     for k, i in enumerate(design.owners):
         if amplitudes[i] > 0.0 and at_limit[k]:
-            process = design.at_shape(i, point.shapes[i])
-            values = {"process": type(process).__name__, "shape": point.shapes[i][0]}
+            process = end.processes[i]
+            values = {"process": type(process).__name__, "shape": shapes[i][0]}
             notices.append(notice("search-limit", "", values, term=process.named()))
     return notices
 

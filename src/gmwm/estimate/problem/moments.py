@@ -408,14 +408,16 @@ def slope_dof(
 ) -> float:
     """Degrees of freedom of the variance of a ramp's slope, see `CurveCoefficients.errors`.
 
-    keys, covariance: Estimated parameters of a model's noise, and (d, d), their covariance.
+    keys, covariance: Estimated parameters of a model, and (d, d), their covariance.
     """
     noise = Model(tuple(term for term in model.terms if not term.is_drift) or model.terms)
-    if not keys or not all(term.has_spectrum() for term in noise.terms) or not _has_power(noise):
+    own = [k for k, key in enumerate(keys) if key in noise.params]
+    if not own or not all(term.has_spectrum() for term in noise.terms) or not _has_power(noise):
         return np.inf
     regression = RampRegression(wv)
     found = regression.estimated(noise.psd)
-    error = _noise_errors(regression, found, noise, keys, covariance)
+    own_keys, own_covariance = [keys[k] for k in own], covariance[np.ix_(own, own)]
+    error = _noise_errors(regression, found, noise, own_keys, own_covariance)
     square = float(np.sum(error**2))
     return 2.0 * found.variance**2 / square if square > 0.0 else np.inf
 

@@ -15,7 +15,6 @@ from gmwm.estimate.problem.moments import chi_square, slope_dof, weight_root
 from gmwm.estimate.problem.parameters import Coordinates, drift_key, in_model_order
 from gmwm.estimate.problem.ramp import walks_beside
 from gmwm.estimate.problem.regressors import Coefficients
-from gmwm.estimate.result.estimate import upper_amplitude
 from gmwm.estimate.result.fit import Fit
 from gmwm.estimate.result.goodness import Goodness
 from gmwm.issues import Notice, notice
@@ -28,15 +27,16 @@ class Estimates:
     """Estimates of the noise terms of a model by some method.
 
     processes: Its noise terms with their values, those of zero amplitude included.
-    covariance: (d, d), of the coordinates of the terms that have an amplitude.
-    absent: Noise term of zero amplitude -> 95 % upper limit of its scale.
+    present, covariance: Coordinates of the terms that have an amplitude, and their (d, d).
+    limits: Noise term -> 95 % upper limit of its scale, where that is not significantly above zero.
     method, weights, discrepancy, log_likelihood, trace: See `Fit`.
     """
 
     coordinates: Coordinates
     processes: Sequence[Process]
+    present: Sequence[int]
     covariance: FloatArray
-    absent: Mapping[int, float]
+    limits: Mapping[int, float]
     slope: Coefficients | None
     method: str
     weights: str = ""
@@ -45,71 +45,77 @@ class Estimates:
     log_likelihood: float = float("nan")
     trace: Sequence[float] = ()
 
-    @property
-    def present(self) -> list[int]:
-        """Coordinates of the terms that have an amplitude."""
-        owners = self.coordinates.owners
-        return [k for k, (i, _) in enumerate(owners) if i not in self.absent]
+    def by_key(self) -> tuple[Model, tuple[str, ...], FloatArray, dict[str, float]]:
+        """The whole model with values; keys of its estimates, their covariance, and the limits."""
+        coordinates, slope = self.coordinates, self.slope
+        model, names = coordinates.fitted(self.processes, None if slope is None else slope.value)
+        keys = [names[k] for k in self.present]
+        jacobian = coordinates.jacobian(self.processes)[np.ix_(self.present, self.present)]
+        matrix = jacobian @ self.covariance @ jacobian.T
+        if slope is not None:
+            keys.append(str(drift_key(model)))
+            matrix = np.pad(matrix, (0, 1))
+            matrix[-1, -1] = slope.variance
+        upper = {
+            names[k]: self.limits[i]
+            for k, (i, is_amplitude) in enumerate(coordinates.owners)
+            if is_amplitude and i in self.limits
+        }
+        return model, *in_model_order(model, keys, matrix), upper
 
 
-def agreement(
-    target: FloatArray,
-    implied: FloatArray,
-    covariance: FloatArray,
-    basis: FloatArray,
-    n_free: int,
-    statistical: FloatArray | None = None,
-    taken: FloatArray | float = 0.0,
-) -> dict[str, Any]:
-    """Agreement of wavelet variances with those of a model, as fields of `Fit`.
+@dataclass(frozen=True, eq=False)
+class Compared:
+    """Wavelet variances of the data without the drift, beside those of a fitted model, (J,).
 
-    covariance: Belongs to the wavelet variances ``basis``.
+    covariance: (J, J), belongs to the wavelet variances ``basis``.
     statistical: The covariance less the discrepancy, where there is one.
+    taken: See `chi_square`.
     """
-    whitened = weight_root(covariance) @ (target - implied)
-    dof = target.size - n_free
-    plain = allowed = float("nan")
-    if dof > 0 and np.all(basis > 0.0):
-        plain = allowed = chi_square(target, implied, covariance, basis, taken)[1]
-        if statistical is not None:
-            plain = chi_square(target, implied, statistical, basis, taken)[1]
-    return {
-        "objective": float(whitened @ whitened),
-        "chi_square": plain,
-        "chi_square_allowed": allowed,
-        "dof": dof,
-    }
+
+    target: FloatArray
+    implied: FloatArray
+    covariance: FloatArray
+    basis: FloatArray
+    taken: FloatArray
+    statistical: FloatArray | None = None
+    is_tested: bool = True
+
+    def agreement(self, n_free: int) -> dict[str, Any]:
+        """Fields of `Fit`."""
+        target, implied, basis = self.target, self.implied, self.basis
+        whitened = weight_root(self.covariance) @ (target - implied)
+        dof = target.size - n_free
+        plain = allowed = float("nan")
+        if self.is_tested and dof > 0 and np.all(basis > 0.0):
+            plain = allowed = chi_square(target, implied, self.covariance, basis, self.taken)[1]
+            if self.statistical is not None:
+                plain = chi_square(target, implied, self.statistical, basis, self.taken)[1]
+        return {
+            "objective": float(whitened @ whitened),
+            "chi_square": plain,
+            "chi_square_allowed": allowed,
+            "dof": dof,
+        }
 
 
-def conclude(
-    found: Estimates, agrees: Mapping[str, Any], wv: WaveletVariance, *, misfits: bool
-) -> Fit:
+def conclude(found: Estimates, compared: Compared, wv: WaveletVariance, *, misfits: bool) -> Fit:
     """Make the `Fit` of some estimates and judge it."""
-    slope = found.slope
-    model, all_keys = found.coordinates.fitted(
-        found.processes, None if slope is None else slope.value
-    )
-    keys = [all_keys[k] for k in found.present]
-    jacobian = found.coordinates.jacobian(found.processes)[np.ix_(found.present, found.present)]
-    matrix = jacobian @ found.covariance @ jacobian.T
-    upper = _upper_limits(found, all_keys, wv)
+    model, keys, matrix, upper = found.by_key()
+    agrees = compared.agreement(len(found.present))
     dof = float("inf")
-    if slope is not None:
+    if found.slope is not None:
         dof = slope_dof(model, keys, matrix, wv)
         faint = [i for i in model.parameters if model.terms[i.term].is_walk and i.key in upper]
-        walks = walks_beside(model, all_keys, wv) if faint and np.isfinite(dof) else None
+        walks = walks_beside(model, {*keys, *upper}, wv) if faint and np.isfinite(dof) else None
         if walks is not None:
             limit = walks.quantile(tuning.UPPER_LEVEL)
             upper |= {item.key: max(limit, float(item.value or 0.0)) for item in faint}
-        keys.append(str(drift_key(model)))
-        matrix = np.pad(matrix, (0, 1))
-        matrix[-1, -1] = slope.variance
-    ordered, matrix = in_model_order(model, keys, matrix)
-    before, after = estimate_notices(model, ordered, matrix, upper, wv)
+    before, after = estimate_notices(model, keys, matrix, upper, wv)
     fit = Fit(
         model=model,
         wv=wv,
-        keys=ordered,
+        keys=keys,
         covariance=matrix,
         upper_bounds=upper,
         **agrees,
@@ -125,27 +131,6 @@ def conclude(
     if misfits or fit.goodness.is_poor:
         shown += misfit_notices(fit.goodness, found.discrepancy, failed=misfits)
     return replace(fit, notices=(*fit.notices, *shown)) if shown else fit
-
-
-def _upper_limits(found: Estimates, keys: Sequence[str], wv: WaveletVariance) -> dict[str, float]:
-    """95 % upper limits of amplitudes that are zero, or have no shape and are not significant."""
-    coordinates = found.coordinates
-    rows = {k: row for row, k in enumerate(found.present)}
-    limits = {}
-    for k, (i, is_amplitude) in enumerate(coordinates.owners):
-        if not is_amplitude:
-            continue
-        if i in found.absent:
-            limits[keys[k]] = found.absent[i]
-            continue
-        term, deviation = coordinates.terms[i], float(np.sqrt(found.covariance[rows[k], rows[k]]))
-        if term.n_shapes or not deviation > 1.0 / tuning.SIGNIFICANT:
-            continue
-        amplitude = float(found.processes[i].values[term.linear.name] or 0.0) ** term.linear.power
-        estimate = (amplitude, deviation * amplitude, amplitude)
-        limit = upper_amplitude(coordinates, found.processes, i, estimate, wv, found.absent)
-        limits[keys[k]] = limit ** (1.0 / term.linear.power)
-    return limits
 
 
 def estimate_notices(

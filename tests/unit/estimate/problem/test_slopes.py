@@ -19,7 +19,7 @@ from gmwm.estimate.problem import (
 )
 from gmwm.estimate.problem.information import density, frequency_nodes
 from gmwm.estimate.problem.ramp import Slope, ols_slope
-from gmwm.estimate.result.estimate import quantile_above_zero
+from gmwm.estimate.result.bound import quantile_above_zero
 
 DT = 0.5
 WV = gmwm.wavelet_variance((WhiteNoise(1.0) + RandomWalk(0.01)).simulate(600, DT, 1), dt=DT)

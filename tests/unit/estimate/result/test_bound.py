@@ -7,7 +7,7 @@ from scipy.stats import binom
 import gmwm
 from gmwm import GaussMarkov, RandomWalk, WhiteNoise
 from gmwm.estimate.problem.parameters import Coordinates
-from gmwm.estimate.result.estimate import quantile_above_zero, upper_amplitude
+from gmwm.estimate.result.bound import quantile_above_zero, upper_amplitude
 from marks import slow
 
 MODEL = WhiteNoise() + RandomWalk()
