@@ -15,7 +15,7 @@ import numpy as np
 from gmwm._core.frozen import frozen
 from gmwm._core.typing import FloatArray
 from gmwm.estimate import tuning
-from gmwm.estimate.problem.parameters import Coordinates, difference, keys_by_term
+from gmwm.estimate.problem.parameters import Coordinates, difference
 from gmwm.process import Model, Process, evaluated, legendre
 
 _STEP = 1e-5
@@ -46,35 +46,12 @@ def density(processes: Sequence[Process], f: FloatArray, dt: float) -> FloatArra
     return total
 
 
-def _slopes(
-    coordinates: Coordinates, processes: Sequence[Process], f: FloatArray, dt: float
-) -> tuple[FloatArray, FloatArray]:
-    """Spectrum of each process at ``f`` (Hz), (terms, len(f)), and slopes dS / d z, (d, len(f))."""
-    own = np.array([evaluated(process.psd, f, dt) for process in processes])
-    rows = np.empty((len(coordinates.owners), f.size))
-    z = coordinates.pack(processes)
-    for k, (i, is_amplitude) in enumerate(coordinates.owners):
-
-        def spectrum(at: FloatArray, i: int = i) -> FloatArray:
-            return coordinates.process(i, at, processes[i]).psd(f, dt)
-
-        rows[k] = own[i] if is_amplitude else difference(spectrum, z, k, _STEP)
-    return own, rows
-
-
-def _relative(slopes: FloatArray, density: FloatArray) -> FloatArray:
-    """Slopes of the logarithm; zero where the density underflows."""
-    return np.divide(slopes, density, out=np.zeros_like(slopes), where=density > 0.0)
-
-
 def spectral_information(
     coordinates: Coordinates, processes: Sequence[Process], n: int, dt: float
 ) -> FloatArray:
     """Expected information of z, (d, d)."""
-    f, weight = frequency_nodes(n, dt)
-    own, rows = _slopes(coordinates, processes, f, dt)
-    scaled = _relative(rows, np.sum(own, axis=0))
-    return np.asarray((weight * scaled) @ scaled.T)
+    weight, own, slopes = _at_nodes(coordinates, processes, n, dt)
+    return _information(weight, slopes, np.sum(own, axis=0))
 
 
 def information_with(
@@ -84,8 +61,7 @@ def information_with(
 
     The spectrum and the slopes of a term are proportional to its amplitude.
     """
-    f, weight = frequency_nodes(n, dt)
-    own, rows = _slopes(coordinates, processes, f, dt)
+    weight, own, slopes = _at_nodes(coordinates, processes, n, dt)
     others = np.sum(np.delete(own, term, axis=0), axis=0)
     linear = coordinates.terms[term].linear
     now = float(processes[term].values[linear.name] or 0.0) ** linear.power
@@ -93,10 +69,34 @@ def information_with(
 
     def information(amplitude: float) -> FloatArray:
         times = amplitude / now
-        scaled = _relative(np.where(mine, times * rows, rows), others + times * own[term])
-        return np.asarray((weight * scaled) @ scaled.T)
+        return _information(
+            weight, np.where(mine, times * slopes, slopes), others + times * own[term]
+        )
 
     return information
+
+
+def _at_nodes(
+    coordinates: Coordinates, processes: Sequence[Process], n: int, dt: float
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Weights of the nodes, (f,), each process's spectrum, (terms, f), and slopes dS/dz, (d, f)."""
+    f, weight = frequency_nodes(n, dt)
+    own = np.array([evaluated(process.psd, f, dt) for process in processes])
+    slopes = np.empty((len(coordinates.owners), f.size))
+    z = coordinates.pack(processes)
+    for k, (i, is_amplitude) in enumerate(coordinates.owners):
+
+        def spectrum(at: FloatArray, i: int = i) -> FloatArray:
+            return coordinates.process(i, at, processes[i]).psd(f, dt)
+
+        slopes[k] = own[i] if is_amplitude else difference(spectrum, z, k, _STEP)
+    return weight, own, slopes
+
+
+def _information(weight: FloatArray, slopes: FloatArray, density: FloatArray) -> FloatArray:
+    """By the slopes of a spectrum's logarithm, which are zero where it underflows, (d, d)."""
+    scaled = np.divide(slopes, density, out=np.zeros_like(slopes), where=density > 0.0)
+    return np.asarray((weight * scaled) @ scaled.T)
 
 
 @np.errstate(divide="ignore", invalid="ignore")  # no noise, or a value beyond its own steps
@@ -107,7 +107,9 @@ def error_growth(model: Model, keys: Sequence[str], n: int, dt: float) -> dict[s
     below and above the estimate, along which the other parameters follow as they are correlated; by
     the expected information.
     """
-    coordinates, processes, names = _opened(model, keys)
+    coordinates = Coordinates(model.with_params(dict.fromkeys(keys)))
+    processes = [model.terms[term.place] for term in coordinates.terms]
+    names = coordinates.fitted(processes)[1]
     if not names or not all(process.has_spectrum() for process in processes):
         return {}
     positive = {i.key for i in model.parameters if i.parameter.lower == 0.0}
@@ -135,15 +137,6 @@ def error_growth(model: Model, keys: Sequence[str], n: int, dt: float) -> dict[s
         if np.isfinite(rise):
             result[name] = float(np.clip(rise, -tuning.STEEPEST_GROWTH, tuning.STEEPEST_GROWTH))
     return result
-
-
-def _opened(model: Model, keys: Sequence[str]) -> tuple[Coordinates, list[Process], list[str]]:
-    """Coordinates of the parameters of these keys, the processes, and the key of each."""
-    coordinates = Coordinates(model.with_params(dict.fromkeys(keys)))
-    by_term = keys_by_term(model)
-    places = [term.place for term in coordinates.terms]
-    names = [by_term[places[i], name] for i, name in coordinates.names]
-    return coordinates, [model.terms[place] for place in places], names
 
 
 def _covariance(
