@@ -17,8 +17,9 @@ from gmwm.estimate.likelihood.kalman import Recursion, accumulated, filtered
 from gmwm.estimate.likelihood.likelihood import Columns, arrays_of, stacked
 from gmwm.estimate.problem.information import spectral_information
 from gmwm.estimate.problem.moments import weight_root
-from gmwm.estimate.problem.parameters import Coordinates, difference, drift_key, in_model_order
+from gmwm.estimate.problem.parameters import Coordinates, difference
 from gmwm.estimate.problem.ramp import Slope, detrended_covariance
+from gmwm.estimate.result.conclusion import Estimates
 from gmwm.process import Model, Process, StateSpace, as_model
 from gmwm.variance import MIN_SAMPLES
 from gmwm.variance.covariance import dyadic_levels, haar_covariance, mean_covariance
@@ -166,19 +167,13 @@ def cramer_rao(
     if ramp is not None:
         slope = Slope(ramp.drift_rate(), _slope_variance(processes, n, dt))
     moments = _held_to(information, _wavelet_information(coordinates, processes, n, dt, slope))
-    transform = coordinates.jacobian(processes)
-    keys = coordinates.fitted(processes)[1]
-    if slope is not None:
-        keys.append(str(drift_key(model)))
-    found = []
-    for matrix in (information, moments):
-        covariance = transform @ regular_inverse(matrix) @ transform.T
-        if slope is not None:
-            covariance = np.pad(covariance, (0, 1))
-            covariance[-1, -1] = slope.variance
-        ranked, ordered = in_model_order(model, keys, covariance)
-        found.append(ordered)
-    return CramerRao(model, int(n), float(dt), ranked, found[0], found[1], exact)
+    everything = range(len(coordinates.owners))
+    found = [
+        Estimates(coordinates, processes, everything, regular_inverse(matrix), {}, slope).by_key()
+        for matrix in (information, moments)
+    ]
+    (_, keys, series, _), (_, _, variances, _) = found
+    return CramerRao(model, int(n), float(dt), keys, series, variances, exact)
 
 
 def _is_short(coordinates: Coordinates, processes: Sequence[Process], n: int, dt: float) -> bool:

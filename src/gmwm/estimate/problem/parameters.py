@@ -192,12 +192,3 @@ def keys_by_term(model: Model) -> Mapping[tuple[int, str], str]:
 def drift_key(model: Model) -> str | None:
     """Key of the slope of a model's rate ramp, if it has one."""
     return next((item.key for item in model.parameters if model.terms[item.term].is_drift), None)
-
-
-def in_model_order(
-    model: Model, keys: Sequence[str], matrix: FloatArray
-) -> tuple[tuple[str, ...], FloatArray]:
-    """Keys and covariance in the order of the model's parameters."""
-    ranked = tuple(key for key in model.params if key in keys)
-    index = [list(keys).index(key) for key in ranked]
-    return ranked, matrix[np.ix_(index, index)]

@@ -12,7 +12,7 @@ from gmwm._core.typing import FloatArray
 from gmwm._core.units import customary_unit
 from gmwm.estimate import tuning
 from gmwm.estimate.problem.moments import chi_square, slope_dof, weight_root
-from gmwm.estimate.problem.parameters import Coordinates, drift_key, in_model_order
+from gmwm.estimate.problem.parameters import Coordinates, drift_key
 from gmwm.estimate.problem.ramp import walks_beside
 from gmwm.estimate.problem.regressors import Coefficients
 from gmwm.estimate.result.fit import Fit
@@ -38,7 +38,7 @@ class Estimates:
     covariance: FloatArray
     limits: Mapping[int, float]
     slope: Coefficients | None
-    method: str
+    method: str = ""
     weights: str = ""
     discrepancy: float = 0.0
     notices: Sequence[Notice] = ()
@@ -61,7 +61,9 @@ class Estimates:
             for k, (i, is_amplitude) in enumerate(coordinates.owners)
             if is_amplitude and i in self.limits
         }
-        return model, *in_model_order(model, keys, matrix), upper
+        ordered = tuple(key for key in model.params if key in keys)
+        rows = [keys.index(key) for key in ordered]
+        return model, ordered, matrix[np.ix_(rows, rows)], upper
 
 
 @dataclass(frozen=True, eq=False)
