@@ -11,9 +11,8 @@ from gmwm._core.distributions import chi2
 from gmwm._core.typing import FloatArray
 from gmwm.estimate import tuning
 from gmwm.estimate.moments.design import Design
-from gmwm.estimate.moments.profile import Point, Profile, search
-from gmwm.estimate.moments.weights import Weights
-from gmwm.estimate.problem.moments import FittedMoments, Moments, weight_root
+from gmwm.estimate.moments.profile import Point, Profile
+from gmwm.estimate.problem.moments import FittedMoments, Moments
 from gmwm.estimate.problem.parameters import drift_key
 from gmwm.estimate.problem.ramp import Slope
 from gmwm.estimate.problem.regressors import Coefficients
@@ -33,7 +32,8 @@ class Converged:
     found: Coefficients of the ramp or the curve removed from the wavelet variances.
     covariance: (J, J), of the moments, with the discrepancy, u^4.
     statistical: (J, J), the same without it.
-    point: The minimum under ``covariance``.
+    root: (J, J), L with L'L the weights, the inverse of ``covariance`` unless others are chosen.
+    point: The minimum under the weights.
     basis: (J,), the wavelet variances to which the covariance belongs, u^2.
     discrepancy: Relative error allowed for at each level.
     """
@@ -42,6 +42,7 @@ class Converged:
     found: Coefficients | None
     covariance: FloatArray
     statistical: FloatArray
+    root: FloatArray
     point: Point
     basis: FloatArray
     discrepancy: float
@@ -49,11 +50,6 @@ class Converged:
     def moments(self, wv: WaveletVariance) -> Moments:
         """The moments that were fitted."""
         return replace(Moments.of(wv, self.design.model, self.design.scales), found=self.found)
-
-    @cached_property
-    def root(self) -> FloatArray:
-        """L with L'L the weights that belong to the minimum, (J, J)."""
-        return weight_root(self.covariance)
 
     @cached_property
     def processes(self) -> Sequence[Process]:
@@ -77,8 +73,7 @@ class Converged:
         slope = self.moments(wv).slope
         value = None if slope is None else slope.value
         model, _ = self.design.coordinates.fitted(self.processes, value)
-        keys = () if slope is None else (str(drift_key(model)),)
-        at = FittedMoments.of(model, wv, keys, self.discrepancy)
+        at = FittedMoments.of(model, wv, self.discrepancy, is_free=slope is not None)
         return Goodness.of(at, wv, is_tested=True)
 
 
@@ -88,12 +83,12 @@ def conclude_moments(end: Converged, wv: WaveletVariance, method: str) -> Fit:
     coordinates, processes, present = design.coordinates, end.processes, end.present
     target, slope = moments.target, moments.slope
     jacobian, curves = _jacobian(end, moments)
-    own = moments.coefficient_covariances(design.unit_terms(point.shapes))
     covariance = _sandwich(jacobian, end.covariance, root)
     absent = [i for i in design.linear if design.amplitudes(point.x)[i] == 0.0]
     weighted, residual = root @ jacobian, root @ (target - end.implied)
     free = {i: _unrestricted(weighted, root @ curves[:, i], residual) for i in absent}
     limits = upper_limits(coordinates, processes, present, covariance, free, wv)
+    own = moments.coefficient_covariances(design.unit_terms(point.shapes))
     for i in absent:
         if own is not None and slope is not None and np.isfinite(limits[i]):
             more = tuning.MEAN_OF_LIMIT * limits[i] ** design.terms[i].linear.power * own[i]
@@ -120,17 +115,18 @@ def conclude_moments(end: Converged, wv: WaveletVariance, method: str) -> Fit:
     return conclude(found, compared, wv, misfits=end.discrepancy > 0.0)
 
 
-def reweighted(fit: Fit, end: Converged, weights: Weights) -> Fit:
+def reweighted(fit: Fit, end: Converged, other: Converged, weights: str) -> Fit:
     """The fit with another Omega: the minimum of eq. (9), errors by eq. (10) of Stebler et al.
 
     Whether the model is right and which terms the data need does not depend on Omega, so that all
     tests are those of the fit by model weights. B and the covariance of the wavelet variances are
     taken there too: at a poor estimate, errors would be as poor as that.
+
+    end, other: The minimum under model weights, and that under the others.
     """
-    design, moments, coordinates = end.design, end.moments(fit.wv), end.design.coordinates
-    root = weights.root(end.covariance, end.implied - moments.target)
-    other = replace(end, point=search(Profile(design, moments.target, root)))
-    matrix = _sandwich(_jacobian(end, moments)[0], end.covariance, root)
+    coordinates = end.design.coordinates
+    jacobian, _ = _jacobian(end, end.moments(fit.wv))
+    matrix = _sandwich(jacobian, end.covariance, other.root)
     before, keys = (coordinates.fitted(each.processes)[1] for each in (end, other))
     rows = {before[k]: row for row, k in enumerate(end.present)}
     present = [k for k in other.present if keys[k] in rows]
@@ -147,7 +143,6 @@ def reweighted(fit: Fit, end: Converged, weights: Weights) -> Fit:
             if is_amplitude and k not in present and keys[k] in ends
         },
         slope=Slope(fit.params[drift], fit.stderr[drift] ** 2) if drift in fit.keys else None,
-        method=fit.method,
     )
     model, ordered, covariance, limits = found.by_key()
     upper = {**fit.upper_bounds, **limits}
@@ -159,7 +154,7 @@ def reweighted(fit: Fit, end: Converged, weights: Weights) -> Fit:
         keys=ordered,
         covariance=covariance,
         upper_bounds=upper,
-        weights=weights.name,
+        weights=weights,
         notices=(*bad, *others, *limit_notices(other), *kept),
     )
 

@@ -133,10 +133,10 @@ class GMWM:
         weights = Weights.of(self.weights, wv, self.drift == "moments")
         efficient = replace(self, weights="model", start=None)
         least, missed = efficient._cached(model, wv), []
+        target = least.moments(wv).target
+        root = weights.root(least.covariance, least.implied - target)
+        profile = Profile(least.design, target, root)
         if self.start is not None:
-            target = least.moments(wv).target
-            excess = least.implied - target
-            profile = Profile(least.design, target, weights.root(least.covariance, excess))
             grid = profile.refine(profile.at(least.point.shapes))
             reached = profile.descend(_started(self.start, least.design.coordinates))
             if self.weights == "model" and reached.objective < grid.objective:
@@ -144,10 +144,13 @@ class GMWM:
             if reached.objective > grid.objective + tuning.SAME_MINIMUM:
                 values = {"objective": reached.objective, "least": grid.objective}
                 missed.append(notice("start-missed", "", values))
+        other = least
+        if self.weights != "model":
+            other = replace(least, root=root, point=search(profile))
         fit = conclude_moments(least, wv, self.name)
         fit = with_doubtful_terms(fit, least, without)
-        if self.weights != "model":
-            fit = reweighted(fit, least, weights)
+        if other is not least:
+            fit = reweighted(fit, least, other, self.weights)
         return replace(fit, notices=(*fit.notices, *missed)) if missed else fit
 
     def _cached(self, model: Model, wv: WaveletVariance) -> Converged:
@@ -337,8 +340,9 @@ def _iterate(problem: _Problem, relaxed: FloatArray, level: Discrepancy) -> Conv
                 target - curve, statistical, target, previous, problem.dof(point), moments.taken
             )
             if converged and not changed:
+                root = weight_root(covariance)
                 return Converged(
-                    design, moments.found, covariance, statistical, point, curve, level.value
+                    design, moments.found, covariance, statistical, root, point, curve, level.value
                 )
         elif rounds > 1:
             ratio = float(step @ before) / max(float(before @ before), 1e-300)
@@ -368,6 +372,7 @@ def _under_reference(problem: _Problem, level: Discrepancy) -> Converged:
             residual, statistical, target, reference.curve, problem.dof(point), moments.taken
         ):
             break
+    root, curve = weight_root(covariance), reference.curve
     return Converged(
-        design, moments.found, covariance, statistical, point, reference.curve, level.value
+        design, moments.found, covariance, statistical, root, point, curve, level.value
     )

@@ -12,7 +12,7 @@ Applied Econometrics* 8, S85-S118; eq. (13) ff. of Stebler et al. 2012).
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, Any
@@ -24,7 +24,6 @@ from gmwm._core.frozen import frozen
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.estimate import tuning
-from gmwm.estimate.problem.parameters import drift_key
 from gmwm.estimate.problem.ramp import RampRegression, Slope, ols_slope, walks_beside
 from gmwm.estimate.problem.regressors import Coefficients, CurveRegression, Regression
 from gmwm.process import PSD, Model, Process, Shape
@@ -270,22 +269,17 @@ class FittedMoments:
 
     @classmethod
     def of(
-        cls,
-        model: Model,
-        wv: WaveletVariance,
-        keys: Collection[str],
-        discrepancy: float,
+        cls, model: Model, wv: WaveletVariance, discrepancy: float, *, is_free: bool
     ) -> FittedMoments:
-        """Moments of the data at a model with values."""
-        drift = drift_key(model)
+        """Moments of the data at a model with values; of a ramp, whether it was estimated."""
         noise = tuple(term for term in model.terms if not term.is_drift)
         scales = Scales.of(wv)
         moments = Moments(wv, None, False, scales)
         if wv.regressors is not None:
             moments = Moments.of(wv, model, scales).under(model)
-        elif drift is not None:
+        elif len(noise) < len(model.terms):
             slope = Slope(model.drift_rate(), 0.0)
-            moments = Moments(wv, slope, drift in keys, scales)
+            moments = Moments(wv, slope, is_free, scales)
             if noise and (under := moments.under(Model(noise)).found):
                 # Not the printed error, which averages over random walks that are left open.
                 found = Coefficients(slope.values, under.covariance, under.weights)

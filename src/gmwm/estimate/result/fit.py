@@ -290,7 +290,8 @@ class Fit(Document, Printed):
     @cached_property
     def moments(self) -> FittedMoments:
         """The moments of the data and of the model, whatever the method."""
-        return FittedMoments.of(self.model, self.wv, self.keys, self.discrepancy)
+        is_free = drift_key(self.model) in self.keys
+        return FittedMoments.of(self.model, self.wv, self.discrepancy, is_free=is_free)
 
     def deviation_interval(
         self, tau: FloatArray, level: float = 0.95, rivals: Sequence[Model] | None = None

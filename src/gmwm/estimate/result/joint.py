@@ -114,7 +114,7 @@ def _curves_test(whole: Fit, each: Sequence[Fit]) -> float:
     """Chi-square test of all recordings' wavelet variances against the joint model."""
     statistic, levels = 0.0, 0
     for part in each:
-        found = FittedMoments.of(whole.model, part.wv, (), whole.discrepancy)
+        found = FittedMoments.of(whole.model, part.wv, whole.discrepancy, is_free=False)
         if np.any(found.implied <= 0.0):
             return float("nan")
         statistic += chi_square(found.target, found.implied, found.covariance, found.implied)[1]
