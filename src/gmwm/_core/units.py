@@ -74,7 +74,7 @@ def factor(unit: str, si_unit: str) -> float:
         return float((value / target).to("dimensionless").magnitude)
     except pint.DimensionalityError as error:
         raise InputError(
-            f"unit {unit!r} does not measure the same as {si_unit}: use a unit of that kind"
+            f"unit {unit!r} cannot be converted to {si_unit}: use a unit of that kind"
         ) from error
 
 

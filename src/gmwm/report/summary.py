@@ -27,7 +27,7 @@ _NOTABLE = 1.1  # times the table's N or K
 _NORMAL = 1.96  # standard errors of a 95 % interval
 _LEAST = 0.1  # smallest number without an exponent
 _LEGEND = "95 % intervals; <=: 95 % upper limit. B at t: Allan minimum / 0.664, at time t"
-_RESERVED = "*: usable with reservation, bias steps or drifts may recur"
+_RESERVED = "*: bias steps or drifts enlarge B and K, or were subtracted and may recur"
 _FILTER = "For your filter, outages up to {:g} s, one value for all axes (GTSAM: N^2, K^2)"
 KEYS = {"N": "noise_density", "K": "random_walk"}
 """Ends of the keys of OpenVINS and Kalibr, which begin with the names of `SENSORS`."""

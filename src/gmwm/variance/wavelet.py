@@ -390,7 +390,7 @@ class PooledVariance(WaveletVariance):
             for name in ("dt", "unit", "wavelet", "efficiency"):
                 if getattr(part, name) != getattr(longest, name):
                     raise InputError(
-                        f"recordings need the same {name}: it is {getattr(part, name)!r} and "
+                        f"recordings need the same {name}, not {getattr(part, name)!r} and "
                         f"{getattr(longest, name)!r}"
                     )
             if not np.array_equal(part.tau, longest.tau[: part.tau.size]):

@@ -177,8 +177,8 @@ def test_threads_side_by_side_have_one_pool():
 
 @pytest.mark.parametrize(("keys", "value", "message"), [
     (("channels", "gyro_x", "wavelet_variance", "name"), "accel_x", "is of channel 'accel_x'"),
-    (("channels", "gyro_x", "covariance"), [[4.0]], "stderr does not follow"),
-    (("channels", "gyro_x", "valid"), False, "valid does not follow"),
+    (("channels", "gyro_x", "covariance"), [[4.0]], "stderr contradicts"),
+    (("channels", "gyro_x", "valid"), False, "valid contradicts"),
     (("channels", "gyro_x", "upper_bounds"), {"R": 1e-3}, "upper_bounds are not those"),
     (("rate_hz",), 1.0, "rate_hz is 1, but its channels have"),
 ])  # fmt: skip

@@ -124,7 +124,7 @@ def test_pages_and_names_are_kept():
 WRONG = [
     ({}, "holds no sensors"),
     ({"gyro": {"N": "0.2"}}, "not a number with a unit"),
-    ({"gyro": {"N": "0.2 deg"}}, "does not measure the same"),
+    ({"gyro": {"N": "0.2 deg"}}, "cannot be converted"),
     ({"gyro": {"N": "0.2 deg/sqrt(h)", "angle_random_walk": "0.2 deg/sqrt(h)"}}, "twice"),
     ({"gyro": {"noise": "0.2 deg/sqrt(h)"}}, "noise_density"),
     ({"gyro": {"B": "8 deg/h"}}, "no white noise is stated"),

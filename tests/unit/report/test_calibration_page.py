@@ -314,7 +314,7 @@ def test_models_that_tie_and_the_data_sheet_are_drawn(calibration, tmp_path):
     ("text", "what"),
     [
         ("gyro: {N: 1.2}", "not a number with a unit"),
-        ("gyro: {N: 1.2 ug}", "does not measure"),
+        ("gyro: {N: 1.2 ug}", "cannot be converted"),
         ("gyro: {N: -1 deg/sqrt(h)}", "positive number"),
         ("gyro: {Z: 1 deg}", "is not one of N, B, K"),
         ("magnetometer: {N: 1 deg}", "is not a sensor"),

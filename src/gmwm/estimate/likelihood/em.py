@@ -212,7 +212,7 @@ class Iteration:
             if not self.columns.drift_is_free:
                 raise InputError('drift = "state" needs a RateRamp() of free slope in the model')
             if all(term.is_white for term in self._terms):
-                raise InputError('drift = "state" needs a RandomWalk or GaussMarkov to drive')
+                raise InputError('drift = "state" needs a RandomWalk or GaussMarkov in the model')
             self.columns = Columns.without_regressors(series.columns.centred, self.dt)
 
     def expectation(self, stage: Stage) -> Expectation:

@@ -477,7 +477,7 @@ class Fit(Document, Printed):
         found = super().from_content(content)
         for name, value in found.derived().items():
             if not _is_alike(content.get(name, value), value):
-                raise InputError(f"{name} does not follow from the other entries: change those")
+                raise InputError(f"{name} contradicts the other entries: correct them")
         return found
 
 
