@@ -210,7 +210,10 @@ def _scores(
     start: int,
     stop: int,
 ) -> tuple[FloatArray, IntArray]:
-    """Largest ratio to the limit over all widths, and the width that has it, of some bins."""
+    """Largest ratio to the limit over all widths, and the width that has it, of some bins.
+
+    The ratio counts where it is above 1, and may be zero elsewhere.
+    """
     widest = max(limits)
     low, high = max(start - widest, 0), min(stop + widest, ratio.size - 1)
     total = np.concatenate([[0.0], np.cumsum(ratio[low:high])])
@@ -222,11 +225,12 @@ def _scores(
         count, begin = end - first, first - width // 2 - low
         if count <= 0:
             continue
-        sums = total[begin + width :][:count] - total[begin:][:count]
-        value = sums / width / np.interp(freedom[first:end], grid, limit)
-        own = slice(first - start, end - start)
-        best[own][value > score[own]] = width
-        score[own] = np.maximum(score[own], value)
+        mean = (total[begin + width :][:count] - total[begin:][:count]) / width
+        above = np.flatnonzero(mean > np.min(limit))
+        value = mean[above] / np.interp(freedom[first + above], grid, limit)
+        is_larger = value > score[first - start + above]
+        places = (first - start + above)[is_larger]
+        score[places], best[places] = value[is_larger], width
     return score, best
 
 
