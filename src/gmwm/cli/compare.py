@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 @click.argument("files", metavar="FILE FILE...", nargs=-1, required=True, type=PATH)
 @options(
     """
-    -o --output HTML  Page to write, of two printed ones.
+    -o --output HTML  Page to write (prints on two pages).
     --horizon
     --datasheet
     --reading

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     """
     -o --output  Folder for calibration.json, report.html, imu.yaml.
     --hours NUMBER  Length of the simulated recording in hours.
-    --seed N  Of the noise.
+    --seed N  Seed of the noise.
     -v --verbose  Print the error models, all notices and the truth beside the estimates too.
     --files  Only write files to try the other commands with: static.csv of a sensor at rest,
         imu.csv and fixes.csv of a drive with it.
@@ -147,7 +147,7 @@ Found = tuple[str, Sequence[Path]]
     """
     -o --output  Folder for tables, figures and raw estimates.
     --runs N  Number of simulated series.
-    --seed N  Of the first series.
+    --seed N  Seed of the first series.
     --jobs
     --method NAME  Only this method, e.g. GMWM; repeat. By default all of the table.
     --resume
@@ -176,7 +176,7 @@ def reproduce(
     bound), coverage of the 95 % intervals and the paper's own errors; fig2, fig3 and fig4 draw
     the same runs as boxplots; five-gm is white noise + five Gauss-Markov processes; appendix-a
     shows the bias of lines in the Allan plot; weights2, weights3 and weights4 compare weights and
-    wavelets of the method of moments; em4, starts4 and arma4 do EM, starting values and ARMA(3,2)
+    wavelets of the method of moments; em4, starts4 and arma4 try EM, starting values and ARMA(3,2)
     for three Gauss-Markov processes; indirect2 simulates the moments; selection counts how often
     the true model is chosen. fig1, fig5 and fig6 show the way from a signal to its model, the lines
     and the model of a gyro and an accelerometer; table5 and table6 have the paper's parameters

@@ -94,7 +94,7 @@ def _sensors(flag: str, texts: Sequence[str]) -> str | dict[str, str]:
         saved; 'truth' for the true models; repeat. The others are compared with the first.
     --outage START:LENGTH  Seconds without GNSS; repeat.
     --runs N  Number of runs.  [default: 100]
-    --seed N  [default: 0]
+    --seed N  Seed of the errors. [default: 0]
     --jobs
     -o --output  Folder for the report, the table and the runs.
     --resume
@@ -144,7 +144,7 @@ def _sensors(flag: str, texts: Sequence[str]) -> str | dict[str, str]:
 def navigate(
     file: Path | None, output: Path, as_json: bool, imu_start: float | None, **keys: Any
 ) -> None:
-    """Prove sensor models by navigating, or filter your own data.
+    """Test sensor models by navigating, or filter your own data.
 
     A study simulates INS/GNSS filters with outages (Monte Carlo). Sensor errors are drawn from the
     true models or taken from real static recordings, and added to the error-free signals of a

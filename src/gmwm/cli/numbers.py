@@ -331,7 +331,7 @@ def export(
     force: bool,
     listed: bool,
 ) -> None:
-    """Write numbers for a filter as the program wants them.
+    """Write filter numbers as the file of a program.
 
     FILE is a calibration.json, numbers that gmwm bound or gmwm reduce saved, or a motion.json (its
     numbers are for updates every --interval and outages up to --horizon). Several files make one
@@ -501,7 +501,7 @@ def _for_filter(name: str, numbers: FilterNumbers, unit_spread: float) -> str:
     worst = [f"{k} {max(n.nees.values()):.2g}" for k, n in numbers.items()]
     warnings = [n for each in numbers.values() for n in each.notices if n.severity == "warning"]
     lines += bullets(dict.fromkeys(map(str, warnings)))
-    lines += wrapped(f"NEES at most {', '.join(worst)} (1: consistent, below: conservative)")
+    lines += wrapped(f"largest NEES: {', '.join(worst)} (1: consistent, below 1: conservative)")
     return "\n".join([*lines, *wrapped("For your unit, record an hour: gmwm calibrate")])
 
 

@@ -29,8 +29,8 @@ HORIZONTAL = "horizontal"
 """Name of the total over the x and y axes of both sensors."""
 
 STARTS = {
-    True: "initial values of the slow errors known",
-    False: "initial values of the errors unknown",
+    True: "slow errors known at the start",
+    False: "slow errors unknown at the start",
 }
 """Knowledge of the sensors' errors at the start, by `ErrorBudget.calibrated`; attitude, velocity
 and position are exact there."""
@@ -158,8 +158,8 @@ class ErrorBudget:
 
     def __str__(self) -> str:
         lines = [
-            "Error (1 sigma) after an outage, level and not manoeuvring, from",
-            f"exact attitude, velocity and position; {STARTS[self.calibrated]}.",
+            "Errors (1 sigma) after an outage, for a level platform that does not manoeuvre.",
+            f"Attitude, velocity and position exact, and {STARTS[self.calibrated]}.",
         ]
         for quantity in QUANTITIES:
             table: list[tuple[str, str, Sequence[float] | FloatArray]] = []
