@@ -210,7 +210,7 @@ def conclude_likelihood(
     statistical, target, taken = moments.covariance(noise), moments.target, moments.taken
     implied = noise.wavelet_variance(wv.tau, wv.dt, wv.wavelet)
     is_tested = not series.is_bridged
-    compared = Compared(target, implied, statistical, implied, taken, is_tested=is_tested)
+    compared = Compared(target, implied, statistical, statistical, implied, taken, is_tested)
     dof = max(target.size - len(present), 1)
     misfits = is_tested and not suffices(
         0.0, target - implied, statistical, target, implied, dof, taken

@@ -110,7 +110,7 @@ def conclude_moments(end: Converged, wv: WaveletVariance, method: str) -> Fit:
         notices=notices,
     )
     compared = Compared(
-        target, end.implied, end.covariance, end.basis, moments.taken, end.statistical
+        target, end.implied, end.covariance, end.statistical, end.basis, moments.taken
     )
     return conclude(found, compared, wv, misfits=end.discrepancy > 0.0)
 

@@ -113,23 +113,7 @@ class GMWM:
         """Fit the open parameters of a model to wavelet variances."""
         ramp = next((term for term in model.terms if term.is_drift and term.is_open), None)
         if self.drift == "moments" and ramp is not None:
-            if not np.any(wv.drift_response):
-                raise InputError(
-                    f'{wv.wavelet!r} does not see a drift: use "haar", or leave out '
-                    'drift = "moments"'
-                )
-            squared = [SquaredRamp() if term is ramp else term for term in model.terms]
-            found = self.estimate(Model(tuple(squared)), wv)
-            size = math.copysign(found.params["R"], ols_slope(wv).value)
-            return replace(found, model=model.with_params({**found.params, "R": size}))
-
-        def without(i: int) -> Converged | None:
-            place = least.design.terms[i].place
-            left = tuple(term for k, term in enumerate(model.terms) if k != place)
-            if not any(term.is_open for term in left) or all(t.is_drift or t.is_line for t in left):
-                return None
-            return efficient._cached(Model(left), wv)
-
+            return self._by_square(ramp, model, wv)
         weights = Weights.of(self.weights, wv, self.drift == "moments")
         efficient = replace(self, weights="model", start=None)
         least, missed = efficient._cached(model, wv), []
@@ -147,11 +131,30 @@ class GMWM:
         other = least
         if self.weights != "model":
             other = replace(least, root=root, point=search(profile))
+
+        def without(i: int) -> Converged | None:
+            place = least.design.terms[i].place
+            left = tuple(term for k, term in enumerate(model.terms) if k != place)
+            if not any(term.is_open for term in left) or all(t.is_drift or t.is_line for t in left):
+                return None
+            return efficient._cached(Model(left), wv)
+
         fit = conclude_moments(least, wv, self.name)
         fit = with_doubtful_terms(fit, least, without)
         if other is not least:
             fit = reweighted(fit, least, other, self.weights)
         return replace(fit, notices=(*fit.notices, *missed)) if missed else fit
+
+    def _by_square(self, ramp: Process, model: Model, wv: WaveletVariance) -> Fit:
+        """The fit with a ramp as a term of nu(theta), whose sign the series tells."""
+        if not np.any(wv.drift_response):
+            raise InputError(
+                f'{wv.wavelet!r} does not see a drift: use "haar", or leave out drift = "moments"'
+            )
+        squared = [SquaredRamp() if term is ramp else term for term in model.terms]
+        found = self.estimate(Model(tuple(squared)), wv)
+        size = math.copysign(found.params["R"], ols_slope(wv).value)
+        return replace(found, model=model.with_params({**found.params, "R": size}))
 
     def _cached(self, model: Model, wv: WaveletVariance) -> Converged:
         """The minimum, searched once for each model and series."""

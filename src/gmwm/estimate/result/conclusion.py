@@ -70,17 +70,16 @@ class Estimates:
 class Compared:
     """Wavelet variances of the data without the drift, beside those of a fitted model, (J,).
 
-    covariance: (J, J), belongs to the wavelet variances ``basis``.
-    statistical: The covariance less the discrepancy, where there is one.
+    covariance, statistical: (J, J), with the discrepancy and without; of ``basis`` (J,).
     taken: See `chi_square`.
     """
 
     target: FloatArray
     implied: FloatArray
     covariance: FloatArray
+    statistical: FloatArray
     basis: FloatArray
     taken: FloatArray
-    statistical: FloatArray | None = None
     is_tested: bool = True
 
     def agreement(self, n_free: int) -> dict[str, Any]:
@@ -90,9 +89,10 @@ class Compared:
         dof = target.size - n_free
         plain = allowed = float("nan")
         if self.is_tested and dof > 0 and np.all(basis > 0.0):
-            plain = allowed = chi_square(target, implied, self.covariance, basis, self.taken)[1]
-            if self.statistical is not None:
-                plain = chi_square(target, implied, self.statistical, basis, self.taken)[1]
+            plain, allowed = (
+                chi_square(target, implied, each, basis, self.taken)[1]
+                for each in (self.statistical, self.covariance)
+            )
         return {
             "objective": float(whitened @ whitened),
             "chi_square": plain,
