@@ -12,14 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from gmwm._core.files import (
-    folder_to_fill,
-    moved_together,
-    opened,
-    replaceable,
-    run_of,
-    write_text,
-)
+from gmwm._core.files import folder_to_fill, moved_together, opened, replaceable, run_of, write_text
 from gmwm.cli.options import (
     FILE_TO_WRITE,
     PATH,

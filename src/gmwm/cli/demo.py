@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,7 +16,6 @@ from gmwm.errors import InputError
 if TYPE_CHECKING:
     import pyarrow
 
-    from gmwm.calibration import Calibration
     from gmwm.process import Model
 
 
@@ -27,7 +25,7 @@ if TYPE_CHECKING:
     -o --output  Folder for calibration.json, report.html, imu.yaml.
     --hours NUMBER  Length of the simulated recording in hours.
     --seed N  Seed of the noise.
-    -v --verbose  Print the error models, all notices and the truth beside the estimates too.
+    -v --verbose  Print the error model of each axis and all notices too.
     --files  Only write files to try the other commands with: static.csv of a sensor at rest,
         imu.csv and fixes.csv of a drive with it.
     """,
@@ -58,12 +56,6 @@ def demo(output: Path, hours: float, seed: int, verbose: bool, files: bool) -> N
             result = run(recording, progress=bar)
         written = write_files(result, folder, recording)
     show(result, [*_truth_lines(truth), *written], verbose=verbose)
-    if verbose:
-        forms = {name: model.opened() for name, model in truth.items()}
-        with progress_bar("fitting", "channels") as bar:
-            fitted = run(recording, forms, progress=bar)
-        click.echo("\nTruth and estimate, the form of each model known:\n")
-        show_truth(fitted, truth)
 
 
 def _truth_lines(truth: dict[str, Model]) -> list[str]:
@@ -97,32 +89,6 @@ def write_files_to_try(output: Path, hours: float, seed: int) -> None:
         f"  gmwm navigate --imu {output / 'imu.csv'} --gnss {output / 'fixes.csv'} \\\n"
         f"    --sensors {output / 'out' / 'calibration.json'} --lever-arm {lever_arm}"
     )
-
-
-def show_truth(fitted: Calibration, truth: dict[str, Model]) -> None:
-    """One table of truth beside estimate, in the units of the field."""
-    from gmwm._core.text import plain_table, wrapped
-    from gmwm._core.units import customary_unit
-
-    rows, held = [], []
-    for name, fit in fitted.items():
-        intervals = fit.interval()
-        for item in truth[name].parameters:
-            key, wv = item.key, fit.wv
-            unit, scale = customary_unit(item.parameter.unit, wv.quantity, wv.unit)
-            lower, upper = (scale * end for end in intervals.get(key, (0.0, math.inf)))
-            true, estimate = scale * (item.value or 0.0), scale * fit.params[key]
-            cells = ["-", "too short to tell"]
-            if upper < math.inf:
-                held.append(lower <= true <= upper)
-                shown = f"{lower:.4g} .. {upper:.4g}" if lower else f"<= {upper:.4g}"
-                cells = [f"{estimate:.4g}", shown + ("" if held[-1] else " *")]
-            rows.append((name, key, f"{true:.4g}", *cells, unit))
-    heads = ("channel", "parameter", "truth", "estimate", "95 % interval", "unit")
-    click.echo(plain_table(heads, rows))
-    text = f"{len(held)} of {len(rows)} parameters are determined by this record; "
-    text += f"{sum(held)} of these {len(held)} intervals hold the truth (* does not)."
-    click.echo("\n".join(wrapped(text)))
 
 
 _SIMULATED = (
@@ -191,7 +157,7 @@ def reproduce(
       gmwm reproduce fig9 --recording a.csv --recording b.csv --rate 100 \\
         --gyro-unit deg/s --accel-unit g --rotate
     """
-    from gmwm.study import reproduce_sensor
+    from gmwm.study import reproduce_figure, reproduce_rotation, reproduce_sensor
 
     alone = {name: options.pop(name) for name in ("method", "cluster", "resume")}
     known = set(alone) if experiment in _SIMULATED else set()
@@ -214,7 +180,9 @@ def reproduce(
                     text, paths = reproduce_sensor(experiment, folder, progress=bar, **own)
             elif experiment in _NAVIGATED:
                 work |= {"recordings": recordings, "resume": alone["resume"]}
-                text, paths = _navigated(experiment, folder, rotate, **work)
+                run = reproduce_rotation if rotate else reproduce_figure
+                with progress_bar(experiment, "recordings" if rotate else "runs") as bar:
+                    text, paths = run(experiment, folder, progress=bar, **work)
             else:
                 text, paths = _tested(experiment, folder, **work)
         except KeyboardInterrupt:
@@ -247,15 +215,6 @@ def _raw(table: pyarrow.Table, path: Path) -> Path:
     with moved_into_place(path) as temporary:
         pq.write_table(table, temporary)
     return path
-
-
-def _navigated(experiment: str, folder: Path, rotate: bool, **work: Any) -> Found:
-    """Figures 7 to 9; 8 and 9 with every recording calibrated in turn if ``rotate``."""
-    from gmwm.study import reproduce_figure, reproduce_rotation
-
-    run = reproduce_rotation if rotate else reproduce_figure
-    with progress_bar(experiment, "recordings" if rotate else "runs") as bar:
-        return run(experiment, folder, progress=bar, **work)
 
 
 def _tested(experiment: str, folder: Path, *, runs: int | None, seed: int, jobs: int) -> Found:

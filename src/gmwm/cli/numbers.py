@@ -491,13 +491,9 @@ def _for_filter(name: str, numbers: FilterNumbers, unit_spread: float) -> str:
         for k, n in numbers.items()
         if n.initial_sd
     ]
-    lines += (
-        wrapped(
-            f"start bias, 1 sigma (with the turn-on bias of the sheet, if any): {', '.join(starts)}"
-        )
-        if starts
-        else []
-    )
+    if starts:
+        start = "start bias, 1 sigma (with the turn-on bias of the sheet, if any)"
+        lines += wrapped(f"{start}: {', '.join(starts)}")
     worst = [f"{k} {max(n.nees.values()):.2g}" for k, n in numbers.items()]
     warnings = [n for each in numbers.values() for n in each.notices if n.severity == "warning"]
     lines += bullets(dict.fromkeys(map(str, warnings)))

@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from gmwm._core.typing import Progress
     from gmwm.calibration import Calibration
     from gmwm.issues import Notice
-if TYPE_CHECKING:
     from gmwm.process import Model
     from gmwm.readers import Recording
 

@@ -15,12 +15,7 @@ from gmwm._core.distributions import chi2, norm
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.estimate import Fit
-from gmwm.estimate.problem import (
-    Scales,
-    detrended_covariance,
-    gls_slope,
-    weight_root,
-)
+from gmwm.estimate.problem import Scales, detrended_covariance, gls_slope, weight_root
 from gmwm.population import tuning
 from gmwm.process import Model
 

@@ -31,14 +31,7 @@ from gmwm.ins.sensors import AXES, Recorded, SensorModels
 from gmwm.ins.simulation import GROUPS, Experiment, FilterErrors, Validation
 from gmwm.issues import Notice, notice
 from gmwm.readers import Recording
-from gmwm.study.navigation import (
-    TEN,
-    Calibrated,
-    aligned,
-    check_channels,
-    scenario_of,
-    times,
-)
+from gmwm.study.navigation import TEN, Calibrated, aligned, check_channels, scenario_of, times
 from gmwm.study.summary import saved
 
 if TYPE_CHECKING:

@@ -12,13 +12,7 @@ import numpy as np
 from gmwm._core.compiled import compiled
 from gmwm._core.typing import FloatArray, IntArray
 from gmwm.variance import tuning
-from gmwm.variance.kernels import (
-    ANY_ORDER,
-    difference_powers,
-    summed,
-    summed_with_moments,
-    survey,
-)
+from gmwm.variance.kernels import ANY_ORDER, difference_powers, summed, summed_with_moments, survey
 
 STARTS = tuning.STREAMING_STARTS
 FINE = STARTS.bit_length()  # levels of single samples: 1, 2, 4, ... STARTS

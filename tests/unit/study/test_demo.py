@@ -1,6 +1,5 @@
-"""The simulated IMU of the demonstration, and truth beside estimate."""
+"""The simulated IMU of the demonstration, and the files to try commands with."""
 
-from dataclasses import replace
 from math import pi
 
 import numpy as np
@@ -8,8 +7,7 @@ import pytest
 
 import gmwm
 from emulated_logs import emulated_log
-from gmwm import RandomWalk, WhiteNoise, ins
-from gmwm.cli.demo import show_truth
+from gmwm import ins
 from gmwm.study.demo import DRIVE, RATE, simulated_imu, write_demo_files
 from gmwm.study.navigation import TABLE_5, TABLE_6
 
@@ -60,30 +58,6 @@ def test_the_seed_decides():
         assert not np.array_equal(one[name].values, other[name].values)
     axes = np.array([one[f"gyro_{axis}"].values for axis in "xyz"])
     assert np.abs(np.corrcoef(axes)[np.triu_indices(3, 1)]).max() < 0.2  # axes are independent
-
-
-# -- truth beside estimate ------------------------------------------------------------------------
-
-
-TRUTH = WhiteNoise(3e-4) + RandomWalk(1e-4)
-
-
-def test_a_bound_is_an_interval_from_zero(capsys):
-    channel = gmwm.Channel("gyro_x", TRUTH.simulate(20_000, 0.01, 5), 0.01, "gyro", "rad/s")
-    fit = gmwm.fit(TRUTH.opened(), channel)
-    nil = replace(
-        fit,
-        model=fit.model.with_params({"K": 0.0}),
-        keys=("N",),
-        covariance=fit.covariance[:1, :1],
-        upper_bounds={"K": 2e-4},
-    )
-    show_truth({"gyro_x": nil}, {"gyro_x": TRUTH})
-    printed = capsys.readouterr().out
-    truth, bound = (K * 180.0 / pi * 3600.0 * 60.0 for K in (1e-4, 2e-4))
-    (walk,) = (line.split() for line in printed.splitlines() if line.split()[1:2] == ["K"])
-    assert walk[2:6] == [f"{truth:.4g}", "0", "<=", f"{bound:.4g}"]
-    assert "2 of 2 parameters are determined" in printed
 
 
 def test_files_to_try_are_read_as_they_were_made(tmp_path):

@@ -18,13 +18,7 @@ from gmwm.ins.filter.filter import Filter, InitialSd, Outputs, Solution
 from gmwm.ins.geometry import matrix_from_rotation_vector, matrix_from_rpy, offset, rpy_from_matrix
 from gmwm.ins.increments import Imu, emulate
 from gmwm.ins.sensors import Recorded, SensorErrors, SensorModels
-from gmwm.ins.simulation.consistency import (
-    PER_RUN,
-    QUANTITIES,
-    FilterErrors,
-    errors_of_run,
-    sizes,
-)
+from gmwm.ins.simulation.consistency import PER_RUN, QUANTITIES, FilterErrors, errors_of_run, sizes
 from gmwm.ins.trajectory.trajectory import NavState, Trajectory
 from gmwm.issues import Notice, notice
 

@@ -18,12 +18,7 @@ from gmwm._core.typing import FloatArray
 from gmwm.process.base import Process, Shape
 from gmwm.process.kinds.arma import haar_sum
 from gmwm.process.parameter import parameter
-from gmwm.process.spectral import (
-    PANEL,
-    POLE_OF_PANEL,
-    log_tangent,
-    log_tangent_weights,
-)
+from gmwm.process.spectral import PANEL, POLE_OF_PANEL, log_tangent, log_tangent_weights
 from gmwm.process.state_space import StateSpace
 
 _GRID_PER_DECADE = 6
