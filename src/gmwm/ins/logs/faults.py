@@ -468,8 +468,8 @@ def _arm_words(fault: Fault) -> dict[str, Any]:
     arm = np.asarray(fault.replay.aiding.lever_arm) - list(values.values()) + known
     hint = f"give the lever arm {','.join(f'{each:.2f}' for each in arm)}, or measure it"
     if unseen:
-        also = f"and measure it {' and '.join(unseen)}, which this motion does not show and"
-        hint = hint.replace("or measure it", f"{also} is left as it was")
+        also = f"measure {' and '.join(unseen)}, which this motion does not show"
+        hint = hint.replace(", or measure it", f"; {also}")
     if len(unseen) == len(values):
         hint = "measure it: this motion does not show any of its parts well enough"
     return {"parts": parts, "hint": hint}

@@ -132,8 +132,8 @@ class ReferenceErrors:
         sizes = self.disagreeing
         if not sizes:
             return "the errors agree with the filter's covariance"
-        shown = (f"those of {name} are {brief(size)} times" for name, size in sizes.items())
-        return f"the errors do not agree with the filter's covariance: {', '.join(shown)} as large"
+        shown = (f"{name} {brief(size)} times" for name, size in sizes.items())
+        return f"the errors contradict the filter's covariance: {', '.join(shown)} as large"
 
     def rms(self, *errors: int) -> tuple[float, float]:
         """Root mean square of some of the nine errors together, and as the filter predicted it."""

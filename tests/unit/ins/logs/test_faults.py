@@ -159,7 +159,7 @@ def test_a_lever_arm_left_out(vehicle, seed, rate):
 @pytest.mark.parametrize(
     ("down", "advice"),
     [(0.3, "give the lever arm 1.50,0.30,-2.80"),
-     (2.0, "give the lever arm 1.50,0.30,-1.00, and measure it down, which"),
+     (2.0, "give the lever arm 1.50,0.30,-1.00; measure down, which"),
      (None, "measure it: this motion does not show any")],
 )  # fmt: skip
 def test_only_what_the_motion_shows_of_a_lever_arm_is_advised(down, advice):
