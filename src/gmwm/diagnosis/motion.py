@@ -14,12 +14,14 @@ from gmwm._core.typing import BoolArray, FloatArray
 from gmwm._core.units import SI_UNIT, factor
 from gmwm.diagnosis import tuning
 from gmwm.diagnosis.innovations import Spans
-from gmwm.readers import AXES, Channel, Recording, block_means, steady_turn, turning_gravity
+from gmwm.readers import AXES, Channel, Recording, block_means, turning_gravity
 
 T = TypeVar("T")
 
 _GRAVITY = factor("g", SI_UNIT["accel"])
 _LISTED = 3
+_LEAST_CONE = 0.01  # rad by which gravity leaves its mean where a sensor turns; at rest, 0.3 deg
+_LAGS, _FEWEST_LAGS = (1, 4, 16), 20  # blocks between which changes count; how many at least
 _LIMIT = {"gyro": tuning.TURNS, "accel": tuning.TILTS * _GRAVITY}
 
 
@@ -115,7 +117,7 @@ def find_motion(recording: Recording) -> Motion:
             white = _white(channel.values, size)
             for row in np.flatnonzero(level_changes(series, _LIMIT[sensor], white)[1]):
                 changing[row : row + tuning.MEDIAN_BLOCKS + 1] = True
-    turn = steady_turn(recording, size)
+    turn = _steady_turn(recording, size)
     if turn > 0.0:
         still = []
     elif np.any(changing):
@@ -251,6 +253,39 @@ def _never_rests(recording: Recording, rate: FloatArray, size: int) -> bool:
         and found.change > tuning.SWAYS * _GRAVITY
         and 1.0 / tuning.AS_PREDICTED < found.factor < tuning.AS_PREDICTED
     )
+
+
+def _steady_turn(recording: Recording, size: int) -> float:
+    """Constant rate at which gravity turns in the frame of a sensor, rad/s; 0 if there is none.
+
+    The w of da/dt = -w x a by least squares. It counts if it explains most of the changes and turns
+    by a radian in all, which noise and drifts do not.
+    """
+    names = [f"accel_{axis}" for axis in AXES]
+    if not set(names) <= set(recording):
+        return 0.0
+    means = block_means([recording[name].values for name in names], size)
+    if np.all(np.any(np.isnan(means), axis=1)):
+        return 0.0
+    wander = np.linalg.norm(means - np.nanmean(means, axis=0), axis=1)
+    if not np.nanmax(wander) > _LEAST_CONE * np.linalg.norm(np.nanmean(means, axis=0)):
+        return 0.0
+    for lag in _LAGS:
+        if means.shape[0] < _FEWEST_LAGS * lag:
+            break
+        change = means[lag:] - means[:-lag]
+        known = ~np.any(np.isnan(change), axis=1)
+        x, y, z = 0.5 * (means[lag:] + means[:-lag])[known].T
+        none = np.zeros(x.size)
+        # -w x a, by the components of w.
+        turned = np.array([[none, z, -y], [-z, none, x], [y, -x, none]])
+        design, wanted = turned.reshape(3, -1).T, change[known].T.ravel()
+        rate, *_ = np.linalg.lstsq(design, wanted, rcond=None)
+        rest, total = wanted - design @ rate, float(wanted @ wanted)
+        speed = float(np.linalg.norm(rate)) / (lag * size * recording.dt)
+        if rest @ rest < 0.5 * total and speed * recording.duration > 1.0:
+            return speed
+    return 0.0
 
 
 def times_of(stretches: Sequence[tuple[float, float]]) -> str:

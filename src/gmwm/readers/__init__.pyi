@@ -22,9 +22,6 @@ from .registry import (
     is_frame as is_frame,
     open_tables as open_tables,
 )
-from .rest import (
-    block_means as block_means,
-    steady_turn as steady_turn,
-    turning_gravity as turning_gravity,
-)
-from .table import label as label, load_columns as load_columns
+from .rest import block_means as block_means, turning_gravity as turning_gravity
+from .samples import load_columns as load_columns
+from .table import label as label

@@ -12,9 +12,11 @@ from gmwm._core.units import SI_UNIT
 from gmwm.errors import InputError
 from gmwm.issues import Notice, notice
 from gmwm.readers import tuning
+from gmwm.readers.columns import Roles
 from gmwm.readers.grid import Grid, Jumps, NoGrid, find_grid, find_lattice
-from gmwm.readers.names import TIME, bare
-from gmwm.readers.table import Table, load_columns, more_such
+from gmwm.readers.names import bare, stated_seconds
+from gmwm.readers.samples import Samples
+from gmwm.readers.table import Columns, Table, more_such
 
 # Names of units of time, by their seconds.
 UNITS = {86400.0: "days", 3600.0: "hours", 60.0: "minutes", 1.0: "seconds"}
@@ -353,27 +355,29 @@ def ask_for_unknown(
 ) -> None:
     """Raise one InputError that asks for the rate and for the units of ``missing`` sensors.
 
-    Time stamps are looked at later, unless the units are to be asked for anyway.
+    The steps of time stamps are looked at later, unless the units are to be asked for anyway.
     """
     rate = None
     if time is None and stated is None:
         problem = f"{table.source} has no time column and no rate was given"
         rate = InputError(problem, "rate", "give it in Hz, e.g. rate=100", {"rate": 100.0})
-    elif missing and time is not None and stated is None and table.meanings[time].seconds is None:
-        steps = np.diff(table.load([time])[time])
-        usual = float(np.median(steps)) if steps.size else 0.0  # too few are reported later
-        rate = without_unit(table.source, table.column(time), usual)
-    if rate is not None and not missing:
-        raise rate
+    elif time is not None and stated is None:
+        # Complain before a long file is read.
+        seconds = stated_seconds(table.source, table.names[time])
+        if missing and seconds is None:
+            steps = np.diff(table.load([time])[time])
+            usual = float(np.median(steps)) if steps.size else 0.0  # too few are reported later
+            rate = without_unit(table.source, table.column(time), usual)
     if not missing:
+        if rate is not None:
+            raise rate
         return
     text = f"does not give the unit of {' and '.join(missing.values())}"
     codes = [f"{key}-unit-missing" if key in SI_UNIT else "unit-missing" for key in missing]
     examples = [f'"{key}": "{_EXAMPLES.get(key, "deg/s")}"' for key in missing]
     hint = f"units={{{', '.join(examples)}}}"
     if rate is None:
-        it = "it" if len(codes) == 1 else "them"
-        code = " ".join(dict.fromkeys(codes))
+        it, code = "it" if len(codes) == 1 else "them", " ".join(dict.fromkeys(codes))
         raise InputError(f"{table.source} {text}", code, f"give {it}, e.g. {hint}")
     # The advice about a time column ends the advice of the command line.
     codes.insert(len(codes) if rate.code == "time-unit" else 0, rate.code)
@@ -382,47 +386,45 @@ def ask_for_unknown(
     raise InputError(f"{rate.problem}, and it {text}", code, hint, rate.values)
 
 
-def timing_in(
-    table: Table, time: int, arrays: Mapping[int, FloatArray], stated: float | None
-) -> Timing:
+def timing_in(table: Table, roles: Roles, samples: Samples, stated: float | None) -> Timing | None:
     """What the time stamps say, checked against the stated rate if there is one."""
+    if roles.time is None or samples.stamps is None:
+        return None
 
     def same(order: IntArray) -> BoolArray:
         found = np.arange(order.size) > 0
-        for values in (arrays[i][order] for i in arrays if i != time):
+        for values in (each[order] for each in samples.series.values()):
             both = np.isnan(values[1:]) & np.isnan(values[:-1])
             found[1:] &= (values[1:] == values[:-1]) | both
         return found
 
-    found, stamps, odd = table.meanings[time], arrays[time], list[Notice]()
+    found, column = table.meanings[roles.time], table.column(roles.time)
+    stamps, odd = samples.stamps, list[Notice]()
     if stated is not None:
         odd.append(notice("rate-stated", "", {"rate": stated}))
     if found.seconds in (None, 1.0) and is_time_of_day(stamps):
         stamps = seconds_of_day(stamps)
         odd.append(notice("time-of-day"))
     unit = (found.seconds, found.stated)
-    origin = table.origins.get(time, 0.0)
-    clock = Clock(table.source, table.column(time), stamps, *unit, table.where, same, origin)
+    origin = table.origins.get(roles.time, 0.0)
+    clock = Clock(table.source, column, stamps, *unit, table.where, same, origin)
     timing = timing_of(clock, stated)
     return replace(timing, notices=(*timing.notices, *odd))
 
 
-def contradicted(table: Table, rate: float) -> list[Notice]:
+def contradicted(table: Table, ignored: Columns, rate: float) -> tuple[Notice, ...]:
     """Say that stamps which are not used have another rate (Hz) than the given one."""
-    stamped = (i for i, each in enumerate(table.meanings) if each.role == TIME and each.seconds)
-    index = next(stamped, None)
-    if index is not None:
-        with suppress(InputError, ZeroDivisionError, ValueError):  # few stamps, or no step
-            stamps = load_columns(table, [index])[index]
-            stamps = stamps[~np.isnan(stamps)]
+    for index, column in ignored.items():
+        with suppress(ZeroDivisionError, ValueError):  # few stamps, or no step
+            stamps = column[~np.isnan(column)]
             unit = table.meanings[index].seconds or 1.0
             known = mean_rate(stamps, unit) if np.min(np.diff(stamps)) < 0.0 else None
             mean = known or (stamps.size - 1) / (float(np.ptp(stamps)) * unit)
             own = 1.0 / (usual_step(stamps) * unit)
             if not (agree(rate, own) and agree(rate, mean)):
                 values = {"rate": rate, "own": own, "mean": mean}
-                return [notice("rate-ignores-stamps", "", values, column=table.column(index))]
-    return []
+                return (notice("rate-ignores-stamps", "", values, column=table.column(index)),)
+    return ()
 
 
 # -- times of day ---------------------------------------------------------------------------------

@@ -1,7 +1,7 @@
 """Which column is which channel, and in what unit."""
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
@@ -11,15 +11,7 @@ from gmwm._core.units import AUXILIARY, SI_UNIT, Unit, auxiliary_unit, is_other_
 from gmwm.errors import InputError
 from gmwm.issues import Notice, notice
 from gmwm.readers import tuning
-from gmwm.readers.names import (
-    AXES,
-    CANONICAL,
-    NUMBERS_OF_SENSORS,
-    TIME,
-    bare,
-    meaning,
-    stated_seconds,
-)
+from gmwm.readers.names import AXES, CANONICAL, NUMBERS_OF_SENSORS, TIME, bare, meaning
 from gmwm.readers.table import Table, label
 
 Reference = str | int  # a column's name, or its index counted from 0
@@ -31,10 +23,10 @@ _EXAMPLE = 'channels={"gyro_x": 0, "accel_x": 3}'
 class Given:
     """What the caller of `gmwm.read` says of a table: the arguments of that name."""
 
-    rate: float | None
-    units: Mapping[str, str]
-    channels: Mapping[str, Reference] | Collection[str] | None
-    time: Reference | Literal[False] | None
+    rate: float | None = None
+    units: Mapping[str, str] = field(default_factory=dict)
+    channels: Mapping[str, Reference] | Collection[str] | None = None
+    time: Reference | Literal[False] | None = None
 
     def __post_init__(self) -> None:
         units = self.units
@@ -50,10 +42,10 @@ class AuxiliaryColumn:
     name: str  # name of its channel
     index: int
     quantity: str  # one of `AUXILIARY`
-    unit: Unit | None  # unit in the file; None if unknown
+    unit: Unit  # in the file; without a text if unknown
 
     def __str__(self) -> str:
-        return f"{self.name!r} ({self.quantity}{'' if self.unit else ', unit unknown'})"
+        return f"{self.name!r} ({self.quantity}{'' if self.unit.kept else ', unit unknown'})"
 
 
 @dataclass(frozen=True)
@@ -63,6 +55,7 @@ class Roles:
     channels: dict[str, int]  # name of a gyro's or accelerometer's channel -> index of its column
     auxiliary: tuple[AuxiliaryColumn, ...]  # other channels that are kept
     time: int | None  # index of the column of time stamps
+    ignored: int | None  # that of such a column whose stamps contradict a stated rate, perhaps
     notices: tuple[Notice, ...]  # auxiliary columns, and columns that are not used
 
     @property
@@ -112,8 +105,6 @@ def roles_of(table: Table, given: Given) -> Roles:
         hint = 'name one of a gyro or an accelerometer, e.g. channels={"gyro_x": 1}'
         raise InputError(f"{table.source}: every channel is auxiliary: {hint}", "channel-unknown")
     _check_one_sensor(table, {*chosen.values(), time})
-    if time is not None and given.rate is None:  # complain before a long file is read
-        stated_seconds(table.source, names[time])
     notices = []
     if given.time is None and len(stamps) > 1:
         this, others = label(names, stamps[0]), ", ".join(label(names, i) for i in stamps[1:])
@@ -123,11 +114,15 @@ def roles_of(table: Table, given: Given) -> Roles:
         listed = ", ".join(map(str, auxiliary))
         notices.append(notice("columns-auxiliary", "", values, listed=listed))
     used = {*chosen.values(), time, *(column.index for column in auxiliary)}
-    ignored = [label(names, i) for i in range(len(names)) if i not in used]
-    if ignored:
-        count = {"count": len(ignored)}
-        notices.append(notice("columns-not-used", "", count, listed=", ".join(ignored)))
-    return Roles(chosen, tuple(auxiliary), time, tuple(notices))
+    unused = [label(names, i) for i in range(len(names)) if i not in used]
+    if unused:
+        count = {"count": len(unused)}
+        notices.append(notice("columns-not-used", "", count, listed=", ".join(unused)))
+    ignored = None
+    if given.time is False and given.rate is not None:
+        stamped = (i for i, m in enumerate(table.meanings) if m.role == TIME and m.seconds)
+        ignored = next(stamped, None)
+    return Roles(chosen, tuple(auxiliary), time, ignored, tuple(notices))
 
 
 def _check_one_sensor(table: Table, columns: Collection[int | None]) -> None:
@@ -261,8 +256,9 @@ def _given_auxiliary(
         elif (role := meaning(name).role) in AUXILIARY or (
             role is None and column.role in AUXILIARY and name not in units
         ):
-            own = column.unit if column.unit and column.unit.quantity in AUXILIARY else None
-            found.append(AuxiliaryColumn(name, index, role or str(column.role), own))
+            quantity, own = role or str(column.role), column.unit
+            own = own if own and own.quantity in AUXILIARY else Unit("", quantity, "")
+            found.append(AuxiliaryColumn(name, index, quantity, own))
     return found
 
 
@@ -281,7 +277,7 @@ def _found_auxiliary(
         unit = auxiliary_unit(units[name]) if name in units else role.unit
         if quantity == "clock" and role.seconds is not None:
             unit = Unit("s", "clock", "s", role.seconds)
-        found.append(AuxiliaryColumn(name, index, quantity, unit))
+        found.append(AuxiliaryColumn(name, index, quantity, unit or Unit("", quantity, "")))
     return found
 
 

@@ -3,33 +3,25 @@
 import math
 import os
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 
-from gmwm._core.typing import FloatArray
+from gmwm._core.spool import scaled
 from gmwm._core.units import Unit
 from gmwm.errors import InputError
-from gmwm.issues import Notice, notice
-from gmwm.readers import clock as clocks, tuning
-from gmwm.readers.columns import AuxiliaryColumn, Given, Reference, Roles, roles_of, units_of
+from gmwm.issues import notice
+from gmwm.readers import clock as clocks
+from gmwm.readers.columns import Given, Reference, roles_of, units_of
 from gmwm.readers.formats.binary import BinaryTable
 from gmwm.readers.names import CANONICAL, TIME, bare
-from gmwm.readers.recording import (
-    Channel,
-    Recording,
-    channel_of,
-    notices_of_gaps,
-    without_sentinels,
-)
+from gmwm.readers.recording import Channel, Recording, joined
 from gmwm.readers.registry import NAMES, Wanted, open_tables
 from gmwm.readers.rest import rest_notices
-from gmwm.readers.table import Table, load_columns
-
-_SAMPLE = 0.5  # by which two clocks may part over a recording and count as one
+from gmwm.readers.samples import samples_of
+from gmwm.readers.table import Table
 
 
 def has_sensors(table: Table) -> bool:
@@ -64,61 +56,6 @@ def shares(
     return found
 
 
-def joined(parts: Sequence[Recording]) -> Recording:
-    """Recordings of topics, cut to the time that they have in common."""
-    first = parts[0]
-    if len(parts) == 1:
-        return first
-    start = max(part.start for part in parts)
-    stop = min(part.start + part.duration for part in parts)
-    if not stop > start:
-        text = f'{first.source}: its topics have no time in common: choose one, or clock="log"'
-        raise InputError(text, "topics-apart")
-    channels = [channel for part in parts for channel in _cut(part, start, stop)]
-    names = [channel.name for channel in channels]
-    if len(set(names)) < len(names):
-        raise InputError(f"{first.source}: two topics have the same channels: choose one", "topic")
-    # Clocks that are the same within half a sample get one rate and length.
-    dt, n = channels[0].dt, channels[0].n
-    for i, channel in enumerate(channels):
-        if abs(channel.dt / dt - 1.0) * channel.n < _SAMPLE and abs(channel.n - n) <= 1:
-            channels[i] = replace(channel, dt=dt, values=channel.values[:n])
-    shortest = min(channel.n for channel in channels if channel.dt == dt)
-    channels = [
-        replace(channel, values=channel.values[:shortest]) if channel.dt == dt else channel
-        for channel in channels
-    ]
-    notices: list[Notice] = []
-    for each in (each for part in parts for each in part.notices):
-        if each.code != "missing-samples" and each not in notices:
-            notices.append(each)
-    values = {
-        "duration": stop - start,
-        "lost": max(part.duration for part in parts) - (stop - start),
-        "rates": len({channel.dt for channel in channels if not channel.is_auxiliary}),
-    }
-    rates = ", ".join(f"{part.rate:.6g} Hz" for part in parts)
-    notices.append(notice("topics-joined", "", values, count=len(parts), listed=rates))
-    jitter = [part.jitter for part in parts if part.jitter is not None]
-    return replace(
-        first,
-        channels=tuple(channels),
-        notices=(*notices, *notices_of_gaps(channels)),
-        jitter=max(jitter, default=None),
-        start=start,
-    )
-
-
-def _cut(recording: Recording, start: float, stop: float) -> list[Channel]:
-    begin, end = (round((time - recording.start) * recording.rate) for time in (start, stop))
-    rows = slice(begin, end)
-    if rows.stop - rows.start < tuning.FEWEST_SAMPLES:
-        common = f"{recording.source}: its topics have {stop - start:.3g} s in common"
-        hint = f"fewer than {tuning.FEWEST_SAMPLES} samples: choose one, or record longer"
-        raise InputError(f"{common}, {hint}", "topics-apart")
-    return [replace(channel, values=channel.values[rows]) for channel in recording.channels]
-
-
 def with_temperature(recording: Recording, table: Table, *, is_one_clock: bool = True) -> Recording:
     """A thermometer beside the sensors, interpolated at their rate between its stamps."""
     roles = [each.role for each in table.meanings]
@@ -138,7 +75,8 @@ def with_temperature(recording: Recording, table: Table, *, is_one_clock: bool =
             values = np.interp(grid, stamps[order], own[order], left=np.nan, right=np.nan)
             unit = table.meanings[column].unit or Unit("", "temperature", "degC")
             name = bare(table.names[column])
-            channels.append(channel_of(name, values, recording.dt, unit))
+            values = scaled(values, unit.scale, unit.offset)
+            channels.append(Channel(name, values, recording.dt, unit.quantity, unit.kept))
         names, first = ", ".join(channel.name for channel in channels), recording.names[0]
         count = {"count": stamps.size}
         outcome = notice("temperature-interpolated", "", count, listed=names, first=first)
@@ -295,42 +233,27 @@ def recording_of(table: Table, given: Given) -> Recording:
     roles = roles_of(table, replace(given, rate=stated))
     units = units_of(table, roles, given.units)
     clocks.ask_for_unknown(table, roles.time, stated, units.missing)
-    arrays, auxiliary, unreadable = _load(table, roles)
-    odd = list[Notice]()
-    for name, index in roles.channels.items():
-        largest = tuning.BEYOND_SENSORS / units.known[name].scale
-        arrays[index], found = without_sentinels(name, arrays[index], largest, table.where)
-        odd += found
-    timing = None if roles.time is None else clocks.timing_in(table, roles.time, arrays, stated)
-    if given.time is False and stated is not None:
-        odd += clocks.contradicted(table, stated)
+    samples = samples_of(table, roles, units.known)
+    timing = clocks.timing_in(table, roles, samples, stated)
     rate = stated or (timing.rate if timing else 0.0)  # or it was asked for with the units
+    contradicted = clocks.contradicted(table, samples.ignored, rate)
+    series = samples.series
     if timing is not None:
-        # One column at a time: its short form goes before the next one is made longer.
-        arrays = {column: timing.jumps.spread(arrays.pop(column)) for column in list(arrays)}
+        # One at a time: its short form goes before the next one is made longer.
+        series = {name: timing.jumps.spread(series.pop(name)) for name in list(series)}
+    of_columns = (*table.notices, *roles.notices, *samples.unreadable, *units.notices)
+    of_rows = (*(timing.notices if timing else ()), *samples.masked, *contradicted)
+    sensors = ((name, series[name], unit) for name, unit in units.known.items())
+    recording = Recording.of_series(sensors, rate, table.source, (*of_columns, *of_rows))
     further = [
-        Channel(column.name, arrays[column.index], 1.0 / rate, column.quantity)
-        if column.unit is None
-        else channel_of(column.name, arrays[column.index], 1.0 / rate, column.unit)
-        for column in auxiliary
+        Channel(each.name, series[each.name], 1.0 / rate, each.unit.quantity, each.unit.kept)
+        for each in samples.auxiliary
     ]
-    series = {name: arrays[index] for name, index in roles.channels.items()}
-    arrays.clear()
-    clock_notices = timing.notices if timing else ()
-    recording = Recording.from_arrays(
-        ((name, series.pop(name)) for name in list(series)),
-        rate=rate,
-        units={name: unit.text for name, unit in units.known.items()},
-        source=table.source,
-        notices=(*table.notices, *roles.notices, *unreadable, *units.notices, *clock_notices, *odd),
-    )
-    is_given, has_layout = isinstance(given.channels, Mapping), isinstance(table, BinaryTable)
-    at_rest = rest_notices(
-        recording, units.known, given.units, are_columns_given=is_given, has_layout=has_layout
-    )
+    has_layout = isinstance(table, BinaryTable)
+    at_rest = rest_notices(recording, units.known, given, has_layout=has_layout)
     channels, notices = (*recording.channels, *further), (*at_rest, *recording.notices)
     jitter, start = (timing.jitter, timing.start) if timing else (None, 0.0)
-    return replace(recording, channels=channels, notices=notices, jitter=jitter, start=start)
+    return Recording(channels, table.source, notices, jitter, start)
 
 
 def _stated_rate(table: Table, rate: float | None) -> float | None:
@@ -344,35 +267,3 @@ def _stated_rate(table: Table, rate: float | None) -> float | None:
         text = f"{table.source} states a rate of {table.rate:.6g} Hz, not {rate:.6g} Hz"
         raise InputError(f"{text}: leave out the rate to use the file's")
     return rate
-
-
-def _load(
-    table: Table, roles: Roles
-) -> tuple[dict[int, FloatArray], list[AuxiliaryColumn], list[Notice]]:
-    """Columns; auxiliary ones that cannot be read or have another length are left out."""
-    wanted = {*roles.columns, *(column.index for column in roles.auxiliary)}
-    kept, notices = list(roles.auxiliary), list[Notice]()
-    try:
-        arrays = load_columns(table, sorted(wanted))
-    except InputError:
-        if not roles.auxiliary:
-            raise
-        arrays, kept = load_columns(table, roles.columns), []
-        n = arrays[roles.columns[0]].size
-        for column in roles.auxiliary:
-            with suppress(InputError):
-                values = load_columns(table, [column.index])[column.index]
-                if values.size == n:
-                    arrays[column.index] = values
-                    kept.append(column)
-        names = ", ".join(repr(column.name) for column in roles.auxiliary if column not in kept)
-        what = f"auxiliary channels that cannot be read, or have another length ({names})"
-        notices.append(notice("columns-unreadable", what=what))
-    n = arrays[roles.columns[0]].size
-    most = max(n - int(np.count_nonzero(np.isnan(arrays[i]))) for i in roles.channels.values())
-    if most < tuning.FEWEST_SAMPLES:
-        of_any = "" if most == n else " of any channel"
-        text = f"{table.source} has {most} samples{of_any}"
-        least = f"needs at least {tuning.FEWEST_SAMPLES}"
-        raise InputError(f"{text}, but {least}: record longer")
-    return arrays, kept, notices

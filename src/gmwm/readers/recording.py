@@ -1,7 +1,7 @@
 """A static recording: named channels, of equal rate or each at its own; missing samples."""
 
 import os
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Self
 
@@ -10,19 +10,11 @@ import numpy as np
 from gmwm._core import checks
 from gmwm._core.spool import scaled
 from gmwm._core.text import Printed
-from gmwm._core.typing import BoolArray, FloatArray, IntArray
+from gmwm._core.typing import FloatArray
 from gmwm._core.units import AUXILIARY, Unit, auxiliary_unit, sensor_unit
 from gmwm.errors import InputError, MissingNameError, printable
-from gmwm.issues import Notice, Severity, codes, notice
+from gmwm.issues import Notice, codes, notice
 from gmwm.readers import tuning
-
-_CODES = {float(sign * (10**k - 1)) for k in range(3, 8) for sign in (-1, 1)} | {-999.25, -99.99}
-_ENDS = {
-    float(end): bits
-    for bits in (64, 32, 24, 16)
-    for end in (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1, 2**bits - 1)
-}
-_ODD = np.array([*_CODES, *_ENDS])
 
 
 @dataclass(frozen=True)
@@ -45,97 +37,13 @@ class Missing:
         return cls(gone.size, int(np.sum(lengths)), lengths.size, longest)
 
 
-def without_sentinels(
-    name: str, values: FloatArray, largest: float, where: Callable[[int], str]
-) -> tuple[FloatArray, list[Notice]]:
-    """Mask numbers that are no samples, and report them; a copy if there is any.
-
-    These are numbers beyond the range of any sensor; error codes (999, -9999, ...) and the smallest
-    and largest integers of 16 to 64 bit, if far outside all others; and numbers that come again and
-    again, exactly, with nothing between them and the others.
-
-    largest: Magnitude beyond the range of any sensor, in the unit of the file.
-    where: Row -> its place in the file.
-    """
-    some = values[:: -(-values.size // tuning.SAMPLED_FOR_RANGE)]
-    some = some[~np.isnan(some)]
-    # The range is that of samples: codes among them would make it as wide as themselves.
-    usual = some[(np.abs(some) <= largest) & np.isfinite(some) & ~np.isin(some, _ODD)]
-    if not usual.size:
-        return values, []
-    low, first, middle, third, high = np.quantile(usual, [0.05, 0.25, 0.5, 0.75, 0.95])
-    width = high - low
-    # Codes without a meaning are among the usual ones: a quarter of the samples at most.
-    narrow = min(tuning.OF_QUARTILES * (third - first), width) if third > first else width
-    reach = tuning.FAR_OUTSIDE * narrow
-    # Almost always, and without arrays as long as the values.
-    if np.fmax.reduce(values) <= middle + reach and np.fmin.reduce(values) >= middle - reach:
-        return values, []
-    far = np.flatnonzero(np.abs(values - middle) > reach)
-    numbers, which = np.unique(values[far], return_inverse=True)
-    chosen = np.array([_meaning(each, largest) != "" for each in numbers.tolist()])
-    chosen &= np.abs(numbers - middle) > tuning.FAR_OUTSIDE * width
-    if narrow > 0.0:
-        chosen |= _are_isolated(values, far, numbers, which, middle)
-    gone = far[chosen[which]]
-    if not gone.size:
-        return values, []
-    clean = scaled(values, 1.0)
-    clean[gone] = np.nan
-    most = tuning.MOST_SENTINELS * values.size
-    severity: Severity = "bad" if gone.size > most else "warning"
-    notices = []
-    own = [[i] for i in np.flatnonzero(chosen & (np.abs(numbers) <= largest)).tolist()]
-    beyond = np.flatnonzero(chosen & (np.abs(numbers) > largest)).tolist()
-    for group in [*own, beyond] if beyond else own:
-        rows = far[np.isin(which, group)]
-        number = max(numbers[group].tolist(), key=abs)
-        data = {"count": rows.size, "value": number, "row": int(rows[0])}
-        words: dict[str, Any] = {
-            "samples": f"{rows.size:,} samples are" if rows.size > 1 else "a sample is",
-            "alike": " and the like" if len(group) > 1 else "",
-            "meaning": _meaning(number, largest) or "far from all others with nothing between",
-            "place": where(int(rows[0])),
-        }
-        notices.append(notice("sentinel", name, data, severity=severity, **words))
-    return clean, notices
-
-
-def _are_isolated(
-    values: FloatArray, far: IntArray, numbers: FloatArray, which: IntArray, middle: float
-) -> BoolArray:
-    """Whether each number comes several times, and from nowhere: motion passes through others."""
-    counts = np.bincount(which, minlength=numbers.size)
-    again = counts >= tuning.LEAST_REPEATS
-    if not np.any(again):
-        return again
-    # Beside another code, or the same one, is no transition. A sensor at the end of its range stays
-    # there: transitions are counted at the ends of each run of equal numbers.
-    passing = np.zeros(values.size + 2, dtype=bool)
-    passing[far + 1] = ~again[which]
-    begins = np.diff(far, prepend=-2) > 1
-    begins[1:] |= np.diff(which) != 0
-    runs = np.bincount(which, begins, minlength=numbers.size)
-    transitions = np.bincount(which, passing[far] | passing[far + 2], minlength=numbers.size)
-    again &= transitions <= tuning.TRANSITIONS * runs
-    others = np.sort(values[far[~again[which]]])
-    reach = 0.5 * np.abs(numbers - middle)
-    near = np.searchsorted(others, numbers + reach) - np.searchsorted(others, numbers - reach)
-    return np.asarray(again & (near <= tuning.TRANSITIONS * counts))
-
-
-def _meaning(number: float, largest: float) -> str:
-    """What a number stands for; empty for a number like others."""
-    if number in _ENDS:
-        end = "largest" if number > 0.0 else "smallest"
-        return f"the {end} integer of {_ENDS[number]} bit"
-    if number in _CODES:
-        return "an error code"
-    return "beyond the range of any sensor" if abs(number) > largest else ""
-
+_SAMPLE = 0.5  # by which two clocks may part over a recording and count as one
 
 READING = codes(topic="reading") | codes(topic="clock")
 """Codes of the notices about how a file was read."""
+
+Series = tuple[str, FloatArray, Unit]
+"""Name, samples (n,) in the unit as kept, and the unit of a channel."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -281,17 +189,30 @@ class Recording(Mapping[str, Channel], Printed):
             If the rate is not positive, a unit is missing or unknown, or the channels are not
             series of numbers of one length, none infinite.
         """
+
+        def converted() -> Iterator[Series]:
+            for name, values in arrays.items() if isinstance(arrays, Mapping) else arrays:
+                text = units.get(name) or units.get(name.partition("_")[0])
+                if text is None:
+                    raise InputError(f"channel {name!r} has no unit: give one, e.g. deg/s or g")
+                series = _series(name, values)
+                unit = auxiliary_unit(text) or sensor_unit(text)
+                yield name, scaled(series, unit.scale, unit.offset), unit
+
+        return cls.of_series(converted(), rate, source, notices)
+
+    @classmethod
+    def of_series(
+        cls, series: Iterable[Series], rate: float, source: str, notices: Sequence[Notice]
+    ) -> Self:
+        """Build a recording from series whose units are known; see `from_arrays`."""
         if not tuning.SLOWEST_RATE <= rate <= tuning.FASTEST_RATE:
             limits = f"{tuning.SLOWEST_RATE:g} to {tuning.FASTEST_RATE:g}"
             raise InputError(f"rate = {rate!r}: give a positive sampling rate in Hz ({limits})")
-        channels = []
-        for name, values in arrays.items() if isinstance(arrays, Mapping) else arrays:
-            unit = units.get(name) or units.get(name.partition("_")[0])
-            if unit is None:
-                raise InputError(f"channel {name!r} has no unit: give one, e.g. deg/s or g")
-            series = _series(name, values)
-            known = auxiliary_unit(unit) or sensor_unit(unit)
-            channels.append(channel_of(name, series, 1.0 / rate, known))
+        channels = [
+            Channel(name, values, 1.0 / rate, unit.quantity, unit.kept)
+            for name, values, unit in series
+        ]
         lengths = {channel.name: channel.n for channel in channels}
         if len(set(lengths.values())) != 1:
             listed = ", ".join(f"{name}: {n}" for name, n in lengths.items()) or "none given"
@@ -417,11 +338,6 @@ class Recording(Mapping[str, Channel], Printed):
         return "\n".join([head, *channels, *map(str, self.notices)])
 
 
-def channel_of(name: str, values: FloatArray, dt: float, unit: Unit) -> Channel:
-    """A channel of values in any unit."""
-    return Channel(name, scaled(values, unit.scale, unit.offset), dt, unit.quantity, unit.kept)
-
-
 def _series(name: str, values: FloatArray) -> FloatArray:
     try:
         series = np.asarray(checks.unmasked(values), dtype=float)
@@ -448,6 +364,61 @@ def notices_of_gaps(channels: Iterable[Channel]) -> list[Notice]:
             notice("missing-samples", where, values, variant=variant, n=each.n, each=them)
         )
     return notices
+
+
+def joined(parts: Sequence[Recording]) -> Recording:
+    """Recordings of topics, cut to the time that they have in common."""
+    first = parts[0]
+    if len(parts) == 1:
+        return first
+    start = max(part.start for part in parts)
+    stop = min(part.start + part.duration for part in parts)
+    if not stop > start:
+        text = f'{first.source}: its topics have no time in common: choose one, or clock="log"'
+        raise InputError(text, "topics-apart")
+    channels = [channel for part in parts for channel in _cut(part, start, stop)]
+    names = [channel.name for channel in channels]
+    if len(set(names)) < len(names):
+        raise InputError(f"{first.source}: two topics have the same channels: choose one", "topic")
+    # Clocks that are the same within half a sample get one rate and length.
+    dt, n = channels[0].dt, channels[0].n
+    for i, channel in enumerate(channels):
+        if abs(channel.dt / dt - 1.0) * channel.n < _SAMPLE and abs(channel.n - n) <= 1:
+            channels[i] = replace(channel, dt=dt, values=channel.values[:n])
+    shortest = min(channel.n for channel in channels if channel.dt == dt)
+    channels = [
+        replace(channel, values=channel.values[:shortest]) if channel.dt == dt else channel
+        for channel in channels
+    ]
+    notices: list[Notice] = []
+    for each in (each for part in parts for each in part.notices):
+        if each.code != "missing-samples" and each not in notices:
+            notices.append(each)
+    values = {
+        "duration": stop - start,
+        "lost": max(part.duration for part in parts) - (stop - start),
+        "rates": len({channel.dt for channel in channels if not channel.is_auxiliary}),
+    }
+    rates = ", ".join(f"{part.rate:.6g} Hz" for part in parts)
+    notices.append(notice("topics-joined", "", values, count=len(parts), listed=rates))
+    jitter = [part.jitter for part in parts if part.jitter is not None]
+    return replace(
+        first,
+        channels=tuple(channels),
+        notices=(*notices, *notices_of_gaps(channels)),
+        jitter=max(jitter, default=None),
+        start=start,
+    )
+
+
+def _cut(recording: Recording, start: float, stop: float) -> list[Channel]:
+    begin, end = (round((time - recording.start) * recording.rate) for time in (start, stop))
+    rows = slice(begin, end)
+    if rows.stop - rows.start < tuning.FEWEST_SAMPLES:
+        common = f"{recording.source}: its topics have {stop - start:.3g} s in common"
+        hint = f"fewer than {tuning.FEWEST_SAMPLES} samples: choose one, or record longer"
+        raise InputError(f"{common}, {hint}", "topics-apart")
+    return [replace(channel, values=channel.values[rows]) for channel in recording.channels]
 
 
 def require_recording(given: Any) -> None:

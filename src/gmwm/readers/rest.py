@@ -8,16 +8,15 @@ from typing import Any, Self
 import numpy as np
 
 from gmwm._core.typing import QUARTILE, FloatArray, known_of, median
-from gmwm._core.units import SI_UNIT, Unit, factor
+from gmwm._core.units import Unit, factor
 from gmwm.errors import InputError
 from gmwm.issues import Notice, notice
 from gmwm.readers import tuning
+from gmwm.readers.columns import Given
 from gmwm.readers.names import AXES
 from gmwm.readers.recording import Recording
 
 _ROWS = 1 << 16  # at a time
-_LEAST_CONE = 0.01  # rad by which gravity leaves its mean where a sensor turns; at rest, 0.3 deg
-_LAGS, _FEWEST_LAGS = (1, 4, 16), 20  # blocks between which changes count; how many at least
 
 
 @dataclass(frozen=True)
@@ -97,70 +96,32 @@ def _integral_means(
     return np.concatenate(means)
 
 
-def steady_turn(recording: Recording, size: int) -> float:
-    """Constant rate at which gravity turns in the frame of a sensor, rad/s; 0 if there is none.
-
-    The w of da/dt = -w x a by least squares. It counts if it explains most of the changes and turns
-    by a radian in all, which noise and drifts do not.
-    """
-    force = _triad(recording, "accel")
-    means = block_means(force, size) if force else np.full((1, 1), np.nan)
-    if np.all(np.any(np.isnan(means), axis=1)):
-        return 0.0
-    wander = np.linalg.norm(means - np.nanmean(means, axis=0), axis=1)
-    if not np.nanmax(wander) > _LEAST_CONE * np.linalg.norm(np.nanmean(means, axis=0)):
-        return 0.0
-    for lag in _LAGS:
-        if means.shape[0] < _FEWEST_LAGS * lag:
-            break
-        change = means[lag:] - means[:-lag]
-        known = ~np.any(np.isnan(change), axis=1)
-        x, y, z = 0.5 * (means[lag:] + means[:-lag])[known].T
-        none = np.zeros(x.size)
-        # -w x a, by the components of w.
-        turned = np.array([[none, z, -y], [-z, none, x], [y, -x, none]])
-        design, wanted = turned.reshape(3, -1).T, change[known].T.ravel()
-        rate, *_ = np.linalg.lstsq(design, wanted, rcond=None)
-        rest, total = wanted - design @ rate, float(wanted @ wanted)
-        speed = float(np.linalg.norm(rate)) / (lag * size * recording.dt)
-        if rest @ rest < 0.5 * total and speed * recording.duration > 1.0:
-            return speed
-    return 0.0
-
-
-_ACCEL_UNITS = {
-    unit: factor(unit, SI_UNIT["accel"]) for unit in ("m/s^2", "g", "mg", "ug", "cm/s^2")
-}
+_ACCEL_UNITS = {unit: factor(unit, "m/s^2") for unit in ("m/s^2", "g", "mg", "ug", "cm/s^2")}
 _GYRO_UNITS = {
-    unit: factor(unit, SI_UNIT["gyro"]) for unit in ("deg/s", "rad/s", "deg/h", "mdeg/s", "mrad/s")
+    unit: factor(unit, "rad/s") for unit in ("deg/s", "rad/s", "deg/h", "mdeg/s", "mrad/s")
 }
 _GRAVITY, _DEGREE = _ACCEL_UNITS["g"], _GYRO_UNITS["deg/s"]
 _LEAST_COUNT = {"gyro": _DEGREE, "accel": 1.0}  # no sensor's last bit is larger
 
 
 def rest_notices(
-    recording: Recording,
-    unit_of: Mapping[str, Unit],
-    given: Mapping[str, str],
-    *,
-    are_columns_given: bool,
-    has_layout: bool,
+    recording: Recording, unit_of: Mapping[str, Unit], given: Given, *, has_layout: bool
 ) -> tuple[Notice, ...]:
     """Notices where means or noise contradict the units or the columns; InputError if not given.
 
     An accelerometer without gravity is fine (it may have been subtracted), and so is a gyro that
     turns.
 
-    unit_of, given: Unit of each channel in the file; those that the user gave.
+    unit_of: Unit of each channel in the file.
     has_layout: Whether the scales are those of a binary layout, where gravity has to show.
     """
     rate, force = _Sensor.of(recording, unit_of, "gyro"), _Sensor.of(recording, unit_of, "accel")
-    swapped = _swapped(recording.source, rate, force, are_columns_given)
+    swapped = _swapped(recording.source, rate, force, isinstance(given.channels, Mapping))
     if swapped:
         return swapped
     counts = _counts(recording, unit_of)
     are_counts = {each.where for each in counts}
-    others = [*_gravity(recording, force, given, has_layout)]
+    others = [*_gravity(recording, force, given.units, has_layout)]
     if rate is not None and not _is_plausible(rate.density, rate.size):
         others.append(_gyro_unit(rate))
     elif rate is not None and rate.size - tuning.SURE_MEAN * rate.size_error >= tuning.USUAL_BIAS:
@@ -333,8 +294,8 @@ def _counts(recording: Recording, unit_of: Mapping[str, Unit]) -> tuple[Notice, 
 def _is_counted(values: FloatArray, size: float) -> bool:
     """Whether samples are multiples of a size, and their noise is several times that size."""
     for part in (values[: tuning.ROWS_OF_COUNTS], values):
-        numbers = known_of(part) / size
+        numbers = part / size
         off = np.abs(numbers - np.rint(numbers))
-        if not numbers.size or np.max(off) > 1e-6:
+        if not np.fmax.reduce(off, initial=np.nan) <= 1e-6:  # passes over NaN
             return False
     return bool(_noise_of([values])[0] > tuning.NOISE_OF_COUNTS * size)

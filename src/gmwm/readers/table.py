@@ -12,7 +12,6 @@ from types import ModuleType
 import numpy as np
 
 from gmwm._core import memory
-from gmwm._core.spool import Spool
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.issues import Notice, notice
@@ -89,24 +88,6 @@ class Table(ABC):
                 f"{more_such(rows.size)}: cut the file before that row, or save NaN if the sample "
                 "is missing"
             )
-
-
-def load_columns(table: Table, columns: Sequence[int]) -> Columns:
-    """Read some columns; those of a file beyond `gmwm._core.memory.held` are mapped from disk."""
-    try:
-        with memory.limited(memory.held()):
-            return table.load(columns)
-    except InputError as error:
-        if error.code != "memory":
-            raise
-    spools = {column: Spool(1) for column in columns}
-    with memory.limited(max(memory.budget() / (1 << 30), tuning.GIGABYTES_OF_BLOCK)):
-        for block in table.segments(columns, tuning.ROWS_OF_BLOCK):
-            for column, values in block.items():
-                spools[column].append(values)
-    if not spools[columns[0]].n:
-        raise InputError(f"{table.source} holds no samples: record longer")
-    return {column: spool.array()[:, 0] for column, spool in spools.items()}
 
 
 def label(names: Sequence[str], index: int) -> str:

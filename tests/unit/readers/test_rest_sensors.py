@@ -5,6 +5,7 @@ import pytest
 
 from gmwm import InputError, Recording
 from gmwm._core.units import sensor_unit
+from gmwm.readers.columns import Given
 from gmwm.readers.rest import rest_notices
 from reading import SI
 
@@ -22,7 +23,8 @@ def recorded(gyro=(1e-3, 0.0, 0.0), accel=(0.0, 0.0, -G), noise=(1e-4, 1e-2), n=
 
 def notices(recording, given=(), columns=False, layout=False):
     units = {name: sensor_unit(SI[name.split("_")[0]]) for name in recording}
-    return rest_notices(recording, units, given, are_columns_given=columns, has_layout=layout)
+    said = Given(units=dict.fromkeys(given, ""), channels={} if columns else None)
+    return rest_notices(recording, units, said, has_layout=layout)
 
 
 def test_of_a_sensor_at_rest_nothing_is_said():
@@ -58,17 +60,14 @@ def test_gravity_in_another_unit_to_a_tenth(unit, off):
 def test_a_scale_that_no_unit_explains(size, noise, said):
     found = notices(recorded(accel=(0.0, 0.0, size), noise=(1e-4, noise)))
     assert bool(found) is said
-    for notice in found:
-        assert notice.severity == "warning"
-        assert "a sensor at rest reads 1 g" in notice.text
+    assert {each.severity for each in found} <= {"warning"}
+    assert all("a sensor at rest reads 1 g" in each.text for each in found)
 
 
-@pytest.mark.parametrize(
-    ("ratio", "refused"), [(0.48, True), (0.55, False), (1.9, False), (2.1, True)]
-)
-def test_gravity_has_to_show_in_a_known_layout(ratio, refused):
+@pytest.mark.parametrize(("ratio", "bad"), [(0.48, True), (0.55, False), (1.9, False), (2.1, True)])
+def test_gravity_has_to_show_in_a_known_layout(ratio, bad):
     recording = recorded(accel=(0.0, 0.0, ratio * G))
-    if refused:
+    if bad:
         with pytest.raises(InputError, match="has another layout"):
             notices(recording, layout=True)
     else:

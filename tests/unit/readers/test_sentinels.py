@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from gmwm.readers import tuning
-from gmwm.readers.recording import without_sentinels
+from gmwm.readers.samples import without_sentinels
 
 LARGEST = 1e6
 
