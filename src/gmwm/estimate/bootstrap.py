@@ -19,7 +19,7 @@ from gmwm.estimate.moments.design import Design
 from gmwm.estimate.moments.profile import Profile, search
 from gmwm.estimate.moments.weights import Weights
 from gmwm.estimate.problem.moments import FittedMoments
-from gmwm.estimate.problem.parameters import drift_key, shape_of
+from gmwm.estimate.problem.parameters import drift_key
 from gmwm.estimate.result.fit import Fit
 from gmwm.process import Model, Process, as_model
 
@@ -95,7 +95,7 @@ def bootstrap(fit: Fit, runs: int = 200, seed: int = 0) -> Bootstrap:
     draws: list[dict[str, float]] = []
     at, root = fit.moments, _root(fit)
     design = Design(opened, at.scales)
-    start = [shape_of(fit.model.terms[term.place]) for term in design.terms]
+    start = [fit.model.terms[term.place].shape_values for term in design.terms]
     ramp = str(drift_key(fit.model))
     slopes = np.zeros(runs)
     if ramp in fit.keys:

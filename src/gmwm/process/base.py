@@ -168,13 +168,20 @@ class Process:
         """The parameter whose power is a factor of the wavelet variance, if there is one."""
         return next((parameter for parameter in self.parameters if parameter.linear), None)
 
+    @property
+    def shape_values(self) -> Shape:
+        """Values of the shape parameters, zero where open."""
+        return tuple([float(self.__dict__.get(p.name) or 0.0) for p in self.shape_parameters])
+
     def at_unit(self, shape: Shape) -> Self:
         """A copy at another shape and unit amplitude."""
+        linear = self.linear_parameter
+        return self.with_shape(shape, **({} if linear is None else {linear.name: 1.0}))
+
+    def with_shape(self, shape: Shape, **values: float | None) -> Self:
+        """A copy at another shape, and with other parameter values."""
         names = [parameter.name for parameter in self.shape_parameters]
-        values: dict[str, float | None] = dict(zip(names, shape, strict=True))
-        if self.linear_parameter is not None:
-            values[self.linear_parameter.name] = 1.0
-        return self.with_values(**values)
+        return self.with_values(**dict(zip(names, shape, strict=True)), **values)
 
     def with_values(self, **values: float | None) -> Self:
         """A copy with other parameter values.

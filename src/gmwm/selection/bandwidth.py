@@ -122,8 +122,7 @@ class _Beside:
             return self._whole_window(free, start)
         profile = Profile(design, self.target, self.root, self.curves)
         point = profile.refine(profile.at([start]), _REACH)
-        names = [p.name for p in free.shape_parameters]
-        given = free.with_values(**dict(zip(names, point.shapes[0], strict=True)))
+        given = free.with_shape(point.shapes[0])
         n_shapes = design.terms[0].n_shapes
         return Bandwidth(given, given.with_values(bandwidth=None), n_shapes), point.objective
 

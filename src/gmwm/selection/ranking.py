@@ -31,7 +31,6 @@ from gmwm.estimate.problem import (
     Scales,
     chi_square,
     gls_slope,
-    shape_of,
     slope_p_value,
     weight_root,
 )
@@ -357,7 +356,7 @@ def _sums(
 ) -> Iterator[tuple[Candidate, Point]]:
     """Sums on each base, each started from the one with one term less."""
     for base in bases:
-        shapes: list[Shape | None] = [shape_of(process) for process in base]
+        shapes: list[Shape | None] = [process.shape_values for process in base]
         before = np.inf
         for g in range(choices.max_gauss_markov + 1):
             if g == 0 and all(process.is_line for process in base):

@@ -190,8 +190,7 @@ def _spread(series: Series) -> tuple[Process, ...]:
             grid = list(process.shape_grid(wv.dt, wv.n))
             shape, rank = grid[int(rank / count * len(grid))], rank + 1.0
             if all(term.free_shape):
-                names = [parameter.name for parameter in process.shape_parameters]
-                process = process.with_values(**dict(zip(names, shape, strict=True)))
+                process = process.with_shape(shape)
         if term.free_scale:
             alone = Scales.of(wv).curve(process.with_amplitude(1.0))
             ratio = wv.variance / np.maximum(alone, np.finfo(float).tiny)

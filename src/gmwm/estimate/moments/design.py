@@ -18,7 +18,7 @@ from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.estimate import tuning
 from gmwm.estimate.problem.moments import Scales, is_plain
-from gmwm.estimate.problem.parameters import Coordinates, difference, shape_of
+from gmwm.estimate.problem.parameters import Coordinates, difference
 from gmwm.process import Model, Process, Shape
 
 _STEP = 1e-5  # of central differences in z, whose natural scale is 1
@@ -63,12 +63,8 @@ class Design:
 
     def at_shape(self, i: int, shape: Shape) -> Process:
         """Term ``i`` at a shape, with unit amplitude where that is free."""
-        term = self.terms[i]
-        names = [p.name for p in term.process.shape_parameters]
-        values: dict[str, float | None] = dict(zip(names, shape, strict=True))
-        if term.free_scale:
-            values[term.linear.name] = 1.0
-        return term.process.with_values(**values)
+        process, is_free = self.terms[i].process, self.terms[i].free_scale
+        return process.at_unit(shape) if is_free else process.with_shape(shape)
 
     def unit_terms(self, shapes: Sequence[Shape]) -> list[Process]:
         """`at_shape` of all terms."""
@@ -87,7 +83,7 @@ class Design:
 
     def grid(self, i: int) -> list[Shape]:
         """Starting shapes of term ``i``, with fixed parameters at their value; see `_cached`."""
-        term, own = self.terms[i], shape_of(self.terms[i].process)
+        term, own = self.terms[i], self.terms[i].process.shape_values
         if not term.n_shapes:
             return [own]
 
@@ -103,7 +99,8 @@ class Design:
 
     def grid_curves(self, i: int) -> FloatArray:
         """Curves of term ``i`` on its grid, (J, G)."""
-        return self._cached("curves", i, lambda: self._stacked(i, self.grid(i)))
+        shapes = self.grid(i)
+        return self._cached("curves", i, lambda: self._stacked(i, shapes))
 
     def dense_grid(self, i: int) -> tuple[list[Shape], FloatArray]:
         """Shapes and curves of the grid with geometric means in between, for ordered kinds.

@@ -21,7 +21,6 @@ from gmwm.estimate.problem.nonnegative import (
     orthogonal_to,
     solve_nonnegative,
 )
-from gmwm.estimate.problem.parameters import shape_of
 from gmwm.process import Model, Process, Shape
 
 _MOST = 200  # evaluations of a search
@@ -122,7 +121,7 @@ class Profile:
         Stebler et al. (2012) would take them from starting values.
         """
         design, coordinates = self.design, self.design.coordinates
-        z0, own = coordinates.pack(processes), [shape_of(process) for process in processes]
+        z0, own = coordinates.pack(processes), [process.shape_values for process in processes]
         if not np.all(np.isfinite(z0)):
             raise InputError(f"start = {list(processes)!r}: give every parameter a positive value")
         linear = np.array([is_amplitude for _, is_amplitude in coordinates.owners])
@@ -155,7 +154,7 @@ def search(profile: Profile, known: Sequence[Shape | None] | None = None) -> Poi
     shapes: list[Shape | None] = (
         list(known)
         if known is not None
-        else [None if term.n_shapes else shape_of(term.process) for term in design.terms]
+        else [None if term.n_shapes else term.process.shape_values for term in design.terms]
     )
     missing = [i for i in design.shaped if shapes[i] is None]
     point = _present(profile, shapes)

@@ -11,7 +11,6 @@ from gmwm.estimate.problem.nonnegative import (
     objectives_with as objectives_with,
     solve_nonnegative as solve_nonnegative,
 )
-from gmwm.estimate.problem.parameters import shape_of as shape_of
 from gmwm.estimate.problem.ramp import (
     detrended_covariance as detrended_covariance,
     gls_slope as gls_slope,

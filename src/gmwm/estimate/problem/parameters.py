@@ -79,11 +79,6 @@ class Term:
         return np.stack([difference(found, z, k, _STEP) for k in free], axis=1)
 
 
-def shape_of(process: Process) -> Shape:
-    """Values of the shape parameters, zero where open."""
-    return tuple(float(process.values[p.name] or 0.0) for p in process.shape_parameters)
-
-
 class Coordinates:
     """Free parameters of the noise terms of a model, in the order of the terms.
 
@@ -125,7 +120,7 @@ class Coordinates:
             if term.free_scale:
                 value = process.values[term.linear.name] or 0.0
                 z[scale] = term.linear.power * np.log(value)
-            z[shape] = process.shape_to_free(shape_of(process))[term.free_shape]
+            z[shape] = process.shape_to_free(process.shape_values)[term.free_shape]
         return z
 
     def processes(self, z: FloatArray, like: Sequence[Process]) -> tuple[Process, ...]:
@@ -143,7 +138,7 @@ class Coordinates:
             if term.free_scale:
                 changes[term.linear.name] = float(np.exp(z[scale] / term.linear.power)[0])
             if term.n_shapes:
-                found = term.moved(shape_of(like), z[shape])
+                found = term.moved(like.shape_values, z[shape])
                 named = zip(like.shape_parameters, found, term.free_shape, strict=True)
                 changes.update({p.name: value for p, value, is_free in named if is_free})
         return like.with_values(**changes)
@@ -156,7 +151,7 @@ class Coordinates:
                 value = float(process.values[term.linear.name] or 0.0)
                 matrix[scale, scale] = value / term.linear.power
             if term.n_shapes:
-                matrix[shape, shape] = term.shape_jacobian(shape_of(process))
+                matrix[shape, shape] = term.shape_jacobian(process.shape_values)
         return matrix
 
     def without(self, dropped: Sequence[int]) -> Coordinates:
