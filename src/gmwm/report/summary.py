@@ -319,7 +319,7 @@ def covers(triad: Triad, numbers: SensorNumbers) -> str:
         ratio = getattr(triad, letter) / own if own else np.inf
         if ratio > _NOTABLE:
             larger.append(letter + (f" ({brief(ratio)} times the table's)" if own else ""))
-    verb = "also carries" if len(larger) == 1 else "carry"
+    verb = "also covers" if len(larger) == 1 else "cover"
     text = f"{triad.quantity} {' and '.join(larger)} {verb} {axis.covers}"
     return f"{text} ({_shortened(axis.name, _NAME)})" if larger and axis.covers else ""
 
