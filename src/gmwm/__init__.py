@@ -18,7 +18,7 @@ from types import ModuleType
 import lazy_loader
 
 from gmwm._core import __version__ as __version__
-from gmwm._core.pages import provide as _provide
+from gmwm._core.pages import providers as _providers
 
 
 def _public() -> dict[str, list[str]]:
@@ -50,7 +50,7 @@ def _load_rooms() -> None:
         import_module(f"gmwm.{room}")
 
 
-_provide(_load_rooms)
+_providers.append(_load_rooms)
 
 # Functions that use the package go to other processes with it, by name. Only plain modules do so by
 # themselves, and this one guards functions from modules of their name.

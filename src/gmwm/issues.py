@@ -229,11 +229,10 @@ def _plain(value: Any) -> Any:
     return float(value) if math.isfinite(value) else None
 
 
-def _catalogue() -> Mapping[str, Issue]:
-    content = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
-    spoils = {code: tuple(each.get("spoils", ())) for code, each in content.items()}
-    return {code: Issue(code, **{**each, "spoils": spoils[code]}) for code, each in content.items()}
+_CONTENT = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
 
-
-CATALOGUE = _catalogue()
+CATALOGUE: Mapping[str, Issue] = {
+    code: Issue(code, **{**each, "spoils": tuple(each.get("spoils", ()))})
+    for code, each in _CONTENT.items()
+}
 """Code -> issue."""

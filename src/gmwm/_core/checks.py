@@ -106,9 +106,7 @@ def truth(name: str, value: Any) -> bool:
 
 def samples(value: Any, least: int = 1) -> int:
     """A number of samples ``n`` that a computer can hold."""
-    more = f"an integer number of samples, {least} or more"
-    hint = f"give {more if least > 1 else 'a positive integer number of samples'}"
-    n = whole("n", value, least, hint)
+    n = whole("n", value, least, f"give an integer number of samples, {least} or more")
     if n > MOST_SAMPLES:
         raise _wrong("n", value, f"that is too long, give at most {MOST_SAMPLES:,} samples")
     return n

@@ -28,7 +28,6 @@ from gmwm.errors import InputError, printable
 if TYPE_CHECKING:
     from pydantic import TypeAdapter, ValidationError
 
-
 _TIMES = 30  # bytes of memory that a byte of a result needs while it is read
 _MOST_NODES = 100_000  # of one: an alias of YAML counts as what it stands for
 
@@ -130,7 +129,7 @@ def plain_schema(read: Callable[[Any], Any], write: Callable[[Any], Any]) -> Any
 
 
 class Document:
-    """A result that can be saved, and comes back from its file by `load_document`.
+    """A result that can be saved, and comes back from its file by `load`.
 
     A subclass is a frozen dataclass that names its ``SCHEMA``; one without is a part of others.
     Pydantic reads and writes its fields by their annotations, with `OrNaN`, `OrInfinity` and
@@ -395,8 +394,10 @@ def read_arrays(path: str | os.PathLike[str]) -> dict[str, npt.NDArray[Any]]:
         return dict(stored)
 
 
-def load_document(path: str | os.PathLike[str]) -> Any:
-    """A result from the file that its ``save`` wrote.
+def load(path: str | os.PathLike[str]) -> Any:
+    """A result from its file: `Calibration`, `Fit`, `Selection`, `Health`, whatever was saved.
+
+    ``Calibration.load`` and its like take files of their own kind only.
 
     Raises InputError if the file is missing, is not JSON, or holds no result of a kind known here.
     """

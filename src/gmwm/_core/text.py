@@ -15,7 +15,6 @@ from gmwm.errors import InputError
 if TYPE_CHECKING:
     import pandas
 
-
 WIDTH = 80
 
 _UNITS = {"rad/s": ("deg/s",), "m/s^2": ("mg", "g")}

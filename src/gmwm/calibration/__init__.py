@@ -1,7 +1,8 @@
 """The main job: every channel of a recording, screening, a summary."""
 
+from gmwm._core.documents import load as load
 from gmwm.calibration.calibrate import AMBIGUITY as AMBIGUITY, calibrate as calibrate
-from gmwm.calibration.calibration import Calibration as Calibration, load as load
+from gmwm.calibration.calibration import Calibration as Calibration
 from gmwm.calibration.channel import LONGEST_PART as LONGEST_PART
 from gmwm.calibration.covariates import compensated as compensated
 from gmwm.calibration.curve import (

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 from annotated_types import Ge, MinLen
 
 from gmwm._core import checks
-from gmwm._core.documents import Document, Rate, Samples, Text, load_document
+from gmwm._core.documents import Document, Rate, Samples, Text
 from gmwm._core.files import of_other_runs
 from gmwm._core.frozen import ByName, freeze
 from gmwm._core.pages import make
@@ -268,16 +268,3 @@ class Calibration(ByName[Fit], Document):
             "page", self, path, recording, datasheet=datasheet, provenance=provenance
         )
         return written
-
-
-def load(path: str | os.PathLike[str]) -> Any:
-    """A result from its file: `Calibration`, `Fit`, `Selection`, `Health`, whatever was saved.
-
-    ``Calibration.load`` and its like take files of their own kind only.
-
-    Raises
-    ------
-    InputError
-        If the file is missing, is not JSON, or holds no result of a kind known here.
-    """
-    return load_document(path)

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from itertools import cycle
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
 from gmwm import plotting
-from gmwm._core import pages
 from gmwm._core.documents import Array, Document, Positive, Text
 from gmwm._core.frozen import freeze
+from gmwm._core.pages import Reported
 from gmwm._core.text import Printed, brief, bullets, per_cent, plain_table
 from gmwm._core.typing import FloatArray
 from gmwm._core.units import SI_UNIT, factor
@@ -124,7 +122,7 @@ class VibrationClass(Document):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class InMotion(Document, Printed):
+class InMotion(Document, Printed, Reported):
     """Noise of IMUs in motion.
 
     Attributes
@@ -320,18 +318,6 @@ class InMotion(Document, Printed):
                 ax.plot(each.tau, rest, "--", color=plotting.DATA_COLOUR, label=label)
         ax.legend(fontsize="small", framealpha=0.9)
         return ax
-
-    def report(self, path: str | os.PathLike[str]) -> Path:
-        """Write a page of curves, factors, vibration and numbers; HTML that needs no network.
-
-        Parameters
-        ----------
-        path : path-like
-
-        Raises InputError if the file cannot be written.
-        """
-        page: Path = pages.make("page", self, path)
-        return page
 
     @property
     def _size(self) -> str:

@@ -180,10 +180,9 @@ def array(
     named = {imu: _without_shocks(imu, each, names) for imu, each in named.items()}
     times = np.geomspace(step, duration / 8.0, _parts(duration / step))
     parts = (WhiteNoise(1.0), *(GaussMarkov(1.0, tau) for tau in times.tolist()), RandomWalk(1.0))
-    axes, notices = [], list[Notice]()
+    axes, notices, tell = [], list[Notice](), progress or (lambda *_: None)
     for done, name in enumerate(names):
-        if progress is not None:
-            progress(done, len(names), name)
+        tell(done, len(names), name)
         own = [
             Channel(
                 imu,
@@ -196,8 +195,7 @@ def array(
         ]
         axes.append(_axis(name, str(shared[0][name].quantity), own, parts, horizon))
         notices += [each for channel in own for each in _steps(channel, name)]
-    if progress is not None:
-        progress(len(names), len(names), "")
+    tell(len(names), len(names), "")
     alike = [x.channel for x in axes if x.p_value > tuning.LEVEL or x.best >= x.mean]
     if alike:
         notices.append(notice("array-mean", values={"axes": len(alike)}, listed=", ".join(alike)))

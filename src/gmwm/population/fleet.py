@@ -18,7 +18,7 @@ from gmwm._core import checks
 from gmwm._core.files import moved_together, replaceable
 from gmwm._core.frozen import ByName, freeze
 from gmwm._core.jobs import results
-from gmwm._core.pages import make
+from gmwm._core.pages import Reported
 from gmwm._core.text import Printed, brief, bullets, cell, frame, per_cent, plain_table, wrapped
 from gmwm._core.typing import Progress
 from gmwm.calibration import Calibration
@@ -98,7 +98,7 @@ def in_words(verdicts: Mapping[str, str]) -> str:
 
 
 @dataclass(frozen=True, repr=False)
-class Fleet(ByName[Calibration | Notice], Printed):
+class Fleet(ByName[Calibration | Notice], Printed, Reported):
     """Units of a sensor: a mapping of paths to a `Calibration`, or to a `Notice` of why not.
 
     Attributes
@@ -250,10 +250,6 @@ class Fleet(ByName[Calibration | Notice], Printed):
             "verdicts": self.grid,
             "notices": [notice.to_dict() for notice in self.notices],
         }
-
-    def report(self, path: str | os.PathLike[str]) -> Path:
-        """Write the self-contained HTML report; see `gmwm.report.write_fleet_report`."""
-        return Path(make("page", self, path))
 
     def save(self, folder: str | os.PathLike[str]) -> Path:
         """Write what `fleet` writes: calibrations, the table (Parquet) and the report.

@@ -253,7 +253,9 @@ class Choice:
             lost = {k: fit for k, fit in fits.items() if k not in sound and _is_noise(fit)}
             again = _fitted(lost, tried[chosen]) if lost else {}
             common |= {name: fit for name, fit in again.items() if self._is_usable(fit)}
-        own = [name for name, fit in sound.items() if self._rejects(common.get(name), fit)]
+        # Those that contradict the structure of the lot while their own model is valid.
+        accepted = {k for k, fit in common.items() if fit is sound.get(k) or self._is_usable(fit)}
+        own = [name for name in sound if name not in accepted]
         used = {**fits, **common} | {name: sound[name] for name in own}
         return Structure(
             channel=channel,
@@ -270,10 +272,6 @@ class Choice:
         fitting = tuning.REJECTED / sum(map(len, self.fits.values())) <= fit.goodness.largest_p
         codes = {n.code for n in fit.notices if n.severity == "bad"} - _SUPERFLUOUS
         return not (codes - _MISFITS if fitting else codes)
-
-    def _rejects(self, common: Fit | None, own: Fit) -> bool:
-        """Whether a unit contradicts the structure of the lot while its own model is valid."""
-        return common is None or not (common is own or self._is_usable(common))
 
 
 def _is_noise(fit: Fit) -> bool:

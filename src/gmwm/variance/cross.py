@@ -23,7 +23,7 @@ from gmwm._core import checks
 from gmwm._core.typing import FloatArray, IntArray
 from gmwm.errors import InputError
 from gmwm.process import PSD
-from gmwm.readers import Channel
+from gmwm.readers import Channel, block_means
 from gmwm.variance.covariance.haar import haar_covariance
 from gmwm.variance.covariance.lags import block_density
 from gmwm.variance.gaps import Runs
@@ -141,8 +141,8 @@ def wavelet_covariance(channels: Sequence[Channel], *, block: int = 1) -> Wavele
     channels : sequence of Channel
         Two or more, of one sampling interval and number of samples.
     block : int, optional
-        Samples whose means are taken first: for slow errors of long records. A mean of less than
-        half of them counts as missing.
+        Samples whose means are taken first: for slow errors of long records. A mean counts as
+        missing unless more than half of them exist.
 
     Raises
     ------
@@ -155,7 +155,8 @@ def wavelet_covariance(channels: Sequence[Channel], *, block: int = 1) -> Wavele
             "channels of one recording, or cut all to the same length"
         )
     block = checks.whole("block", block, 1, "give a number of samples")
-    alike = [replace(c, values=_means(c.values, block), dt=block * c.dt) for c in channels]
+    means = block_means([each.values for each in channels], block, 0.5).T
+    alike = [replace(c, values=m, dt=block * c.dt) for c, m in zip(channels, means, strict=True)]
     gone = np.logical_or.reduce([np.isnan(each.values) for each in alike])
     alike = [replace(c, values=np.where(gone, np.nan, c.values)) for c in alike]
     found = [checked_samples(channel) for channel in alike]
@@ -196,14 +197,3 @@ def wavelet_covariance(channels: Sequence[Channel], *, block: int = 1) -> Wavele
         inflation=np.ones((levels.averaging.size,) * 2) if gaps is None else gaps.inflation,
         change=np.stack(changes, axis=1),
     )
-
-
-def _means(values: FloatArray, block: int) -> FloatArray:
-    """Means of the samples of each block that exist."""
-    if block == 1:
-        return values
-    parts = values[: values.size // block * block].reshape(-1, block)
-    there = ~np.isnan(parts)
-    count = np.sum(there, axis=1)
-    total = np.sum(np.where(there, parts, 0.0), axis=1)
-    return np.where(2 * count >= block, total / np.maximum(count, 1), np.nan)

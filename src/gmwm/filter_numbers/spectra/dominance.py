@@ -99,7 +99,8 @@ def dominating(problem: Problem, form: str, tau: float | None = None) -> Model:
 
     tau: Correlation time of the Gauss-Markov process, s; by default the smallest model's.
     """
-    if "K" not in KINDS[form] and not all(target.is_stationary for target in problem.dominated):
+    rises = any(target.slope >= tuning.RISING for target in problem.dominated)
+    if "K" not in KINDS[form] and rises:
         raise InputError(
             f"{form} cannot cover a random walk, whose spectrum rises without limit towards "
             "zero frequency: use N+K or N+K+GM"

@@ -99,11 +99,6 @@ class RequiredSpectrum:
         """Low-frequency density of terms counted only there, u^2/Hz."""
         return sum(self.feet)
 
-    @property
-    def is_stationary(self) -> bool:
-        """Whether its spectrum has a limit at zero frequency."""
-        return self.slope < tuning.RISING
-
     def psd(self, f: FloatArray) -> FloatArray:
         """Spectral density, u^2/Hz."""
         return sum((density for _, density in self.densities(f)), np.full_like(f, self.foot))

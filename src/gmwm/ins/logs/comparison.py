@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from itertools import permutations
@@ -13,7 +12,7 @@ import numpy as np
 
 from gmwm._core import checks
 from gmwm._core.distributions import norm, student
-from gmwm._core.pages import make
+from gmwm._core.pages import Reported
 from gmwm._core.text import bullets, plain_table, wrapped
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
@@ -138,7 +137,7 @@ def _p_value(within: float, value: float, error: float, count: int) -> float:
 
 
 @dataclass(frozen=True, eq=False)
-class Comparison:
+class Comparison(Reported):
     """Sensor models side by side on one log.
 
     Attributes
@@ -283,10 +282,6 @@ class Comparison:
             "verdict": self.verdict.to_dict(),
             "notices": [each.to_dict() for each in self.notices],
         }
-
-    def report(self, path: str | os.PathLike[str]) -> Path:
-        """Write the page; see `gmwm.report.write_comparison_report`."""
-        return Path(make("page", self, path))
 
     def plot(self) -> Figure:
         """Errors at the end of each outage, and their ratios with intervals."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -12,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gmwm._core.files import written
-from gmwm._core.pages import make
+from gmwm._core.pages import Reported
 from gmwm._core.text import brief, bullets, wrapped
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
@@ -56,7 +55,7 @@ class LongestOutage:
 
 
 @dataclass(frozen=True, eq=False)
-class Navigated:
+class Navigated(Reported):
     """A solution of real data."""
 
     measured: Measured
@@ -333,10 +332,6 @@ class Navigated:
         with written(path) as stream:
             np.savetxt(stream, columns, digits, delimiter=",", header=_HEADER, comments="")
         return path
-
-    def report(self, path: str | os.PathLike[str]) -> Path:
-        """Write the page; see `gmwm.report.write_navigated_report`."""
-        return Path(make("page", self, path))
 
     def plot_track(self) -> Figure:
         """The solution's track and the fixes."""

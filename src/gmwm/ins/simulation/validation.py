@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
 
-from gmwm._core.pages import make
+from gmwm._core.pages import Reported
 from gmwm._core.text import bullets, plain_table, wrapped
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
@@ -42,7 +40,7 @@ _SHORT = {"horizontal": "hor.", "vertical": "vert."}
 
 
 @dataclass(frozen=True, eq=False)
-class Validation:
+class Validation(Reported):
     """How filters with different sensor models navigated."""
 
     experiment: Experiment
@@ -176,10 +174,6 @@ class Validation:
             means = f"{d.value:+.3g} ({d.lower:+.3g} .. {d.upper:+.3g}){mark}"
             rows.append([name, ratio, means])
         return plain_table(["filter", "ratio of RMS", "difference of means [m]"], rows)
-
-    def report(self, path: str | os.PathLike[str]) -> Path:
-        """Write the page."""
-        return Path(make("page", self, path))
 
     def plot_track(self) -> Figure:
         """The track with its outages and each filter's first run (Figure 7 of the paper)."""

@@ -267,19 +267,6 @@ def coefficients(values: FloatArray, dt: float) -> FloatArray:
     return np.ascontiguousarray(np.transpose(spline.c[::-1], (0, 2, 1)))
 
 
-def track_velocity(lla: FloatArray, dt: float) -> FloatArray:
-    """Velocity, (n + 1, 3), along a track without jumps of the longitude."""
-    # Relative to the first epoch fewer digits are lost in the differences.
-    spline = CubicSpline(np.arange(len(lla)) * dt, lla - lla[0], axis=0)
-    rate = spline(np.arange(len(lla)) * dt, 1)
-    lat, h = lla[:, 0], lla[:, 2]
-    meridian, transverse = radii_along(lat)
-    return np.stack(
-        [(meridian + h) * rate[:, 0], (transverse + h) * np.cos(lat) * rate[:, 1], -rate[:, 2]],
-        axis=-1,
-    )
-
-
 def smoothed(values: FloatArray, dt: float, cutoff: float) -> FloatArray:
     """Least-squares cubic spline with evenly spaced knots: what moves faster is left out.
 
@@ -377,7 +364,14 @@ class Trajectory:
         )
         check_latitudes(position, "lla")
         position = unwrapped_longitudes(position)
-        return cls(dt, position, track_velocity(position, dt), attitude)
+        # Relative to the first epoch fewer digits are lost in the differences.
+        time, (lat, _, height) = np.arange(len(position)) * dt, position.T
+        rate = CubicSpline(time, position - position[0], axis=0)(time, 1)
+        meridian, transverse = radii_along(lat)
+        rate[:, 0] *= meridian + height
+        rate[:, 1] *= (transverse + height) * np.cos(lat)
+        rate[:, 2] *= -1.0
+        return cls(dt, position, rate, attitude)
 
     @classmethod
     def read(cls, path: str | os.PathLike[str], *, smooth: float | None = 1.0) -> Trajectory:
