@@ -1,7 +1,7 @@
 """Time stamps: the sampling rate, and the place of every row on an even grid."""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
 
@@ -347,16 +347,12 @@ def _notices(clock: Clock, found: Grid, seconds: float, *, is_guess: bool) -> li
     return notices
 
 
-# -- the column of time stamps --------------------------------------------------------------------
-
-
-def ask_for_unknown(
-    table: Table, time: int | None, stated: float | None, missing: Mapping[str, str]
-) -> None:
-    """Raise one InputError that asks for the rate and for the units of ``missing`` sensors.
+def ask_for_unknown(table: Table, roles: Roles, stated: float | None) -> None:
+    """Raise one InputError that asks for the rate and for the units that are not known.
 
     The steps of time stamps are looked at later, unless the units are to be asked for anyway.
     """
+    time, missing = roles.time, roles.units.missing
     rate = None
     if time is None and stated is None:
         problem = f"{table.source} has no time column and no rate was given"

@@ -49,6 +49,15 @@ class AuxiliaryColumn:
 
 
 @dataclass(frozen=True)
+class Units:
+    """In what units the channels are."""
+
+    known: dict[str, Unit]  # of each channel
+    missing: dict[str, str]  # sensor, or channel of another name, without a unit -> what lacks it
+    notices: tuple[Notice, ...]
+
+
+@dataclass(frozen=True)
 class Roles:
     """What the columns are."""
 
@@ -56,6 +65,7 @@ class Roles:
     auxiliary: tuple[AuxiliaryColumn, ...]  # other channels that are kept
     time: int | None  # index of the column of time stamps
     ignored: int | None  # that of such a column whose stamps contradict a stated rate, perhaps
+    units: Units
     notices: tuple[Notice, ...]  # auxiliary columns, and columns that are not used
 
     @property
@@ -71,10 +81,50 @@ def roles_of(table: Table, given: Given) -> Roles:
     The units decide what one or three columns without names are. The rate of ``given`` is the
     file's where the caller gives none.
     """
-    names, channels = table.names, given.channels
     time: int | None = None
     if given.time is not None and given.time is not False:
         time = find_column(table, given.time, "time")
+    chosen, stamps = _chosen(table, given, time)
+    if given.time is None and stamps:
+        time = stamps[0]
+    auxiliary = _given_auxiliary(table, chosen, given.units)
+    chosen = {name: i for name, i in chosen.items() if name not in {a.name for a in auxiliary}}
+    if not isinstance(given.channels, Mapping):
+        left = {*chosen.values(), time, *(() if given.time is not False else stamps)}
+        auxiliary += _found_auxiliary(table, left, chosen, given.units)
+    if not chosen:
+        hint = 'name one of a gyro or an accelerometer, e.g. channels={"gyro_x": 1}'
+        raise InputError(f"{table.source}: every channel is auxiliary: {hint}", "channel-unknown")
+    _check_one_sensor(table, {*chosen.values(), time})
+    known = (*chosen, *(column.name for column in auxiliary))
+    for key in given.units:
+        if key not in SI_UNIT and key not in known:
+            text = f"units has {key!r}, which is neither gyro nor accel nor a channel"
+            raise InputError(f"{text}: choose a channel from {', '.join(known)}")
+    units = _units_of(table, chosen, given.units)
+    names, notices = table.names, list[Notice]()
+    if given.time is None and len(stamps) > 1:
+        this, others = label(names, stamps[0]), ", ".join(label(names, i) for i in stamps[1:])
+        notices.append(notice("time-column", "", {"column": time}, used=this, others=others))
+    if auxiliary:
+        values = {column.name: column.quantity for column in auxiliary}
+        listed = ", ".join(map(str, auxiliary))
+        notices.append(notice("columns-auxiliary", "", values, listed=listed))
+    used = {*chosen.values(), time, *(column.index for column in auxiliary)}
+    unused = [label(names, i) for i in range(len(names)) if i not in used]
+    if unused:
+        count = {"count": len(unused)}
+        notices.append(notice("columns-not-used", "", count, listed=", ".join(unused)))
+    ignored = None
+    if given.time is False and given.rate is not None:
+        stamped = (i for i, m in enumerate(table.meanings) if m.role == TIME and m.seconds)
+        ignored = next(stamped, None)
+    return Roles(chosen, tuple(auxiliary), time, ignored, units, tuple(notices))
+
+
+def _chosen(table: Table, given: Given, time: int | None) -> tuple[dict[str, int], list[int]]:
+    """The column of each channel, and those that may have its time stamps."""
+    names, channels = table.names, given.channels
     stamps = [i for i, each in enumerate(table.meanings) if each.role == TIME]
     if isinstance(channels, Mapping):
         if not channels:
@@ -94,35 +144,7 @@ def roles_of(table: Table, given: Given) -> Roles:
             chosen, stamp = _by_number(table, rest, bool(known - {None}), given.units)
             stamps = [stamp] if stamp is not None else stamps
         chosen = _only(table, chosen, channels)
-    if given.time is None and stamps:
-        time = stamps[0]
-    auxiliary = _given_auxiliary(table, chosen, given.units)
-    chosen = {name: i for name, i in chosen.items() if name not in {a.name for a in auxiliary}}
-    if not isinstance(channels, Mapping):
-        left = {*chosen.values(), time, *(() if given.time is not False else stamps)}
-        auxiliary += _found_auxiliary(table, left, chosen, given.units)
-    if not chosen:
-        hint = 'name one of a gyro or an accelerometer, e.g. channels={"gyro_x": 1}'
-        raise InputError(f"{table.source}: every channel is auxiliary: {hint}", "channel-unknown")
-    _check_one_sensor(table, {*chosen.values(), time})
-    notices = []
-    if given.time is None and len(stamps) > 1:
-        this, others = label(names, stamps[0]), ", ".join(label(names, i) for i in stamps[1:])
-        notices.append(notice("time-column", "", {"column": time}, used=this, others=others))
-    if auxiliary:
-        values = {column.name: column.quantity for column in auxiliary}
-        listed = ", ".join(map(str, auxiliary))
-        notices.append(notice("columns-auxiliary", "", values, listed=listed))
-    used = {*chosen.values(), time, *(column.index for column in auxiliary)}
-    unused = [label(names, i) for i in range(len(names)) if i not in used]
-    if unused:
-        count = {"count": len(unused)}
-        notices.append(notice("columns-not-used", "", count, listed=", ".join(unused)))
-    ignored = None
-    if given.time is False and given.rate is not None:
-        stamped = (i for i, m in enumerate(table.meanings) if m.role == TIME and m.seconds)
-        ignored = next(stamped, None)
-    return Roles(chosen, tuple(auxiliary), time, ignored, tuple(notices))
+    return chosen, stamps
 
 
 def _check_one_sensor(table: Table, columns: Collection[int | None]) -> None:
@@ -281,28 +303,11 @@ def _found_auxiliary(
     return found
 
 
-# -- units ----------------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True)
-class Units:
-    """In what units the channels are."""
-
-    known: dict[str, Unit]  # of each channel
-    missing: dict[str, str]  # sensor, or channel of another name, without a unit -> what lacks it
-    notices: tuple[Notice, ...]
-
-
-def units_of(table: Table, roles: Roles, units: Mapping[str, str]) -> Units:
+def _units_of(table: Table, channels: Mapping[str, int], units: Mapping[str, str]) -> Units:
     """Unit of every channel, as the user gives it (by channel, else by sensor) or the header."""
-    known = (*roles.channels, *(column.name for column in roles.auxiliary))
-    for key in units:
-        if key not in SI_UNIT and key not in known:
-            text = f"units has {key!r}, which is neither gyro nor accel nor a channel"
-            raise InputError(f"{text}: choose a channel from {', '.join(known)}")
     found, from_header, overruled = dict[str, Unit](), dict[str, str](), dict[str, str]()
     missing: dict[str, str] = {}  # one channel of each sensor stands for the others
-    for channel, column in roles.channels.items():
+    for channel, column in channels.items():
         header = table.meanings[column]
         sensor = _sensor(channel) or _sensor(header.role or "")
         given, own = units.get(channel, units.get(sensor)), header.unit

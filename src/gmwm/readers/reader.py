@@ -14,7 +14,7 @@ from gmwm._core.units import Unit
 from gmwm.errors import InputError
 from gmwm.issues import notice
 from gmwm.readers import clock as clocks
-from gmwm.readers.columns import Given, Reference, roles_of, units_of
+from gmwm.readers.columns import Given, Reference, roles_of
 from gmwm.readers.formats.binary import BinaryTable
 from gmwm.readers.names import CANONICAL, TIME, bare
 from gmwm.readers.recording import Channel, Recording, joined
@@ -231,9 +231,8 @@ def recording_of(table: Table, given: Given) -> Recording:
     """The recording of a table."""
     stated = _stated_rate(table, given.rate)
     roles = roles_of(table, replace(given, rate=stated))
-    units = units_of(table, roles, given.units)
-    clocks.ask_for_unknown(table, roles.time, stated, units.missing)
-    samples = samples_of(table, roles, units.known)
+    clocks.ask_for_unknown(table, roles, stated)
+    samples = samples_of(table, roles)
     timing = clocks.timing_in(table, roles, samples, stated)
     rate = stated or (timing.rate if timing else 0.0)  # or it was asked for with the units
     contradicted = clocks.contradicted(table, samples.ignored, rate)
@@ -241,16 +240,16 @@ def recording_of(table: Table, given: Given) -> Recording:
     if timing is not None:
         # One at a time: its short form goes before the next one is made longer.
         series = {name: timing.jumps.spread(series.pop(name)) for name in list(series)}
-    of_columns = (*table.notices, *roles.notices, *samples.unreadable, *units.notices)
+    of_columns = (*table.notices, *roles.notices, *samples.unreadable, *roles.units.notices)
     of_rows = (*(timing.notices if timing else ()), *samples.masked, *contradicted)
-    sensors = ((name, series[name], unit) for name, unit in units.known.items())
+    sensors = ((name, series[name], unit) for name, unit in roles.units.known.items())
     recording = Recording.of_series(sensors, rate, table.source, (*of_columns, *of_rows))
     further = [
         Channel(each.name, series[each.name], 1.0 / rate, each.unit.quantity, each.unit.kept)
         for each in samples.auxiliary
     ]
     has_layout = isinstance(table, BinaryTable)
-    at_rest = rest_notices(recording, units.known, given, has_layout=has_layout)
+    at_rest = rest_notices(recording, roles.units.known, given, has_layout=has_layout)
     channels, notices = (*recording.channels, *further), (*at_rest, *recording.notices)
     jitter, start = (timing.jitter, timing.start) if timing else (None, 0.0)
     return Recording(channels, table.source, notices, jitter, start)

@@ -120,14 +120,17 @@ def rest_notices(
     if swapped:
         return swapped
     counts = _counts(recording, unit_of)
-    are_counts = {each.where for each in counts}
     others = [*_gravity(recording, force, given.units, has_layout)]
     if rate is not None and not _is_plausible(rate.density, rate.size):
         others.append(_gyro_unit(rate))
     elif rate is not None and rate.size - tuning.SURE_MEAN * rate.size_error >= tuning.USUAL_BIAS:
         others.append(notice("mean-rate", "gyro", {"mean": rate.size}, size=rate.size / _DEGREE))
-    rest = [each for each in others if each.code == "gravity" or each.where not in are_counts]
-    return (*counts, *rest)
+    others = [each for each in others if each.code == "gravity" or each.where not in counts]
+    found = []
+    for sensor, (names, noise) in counts.items():
+        listed, unit = ", ".join(names), unit_of[names[0]].text
+        found.append(notice("counts", sensor, {"noise": noise}, listed=listed, unit=unit))
+    return (*found, *others)
 
 
 class _Sensor:
@@ -274,21 +277,22 @@ def _is_plausible(density: float, mean: float) -> bool:
     return density < tuning.NOISIEST_GYRO and mean < tuning.LARGEST_BIAS
 
 
-def _counts(recording: Recording, unit_of: Mapping[str, Unit]) -> tuple[Notice, ...]:
-    """Whole numbers with noise of several, in a unit in which no sensor's last bit is one."""
-    notices = []
+def _counts(
+    recording: Recording, unit_of: Mapping[str, Unit]
+) -> dict[str, tuple[list[str], float]]:
+    """Channels of a sensor that are multiples of a unit too coarse for it, and their noise."""
+    found = {}
     for sensor, largest in _LEAST_COUNT.items():
-        units = {name: unit for name, unit in unit_of.items() if name.startswith(sensor)}
         counts = {
             name: recording[name].values / unit.scale
-            for name, unit in units.items()
-            if unit.scale >= largest and _is_counted(recording[name].values, unit.scale)
+            for name, unit in unit_of.items()
+            if name.startswith(sensor)
+            and unit.scale >= largest
+            and _is_counted(recording[name].values, unit.scale)
         }
         if counts:
-            noise = float(np.max(_noise_of([*counts.values()])))
-            listed, unit = ", ".join(counts), units[next(iter(counts))].text
-            notices.append(notice("counts", sensor, {"noise": noise}, listed=listed, unit=unit))
-    return tuple(notices)
+            found[sensor] = [*counts], float(np.max(_noise_of([*counts.values()])))
+    return found
 
 
 def _is_counted(values: FloatArray, size: float) -> bool:

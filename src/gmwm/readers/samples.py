@@ -1,6 +1,6 @@
 """The samples of the columns that a recording needs, as it keeps them."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
@@ -10,7 +10,6 @@ import numpy as np
 from gmwm._core import memory
 from gmwm._core.spool import Spool, scaled
 from gmwm._core.typing import BoolArray, FloatArray, IntArray
-from gmwm._core.units import Unit
 from gmwm.errors import InputError
 from gmwm.issues import Notice, Severity, notice
 from gmwm.readers import tuning
@@ -38,7 +37,7 @@ class Samples:
     masked: Sequence[Notice]  # numbers that are no samples
 
 
-def samples_of(table: Table, roles: Roles, units: Mapping[str, Unit]) -> Samples:
+def samples_of(table: Table, roles: Roles) -> Samples:
     """Read the columns, mask what is no sample, and convert the units.
 
     Auxiliary columns that cannot be read or have another length are left out.
@@ -74,14 +73,15 @@ def samples_of(table: Table, roles: Roles, units: Mapping[str, Unit]) -> Samples
             ignored = load_columns(table, [roles.ignored])
     masked = list[Notice]()
     for name, index in roles.channels.items():
-        largest = tuning.BEYOND_SENSORS / units[name].scale
+        largest = tuning.BEYOND_SENSORS / roles.units.known[name].scale
         arrays[index], found = without_sentinels(name, arrays[index], largest, table.where)
         masked += found
     series = {name: arrays[index] for name, index in roles.channels.items()}
     series |= {column.name: arrays[column.index] for column in kept}
     stamps = None if roles.time is None else arrays[roles.time]
     arrays.clear()  # the converted ones take their places one by one
-    for name, unit in (*units.items(), *((column.name, column.unit) for column in kept)):
+    unit_of = roles.units.known | {column.name: column.unit for column in kept}
+    for name, unit in unit_of.items():
         series[name] = scaled(series[name], unit.scale, unit.offset)
     return Samples(series, kept, stamps, ignored, notices, masked)
 
