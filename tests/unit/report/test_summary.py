@@ -169,7 +169,19 @@ def test_the_verdict_counts_the_axes(two):
     text = summary_text(replace(two, fits={**two.fits, "accel_x": inflated}))
     assert "Usable: gyro_z. Usable with reservation (*): accel_x." in " ".join(text.split())
     assert re.search(r"^accel_x\* ", text, re.MULTILINE)
+    assert "\n*: bias steps or drifts enlarge B and K" in text
+    assert "\n*: " not in summary_text(two)
     assert len(re.findall(r"^accelerometer_noise.* \*$", text, re.MULTILINE)) == 1
+
+
+def test_of_two_commands_to_rerun_the_first_comes_first(two):
+    cuts = {
+        name: Notice(f"own-{name}", "bad", "", name, {}, "rerun with --start 9") for name in two
+    }
+    fits = {name: replace(fit, notices=(cuts[name],)) for name, fit in two.items()}
+    assert "What to do: 1. first, then see what remains (" in printed(replace(two, fits=fits))
+    fits["gyro_z"] = two["gyro_z"]
+    assert "What to do (" in printed(replace(two, fits=fits))
 
 
 def test_intervals_of_filter_numbers_reach_to_models_that_fit_equally_well(two):
