@@ -18,11 +18,11 @@ from gmwm.estimate.likelihood.likelihood import (
 )
 from gmwm.estimate.moments.weights import suffices
 from gmwm.estimate.problem.information import density, frequency_nodes
-from gmwm.estimate.problem.moments import Moments
+from gmwm.estimate.problem.moments import Compared, Moments
 from gmwm.estimate.problem.parameters import Coordinates, difference
 from gmwm.estimate.problem.ramp import Slope
 from gmwm.estimate.result.bound import upper_limits
-from gmwm.estimate.result.conclusion import Compared, Estimates, conclude
+from gmwm.estimate.result.conclusion import Estimates, agreement, conclude
 from gmwm.estimate.result.fit import Fit
 from gmwm.issues import Notice, notice
 from gmwm.process import Model, Process
@@ -207,15 +207,15 @@ def conclude_likelihood(
     if slope is not None:
         moments = Moments(wv, slope, True, moments.scales)
     noise = Model(top.processes)
-    statistical, target, taken = moments.covariance(noise), moments.target, moments.taken
     implied = noise.wavelet_variance(wv.tau, wv.dt, wv.wavelet)
-    is_tested = not series.is_bridged
-    compared = Compared(target, implied, statistical, statistical, implied, taken, is_tested)
-    dof = max(target.size - len(present), 1)
-    misfits = is_tested and not suffices(
-        0.0, target - implied, statistical, target, implied, dof, taken
-    )
-    return conclude(found, compared, wv, misfits=misfits)
+    statistical = moments.covariance(noise)
+    compared = Compared(moments.target, implied, statistical, implied, moments.taken)
+    agrees = agreement(compared, statistical, len(present))
+    if series.is_bridged:
+        agrees |= dict.fromkeys(("chi_square", "chi_square_allowed"), float("nan"))
+        return conclude(found, agrees, wv, misfits=False)
+    misfits = not suffices(0.0, compared, max(agrees["dof"], 1))
+    return conclude(found, agrees, wv, misfits=misfits)
 
 
 def redundant_term(

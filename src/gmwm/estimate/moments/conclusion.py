@@ -1,5 +1,7 @@
 """From the minimum of the method of moments to a fit, without terms that the data do not need."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
@@ -12,12 +14,12 @@ from gmwm._core.typing import FloatArray
 from gmwm.estimate import tuning
 from gmwm.estimate.moments.design import Design
 from gmwm.estimate.moments.profile import Point, Profile
-from gmwm.estimate.problem.moments import FittedMoments, Moments
+from gmwm.estimate.problem.moments import Compared, FittedMoments, Moments
 from gmwm.estimate.problem.parameters import drift_key
 from gmwm.estimate.problem.ramp import Slope
 from gmwm.estimate.problem.regressors import Coefficients
 from gmwm.estimate.result.bound import upper_limits
-from gmwm.estimate.result.conclusion import Compared, Estimates, conclude, estimate_notices
+from gmwm.estimate.result.conclusion import Estimates, agreement, conclude, estimate_notices
 from gmwm.estimate.result.fit import Fit
 from gmwm.estimate.result.goodness import Goodness
 from gmwm.issues import Notice, notice
@@ -31,20 +33,17 @@ class Converged:
 
     found: Coefficients of the ramp or the curve removed from the wavelet variances.
     covariance: (J, J), of the moments, with the discrepancy, u^4.
-    statistical: (J, J), the same without it.
     root: (J, J), L with L'L the weights, the inverse of ``covariance`` unless others are chosen.
     point: The minimum under the weights.
-    basis: (J,), the wavelet variances to which the covariance belongs, u^2.
     discrepancy: Relative error allowed for at each level.
     """
 
     design: Design
     found: Coefficients | None
+    compared: Compared
     covariance: FloatArray
-    statistical: FloatArray
     root: FloatArray
     point: Point
-    basis: FloatArray
     discrepancy: float
 
     def moments(self, wv: WaveletVariance) -> Moments:
@@ -63,10 +62,10 @@ class Converged:
         owners = self.design.coordinates.owners
         return [k for k, (i, _) in enumerate(owners) if amplitudes[i] > 0.0]
 
-    @property
-    def implied(self) -> FloatArray:
-        """Wavelet variance of the noise, u^2, (J,)."""
-        return self.design.implied(self.point.x, self.point.shapes)
+    def moved(self, point: Point) -> Converged:
+        """The same at another point."""
+        implied = self.design.implied(point.x, point.shapes)
+        return replace(self, point=point, compared=replace(self.compared, implied=implied))
 
     def goodness(self, wv: WaveletVariance) -> Goodness:
         """Agreement of the data with the fitted model."""
@@ -81,11 +80,11 @@ def conclude_moments(end: Converged, wv: WaveletVariance, method: str) -> Fit:
     """Make the `Fit` of a minimum under model weights."""
     design, point, moments, root = end.design, end.point, end.moments(wv), end.root
     coordinates, processes, present = design.coordinates, end.processes, end.present
-    target, slope = moments.target, moments.slope
+    compared, slope = end.compared, moments.slope
     jacobian, curves = _jacobian(end, moments)
     covariance = _sandwich(jacobian, end.covariance, root)
     absent = [i for i in design.linear if design.amplitudes(point.x)[i] == 0.0]
-    weighted, residual = root @ jacobian, root @ (target - end.implied)
+    weighted, residual = root @ jacobian, root @ compared.residual
     free = {i: _unrestricted(weighted, root @ curves[:, i], residual) for i in absent}
     limits = upper_limits(coordinates, processes, present, covariance, free, wv)
     own = moments.coefficient_covariances(design.unit_terms(point.shapes))
@@ -94,8 +93,8 @@ def conclude_moments(end: Converged, wv: WaveletVariance, method: str) -> Fit:
             more = tuning.MEAN_OF_LIMIT * limits[i] ** design.terms[i].linear.power * own[i]
             slope = Coefficients(slope.values, slope.covariance + more)
     notices = limit_notices(end)
-    if target.size < design.n_free:
-        values = {"levels": target.size, "parameters": design.n_free}
+    if wv.tau.size < design.n_free:
+        values = {"levels": wv.tau.size, "parameters": design.n_free}
         notices.append(notice("too-few-levels", "", values))
     found = Estimates(
         coordinates=coordinates,
@@ -109,10 +108,8 @@ def conclude_moments(end: Converged, wv: WaveletVariance, method: str) -> Fit:
         discrepancy=end.discrepancy,
         notices=notices,
     )
-    compared = Compared(
-        target, end.implied, end.covariance, end.statistical, end.basis, moments.taken
-    )
-    return conclude(found, compared, wv, misfits=end.discrepancy > 0.0)
+    agrees = agreement(compared, end.covariance, len(present))
+    return conclude(found, agrees, wv, misfits=end.discrepancy > 0.0)
 
 
 def reweighted(fit: Fit, end: Converged, other: Converged, weights: str) -> Fit:
@@ -237,7 +234,7 @@ def with_doubtful_terms(
 
     without: The minimum without a noise term; None if nothing is left to fit.
     """
-    redundant = _redundant_terms(end, fit.objective, end.moments(fit.wv).target)
+    redundant = _redundant_terms(end, fit.objective)
     # One without a finite interval is only limited, whether it is needed or not.
     largest = {key: tuning.UNDETERMINED * fit.params[key] for key in fit.upper_bounds}
     present = [key for key, error in fit.stderr.items() if 0.0 < error <= largest.get(key, 0.0)]
@@ -265,18 +262,16 @@ def with_doubtful_terms(
     return replace(fit, notices=tuple(notices), upper_bounds=bounds)
 
 
-def _redundant_terms(
-    end: Converged, objective: float, target: FloatArray
-) -> list[tuple[float, int]]:
+def _redundant_terms(end: Converged, objective: float) -> list[tuple[float, int]]:
     """Gain and place of terms that do not improve the fit significantly, the least useful first.
 
     Only terms with free shapes are tested. Their amplitude alone does not show it: among all shapes
     one always fits some accident. The objective without the term does, at one per cent shared among
     the levels where a term of this kind might have been found.
 
-    objective: Of the minimum under its own covariance, of wavelet variances ``target`` (J,).
+    objective: Of the minimum under its own covariance.
     """
-    design, point = end.design, end.point
+    design, point, target = end.design, end.point, end.compared.target
     amplitudes = design.amplitudes(point.x)
     redundant: list[tuple[float, int]] = []
     for i in design.shaped:

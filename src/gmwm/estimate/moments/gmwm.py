@@ -34,7 +34,14 @@ from gmwm.estimate.moments.weights import (
     dictionary_fit,
     with_discrepancy,
 )
-from gmwm.estimate.problem.moments import Moments, Scales, Simulation, is_plain, weight_root
+from gmwm.estimate.problem.moments import (
+    Compared,
+    Moments,
+    Scales,
+    Simulation,
+    is_plain,
+    weight_root,
+)
 from gmwm.estimate.problem.parameters import Coordinates, keys_by_term
 from gmwm.estimate.problem.ramp import ols_slope
 from gmwm.estimate.result.fit import Fit
@@ -117,20 +124,19 @@ class GMWM:
         weights = Weights.of(self.weights, wv, self.drift == "moments")
         efficient = replace(self, weights="model", start=None)
         least, missed = efficient._cached(model, wv), []
-        target = least.moments(wv).target
-        root = weights.root(least.covariance, least.implied - target)
-        profile = Profile(least.design, target, root)
+        root = weights.root(least.covariance, -least.compared.residual)
+        profile = Profile(least.design, least.compared.target, root)
         if self.start is not None:
             grid = profile.refine(profile.at(least.point.shapes))
             reached = profile.descend(_started(self.start, least.design.coordinates))
             if self.weights == "model" and reached.objective < grid.objective:
-                least = replace(least, point=reached)
+                least = least.moved(reached)
             if reached.objective > grid.objective + tuning.SAME_MINIMUM:
                 values = {"objective": reached.objective, "least": grid.objective}
                 missed.append(notice("start-missed", "", values))
         other = least
         if self.weights != "model":
-            other = replace(least, root=root, point=search(profile))
+            other = replace(least.moved(search(profile)), root=root)
 
         def without(i: int) -> Converged | None:
             place = least.design.terms[i].place
@@ -197,7 +203,7 @@ class GMWM:
         if found is not None and found.discrepancy > 0.0 and len(first) > 1:
             # What no mixture follows the model itself may follow, under its own weights.
             level.value = 0.0
-            again = _iterate(problem, found.statistical, level) or found
+            again = _iterate(problem, found.compared.statistical, level) or found
             found = min(found, again, key=lambda each: each.discrepancy)
             level.value = found.discrepancy
         is_large = self.discrepancy is None and level.value > tuning.DISCREPANCY_LARGE
@@ -221,7 +227,7 @@ class GMWM:
             if nested.discrepancy < found.discrepancy:
                 target = replace(problem.moments, found=nested.found).target
                 point = problem.search(target, nested.covariance)
-                found = replace(nested, design=problem.design, point=point)
+                found = replace(nested, design=problem.design).moved(point)
         return found
 
 
@@ -339,13 +345,12 @@ def _iterate(problem: _Problem, relaxed: FloatArray, level: Discrepancy) -> Conv
         converged = largest < tuning.SETTLED
         # A discrepancy does not enter before the weights settle, where any model looks wrong.
         if converged or (level.value > 0.0 and rounds % tuning.DISCREPANCY_EVERY == 0):
-            changed = level.update(
-                target - curve, statistical, target, previous, problem.dof(point), moments.taken
-            )
+            compared = Compared(target, curve, statistical, previous, moments.taken)
+            changed = level.update(compared, problem.dof(point))
             if converged and not changed:
-                root = weight_root(covariance)
+                compared, root = replace(compared, basis=curve), weight_root(covariance)
                 return Converged(
-                    design, moments.found, covariance, statistical, root, point, curve, level.value
+                    design, moments.found, compared, covariance, root, point, level.value
                 )
         elif rounds > 1:
             ratio = float(step @ before) / max(float(before @ before), 1e-300)
@@ -370,12 +375,9 @@ def _under_reference(problem: _Problem, level: Discrepancy) -> Converged:
     for _ in range(tuning.REFERENCE_ROUNDS):
         covariance = with_discrepancy(statistical, target, level.value)
         point = problem.search(target, covariance)
-        residual = target - design.implied(point.x, point.shapes)
-        if not level.update(
-            residual, statistical, target, reference.curve, problem.dof(point), moments.taken
-        ):
+        implied = design.implied(point.x, point.shapes)
+        compared = Compared(target, implied, statistical, reference.curve, moments.taken)
+        if not level.update(compared, problem.dof(point)):
             break
-    root, curve = weight_root(covariance), reference.curve
-    return Converged(
-        design, moments.found, covariance, statistical, root, point, curve, level.value
-    )
+    root = weight_root(covariance)
+    return Converged(design, moments.found, compared, covariance, root, point, level.value)

@@ -13,7 +13,6 @@ from typing import Any, Self
 from weakref import WeakKeyDictionary
 
 import numpy as np
-import numpy.typing as npt
 from scipy.optimize import brentq
 
 from gmwm._core.distributions import chi2
@@ -21,7 +20,7 @@ from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.estimate import tuning
 from gmwm.estimate.moments.design import Design
-from gmwm.estimate.problem.moments import Scales, chi_square, is_plain, weight_root
+from gmwm.estimate.problem.moments import Compared, Scales, is_plain, weight_root
 from gmwm.estimate.problem.nonnegative import solve_nonnegative
 from gmwm.process import CATALOGUE, Model, Process, Shape
 from gmwm.variance import WaveletVariance
@@ -81,47 +80,32 @@ class Weights:
 _SETTLED = 1e-3  # relative change of delta
 
 
-def suffices(
-    value: float,
-    residual: FloatArray,
-    covariance: FloatArray,
-    target: FloatArray,
-    basis: FloatArray,
-    dof: int,
-    taken: FloatArray | float = 0.0,
-) -> bool:
-    """Whether residuals (J,) agree with their covariance under a discrepancy of ``value``.
+def suffices(value: float, compared: Compared, dof: int) -> bool:
+    """Whether residuals agree with their covariance under a discrepancy of ``value``.
 
     Without one, the chi-square test decides; with one, the sum of squares must not exceed its
     degrees of freedom. Only levels that are known well enough to show a discrepancy count.
     """
-    known, dof = _well_known(covariance, target, dof)
-    residual, target, basis = residual[known], target[known], basis[known]
-    covariance = covariance[np.ix_(known, known)]
-    if value == 0.0:
-        implied = target - residual
-        if np.any(implied <= 0.0) or np.any(basis <= 0.0):
-            return False
-        if isinstance(taken, np.ndarray):
-            taken = taken[known]
-        objective = chi_square(target, implied, covariance, basis, taken)[1]
-        return bool(chi2.sf(objective, dof) > tuning.MISFIT_P)
-    return _objective(value, residual, covariance, target) <= dof
+    known, dof = _well_known(compared, dof)
+    if value > 0.0:
+        return _objective(value, known) <= dof
+    if np.any(known.implied <= 0.0) or np.any(known.basis <= 0.0):
+        return False
+    return bool(chi2.sf(known.chi_square(known.statistical), dof) > tuning.MISFIT_P)
 
 
-def _well_known(
-    covariance: FloatArray, target: FloatArray, dof: int
-) -> tuple[npt.NDArray[np.intp], int]:
+def _well_known(compared: Compared, dof: int) -> tuple[Compared, int]:
     """Levels of small relative error, and the degrees of freedom that they leave.
 
     The misfit of a coarse level is chance, and allowing for it would loosen the fine levels.
     """
+    target = compared.target
     with np.errstate(over="ignore"):  # a level without any variance is not known
-        relative = np.sqrt(np.diag(covariance)) / np.maximum(target, 1e-300)
+        relative = np.sqrt(np.diag(compared.statistical)) / np.maximum(target, 1e-300)
     known = np.flatnonzero(relative < tuning.DISCREPANCY_KNOWN)
     if known.size == 0:
         known = np.array([int(np.argmin(relative))])
-    return known, max(dof - (target.size - known.size), 1)
+    return compared.at(known), max(dof - (target.size - known.size), 1)
 
 
 def with_discrepancy(covariance: FloatArray, target: FloatArray, value: float) -> FloatArray:
@@ -129,10 +113,9 @@ def with_discrepancy(covariance: FloatArray, target: FloatArray, value: float) -
     return covariance + np.diag((value * target) ** 2)
 
 
-def _objective(
-    value: float, residual: FloatArray, covariance: FloatArray, target: FloatArray
-) -> float:
-    whitened = weight_root(with_discrepancy(covariance, target, value)) @ residual
+def _objective(value: float, compared: Compared) -> float:
+    covariance = with_discrepancy(compared.statistical, compared.target, value)
+    whitened = weight_root(covariance) @ compared.residual
     return float(whitened @ whitened)
 
 
@@ -155,38 +138,21 @@ class Discrepancy:
         if self._estimated and value > tuning.DISCREPANCY_NOTABLE:
             self.value = value
 
-    def update(
-        self,
-        residual: FloatArray,
-        covariance: FloatArray,
-        target: FloatArray,
-        basis: FloatArray,
-        dof: int,
-        taken: FloatArray | float = 0.0,
-    ) -> bool:
-        """Estimate anew from residuals (J,) and their covariance; returns whether it changed.
-
-        ``basis`` (J,) are the wavelet variances to which ``covariance`` belongs.
-        """
-        if not self._estimated:
-            return False
-        if self.value == 0.0 and suffices(0.0, residual, covariance, target, basis, dof, taken):
+    def update(self, compared: Compared, dof: int) -> bool:
+        """Estimate anew from residuals and their covariance; returns whether it changed."""
+        if not self._estimated or (self.value == 0.0 and suffices(0.0, compared, dof)):
             return False
         before = self.value
-        self.value = moment_estimate(residual, covariance, target, dof)
+        self.value = moment_estimate(compared, dof)
         return abs(self.value - before) > _SETTLED * max(self.value, before, 1e-6)
 
 
-def moment_estimate(
-    residual: FloatArray, covariance: FloatArray, target: FloatArray, dof: int
-) -> float:
+def moment_estimate(compared: Compared, dof: int) -> float:
     """Discrepancy whose weighted sum of squares equals its degrees of freedom."""
-    known, dof = _well_known(covariance, target, dof)
-    residual, target = residual[known], target[known]
-    covariance = covariance[np.ix_(known, known)]
+    known, dof = _well_known(compared, dof)
 
     def excess(log_delta: float) -> float:
-        return _objective(float(np.exp(log_delta)), residual, covariance, target) - dof
+        return _objective(float(np.exp(log_delta)), known) - dof
 
     low, high = np.log(1e-5), np.log(10.0)
     if excess(low) <= 0.0:
@@ -327,8 +293,8 @@ def _needed(matrix: FloatArray, target: FloatArray, covariance: FloatArray) -> f
         value = low if high == 1.0 and low == 0.0 else float(np.sqrt(max(low, 1e-4) * high))
         x = _amplitudes(matrix, target, covariance, value)
         curve = matrix @ x
-        dof = max(target.size - int(np.sum(x > 0.0)), 3)
-        if suffices(value, target - curve, covariance, target, curve, dof):
+        compared = Compared(target, curve, covariance, curve, np.zeros_like(target))
+        if suffices(value, compared, max(target.size - int(np.sum(x > 0.0)), 3)):
             if value == 0.0:
                 return 0.0
             high = value

@@ -18,6 +18,7 @@ from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gmwm._core.distributions import norm, student
 from gmwm._core.frozen import frozen
@@ -454,3 +455,35 @@ def chi_square(
     standard = (root - expected) / np.sqrt(share)
     whitened = weight_root(covariance / np.outer(scale, scale)) @ standard
     return standard, float(whitened @ whitened)
+
+
+@dataclass(frozen=True, eq=False)
+class Compared:
+    """Wavelet variances of the data without the drift, beside those of a fitted model, (J,).
+
+    statistical: (J, J), covariance without discrepancy, of the wavelet variances ``basis``.
+    taken: See `chi_square`.
+    """
+
+    target: FloatArray
+    implied: FloatArray
+    statistical: FloatArray
+    basis: FloatArray
+    taken: FloatArray
+
+    @property
+    def residual(self) -> FloatArray:
+        """Of the model, (J,)."""
+        return self.target - self.implied
+
+    def at(self, levels: NDArray[np.intp]) -> Compared:
+        """Some levels of it."""
+        rows = (each[levels] for each in (self.target, self.implied, self.basis, self.taken))
+        target, implied, basis, taken = rows
+        return Compared(target, implied, self.statistical[np.ix_(levels, levels)], basis, taken)
+
+    def chi_square(self, covariance: FloatArray) -> float:
+        """See `chi_square`; NaN where a basis is not positive."""
+        if not np.all(self.basis > 0.0):
+            return float("nan")
+        return chi_square(self.target, self.implied, covariance, self.basis, self.taken)[1]

@@ -11,7 +11,7 @@ from gmwm._core.text import brief, per_cent
 from gmwm._core.typing import FloatArray
 from gmwm._core.units import customary_unit
 from gmwm.estimate import tuning
-from gmwm.estimate.problem.moments import chi_square, slope_dof, weight_root
+from gmwm.estimate.problem.moments import Compared, slope_dof, weight_root
 from gmwm.estimate.problem.parameters import Coordinates, drift_key
 from gmwm.estimate.problem.ramp import walks_beside
 from gmwm.estimate.problem.regressors import Coefficients
@@ -66,45 +66,26 @@ class Estimates:
         return model, ordered, matrix[np.ix_(rows, rows)], upper
 
 
-@dataclass(frozen=True, eq=False)
-class Compared:
-    """Wavelet variances of the data without the drift, beside those of a fitted model, (J,).
-
-    covariance, statistical: (J, J), with the discrepancy and without; of ``basis`` (J,).
-    taken: See `chi_square`.
-    """
-
-    target: FloatArray
-    implied: FloatArray
-    covariance: FloatArray
-    statistical: FloatArray
-    basis: FloatArray
-    taken: FloatArray
-    is_tested: bool = True
-
-    def agreement(self, n_free: int) -> dict[str, Any]:
-        """Fields of `Fit`."""
-        target, implied, basis = self.target, self.implied, self.basis
-        whitened = weight_root(self.covariance) @ (target - implied)
-        dof = target.size - n_free
-        plain = allowed = float("nan")
-        if self.is_tested and dof > 0 and np.all(basis > 0.0):
-            plain, allowed = (
-                chi_square(target, implied, each, basis, self.taken)[1]
-                for each in (self.statistical, self.covariance)
-            )
-        return {
-            "objective": float(whitened @ whitened),
-            "chi_square": plain,
-            "chi_square_allowed": allowed,
-            "dof": dof,
-        }
+def agreement(compared: Compared, covariance: FloatArray, n_free: int) -> dict[str, Any]:
+    """Agreement with a model, as fields of `Fit`; the covariance has the discrepancy in it."""
+    whitened = weight_root(covariance) @ compared.residual
+    dof = compared.target.size - n_free
+    plain = allowed = float("nan")
+    if dof > 0:
+        plain, allowed = map(compared.chi_square, (compared.statistical, covariance))
+    return {
+        "objective": float(whitened @ whitened),
+        "chi_square": plain,
+        "chi_square_allowed": allowed,
+        "dof": dof,
+    }
 
 
-def conclude(found: Estimates, compared: Compared, wv: WaveletVariance, *, misfits: bool) -> Fit:
+def conclude(
+    found: Estimates, agrees: Mapping[str, Any], wv: WaveletVariance, *, misfits: bool
+) -> Fit:
     """Make the `Fit` of some estimates and judge it."""
     model, keys, matrix, upper = found.by_key()
-    agrees = compared.agreement(len(found.present))
     dof = float("inf")
     if found.slope is not None:
         dof = slope_dof(model, keys, matrix, wv)

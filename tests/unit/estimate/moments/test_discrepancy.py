@@ -4,10 +4,15 @@ import numpy as np
 import pytest
 
 from gmwm.estimate.moments.weights import Discrepancy, moment_estimate
+from gmwm.estimate.problem.moments import Compared
 
 LEVELS = 12
 TARGET = 2.0 ** -np.arange(LEVELS)
 COVARIANCE = np.diag((0.01 * TARGET) ** 2)
+
+
+def compared(residual):
+    return Compared(TARGET, TARGET - residual, COVARIANCE, TARGET, np.zeros(LEVELS))
 
 
 @pytest.mark.parametrize("delta", [0.02, 0.1, 1.0])
@@ -16,20 +21,20 @@ def test_it_is_what_makes_the_sum_of_squares_its_degrees_of_freedom(delta):
     dof = 9
     size = np.sqrt(dof / LEVELS) * np.hypot(0.01, delta)
     residual = size * TARGET * np.where(np.arange(LEVELS) % 2, 1.0, -1.0)
-    found = moment_estimate(residual, COVARIANCE, TARGET, dof)
+    found = moment_estimate(compared(residual), dof)
     assert found == pytest.approx(delta, rel=1e-4)
 
 
 def test_none_where_chance_explains_the_residuals():
     residual = 0.01 * TARGET * np.sqrt(9 / LEVELS)
-    assert moment_estimate(0.999 * residual, COVARIANCE, TARGET, 9) == 0.0
-    assert 0.0 < moment_estimate(1.01 * residual, COVARIANCE, TARGET, 9) < 0.01
-    assert moment_estimate(1e3 * TARGET, COVARIANCE, TARGET, 9) == pytest.approx(10.0)
+    assert moment_estimate(compared(0.999 * residual), 9) == 0.0
+    assert 0.0 < moment_estimate(compared(1.01 * residual), 9) < 0.01
+    assert moment_estimate(compared(1e3 * TARGET), 9) == pytest.approx(10.0)
 
 
 def update(each, size):
     residual = size * TARGET * np.where(np.arange(LEVELS) % 2, 1.0, -1.0)
-    return each.update(residual, COVARIANCE, TARGET, TARGET, 9)
+    return each.update(compared(residual), 9)
 
 
 def test_it_starts_where_the_residuals_are_no_chance_and_settles():
