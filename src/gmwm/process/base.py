@@ -159,6 +159,11 @@ class Process:
         return any(parameter.name not in self.__dict__ for parameter in self.parameters)
 
     @property
+    def is_plain(self) -> bool:
+        """Whether it holds nothing but parameters, so that equal ones are the same."""
+        return vars(self).keys() <= {parameter.name for parameter in self.parameters}
+
+    @property
     def is_repeatable(self) -> bool:
         """Whether two of this kind in one model can be distinguished."""
         return bool(self.shape_parameters) if self.repeatable is None else self.repeatable

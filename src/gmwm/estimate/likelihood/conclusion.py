@@ -211,10 +211,9 @@ def conclude_likelihood(
     statistical = moments.covariance(noise)
     compared = Compared(moments.target, implied, statistical, implied, moments.taken)
     agrees = agreement(compared, statistical, len(present))
+    misfits = not series.is_bridged and not suffices(0.0, compared, max(agrees["dof"], 1))
     if series.is_bridged:
         agrees |= dict.fromkeys(("chi_square", "chi_square_allowed"), float("nan"))
-        return conclude(found, agrees, wv, misfits=False)
-    misfits = not suffices(0.0, compared, max(agrees["dof"], 1))
     return conclude(found, agrees, wv, misfits=misfits)
 
 

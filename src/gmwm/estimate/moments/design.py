@@ -17,7 +17,7 @@ import numpy as np
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.estimate import tuning
-from gmwm.estimate.problem.moments import Scales, is_plain
+from gmwm.estimate.problem.moments import Scales
 from gmwm.estimate.problem.parameters import Coordinates, difference
 from gmwm.process import Model, Process, Shape
 
@@ -127,7 +127,7 @@ class Design:
     def _cached(self, name: str, i: int, make: Callable[[], Any]) -> Any:
         """A value that depends on a term and the levels only, shared by designs of these levels."""
         term = self.terms[i]
-        plain = is_plain(term.process) and not self.scales.is_simulated(term.process)
+        plain = term.process.is_plain and not self.scales.is_simulated(term.process)
         kept = self.scales.shared if plain and term.n_shapes else self._own
         key = name, term.process
         if key not in kept:

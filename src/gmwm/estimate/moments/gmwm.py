@@ -34,14 +34,7 @@ from gmwm.estimate.moments.weights import (
     dictionary_fit,
     with_discrepancy,
 )
-from gmwm.estimate.problem.moments import (
-    Compared,
-    Moments,
-    Scales,
-    Simulation,
-    is_plain,
-    weight_root,
-)
+from gmwm.estimate.problem.moments import Compared, Moments, Scales, Simulation, weight_root
 from gmwm.estimate.problem.parameters import Coordinates, keys_by_term
 from gmwm.estimate.problem.ramp import ols_slope
 from gmwm.estimate.result.fit import Fit
@@ -164,7 +157,7 @@ class GMWM:
 
     def _cached(self, model: Model, wv: WaveletVariance) -> Converged:
         """The minimum, searched once for each model and series."""
-        if not all(is_plain(term) for term in model.terms):
+        if not all(term.is_plain for term in model.terms):
             return self._solve(model, wv)
         known, key = _converged.setdefault(wv, {}), (self, model)
         if key not in known:

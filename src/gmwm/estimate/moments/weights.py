@@ -20,7 +20,7 @@ from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
 from gmwm.estimate import tuning
 from gmwm.estimate.moments.design import Design
-from gmwm.estimate.problem.moments import Compared, Scales, is_plain, weight_root
+from gmwm.estimate.problem.moments import Compared, Scales, weight_root
 from gmwm.estimate.problem.nonnegative import solve_nonnegative
 from gmwm.process import CATALOGUE, Model, Process, Shape
 from gmwm.variance import WaveletVariance
@@ -204,7 +204,7 @@ def dictionary_fit(
 ) -> Reference:
     """Non-negative least-squares fit of the textbook processes and the kinds of ``extra``."""
     kinds = _kinds(extra)
-    if not all(is_plain(kind) for kind in kinds):
+    if not all(kind.is_plain for kind in kinds):
         return _mixture(wv, target, kinds)
     known, key = _references.setdefault(wv, {}), (kinds, target.tobytes())
     if key not in known:

@@ -143,11 +143,6 @@ def _of_levels(tau: tuple[float, ...], dt: float, n: int, wavelet: str) -> Scale
     return Scales(frozen(np.array(tau)), dt, n, wavelet)
 
 
-def is_plain(process: Process) -> bool:
-    """Whether an instance holds only parameters, so that equal ones are the same."""
-    return vars(process).keys() <= {parameter.name for parameter in process.parameters}
-
-
 @dataclass(frozen=True, eq=False)
 class Moments:
     """The moments of a series, given what is known of its ramp or curve.
