@@ -68,7 +68,8 @@ class Periodogram:
         """Two-sided spectrum, u^2/Hz."""
         powers, missed = self._fit
         factor = np.exp(missed[self._bin(f * dt)])
-        laws = np.stack([_law(law, f * dt, 1.0) for law in tuning.LAWS])
+        sine = 2.0 * np.sin(np.pi * f * dt)
+        laws = np.stack([sine**law for law in tuning.LAWS])
         return np.asarray(dt * (powers @ laws) * factor)
 
     def root_square(self, f: FloatArray, dt: float) -> FloatArray:
@@ -193,8 +194,8 @@ def _fitted(
         ratio = seen / implied
         if step >= steps:
             ratio = np.minimum(np.maximum(ratio, 1.0 / largest), largest)
-        pull = laws * (count / implied)
-        powers *= np.sqrt(pull @ ratio / pull.sum(axis=1))
+        weight = count / implied
+        powers *= np.sqrt((laws @ (weight * ratio)) / (laws @ weight))
     return powers
 
 
