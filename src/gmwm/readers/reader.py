@@ -228,7 +228,7 @@ def _recording(tables: Sequence[Table], given: Given) -> Recording:
 
 
 def recording_of(table: Table, given: Given) -> Recording:
-    """The recording of a table."""
+    """The recording of a table: one stage after another, each of which hands on what it found."""
     stated = _stated_rate(table, given.rate)
     roles = roles_of(table, replace(given, rate=stated))
     clocks.ask_for_unknown(table, roles, stated)
