@@ -1,12 +1,14 @@
 """Where events begin and end, and what is said of them, from prediction errors made by hand."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from examining import examined, only
 
 from gmwm.diagnosis import tuning
-from gmwm.diagnosis.events import _LISTED, event, find_events
-from gmwm.diagnosis.innovations import Innovations
+from gmwm.diagnosis.events import _LISTED, event, find_events, with_single_outliers
+from gmwm.diagnosis.innovations import Innovations, innovations
 
 N, G = 1000, tuning.GUARD
 
@@ -54,6 +56,26 @@ def test_one_of_a_thousand_records_of_noise_has_an_event(n, size, found):
     # Gaussian errors: of 1000 the largest is beyond 4.89 with a chance of 0.1 %.
     assert bool(spans((500, size), n=n)) is found
     assert bool(spans((500, size), n=100 * n)) is False
+
+
+@pytest.mark.parametrize(("length", "both"), [(49, True), (50, False)])
+def test_outliers_are_left_out_beside_events_unless_these_are_many(length, both):
+    values = np.random.default_rng(1).uniform(-1.0, 1.0, N)
+    values[100] = 50.0
+    errors = Innovations(values, np.ones(N, dtype=bool), np.ones(N), 0.0)
+    event = (N - length, N)
+    expected = ((100, 101), event) if both else ((100, 101),)
+    assert with_single_outliers((event,), errors, values, 0.0) == expected
+
+
+def test_a_sample_is_predicted_from_as_many_beside_it_as_the_order_and_none_missing():
+    values = np.random.default_rng(1).standard_normal(N)
+    short, enough = tuning.ORDER + 1, tuning.ORDER + 2
+    places = np.cumsum([100, short + 1, enough + 1])
+    values[places] = np.nan
+    known = innovations(values, 0.0).known
+    counts = [np.count_nonzero(known[a:b]) for a, b in pairwise([0, *places])]
+    assert counts == [100, 0, 2]  # forwards one, backwards one
 
 
 def notice(values, events, scatter=0.1):

@@ -22,7 +22,13 @@ def test_repr_is_readable_and_evaluates_back():
 
 @pytest.mark.parametrize(
     "process",
-    [AR([0.5, 0.1], 2.0), ARMA(2, 1), ARIMA([0.5], 1, [0.2], 1.0), Resonance(1.0, 2.0, 0.1)],
+    [
+        AR([0.5, 0.1], 2.0),
+        ARMA(2, 1),
+        ARIMA(1),
+        ARIMA([0.5], 1, [0.2], 1.0),
+        Resonance(1.0, 2.0, 0.1),
+    ],
     ids=repr,
 )
 def test_processes_survive_pickle_repr_and_json(process):
@@ -30,6 +36,7 @@ def test_processes_survive_pickle_repr_and_json(process):
     assert pickle.loads(pickle.dumps(process)) == process
     assert eval(repr(process), scope) == process
     assert model_from_list([process.to_dict()]).terms == (process,)
+    assert ARIMA(1).d == 0
 
 
 def test_parameters_are_numbered_only_where_they_have_to_be():

@@ -288,6 +288,8 @@ def test_scale_errors(kind, vehicle, seed, axis):
     assert (fault.code, fault.where) == ("scale-error", kind)
     assert within(fault, axis, 0.03) < 0.01
     assert f"{kind}_{axis}" in fault.hint
+    unseen = [a for a in "xyz" if abs(fault.values[a]) < 5.0 * fault.values[f"{a} error"]]
+    assert unseen and not any(f"{kind}_{a}" in fault.hint for a in unseen)
 
 
 @pytest.mark.parametrize("vehicle", ["car", slow("helicopter")])

@@ -51,6 +51,13 @@ def test_a_filter_that_diverged_is_named_and_left_out(made_up):
         plt.close(figure)
 
 
+def test_errors_grow_from_the_start_of_an_outage_to_its_end(made_up):
+    figure = made_up(runs=3).plot_growth()
+    spans = [ax.lines[0].get_xdata()[[0, -1]].tolist() for ax in figure.axes[:2]]
+    assert spans == [[0.0, 10.0], [0.0, 15.0]]
+    plt.close(figure)
+
+
 def test_figures_need_an_outage(made_up):
     found = made_up(outages=())
     plt.close(found.plot_track())

@@ -84,6 +84,11 @@ def spoilt(row: int, column: int, value: float) -> np.ndarray:
     return table
 
 
+def late(table: np.ndarray) -> np.ndarray:
+    table[:20, 0] *= 1.012
+    return table
+
+
 @pytest.mark.parametrize(
     ("table", "message"),
     [
@@ -92,6 +97,7 @@ def spoilt(row: int, column: int, value: float) -> np.ndarray:
         (spoilt(7, 0, 0.6), r"column 'time_s', line 9: time stamp 0\.6 repeats the one before"),
         (spoilt(7, 0, 0.55), r"column 'time_s', line 9: time stamp 0\.55 goes back"),
         (spoilt(7, 0, 0.73), r"line 9: time stamp 0\.73 is off the even spacing of 0\.1"),
+        (late(rows()), r"line 11: time stamp 0\.9108 is off the even spacing of 0\.1"),
         (np.delete(rows(), 7, axis=0), r"line 9: time stamp 0\.8 is off the even spacing of 0\.1"),
         (spoilt(7, 1, 97.0), r"line 9: a latitude of 97 deg: check the unit"),
         (spoilt(7, 5, -91.0), r"line 9: a pitch of -91 deg: check the unit"),

@@ -150,6 +150,11 @@ def test_thinned_topics_are_refused(tmp_path):
     )
     message = refusal(path)
     assert "sensor_accel[0] is logged at 1 Hz, thinned" in message and "SDLOG_PROFILE" in message
+    slow[:] = 5_000_000
+    path = write_ulog(
+        tmp_path / "a.ulg", single("gyro", X[:, :3], slow), single("accel", X[:, 3:], slow)
+    )
+    assert "is logged at 0 Hz, thinned" in refusal(path)
     path = write_ulog(tmp_path / "b.ulg", single("gyro", X[:, :3]), single("accel", X[:, 3:]))
     assert exact(gmwm.read(path))
 

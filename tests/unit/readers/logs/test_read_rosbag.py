@@ -291,6 +291,9 @@ def test_no_imu(tmp_path):
     path = write1(tmp_path / "a.bag", {"/chat": (TEXT_TYPE, [(START, text(ROS1, "hello"))])})
     assert "a.bag has no messages of sensor_msgs/Imu: it has /chat" in refusal(path)
     assert "it is empty" in refusal(write1(tmp_path / "b.bag", {}))
+    for content, words in ((b"", "c.bag is empty"), (b"no bag", "c.bag is not a ROS bag")):
+        (tmp_path / "c.bag").write_bytes(content)
+        assert words in refusal(tmp_path / "c.bag")
 
 
 def test_stamps_out_of_order(tmp_path):
