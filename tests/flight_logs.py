@@ -121,7 +121,7 @@ BATCH = (("ISBH", "QHBBHHQf", "TimeUS,N,type,instance,mul,smp_cnt,SampleUS,smp_r
 
 def write_dataflash(path, forms, messages):
     """Formats and (name, values) messages."""
-    numbers = {"FMT": 0x80} | {name: 0x81 + i for i, (name, _, _) in enumerate(forms)}
+    numbers = {"FMT": 0x80} | {name: 0xFF - i for i, (name, _, _) in enumerate(forms)}
     layouts = {"FMT": "BBnNZ"} | {name: letters for name, letters, _ in forms}
 
     def packed(name, *values):

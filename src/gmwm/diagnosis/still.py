@@ -410,7 +410,5 @@ def _changes(logs: FloatArray) -> list[int]:
             before = np.arange(1, part.size)
             sums = np.cumsum(part)[:-1]
             explained = sums**2 / before + (np.sum(part) - sums) ** 2 / (part.size - before)
-            split = start + 1 + int(np.argmax(explained))
-            if split > ends[-1]:
-                ends.append(split)
+            ends.append(start + 1 + int(np.argmax(explained)))
     return [*ends, logs.size]

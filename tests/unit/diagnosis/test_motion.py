@@ -84,4 +84,5 @@ def test_the_three_longest_moves_are_named_and_the_others_counted():
     turns = [(60.0 * k, 60.0 * k + 5.0 * k, 0.3) for k in range(1, 6)]
     (notice,) = gmwm.health(record(rate=turns, seconds=420.0)).of(code="not-static")
     assert notice.values["moves"] == 5
+    assert "it turns at up to 17.2 deg/s" in notice.text
     assert notice.text.endswith(", and 2 shorter ones")

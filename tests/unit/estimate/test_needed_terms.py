@@ -32,6 +32,12 @@ def test_a_walk_without_which_the_data_are_missed_is_above_zero(seed):
     assert 0.0 < low < 4e-6 < high
 
 
+def test_a_process_slower_than_the_record_is_at_the_limit_of_the_search():
+    model, walk = WhiteNoise() + GaussMarkov(), WhiteNoise(1.0) + RandomWalk(0.1)
+    assert "shapes_within_search" in fitted(model, walk, 1).reasons
+    assert not fitted(model, WhiteNoise(1.0) + GaussMarkov(0.5, 20.0), 1).reasons
+
+
 @pytest.mark.parametrize("seed", range(3))
 def test_a_term_that_the_truth_does_not_have_stays_redundant(seed):
     truth = WhiteNoise(1.0) + GaussMarkov(0.5, 20.0)

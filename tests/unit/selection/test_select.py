@@ -167,6 +167,7 @@ def test_merging_holds_a_time_that_the_record_does_not_determine():
     assert fit.valid
     assert set(fit.keys) == {"N", "sigma"}
     assert selection.chosen is selection[0]
+    assert [each.n_parameters for each in selection] == [2, 3, 5]
     (held,) = (each for each in fit.notices if each.code == "time-held")
     assert held.where == "tau"
     assert held.values["shortest"] <= min(4000.0, held.values["tau"])

@@ -13,6 +13,7 @@ from gmwm.variance.gaps import (
     Runs,
     bridged,
     common_share,
+    lags_to,
     pair_factor,
     spread_by_lags,
     unmasked,
@@ -66,6 +67,11 @@ def test_short_gaps_belong_to_runs():
     runs = Runs.of(with_gaps(np.zeros(100), [(0, 5), (20, 21), (40, 44), (60, 65)])).edges
     assert bridged(runs, np.zeros(3, dtype=bool), 5.0).tolist() == [[5, 60], [65, 100]]
     assert bridged(runs, np.array([True, False, False]), 9.0).tolist() == [[5, 20], [21, 100]]
+
+
+def test_lags_end_at_the_longest_gap():
+    assert lags_to(1).tolist() == [0, 1]
+    assert lags_to(100)[-4:].tolist() == [81, 87, 94, 101]
 
 
 @settings(deadline=None)
