@@ -26,8 +26,8 @@ BOUNDS = {
     "sigma2_3": {"table4": 0.00185},
 }
 RUN = {
-    "table2": (TABLE_2, ["GMWM", "AV"], 6),
-    "table3": (TABLE_3, ["GMWM", "MLE", "EM"], 6),
+    "table2": (TABLE_2, ["GMWM", "AV"], 4),
+    "table3": (TABLE_3, ["GMWM", "MLE", "EM"], 4),
     "table4": (TABLE_4, ["GMWM"], 2),
 }
 CASES = [(study, name) for name, by_study in BOUNDS.items() for study in by_study]

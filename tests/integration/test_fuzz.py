@@ -9,7 +9,7 @@ import pytest
 import fuzz
 from marks import slow
 
-SOME = {"npy": 150, "odd": 2, "document": 10, "study": 6, "field": 12, "fleet": 2}
+SOME = {"npy": 150, "odd": 2, "document": 10, "study": 6, "field": 12, "fleet": 1}
 SOME |= {"gzip": 40, "datasheet": 60}
 SOME |= {"mat": 2, "mat73": 5, "hdf5": 2}  # each is first tried in a process of its own
 

@@ -11,7 +11,7 @@ import gmwm
 from gmwm.process import CATALOGUE, Process
 from gmwm.process.spectral import haar_gain, haar_variance
 from gmwm.variance import haar_covariance, wavelet_variance
-from marks import EXAMPLES, FIRST
+from marks import EXAMPLES, FIRST, slow
 from places import GOLDEN
 
 CURVES = json.loads((GOLDEN / "haar_wavelet_variance.json").read_text())["curves"]
@@ -99,8 +99,8 @@ def test_closed_form_equals_mean_over_simulation(process):
 
 @pytest.mark.parametrize(
     "process",
-    [gmwm.WhiteNoise(1.0), gmwm.RandomWalk(0.1), gmwm.GaussMarkov(1.0, 20.0),
-     gmwm.Resonance(1.0, 0.05, 0.1)],
+    [gmwm.WhiteNoise(1.0), gmwm.RandomWalk(0.1), slow(gmwm.GaussMarkov(1.0, 20.0)),
+     slow(gmwm.Resonance(1.0, 0.05, 0.1))],
     ids=name,
 )  # fmt: skip
 def test_variance_of_the_estimates_is_as_predicted(process):

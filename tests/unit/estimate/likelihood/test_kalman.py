@@ -1,9 +1,8 @@
-"""Kalman filter and smoother against dense Gaussian algebra and against statsmodels."""
+"""Kalman filter and smoother against dense Gaussian algebra."""
 
 import numpy as np
 import pytest
 from scipy.linalg import solve_triangular
-from statsmodels.tsa.statespace.kalman_smoother import KalmanSmoother
 
 import gmwm
 from gmwm import AR, MA, GaussMarkov, QuantizationNoise, RandomWalk, Resonance, Sinusoid, WhiteNoise
@@ -126,34 +125,6 @@ def test_smoothing_is_conditioning_on_all_samples(model, gap):
         rtol=1e-8,
         atol=1e-9,
     )
-
-
-@pytest.mark.parametrize("model", MODELS[:-1], ids=repr)  # statsmodels wants states
-@pytest.mark.parametrize("gap", ["first three", "some"])
-def test_filter_and_smoother_agree_with_statsmodels(model, gap):
-    space = model.state_space(1.0)
-    p = space.n_states
-    y = columns(N, GAPS[gap], seed=3)[:, :1].copy()
-    peer = KalmanSmoother(k_endog=1, k_states=p)
-    peer.bind(y.copy())
-    peer["design"] = space.output[None, :]
-    peer["obs_cov"] = np.array([[space.measurement_noise]])
-    peer["transition"] = space.transition
-    peer["selection"] = np.eye(p)
-    peer["state_cov"] = space.process_noise
-    peer.initialize_known(np.zeros(p), space.initial_covariance)
-    peer.tolerance = 0.0  # no settled gain
-    theirs = peer.smooth()
-    zero = np.zeros((1, p))
-    states, covariance, lagged, _, _ = smooth(arguments(space), y, zero, zero)
-    np.testing.assert_allclose(states[:, 0], theirs.smoothed_state.T, rtol=1e-7, atol=1e-8)
-    np.testing.assert_allclose(covariance, theirs.smoothed_state_cov.transpose(2, 0, 1), atol=1e-8)
-    np.testing.assert_allclose(
-        lagged, theirs.smoothed_state_autocov.transpose(2, 0, 1)[: N - 1], atol=1e-8
-    )
-    whitened, log_variance, count = whiten(arguments(space), y)
-    value = -0.5 * (count * np.log(2.0 * np.pi) + log_variance + np.sum(whitened**2))
-    assert value == pytest.approx(theirs.llf, rel=1e-9, abs=1e-8)
 
 
 LONG = 5000

@@ -1,13 +1,11 @@
-"""The diffuse likelihood against dense algebra and against statsmodels."""
+"""The diffuse likelihood against dense algebra."""
 
 import numpy as np
 import pytest
-from statsmodels.tsa.statespace.sarimax import SARIMAX
-from statsmodels.tsa.statespace.structural import UnobservedComponents
 
 import gmwm
 from gmwm import AR, ARMA, GaussMarkov, QuantizationNoise, RandomWalk, Sinusoid, WhiteNoise
-from gmwm.estimate.likelihood.likelihood import Columns, KalmanLikelihood, Regression, whitened
+from gmwm.estimate.likelihood.likelihood import Columns, KalmanLikelihood
 
 MODELS = [
     (WhiteNoise(0.3),),
@@ -133,43 +131,9 @@ def test_the_first_and_last_missing_samples_are_as_if_they_were_not_there():
     )
 
 
-@pytest.mark.parametrize("missing", [(), (0, 100, 101, 299)], ids=["complete", "gaps"])
-@pytest.mark.parametrize("ramp", [False, True])
-def test_differences_are_those_of_statsmodels_diffuse_local_levels(ramp, missing):
-    y = np.cumsum(series(300, seed=4)) * 0.2 + series(300, seed=5) + 1e3
-    y[list(missing)] = np.nan
-    kind = "local linear deterministic trend" if ramp else "local level"
-    peer = UnobservedComponents(y - 1e3, kind, use_exact_diffuse=True)
-    likelihood = KalmanLikelihood(Columns(y, 1.0, None, ramp))
-    ours, theirs = [], []
-    for white, walk in ((1.0, 0.2), (0.5, 0.3), (2.0, 0.01), (0.8, 1.5)):
-        ours.append(likelihood((WhiteNoise(white), RandomWalk(walk))))
-        theirs.append(peer.loglike([white**2, walk**2]))
-    np.testing.assert_allclose(np.diff(ours), np.diff(theirs), rtol=1e-8)
-
-
-@pytest.mark.parametrize(
-    ("process", "order", "parameters"),
-    [
-        (AR([1.5, -0.7], 0.3), (2, 0, 0), [1.5, -0.7, 0.3]),
-        (ARMA([0.9], [-0.5], 1.2), (1, 0, 1), [0.9, -0.5, 1.2]),
-    ],
-    ids=repr,
-)
-def test_without_regressors_it_is_that_of_statsmodels_arma(process, order, parameters):
-    y = series(300, seed=6, missing=(17, 18))
-    likelihood = KalmanLikelihood(Columns.without_regressors(y, 1.0))
-    matrix = likelihood.columns.matrix
-    assert matrix.shape == (300, 1)
-    peer = SARIMAX(y, order=order).loglike(parameters)
-    # With a regressor of zero information the constant leaves one term of 2 pi out.
-    columns = Columns(y, 1.0, None, False)
-    restricted_value = KalmanLikelihood(columns)([process])
-    innovations, _, _ = whitened(columns, [process])
-    regression = Regression.of(innovations.T @ innovations)
-    mean = np.nanmean(y) + regression.beta[0]
-    at_mean = SARIMAX(y - mean, order=order).loglike(parameters)
-    assert likelihood([process]) == pytest.approx(peer, rel=1e-9)
-    assert restricted_value == pytest.approx(
-        at_mean + 0.5 * np.log(2.0 * np.pi) - 0.5 * regression.log_determinant, rel=1e-9
-    )
+@models
+def test_without_regressors_it_is_the_dense_likelihood(processes):
+    y = series(missing=(17, 18))
+    value, _, _ = restricted(y, noise_covariance(processes, N, DT), np.ones((N, 0)))
+    likelihood = KalmanLikelihood(Columns.without_regressors(y, DT))
+    assert likelihood(processes) == pytest.approx(value, rel=1e-9, abs=1e-7)

@@ -93,23 +93,6 @@ def test_arma_estimates_are_those_of_statsmodels_but_for_the_mean(truth, order):
     assert fit.log_likelihood >= at(theirs) - 1e-6
 
 
-def test_a_noisy_autoregression_is_that_of_statsmodels():
-    truth = WhiteNoise(0.6) + GaussMarkov(1.0, 8.0)
-    x = truth.simulate(3000, 1.0, seed=5)
-    fit = mle(truth.opened(), x)
-    peer = peer_fit(
-        SARIMAX(x, order=(1, 0, 0), trend="c", measurement_error=True), [0.0, 0.9, 0.36, 0.2]
-    )
-    phi, noise, innovation = peer.params[1:]
-    theirs = {
-        "N": np.sqrt(noise),
-        "tau": -1.0 / np.log(phi),
-        "sigma": np.sqrt(innovation / (1.0 - phi**2)),
-    }
-    for key, value in theirs.items():
-        assert fit.params[key] == pytest.approx(value, abs=0.1 * fit.stderr[key])
-
-
 # -- its own statistics -------------------------------------------------------------------------
 
 

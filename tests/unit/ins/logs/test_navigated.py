@@ -165,7 +165,6 @@ def test_a_vehicle_that_never_moves_has_no_heading_unless_its_gyros_feel_the_ear
 @pytest.mark.parametrize(
     ("changes", "verdict"),
     [
-        ({"sensors": WRONG, "bias": {"gyro": 0, "accel": 0}}, "lost"),
         ({"sensors": {"gyro": {"N": "1 deg/s/sqrt(Hz)"}, "accel": {"N": "30000 ug/sqrt(Hz)"}}},
          "too-small"),
         ({"position_sd": 0.3}, "too-large"),
@@ -213,9 +212,10 @@ def test_a_z_axis_that_points_up_is_the_first_thing_to_look_at_when_the_filter_i
     table(path, IMU_HEADER, [rows])
     bad = {"sensors": WRONG, "bias": {"gyro": 0, "accel": 0}}
     found = filtered(tmp_path, **bad)
+    assert not found.fits
     (up,) = (each for each in found.notices if each.code == "axis-up")
     assert "reverse gyro_z and accel_z" in up.hint
-    assert found.verdict.code == "lost"
+    assert (found.verdict.code, found.verdict.severity) == ("lost", "bad")
     assert f"Look first at accel_z, which points up ({up.hint}), then at" in found.verdict.text
 
 

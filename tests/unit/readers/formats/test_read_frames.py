@@ -17,6 +17,7 @@ import gmwm
 from bags import START, at_rest
 from gmwm.readers.formats import hdf5
 from gmwm.readers.names import CANONICAL
+from marks import slow
 from reading import SI, refusal
 
 X = at_rest()
@@ -204,7 +205,7 @@ def test_missing_half_floats_of_any_pattern_are_missing():
     assert np.flatnonzero(np.isnan(rec["gyro_x"].values)).tolist() == [7]
 
 
-@pytest.mark.parametrize(("place", "size"), [("collection", 1 << 40), ("free space", 0)])
+@pytest.mark.parametrize(("place", "size"), [slow("collection", 1 << 40), ("free space", 0)])
 def test_a_damaged_heap_of_hdf5_is_refused(place, size, tmp_path, monkeypatch):
     """It goes on without end where free space has no size, or where it ends before the heap does
     and zeros follow.
@@ -230,7 +231,7 @@ def test_a_damaged_heap_of_hdf5_is_refused(place, size, tmp_path, monkeypatch):
         gmwm.read(path, rate=100.0)
 
 
-@pytest.mark.parametrize("version", ["earliest", "latest"])
+@pytest.mark.parametrize("version", [slow("earliest"), "latest"])
 def test_a_unit_longer_than_its_file_is_refused_before_the_library_makes_room(version, tmp_path):
     """For a damaged length of 3.9 GB it takes as much memory."""
     path = tmp_path / "a.h5"
