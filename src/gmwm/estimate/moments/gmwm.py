@@ -218,8 +218,7 @@ class GMWM:
                 continue
             nested = self._cached(Model(left), wv)
             if nested.discrepancy < found.discrepancy:
-                target = replace(problem.moments, found=nested.found).target
-                point = problem.search(target, nested.covariance)
+                point = problem.search(nested.compared.target, nested.covariance)
                 found = replace(nested, design=problem.design).moved(point)
         return found
 
