@@ -67,6 +67,7 @@ from .trajectory.manoeuvres import (
     Straight as Straight,
     Turn as Turn,
     perform as perform,
+    through as through,
 )
 from .trajectory.missions import (
     car_drive as car_drive,

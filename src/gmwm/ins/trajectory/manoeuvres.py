@@ -1,4 +1,4 @@
-"""Trajectories from lists of manoeuvres.
+"""Trajectories from lists of manoeuvres or through waypoints.
 
 Speed is horizontal, over ground; heading is counted from north to the east. Rates of change rise
 and fall smoothly, so that angular rates and specific forces are continuous.
@@ -17,13 +17,15 @@ from gmwm._core.checks import is_number, positive, sampling_interval, shown
 from gmwm._core.compiled import compiled
 from gmwm._core.typing import FloatArray
 from gmwm.errors import InputError
-from gmwm.ins.geometry import RATE, gravity_along, radii_at
-from gmwm.ins.trajectory.trajectory import Trajectory, check_latitudes, three_numbers
+from gmwm.ins.geometry import RATE, gravity_along, ned_difference, radii_at
+from gmwm.ins.trajectory.trajectory import Trajectory, check_latitudes, finite_rows, three_numbers
 
 Lla = Sequence[float] | FloatArray
 """Latitude, longitude, rad, and height, m."""
 
 _LONGEST = 10_000_000  # steps: 2 GB while the trajectory is built
+_SHORTEST = 1e-6  # m
+_HALF_TURN = math.radians(179.0)  # the corner of a U-turn lies at infinity
 _TURN_POINTS = 1001
 
 
@@ -345,6 +347,78 @@ def _angular_speed(lat: float, h: float, speed: float, heading: float) -> tuple[
     meridian, transverse = radii_at(math.sin(lat))
     north, east = speed * math.cos(heading), speed * math.sin(heading)
     return north / (meridian + h), east / ((transverse + h) * math.cos(lat))
+
+
+def through(
+    waypoints: Sequence[Lla] | FloatArray,
+    *,
+    speed: float,
+    turn_rate: float,
+    dt: float = 0.01,
+    ramp: float = 2.0,
+    flat: bool = False,
+    level: bool = False,
+) -> Trajectory:
+    """The trajectory of a vehicle that follows straight legs and cuts the corners.
+
+    It starts at the first waypoint in the direction of the second and ends at the last one. Legs
+    have a constant heading. Heights change on the straight parts; corners are level.
+
+    Raises InputError if legs are too short for the turns at their ends or for the climb, or one
+    turns back.
+
+    Parameters
+    ----------
+    waypoints : (k, 3) array_like
+        Latitude, longitude, rad, and height, m.
+    speed : float
+        Horizontal speed over ground, m/s.
+    turn_rate : float
+        Highest rate of turn, rad/s.
+    dt, ramp, flat, level : optional
+        See `perform`.
+    """
+    hint = "two or more, each of latitude, longitude and height"
+    points = finite_rows(waypoints, "waypoints", hint, 2)
+    speed, ramp = positive("speed", speed), positive("ramp", ramp)
+    turn_rate = positive("turn_rate", turn_rate)
+    legs = ned_difference(points[1:], points[:-1])
+    lengths = np.hypot(legs[:, 0], legs[:, 1])
+    if np.any(lengths < _SHORTEST):
+        i = int(np.argmin(lengths))
+        raise InputError(f"waypoints {i} and {i + 1} coincide: leave one out")
+    headings = np.arctan2(legs[:, 1], legs[:, 0])
+    turns = (np.diff(headings) + np.pi) % (2.0 * np.pi) - np.pi
+    if np.any(np.abs(turns) > _HALF_TURN):
+        i = int(np.argmax(np.abs(turns) > _HALF_TURN)) + 1
+        raise InputError(f"path turns back at waypoint {i}: put two waypoints there, side by side")
+    cuts = [0.0]  # how far before a waypoint a turn begins, and behind it ends, m
+    for turn in map(float, turns):
+        base = displacement(Pulse(turn, turn_rate, ramp), -0.5 * turn, speed)[0] if turn else 0.0
+        cuts.append(base / (2.0 * math.cos(0.5 * turn)))
+    cuts.append(0.0)
+    manoeuvres: list[Manoeuvre] = []
+    for i, length in enumerate(lengths):
+        time, rise = (float(length) - cuts[i] - cuts[i + 1]) / speed, -float(legs[i, 2])
+        if time < 0.0:
+            raise InputError(
+                f"waypoints {i} and {i + 1} are {length:.4g} m apart where turns take "
+                f"{cuts[i] + cuts[i + 1]:.4g} m: set them farther apart, turn faster or go slower"
+            )
+        if rise and time < 2.0 * ramp:
+            raise InputError(
+                f"waypoints {i} and {i + 1} leave only {time:.4g} s to climb {rise:.4g} m: set "
+                "them farther apart, or at one height"
+            )
+        if rise:
+            manoeuvres.append(Climb(rise, abs(rise) / (time - ramp)))
+        elif time > 0.0:
+            manoeuvres.append(Straight(time))
+        if i < turns.size and turns[i]:
+            manoeuvres.append(Turn(float(turns[i]), turn_rate))
+    body: Body = {"flat": flat, "level": level}
+    motion = {"heading": float(headings[0]), "speed": speed}
+    return perform(manoeuvres, start=points[0], dt=dt, ramp=ramp, **motion, **body)
 
 
 def displacement(turn: Pulse, heading: float, speed: float) -> tuple[float, float]:
