@@ -33,10 +33,10 @@ def files(samples, tmp_path_factory):
 
 
 def test_command_prints_saves_and_draws(run, files):
-    code, out, _ = run("motion", *files, "-o", "motion.json", "--report", "motion.html")
+    code, out, _ = run("motion", *files, "-o", "motion.json", "--plot", "motion.png")
     assert code == 0
     assert "Allan deviation of each IMU in motion: 1 flight" in out
-    assert out.endswith("wrote motion.json\nwrote motion.html\n")
+    assert out.endswith("wrote motion.json\nwrote motion.png\n")
     code, printed, _ = run("motion", *files, "--json")
     with open("motion.json") as saved:
         assert json.loads(printed) == json.load(saved)

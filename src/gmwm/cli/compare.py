@@ -206,6 +206,7 @@ def fleet(
     --logs  Each file is a log of one flight with all IMUs, as a single file always is.
     -o --output JSON  File to save the result in.
     --report HTML  Page of the curves, the factors over rest, vibration and numbers.
+    --plot PNG  Picture of the Allan deviations, a panel for each channel.
     --reading
     --part
     --json
@@ -213,6 +214,7 @@ def fleet(
     """,
     output=FILE_TO_WRITE,
     report=FILE_TO_WRITE,
+    plot=FILE_TO_WRITE,
     reference={"multiple": True},
     at={"type": click.Choice(["low", "middle", "high", "rest"])},
 )
@@ -226,6 +228,7 @@ def motion(
     logs: bool,
     output: Path | None,
     report: Path | None,
+    plot: Path | None,
     as_json: bool,
     quiet: bool,
     **reading: Any,
@@ -241,7 +244,7 @@ def motion(
     \b
     Examples:
       gmwm motion imu1.csv imu2.csv imu3.csv --static calibration.json
-      gmwm motion flight*_imu*.csv --imus 4 -o motion.json --report motion.html
+      gmwm motion flight*_imu*.csv --imus 4 -o motion.json --plot motion.png
       gmwm motion flight.ulg
     """
     from gmwm.calibration import Calibration
@@ -267,7 +270,9 @@ def motion(
         found.save(output)
     if report is not None:
         found.report(report)
-    print_result(found, output, report, as_json=as_json, quiet=quiet)
+    if plot is not None:
+        _draw(found, plot)
+    print_result(found, output, report, plot, as_json=as_json, quiet=quiet)
 
 
 def _of_log(
@@ -277,3 +282,15 @@ def _of_log(
 
     found = read_imus(file, **arguments_of_read(**reading))
     return {imu: recording.part(start, stop) for imu, recording in found.items()}
+
+
+def _draw(found: Any, path: Path) -> None:
+    import matplotlib.pyplot as plt
+
+    channels = list(dict.fromkeys(each.channel for each in found.curves))
+    figure, axes = plt.subplots(-(-len(channels) // 3), 3, squeeze=False, layout="constrained")
+    figure.set_size_inches(15.0, 5.0 * len(axes))
+    for channel, ax in zip(channels, axes.flat, strict=True):
+        found.plot(channel, ax=ax)
+    figure.savefig(path)
+    plt.close(figure)
