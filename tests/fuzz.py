@@ -511,7 +511,7 @@ def gone_on(_: random.Random, path: Path) -> Any:
     stream = gmwm.StreamingVariance.load(path)
     width = max(len(stream.channels), 1)
     stream.update(noise()[:, :width] if stream.channels else noise()[:, 0])
-    stream.result()
+    stream.results()
     str(stream)
     return stream
 

@@ -123,7 +123,7 @@ def test_outsiders_import_faces_only():
 LINES = {
     "": 400, "_core": 2_250, "process": 3_150, "readers": 5_600, "plotting": 750,
     "variance": 4_650, "diagnosis": 3_350, "estimate": 8_150, "selection": 1_200,
-    "calibration": 3_350, "motion": 1_800, "datasheet": 700, "filter_numbers": 3_700, "ins": 9_530,
+    "calibration": 3_370, "motion": 1_800, "datasheet": 700, "filter_numbers": 3_700, "ins": 9_530,
     "population": 2_550, "export": 1_400, "report": 2_550, "study": 1_800, "cli": 2_290,
 }  # fmt: skip
 """Most lines of Python of each room; only a new kind or room raises one."""

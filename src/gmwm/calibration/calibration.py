@@ -11,17 +11,18 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from annotated_types import Ge, MinLen
 
+from gmwm._core import checks
 from gmwm._core.documents import Document, Rate, Samples, Text
 from gmwm._core.files import of_other_runs
 from gmwm._core.frozen import ByName, freeze
 from gmwm._core.pages import make
-from gmwm._core.text import wrapped
+from gmwm._core.text import frame, wrapped
 from gmwm.calibration.covariates import compensated
 from gmwm.calibration.curve import BiasCurve
 from gmwm.calibration.numbers import SensorNumbers, axis_numbers
 from gmwm.calibration.scaling import with_noise
 from gmwm.errors import InputError, MissingNameError
-from gmwm.estimate import Fit
+from gmwm.estimate import Estimate, Fit
 from gmwm.issues import Notice, notice
 from gmwm.plotting import straight_lines
 from gmwm.process import Model
@@ -216,15 +217,24 @@ class Calibration(ByName[Fit], Document):
             ax.remove()
         return figure
 
-    def to_frame(self, *, units: str = "field") -> pandas.DataFrame:
-        """A table of the sensor numbers, see `SensorNumbers.to_frame`; needs pandas.
+    def to_frame(self, content: str = "numbers", *, units: str = "field") -> pandas.DataFrame:
+        """A table of the sensor numbers, or of the terms of all models; needs pandas.
 
         Parameters
         ----------
+        content : {"numbers", "terms"}, optional
+            A row per channel and number (N, B, K), or per channel and parameter of its model.
         units : {"field", "si"}, optional
             Data-sheet units, or SI.
         """
-        return self.numbers.to_frame(units=units)
+        if checks.choice("content", content, ("numbers", "terms")) == "numbers":
+            return self.numbers.to_frame(units=units)
+        rows = [
+            {"channel": name, **estimate.to_dict(units), "valid": fit.valid}
+            for name, fit in self.fits.items()
+            for estimate in fit.estimates
+        ]
+        return frame(rows, ("channel", *Estimate.COLUMNS, "valid"))
 
     def derived(self) -> dict[str, Any]:
         return {"numbers": self.numbers.to_dict()}

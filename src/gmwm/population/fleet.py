@@ -251,9 +251,22 @@ class Fleet(ByName[Calibration | Notice], Printed, Reported):
             "notices": [notice.to_dict() for notice in self.notices],
         }
 
+    def save(self, folder: str | os.PathLike[str]) -> Path:
+        """Write what `fleet` writes: calibrations, the table (Parquet) and the report.
+
+        Raises
+        ------
+        InputError
+            If the folder cannot be written, is in use, or holds calibrations.
+        """
+        with opened_store(Path(folder), self.options, resume=False) as store:
+            units = {path: store.save(unit) for path, unit in self.units.items()}
+            replace(self, units=units)._conclude(store)
+        return Path(folder)
+
     @classmethod
     def load(cls, folder: str | os.PathLike[str]) -> Fleet:
-        """The fleet that `gmwm.fleet` wrote into a folder.
+        """The fleet that `gmwm.fleet` or `save` wrote into a folder.
 
         Raises
         ------

@@ -236,11 +236,22 @@ class StreamingVariance:
         InputError
             If a channel is too short, constant or of no sensor's size.
         """
-        found = {}
-        for (name, unit), series in zip(self._units.items(), self._series, strict=True):
-            channel = Channel(name, np.zeros(0), self.dt, _QUANTITY.get(unit), unit)
-            found[name] = variance_of(series.finished().sums, channel, self.confidence)
+        found = self.results()
+        for item in found.values():
+            if isinstance(item, InputError):
+                raise item
         return found[""] if self._single else found
+
+    def results(self) -> dict[str, WaveletVariance | InputError]:
+        """The same by channel, with the reason in place of a variance that cannot be given."""
+        found: dict[str, WaveletVariance | InputError] = {}
+        for (name, unit), series in zip(self._units.items(), self._series, strict=True):
+            try:
+                channel = Channel(name, np.zeros(0), self.dt, _QUANTITY.get(unit), unit)
+                found[name] = variance_of(series.finished().sums, channel, self.confidence)
+            except InputError as error:
+                found[name] = error
+        return found
 
     def __repr__(self) -> str:
         what = ", ".join(self.channels) or "a series"

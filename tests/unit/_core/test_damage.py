@@ -65,7 +65,7 @@ def test_sums_of_a_checkpoint_are_used_or_rejected(tmp_path):
     for (name, place), value in itertools.product(places, (1e200, 1e60, 1e-170)):
         (tmp_path / "a.npz").write_bytes(whole)
         with suppress(InputError):
-            gmwm.StreamingVariance.load(edited(tmp_path / "a.npz", name, place, value)).result()
+            gmwm.StreamingVariance.load(edited(tmp_path / "a.npz", name, place, value)).results()
 
 
 # -- documents -------------------------------------------------------------------------------------

@@ -57,6 +57,12 @@ def test_candidates(results):
     assert table["tie"][0] and table["chosen"][0]
 
 
+def test_channels(results):
+    table = results["calibration"].to_frame("terms")
+    assert list(table["channel"]) == ["gyro_x", "gyro_y"]
+    assert list(table["key"]) == ["N", "N"]
+
+
 def test_sensor_numbers(results):
     calibration = results["calibration"]
     table = calibration.to_frame()
