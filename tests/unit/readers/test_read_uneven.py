@@ -74,7 +74,7 @@ def test_every_row_has_its_number(kind, rate, seed):
     there = ~np.isnan(spread)
     off = spread[there] - np.flatnonzero(there)
     if kind == "jitter and losses":
-        assert np.max(np.abs(off)) <= 1.0 and np.mean(off == 0.0) > 0.98
+        assert np.mean(off == 0.0) > 0.98 and np.mean(np.abs(off) > 1.0) < 1e-3
     else:
         assert not np.any(off)
     assert found.jumps.interval * rate == pytest.approx(1.0, abs=1e-5)
