@@ -85,7 +85,7 @@ def test_moments_of_a_sum_are_sums_of_moments():
         (lambda: True * WhiteNoise(), "must be 1 or more"),
         (lambda: 1 + WhiteNoise(), "not|no "),
         (lambda: WhiteNoise().simulate(10, 1.0), "free parameters"),
-        (lambda: WhiteNoise(1.0).simulate(0, 1.0), "positive integer"),
+        (lambda: WhiteNoise(1.0).simulate(0, 1.0), "1 or more"),
         (lambda: WhiteNoise(1.0).simulate(5, -1.0), "positive sampling interval"),
         (lambda: (WhiteNoise() + RandomWalk()).psd(np.ones(1), 1.0), "free parameters .N, K."),
         (lambda: (WhiteNoise() + RandomWalk()).with_params({"Z": 1.0}), "no parameter 'Z'"),
