@@ -20,7 +20,7 @@ from gmwm.errors import InputError, MissingNameError
 from gmwm.issues import Notice, worst_first
 from gmwm.motion import tuning
 from gmwm.motion.clocks import Clock
-from gmwm.motion.envelope import BOUNDED, FILTER, between, dominating
+from gmwm.motion.curves import BOUNDED, FILTER, between, dominating
 from gmwm.motion.mapping import Mounting
 from gmwm.process import Model
 
