@@ -28,7 +28,7 @@ def test_from_a_sheet_to_kalibr_and_back(run, sheet, tmp_path):
     assert code == 0
     written = yaml.safe_load((tmp_path / "imu.yaml").read_text())
     assert "record an hour" in (tmp_path / "imu.yaml").read_text()
-    numbers = gmwm.datasheet(sheet).numbers()
+    numbers = gmwm.load(tmp_path / "numbers.json")
     assert written["gyroscope_random_walk"] == pytest.approx(numbers["gyro"].K, rel=1e-5)
     assert f"{numbers['gyro'].K:.2e} rad/s^2" in "".join(printed.splitlines()[:5])  # comes first
     code, printed, _ = run("sheet", "sheet.yaml", "--imu", "imu.yaml")

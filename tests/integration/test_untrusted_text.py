@@ -14,6 +14,7 @@ import gmwm
 from gmwm import cli
 from gmwm.errors import InputError, printable
 from gmwm.export import export
+from marks import slow
 
 X = np.random.default_rng(0).normal(size=(400, 6))
 
@@ -111,7 +112,7 @@ def test_a_file_name_that_is_not_utf8(run, tmp_path, no_pages):
     assert done.stderr.startswith(b"gmwm: no\\udcff.csv does not exist")
 
 
-@pytest.mark.parametrize("encoding", ["ascii", "latin-1"])
+@pytest.mark.parametrize("encoding", ["ascii", slow("latin-1")])
 def test_a_terminal_that_lacks_letters(run, tmp_path, encoding, no_pages):
     recording(tmp_path / "Größe²Ω.csv", extra="température Ω")
     done = run("calibrate", "Größe²Ω.csv", *OPTIONS, "-o", "out", encoding=encoding)
