@@ -4,7 +4,7 @@ Run with ``pip install cosmic-ray coverage`` and ``python benchmarks/mutation.py
 hour on one core; ``--rooms readers`` for one room). Cosmic Ray makes the changes in a copy of the
 checkout, drawn at random, as many in each room: arithmetic and comparisons turned, terms and
 conditions negated, constants raised or lowered by one, loops skipped; not those of flags that only
-forbid (``strict`` of zip, ``frozen`` of a dataclass). Which unit tests pass through which line is
+forbid (``strict`` of zip, ``frozen`` of a dataclass, names of arguments). Which unit tests pass through which line is
 traced once. Of these (or, where the line is compiled or runs at import, of those that pass through
 its file), as many run as take ``--longest`` together, the nearest and quickest first, in a fork of
 a process that has what the package imports. A change that none of them fails on survives; survivors
@@ -81,7 +81,17 @@ def mutants_of(path: Path, tree: Path) -> Iterator[Mutant]:
 
 
 class _WithoutGuards(ast.NodeTransformer):
-    """Leaves out what forbids and computes nothing: zip(strict=True), dataclass(frozen=True)."""
+    """Leaves out what forbids and computes nothing: zip(strict=True), dataclass(frozen=True), how
+    arguments may be given.
+    """
+
+    def visit_arguments(self, node: ast.arguments) -> ast.AST:
+        """By position or by name, all of them."""
+        self.generic_visit(node)
+        node.args = [*node.posonlyargs, *node.args, *node.kwonlyargs]
+        node.defaults = [*node.defaults, *filter(None, node.kw_defaults)]
+        node.posonlyargs, node.kwonlyargs, node.kw_defaults = [], [], []
+        return node
 
     def visit_Call(self, node: ast.Call) -> ast.AST:
         """Without its flags, if it is one of these."""

@@ -470,6 +470,6 @@ def _combined(matrices: Sequence[FloatArray], shares: FloatArray) -> FloatArray:
     """Covariance of the weighted sum of independent vectors."""
     total = np.zeros((shares.shape[1], shares.shape[1]))
     for matrix, share in zip(matrices, shares, strict=True):
-        levels = slice(0, matrix.shape[0])
+        levels = slice(len(matrix))
         total[levels, levels] += np.outer(share[levels], share[levels]) * matrix
     return total

@@ -247,3 +247,10 @@ def test_the_p_value_is_that_of_statistical_errors_alone():
     assert fit.p_value_allowed > 0.01
     good = gmwm.fit(truth.opened(), truth.simulate(100_000, 1.0, 1), 1.0)
     assert good.p_value == good.p_value_allowed > 0.001
+
+
+def test_coefficients_of_a_process_are_fixed_all_or_none():
+    x = gmwm.AR([0.5, -0.2], 2.0).simulate(2000, 1.0, 1)
+    assert gmwm.fit(gmwm.AR([0.5, -0.2]), x, 1.0).params["sigma2"] == pytest.approx(2.0, rel=0.2)
+    with pytest.raises(gmwm.InputError, match="some coefficients fixed and some free"):
+        gmwm.fit(gmwm.AR(2).with_values(ar_1=0.5), x, 1.0)

@@ -96,6 +96,12 @@ def test_eigenvalues_of_a_circle_are_the_power_of_its_series():
     np.testing.assert_allclose(power, spectrum, rtol=0.12, atol=1e-20)
 
 
+@pytest.mark.parametrize(("slope", "is_bounded"), [(0.05, True), (0.1, False)])
+def test_a_spectrum_that_grows_without_bound_starts_at_zero(slope, is_bounded):
+    x = spectral.from_psd(lambda f, dt: f**-slope, 64, 1.0, np.random.default_rng(1))
+    assert bool(x[0]) is is_bounded
+
+
 def test_state_spaces_can_be_compared():
     """It ended in an error of numpy: arrays have no one answer."""
     form = RandomWalk(2.0).state_space(0.25)
