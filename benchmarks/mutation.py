@@ -4,11 +4,11 @@ Run with ``pip install cosmic-ray coverage`` and ``python benchmarks/mutation.py
 hour on one core; ``--rooms readers`` for one room). Cosmic Ray makes the changes in a copy of the
 checkout, drawn at random, as many in each room: arithmetic and comparisons turned, terms and
 conditions negated, constants raised or lowered by one, loops skipped; not those of flags that only
-forbid (``strict`` of zip, ``frozen`` of a dataclass, names of arguments). Which unit tests pass through which line is
-traced once. Of these (or, where the line is compiled or runs at import, of those that pass through
-its file), as many run as take ``--longest`` together, the nearest and quickest first, in a fork of
-a process that has what the package imports. A change that none of them fails on survives; survivors
-are printed with the changed line.
+forbid (``strict`` of zip, ``frozen`` of a dataclass, names of arguments). Which unit tests pass
+through which line is traced once. Of these (or, where the line is compiled or runs at import, of
+those that pass through its file), as many run as take ``--longest`` together, the nearest and
+quickest first, in a fork of a process that has what the package imports. A change that none of them
+fails on survives; survivors are printed with the changed line.
 
 The folder keeps results; a second call goes on with what is there.
 """
