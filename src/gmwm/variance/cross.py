@@ -141,8 +141,8 @@ def wavelet_covariance(channels: Sequence[Channel], *, block: int = 1) -> Wavele
     channels : sequence of Channel
         Two or more, of one sampling interval and number of samples.
     block : int, optional
-        Samples whose means are taken first: for slow errors of long records. A mean counts as
-        missing unless more than half of them exist.
+        Samples whose means are taken first: for slow errors of long records. A mean of less than
+        half of them counts as missing.
 
     Raises
     ------
@@ -155,7 +155,8 @@ def wavelet_covariance(channels: Sequence[Channel], *, block: int = 1) -> Wavele
             "channels of one recording, or cut all to the same length"
         )
     block = checks.whole("block", block, 1, "give a number of samples")
-    means = block_means([each.values for each in channels], block, 0.5).T
+    least = 0.5 - 0.25 / block  # exactly half of the samples are enough
+    means = block_means([each.values for each in channels], block, least).T
     alike = [replace(c, values=m, dt=block * c.dt) for c, m in zip(channels, means, strict=True)]
     gone = np.logical_or.reduce([np.isnan(each.values) for each in alike])
     alike = [replace(c, values=np.where(gone, np.nan, c.values)) for c in alike]

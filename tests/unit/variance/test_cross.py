@@ -83,6 +83,13 @@ def test_levels_of_block_means_are_those_of_the_samples_at_their_averaging_times
     assert np.all((ratio > 0.97) & (ratio < 1.4)) and np.all(ratio[:, 3:] < 1.03)
 
 
+def test_half_of_a_block_is_enough_for_its_mean():
+    own = channels(np.random.default_rng(5), 400)
+    for each in own:
+        each.values[[40, 141, 243]] = np.nan
+    np.testing.assert_array_equal(wavelet_covariance(own, block=2).change, 0.0)
+
+
 @pytest.mark.parametrize(
     "own",
     [
