@@ -83,6 +83,7 @@ def test_a_turn_and_the_stretches_before_and_after(moved, seed, only, axis):
     recording = moved(turn(30_000, 100, 200, 60.0, axis), seed, only=only)
     found = gmwm.health(recording)
     assert [n.code for n in found.notices if n.severity == "bad"] == ["not-static"]
+    assert "1 bad" in repr(found)
     (notice,) = found.of(code="not-static")
     assert notice.values["rate"] == pytest.approx(np.radians(60.0), rel=0.01)
     motion = find_motion(recording)
