@@ -200,7 +200,7 @@ def length_sentence(calibration: Calibration, horizon: float) -> str:
     worst, error, least = found
     if is_short(calibration.values(), horizon):  # what is beyond the curve tells no length
         return f"too short for {horizon:g} s outages: record an hour or more"
-    share, text = per_cent(error), duration_text(least)
+    share, text = f"{100.0 * error:.3g} %", duration_text(least)
     if least <= calibration.duration:
         return (
             f"long enough for {horizon:g} s outages: {worst} is known to +-{share} there; {text} "
