@@ -54,10 +54,10 @@ def _drawn(fit: gmwm.Fit, number: int) -> list[Model]:
 def chains() -> None:
     """Worst direction of any chain of integrators for any drawn parameter set."""
     _say(
-        f"{DRAWS} parameter sets of the {LEVEL:.0%} region of a fit, bounds for {HORIZON:g} s. "
-        "Chains of 1 to 3 integrals, after 0 and 120 s of fixes: largest eigenvalue at 0.1, 1 and "
-        "10 horizons, with the bound of the region and with the bound of the estimate; sets: those "
-        "that the bound of the estimate does not cover"
+        f"{DRAWS} parameter sets of the {LEVEL:.0%} region of a fit, bounds for {HORIZON:g} s. The "
+        "error is integrated once to three times, after 0 or 120 s of fixes. region, estimate: "
+        "largest eigenvalue at 0.1, 1 and 10 horizons, with the bound of the region or of the "
+        "estimate. sets: how many the bound of the estimate does not cover."
     )
     print(f"{'truth':<12}{'hours':>6}  {'form':<8}{'region':>10}{'estimate':>10}{'sets':>6}")
     for name, (truth, hours) in FITS.items():

@@ -56,7 +56,7 @@ TRUTHS = {
 RULES = ("Allan lines", "times ten", "bound", "reduce")
 LINE = 1000.0  # s, where the line of slope +1/2 touches an Allan deviation
 HEADS = ("attit.", "veloc.", "posit.", "gyro b", "acc. b",
-         "turn", "cert.", "here", "step", "cert.", "here")  # fmt: skip
+         "turn", "cert.", "of runs", "step", "cert.", "of runs")  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -249,10 +249,10 @@ def main() -> None:
     se = [np.sqrt(2.0 / n / options.runs) for n in (3, 6)]
     text = (
         f"{options.runs} runs of {SECONDS} s: NEES per degree of freedom of the last keyframe, and "
-        "of the next pose relative to it (turn; step with velocity), predicted from the IMU alone. "
-        f"cert.: the same NEES by gmwm.certify, for one axis after {KEYFRAMES} keyframes; here: "
-        f"after {SECONDS - 1} as in these runs. Standard error of a NEES of 1: {se[0]:.2f}, of the "
-        f"step {se[1]:.2f}."
+        "of the next pose relative to it, predicted from the IMU alone (turn; step with velocity). "
+        f"cert.: what gmwm.certify predicts for one axis after {KEYFRAMES} keyframes; of runs: "
+        f"after {SECONDS - 1}, as in these runs. Standard error of a NEES of 1: {se[0]:.2f}, of "
+        f"the step {se[1]:.2f}."
     )
     print(fill(text, 96))
     print(f"{'truth':<12}{'numbers':<12}" + "".join(f"{head:>8}" for head in HEADS))

@@ -422,7 +422,7 @@ def _channels(pairs: Sequence[str], only: str | None) -> dict[str, str | int] | 
         raise InputError("--channels names no channel: write names, e.g. gyro_x,accel_z")
     for name in names if columns else ():
         if name not in columns:
-            raise InputError(f"--channels {only}: add --channel {name}=COLUMN, or leave it out")
+            raise InputError(f"--channels {only}: add --channel {name}=COLUMN, or leave {name} out")
     return {name: columns[name] for name in names} if columns else names
 
 

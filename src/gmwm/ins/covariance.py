@@ -314,8 +314,8 @@ def loiter_with_outages(
         trajectory = make(duration=max(start, 2.0 * tuning.SETTLING), dt=dt)
     elif trajectory.duration < end:
         raise InputError(
-            f"trajectory: it has {trajectory.duration:g} s, and outages of these lengths two "
-            f"minutes apart need {end:g} s: give a longer one, or fewer outages"
+            f"trajectory: it has {trajectory.duration:g} s, but these outages, with two minutes "
+            f"between them, need {end:g} s: give a longer one, or fewer outages"
         )
     aided = aids(trajectory, keyframe)
     return Scenario(trajectory, aided, tuple(outages), interval=tuning.SETTLING)

@@ -318,7 +318,7 @@ def covers(triad: Triad, numbers: SensorNumbers) -> str:
         own = max(getattr(numbers[axis.name], letter).value for axis in triad.axes)
         ratio = getattr(triad, letter) / own if own else np.inf
         if ratio > _NOTABLE:
-            larger.append(letter + (f" ({brief(ratio)} times the table's)" if own else ""))
+            larger.append(letter + (f" ({brief(ratio)} times {letter} above)" if own else ""))
     verb = "also covers" if len(larger) == 1 else "cover"
     text = f"{triad.quantity} {' and '.join(larger)} {verb} {axis.covers}"
     return f"{text} ({_shortened(axis.name, _NAME)})" if larger and axis.covers else ""

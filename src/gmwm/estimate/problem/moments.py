@@ -164,8 +164,8 @@ class Moments:
         if wv.regressors is not None:
             if ramp is not None:
                 raise InputError(
-                    "with covariates the model cannot have a rate ramp: leave R out, and add the "
-                    "covariate time"
+                    "with covariates the model cannot have a rate ramp: leave R out, and add time "
+                    "as a covariate"
                 )
             size = wv.regressors.removed.size
             return cls(wv, Coefficients(np.zeros(size), np.zeros((size, size))), True, scales)

@@ -164,10 +164,10 @@ def _fill(source: str, dt: float, *triads: FloatArray) -> list[Notice]:
             begin, end = int(gap[0]), int(gap[-1]) + 1
             if end - begin > most or begin == 0 or end == n:
                 raise InputError(
-                    f"{source}: sample {begin + 1:,} of {name}, {begin * dt:.6g} s after the "
-                    f"first, is missing, {end - begin:,} in a row: gaps of up to {most} are "
-                    "filled; use the part before or after, or remove the jump from the time stamps "
-                    "if a clock was set there"
+                    f"{source}: {name} has a gap of length {end - begin:,} from sample "
+                    f"{begin + 1:,} on, {begin * dt:.6g} s after the first: gaps of up to {most} "
+                    "are filled; use the part before or after, or remove the jump from the time "
+                    "stamps if a clock was set there"
                 )
             longest = max(longest, end - begin)
             samples[begin:end] = np.interp(gap, [begin - 1, end], samples[[begin - 1, end]])

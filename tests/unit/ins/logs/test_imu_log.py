@@ -92,10 +92,10 @@ def test_gaps_are_filled_along_a_line(tmp_path):
     [
         (
             slice(30, 31 + MOST),
-            f"sample 31 of gyro_z, 0.6 s .* {MOST + 1} in a row: gaps of up to {MOST}",
+            f"gyro_z has a gap of length {MOST + 1} from sample 31 on, 0.6 s .* up to {MOST}",
         ),
-        ([0], "sample 1 of gyro_z, 0 s"),
-        ([99], "sample 100 of gyro_z, 1.98 s"),
+        ([0], "gyro_z has a gap of length 1 from sample 1 on, 0 s"),
+        ([99], "length 1 from sample 100 on, 1.98 s"),
     ],
 )
 def test_a_gap_that_is_too_long_or_at_an_end_is_rejected(tmp_path, rows, words):
@@ -107,7 +107,7 @@ def test_a_gap_that_is_too_long_or_at_an_end_is_rejected(tmp_path, rows, words):
 
 def test_bad_imu_files(tmp_path):
     rows = imu_rows()
-    with pytest.raises(InputError, match="sample 31 of gyro_x"):
+    with pytest.raises(InputError, match="gyro_x has a gap of length 6 from sample 31"):
         read_imu(write_imu(tmp_path, np.delete(rows, range(30, 36), axis=0)))
     with pytest.raises(InputError, match="no channel accel_z"):
         read_imu(write_imu(tmp_path, rows[:, :6], HEAD.rpartition(",")[0]))
