@@ -138,5 +138,5 @@ def test_a_pilot_is_near_the_coefficients_under_the_noise(missing):
 
 def test_a_ramp_beside_a_curve_is_refused():
     wv = with_columns(NOISE.simulate(SIZE, DT, 1), CUBIC)
-    with pytest.raises(gmwm.InputError, match="add the covariate time"):
+    with pytest.raises(gmwm.InputError, match="add time as a covariate"):
         gmwm.fit(MODEL + RateRamp(), wv)
