@@ -191,6 +191,14 @@ def test_gaps_shorten_no_curve_and_change_no_variance(missing, walk):
     assert np.all((spread / stated > 0.5) & (spread / stated < 1.6)), spread / stated
 
 
+def test_one_early_gap_costs_an_instant_of_a_long_stream():
+    x = np.random.default_rng(1).normal(size=400_000)
+    x[1000:1040] = np.nan
+    found, exact = streamed(x).result(), gmwm.wavelet_variance(x, 0.1)
+    np.testing.assert_array_equal(found.tau, exact.tau)
+    np.testing.assert_allclose(found.variance, exact.variance, rtol=0.01)
+
+
 def test_half_missing_singly_biases_no_coarse_level():
     # White noise of 1: what few windows give less what gaps add was bounded from below too early,
     # and these three levels were 11 % too large, with an error of 3 %.
